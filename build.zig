@@ -1,0 +1,188 @@
+//! Builds Raylane: one static `raylane`, its tests on every target, and its tools.
+//!
+//! In: the command line's options, the sources, the headers that `vendor/fetch` checks. Out: the
+//! steps at the top of `build`; `zig build` alone installs a fast, native, static program. What is
+//! wired once a target stands in build/package.zig, what only tests need in build/tests.zig.
+
+const std = @import("std");
+const builtin = @import("builtin");
+const manifest = @import("build.zig.zon");
+const Package = @import("build/package.zig");
+const Tests = @import("build/tests.zig");
+const Compile = std.Build.Step.Compile;
+const Run = std.Build.Step.Run;
+
+comptime {
+    // Not a floor: language and std change with every release, and so may the generated code.
+    if (!std.mem.eql(u8, builtin.zig_version_string, manifest.minimum_zig_version)) @compileError(
+        "Raylane needs Zig " ++ manifest.minimum_zig_version ++ ", this is Zig " ++
+            builtin.zig_version_string ++ "; ./zigw fetches the right one",
+    );
+}
+
+/// Declares the steps and options of `zig build`.
+pub fn build(b: *std.Build) void {
+    const steps = .{
+        .install = b.getInstallStep(),
+        .run = b.step("run", "Render: zig build run -- SCENE [-o OUT]"),
+        .@"test" = b.step("test", "Run all tests, here and under qemu, and count them"),
+        .test_unit = b.step("test:unit", "Run the unit tests of this machine"),
+        .test_fmt = b.step("test:fmt", "Check the formatting"),
+        .test_tidy = b.step("test:tidy", "Check the style of the source tree"),
+        .check = b.step("check", "Compile the program and its tests, write nothing"),
+        .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
+        .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
+        .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
+        .vendor = b.step("vendor", "Fetch and check the third-party headers"),
+    };
+    const query = b.standardTargetOptionsQueryOnly(.{});
+    const optimize = b.option(std.lang.Optimize, "optimize", "debug, safe, fast (default), small");
+    const options: Package.Options = .{
+        .backend = b.option(Package.Backend, "backend", "Arithmetic of the default variant") orelse
+            .vector,
+        .traversal = b.option(Package.Traversal, "traversal", "Its bundles of rays") orelse .packet,
+        .lanes = b.option(u8, "lanes", "Its SIMD width: 4, 8 or 16 (default: the target's)"),
+        .variants = b.option(Package.Variants, "variants", "Hold that variant only, or all") orelse
+            .all,
+    };
+
+    const filters = b.option([]const []const u8, "test-filter", "Only tests with this in the name");
+
+    const vendor = addVendor(b);
+    steps.vendor.dependOn(vendor.step);
+    const target = resolve(b, query);
+    const package: Package = .init(b, target, optimize orelse .fast, vendor.headers, options);
+
+    const program = package.program();
+    steps.install.dependOn(&b.addInstallArtifact(program, .{}).step);
+    const run = runOn(b, program);
+    run.addPassthruArgs();
+    steps.run.dependOn(&run.step);
+    steps.@"asm".dependOn(&b.addInstallFile(program.getEmittedAsm(), "raylane.s").step);
+
+    const tests: Tests = .init(b, resolve(b, .{}), filters orelse &.{});
+    const test_packages: TestPackages = .{
+        .owner = b,
+        .optimize = optimize orelse .safe,
+        .headers = vendor.headers,
+        .options = options,
+    };
+    const targets = test_packages.targets(query);
+    tests.addAll(steps.@"test", targets);
+    tests.addUnit(steps.test_unit, targets[0]);
+    tests.addFormat(steps.test_fmt);
+    tests.addTidy(steps.test_tidy);
+    tests.addCheck(steps.check, targets[0]);
+    steps.check.dependOn(&package.program().step);
+
+    const here: Package = .init(b, resolve(b, .{}), .safe, vendor.headers, options);
+    const scenes = b.addRunArtifact(here.addProgram("make-scenes", "scenes/make.zig"));
+    scenes.setCwd(b.path("."));
+    scenes.addArg("scenes/cornell.gltf");
+    steps.scenes.dependOn(&scenes.step);
+
+    const lowering = b.addSystemCommand(&.{ "python3", "bench/lowering.py" });
+    lowering.setCwd(b.path("."));
+    lowering.addFileArg(.zig_exe);
+    lowering.addArg("docs/lowering.md");
+    lowering.has_side_effects = true;
+    steps.lowering.dependOn(&lowering.step);
+}
+
+/// The step that puts the headers in place, and the folder of copies that depends on it.
+fn addVendor(b: *std.Build) struct { step: *std.Build.Step, headers: std.Build.LazyPath } {
+    const fetch = b.addSystemCommand(&.{"sh"});
+    fetch.setName("vendor/fetch");
+    fetch.addFileArg(b.path("vendor/fetch"));
+    // It looks at files that a user may have put there, so it runs each time (10 ms).
+    fetch.has_side_effects = true;
+    const copies = b.addWriteFiles();
+    copies.step.dependOn(&fetch.step);
+    for ([_][]const u8{ "cgltf.h", "stb_image.h", "stb_image_write.h" }) |name| {
+        _ = copies.addCopyFile(b.path(b.pathJoin(&.{ "vendor/include", name })), name);
+    }
+    return .{ .step = &fetch.step, .headers = copies.getDirectory() };
+}
+
+/// Fills in what a bare `-Dtarget=` leaves open: a static libc, and a NEON CPU for ARMv7.
+fn resolve(b: *std.Build, query: std.Target.Query) std.Build.ResolvedTarget {
+    var filled = query;
+    const arch = query.cpu_arch orelse b.graph.host.result.cpu.arch;
+    const os = query.os_tag orelse b.graph.host.result.os.tag;
+    if (query.abi == null and os == .linux) filled.abi = if (arch == .arm) .musleabihf else .musl;
+    if (query.cpu_model == .determined_by_arch_os) {
+        if (query.cpu_arch == null) filled.cpu_model = .native;
+        if (query.cpu_arch == .arm) {
+            filled.cpu_model = .{ .explicit = &std.Target.arm.cpu.cortex_a15 };
+        }
+    }
+    return b.resolveTargetQuery(filled);
+}
+
+/// What the targets of the tests have in common.
+const TestPackages = struct {
+    owner: *std.Build,
+    optimize: std.lang.Optimize,
+    headers: std.Build.LazyPath,
+    options: Package.Options,
+
+    /// The chosen target, or else this machine, AArch64 and ARMv7, the first of them first.
+    /// qemu is told which CPU to be, so that an instruction too new for it does not pass.
+    fn targets(packages: TestPackages, chosen: std.Target.Query) []const Tests.Target {
+        const host = packages.owner.graph.host.result.cpu.arch;
+        var list: std.ArrayList(Tests.Target) = .empty;
+        if (chosen.cpu_arch) |arch| {
+            const emulator = packages.owner.fmt("qemu-{t}", .{arch});
+            packages.add(&list, @tagName(arch), chosen, &.{emulator});
+            return list.items;
+        }
+        packages.add(&list, "native", chosen, &.{});
+        for ([_]std.Target.Query{
+            .{ .cpu_arch = .aarch64, .os_tag = .linux, .cpu_model = .baseline },
+            .{ .cpu_arch = .arm, .os_tag = .linux },
+        }, [_][]const []const u8{
+            &.{ "qemu-aarch64", "-cpu", "cortex-a53" },
+            &.{ "qemu-arm", "-cpu", "cortex-a15" },
+        }) |query, emulator| {
+            const arch = query.cpu_arch.?;
+            if (arch != host) packages.add(&list, @tagName(arch), query, emulator);
+        }
+        return list.items;
+    }
+
+    fn add(
+        packages: TestPackages,
+        list: *std.ArrayList(Tests.Target),
+        name: []const u8,
+        query: std.Target.Query,
+        emulator: []const []const u8,
+    ) void {
+        const b = packages.owner;
+        const target = resolve(b, query);
+        const is_here = target.result.cpu.arch == b.graph.host.result.cpu.arch;
+        const package: Package =
+            .init(b, target, packages.optimize, packages.headers, packages.options);
+        // The integration tests compare all variants everywhere; a second program that holds them
+        // all takes minutes to compile, so elsewhere the command line makes do with one.
+        var fewer = packages.options;
+        if (!is_here) fewer.variants = .one;
+        list.append(b.allocator, .{
+            .name = name,
+            .package = package,
+            .command = if (is_here)
+                package
+            else
+                .init(b, target, packages.optimize, packages.headers, fewer),
+            .emulator = if (is_here) &.{} else b.graph.dupeStrings(emulator),
+        }) catch @panic("OOM");
+    }
+};
+
+/// Runs a program where it is, or under qemu-user when it is built for another machine.
+fn runOn(b: *std.Build, program: *Compile) *Run {
+    const arch = program.rootModuleTarget().cpu.arch;
+    if (arch == b.graph.host.result.cpu.arch) return b.addRunArtifact(program);
+    const run = b.addSystemCommand(&.{b.fmt("qemu-{t}", .{arch})});
+    run.addArtifactArg(program);
+    return run;
+}
