@@ -1,0 +1,143 @@
+//! The SIMD mathematics library: `F32`, `I32`, `Mask` and `Vec3` of some lanes, in one backend.
+//!
+//! In: a comptime backend and lane count. Out: value types with equal surfaces in every backend,
+//! which a comptime check holds; the same bits from every exact operation, on every target, in
+//! threads that called `setFlushToZero`. Inexact ones (`mulAdd`, `minFast`, `maxFast`, the
+//! estimates) are for culling only, never for what reaches a pixel.
+//!
+//! Every operation is inline and counts as one evaluated branch: a function with some hundreds of
+//! them starts with `@setEvalBranchQuota`.
+
+const std = @import("std");
+const assert = std.debug.assert;
+const variant = @import("variant.zig");
+const flush_to_zero = @import("simd/flush_to_zero.zig");
+const vec3 = @import("simd/vec3.zig");
+
+const scalar = @import("simd/scalar.zig");
+const vector = @import("simd/vector.zig");
+const intrinsics = @import("simd/intrinsics.zig");
+
+const Backend = variant.Backend;
+
+/// A thread's floating-point control register.
+pub const FloatControl = flush_to_zero.FloatControl;
+/// Reads the calling thread's.
+pub const floatControl = flush_to_zero.floatControl;
+/// Puts a state back that was read before.
+pub const setFloatControl = flush_to_zero.setFloatControl;
+/// Makes denormals zeros in the calling thread; returns the state before.
+pub const setFlushToZero = flush_to_zero.setFlushToZero;
+
+/// Greatest relative error of `reciprocalEstimate` and `reciprocalSqrtEstimate`.
+pub const estimate_error: f32 = 0x1p-20;
+
+/// Magnitudes of operands for which `estimate_error` holds.
+pub const estimate_range: [2]f32 = .{ 0x1p-100, 0x1p100 };
+
+/// The lane types of a backend. One lane is always the scalar backend, so that code for single
+/// values exists once. Asserts (comptime) that `lanes` is 1, 4, 8 or 16, and 4 for intrinsics.
+pub fn Lanes(comptime backend: Backend, comptime lanes: comptime_int) type {
+    return LanesOf(if (lanes == 1) .scalar else backend, lanes);
+}
+
+fn LanesOf(comptime chosen: Backend, comptime lanes: comptime_int) type {
+    if (lanes != 1 and lanes != 4 and lanes != 8 and lanes != 16) {
+        @compileError("lanes are 1, 4, 8 or 16");
+    }
+    const Operations = BackendOf(chosen);
+    return struct {
+        pub const backend = chosen;
+        pub const count = lanes;
+        pub const F32 = Operations.F32x(lanes);
+        pub const I32 = Operations.I32x(lanes);
+        pub const Mask = Operations.Mask(lanes);
+        pub const Vec3 = vec3.Vec3x(F32, Mask);
+
+        /// Rows to columns: lane r of result c is lane c of `rows[r]`. Turns four structures of
+        /// four floats into four lane values. Asserts (comptime) 4 lanes.
+        pub inline fn transpose4x4(rows: [4]F32) [4]F32 {
+            comptime assert(lanes == 4);
+            const even_low = rows[0].interleaveLow(rows[2]);
+            const even_high = rows[0].interleaveHigh(rows[2]);
+            const odd_low = rows[1].interleaveLow(rows[3]);
+            const odd_high = rows[1].interleaveHigh(rows[3]);
+            return .{
+                even_low.interleaveLow(odd_low),
+                even_low.interleaveHigh(odd_low),
+                even_high.interleaveLow(odd_high),
+                even_high.interleaveHigh(odd_high),
+            };
+        }
+    };
+}
+
+fn BackendOf(comptime backend: Backend) type {
+    return switch (backend) {
+        .scalar => scalar,
+        .vector => vector,
+        .intrinsics => intrinsics,
+    };
+}
+
+const lane_types = [_][]const u8{ "F32x", "I32x", "Mask" };
+
+// Every backend has what the reference has, of the same type, and nothing more.
+comptime {
+    @setEvalBranchQuota(100_000);
+    for (std.enums.values(Backend)) |backend| {
+        for (lane_types) |lane_type| {
+            requireDeclarations(.scalar, backend, lane_type);
+            requireDeclarations(backend, .scalar, lane_type);
+        }
+    }
+}
+
+/// Fails to compile unless `candidate` declares what `reference` does in the type of this name.
+fn requireDeclarations(
+    comptime reference: Backend,
+    comptime candidate: Backend,
+    comptime lane_type: []const u8,
+) void {
+    const Wanted = @field(BackendOf(reference), lane_type)(4);
+    const Found = @field(BackendOf(candidate), lane_type)(4);
+    for (@typeInfo(Wanted).@"struct".decl_names) |name| {
+        const place = "simd backend " ++ @tagName(candidate) ++ ": " ++ lane_type ++ "." ++ name;
+        if (!@hasDecl(Found, name)) @compileError(place ++ " is missing");
+        const wanted = @TypeOf(@field(Wanted, name));
+        const found = @TypeOf(@field(Found, name));
+        if (!sameSurface(reference, wanted, candidate, found)) {
+            @compileError(place ++ " should be " ++ @typeName(wanted));
+        }
+    }
+}
+
+/// Whether two types differ in nothing but whose lane types they name.
+fn sameSurface(
+    comptime a_backend: Backend,
+    comptime a: ?type,
+    comptime b_backend: Backend,
+    comptime b: ?type,
+) bool {
+    const A = a orelse return b == null;
+    const B = b orelse return false;
+    if (A == B) return true;
+    for (lane_types) |lane_type| {
+        if (A == @field(BackendOf(a_backend), lane_type)(4)) {
+            return B == @field(BackendOf(b_backend), lane_type)(4);
+        }
+    }
+    if (@typeInfo(A) != .@"fn" or @typeInfo(B) != .@"fn") return false;
+    const a_fn = @typeInfo(A).@"fn";
+    const b_fn = @typeInfo(B).@"fn";
+    if (a_fn.param_types.len != b_fn.param_types.len) return false;
+    for (a_fn.param_types, b_fn.param_types) |a_param, b_param| {
+        if (!sameSurface(a_backend, a_param, b_backend, b_param)) return false;
+    }
+    return sameSurface(a_backend, a_fn.return_type, b_backend, b_fn.return_type);
+}
+
+test {
+    _ = @import("simd/agreement.zig");
+    _ = flush_to_zero;
+}

@@ -1,0 +1,114 @@
+//! What a tracer is made of: the arithmetic backend, the way rays are bundled, and the SIMD width.
+//!
+//! In: the build options (`-Dbackend= -Dtraversal= -Dlanes= -Dvariants=`). Out: the comptime list
+//! of variants that this binary holds, the default one first. Everything from `simd` to `trace` is
+//! generic over a comptime `Variant`; the name is looked up once, at start.
+
+const std = @import("std");
+const builtin = @import("builtin");
+const config = @import("config");
+const assert = std.debug.assert;
+
+/// How four floats are added: loops over arrays, Zig's `@Vector`, or C intrinsics.
+pub const Backend = enum { scalar, vector, intrinsics };
+
+/// How rays travel: alone, as the thesis's 2x2 packets, or in the widest bundle we have.
+pub const Traversal = enum { single, packet2x2, packet };
+
+/// One way to build the tracer; all of them give the same picture, bit for bit.
+pub const Variant = struct {
+    backend: Backend,
+    traversal: Traversal,
+    /// Lanes of a SIMD value, 4, 8 or 16; also the width of the BVH's nodes and triangle blocks.
+    lanes: u8,
+
+    /// Whether the combination exists: the C intrinsics and the thesis's 2x2 packets are 4 wide.
+    pub fn isSupported(variant: Variant) bool {
+        if (variant.lanes != 4 and variant.lanes != 8 and variant.lanes != 16) return false;
+        if (variant.backend == .intrinsics and variant.lanes != 4) return false;
+        if (variant.traversal == .packet2x2 and variant.lanes != 4) return false;
+        return true;
+    }
+
+    /// `backend-traversal-lanes`, as `--variant` and the reports spell it.
+    pub fn name(comptime variant: Variant) []const u8 {
+        return std.fmt.comptimePrint("{t}-{t}-{d}", .{
+            variant.backend, variant.traversal, variant.lanes,
+        });
+    }
+};
+
+/// The variant of the build options, the first of `compiled`.
+pub const default: Variant = .{
+    .backend = std.enums.fromInt(Backend, @backingInt(config.backend)).?,
+    .traversal = std.enums.fromInt(Traversal, @backingInt(config.traversal)).?,
+    .lanes = config.lanes,
+};
+
+/// Lane counts that a binary with all variants holds: the wide ones pay on x86 only.
+const lane_counts: []const u8 = if (builtin.cpu.arch.isX86()) &.{ 4, 8, 16 } else &.{4};
+
+/// Whether a binary with all variants holds this one. Wide scalar loops tell nothing that narrow
+/// ones do not, but take longest to compile; they are built by name (`-Dbackend=scalar -Dlanes=8`).
+fn isInAll(variant: Variant) bool {
+    return variant.isSupported() and (variant.backend != .scalar or variant.lanes == 4);
+}
+
+/// Every variant in this binary, the default first.
+pub const compiled: []const Variant = list: {
+    if (!default.isSupported()) @compileError(
+        "no such variant: " ++ default.name() ++
+            " (lanes are 4, 8 or 16; intrinsics and packet2x2 have 4 lanes only)",
+    );
+    var list: []const Variant = &.{default};
+    if (config.variants == .one) break :list list;
+    for (lane_counts) |lanes| {
+        for (std.enums.values(Backend)) |backend| {
+            for (std.enums.values(Traversal)) |traversal| {
+                const variant: Variant = .{
+                    .backend = backend,
+                    .traversal = traversal,
+                    .lanes = lanes,
+                };
+                if (!isInAll(variant) or std.meta.eql(variant, default)) continue;
+                list = list ++ .{variant};
+            }
+        }
+    }
+    break :list list;
+};
+
+/// The backend that counts tests: how many there are depends on the traversal and the lanes alone,
+/// so one backend counts for all where all are there.
+pub const counting_backend: Backend =
+    if (config.variants == .one) default.backend else .vector;
+
+/// Names of `compiled`, in the same order.
+pub const names: []const []const u8 = list: {
+    var list: []const []const u8 = &.{};
+    for (compiled) |variant| list = list ++ .{variant.name()};
+    break :list list;
+};
+
+/// Index into `compiled` of the variant with this name, or null.
+pub fn indexOf(name: []const u8) ?usize {
+    for (names, 0..) |candidate, index| {
+        if (std.mem.eql(u8, candidate, name)) return index;
+    }
+    return null;
+}
+
+test "the default comes first and every name is found once" {
+    try std.testing.expect(std.meta.eql(compiled[0], default));
+    for (names, 0..) |name, index| try std.testing.expectEqual(index, indexOf(name).?);
+    try std.testing.expectEqual(null, indexOf("vector-single-5"));
+    try std.testing.expectEqual(null, indexOf(""));
+}
+
+test "4 lanes only where the hardware's registers say so" {
+    const wide: Variant = .{ .backend = .intrinsics, .traversal = .single, .lanes = 8 };
+    try std.testing.expect(!wide.isSupported());
+    const odd: Variant = .{ .backend = .vector, .traversal = .single, .lanes = 5 };
+    try std.testing.expect(!odd.isSupported());
+    assert((Variant{ .backend = .vector, .traversal = .packet, .lanes = 16 }).isSupported());
+}
