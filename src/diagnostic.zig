@@ -1,0 +1,169 @@
+//! What a stage has to say to the user: the one line of an error, and the warnings of a file.
+//!
+//! A leaf that every stage may import. Stages write here and return a small error; `main` alone
+//! prints and picks the exit code. Text from files is made printable and cut before it is kept,
+//! so that no message can be longer than a line or carry control characters.
+
+const std = @import("std");
+const assert = std.debug.assert;
+
+/// Longest message kept, in bytes.
+pub const message_bytes_max = 300;
+/// Longest quoted name within a message, in bytes.
+pub const name_bytes_max = 80;
+/// Warnings kept of one run; what comes after is counted only.
+pub const warning_count_max = 32;
+
+/// A fixed-size line of text.
+pub const Message = struct {
+    buffer: [message_bytes_max]u8 = undefined,
+    length: usize = 0,
+
+    /// The text, without a line end.
+    pub fn text(message: *const Message) []const u8 {
+        return message.buffer[0..message.length];
+    }
+
+    /// Replaces the text; what does not fit is cut.
+    pub fn set(message: *Message, comptime format: []const u8, arguments: anytype) void {
+        var writer: std.Io.Writer = .fixed(&message.buffer);
+        writer.print(format, arguments) catch |err| switch (err) {
+            error.WriteFailed => {}, // Full: the beginning is what matters.
+        };
+        message.length = writer.buffered().len;
+        for (message.buffer[0..message.length]) |*byte| {
+            if (byte.* < 0x20 or byte.* == 0x7f) byte.* = '?';
+        }
+        assert(message.length <= message_bytes_max);
+    }
+};
+
+/// One run's error text and warnings.
+pub const Diagnostic = struct {
+    /// Why the run failed; empty until `fail`.
+    message: Message = .{},
+    warnings: [warning_count_max]Message = undefined,
+    warning_count: usize = 0,
+    /// Warnings past `warning_count_max`.
+    warning_dropped_count: usize = 0,
+
+    /// Sets the error line and returns the error, so that a stage can write `return d.fail(...)`.
+    pub fn fail(
+        diagnostic: *Diagnostic,
+        err: anytype,
+        comptime format: []const u8,
+        arguments: anytype,
+    ) @TypeOf(err) {
+        diagnostic.message.set(format, arguments);
+        return err;
+    }
+
+    /// Adds a warning; the same text is kept once.
+    pub fn warn(diagnostic: *Diagnostic, comptime format: []const u8, arguments: anytype) void {
+        var message: Message = .{};
+        message.set(format, arguments);
+        for (diagnostic.warnings[0..diagnostic.warning_count]) |*other| {
+            if (std.mem.eql(u8, other.text(), message.text())) return;
+        }
+        if (diagnostic.warning_count == warning_count_max) {
+            diagnostic.warning_dropped_count += 1;
+            return;
+        }
+        diagnostic.warnings[diagnostic.warning_count] = message;
+        diagnostic.warning_count += 1;
+    }
+};
+
+/// Prints a text of outside origin whole, bad UTF-8 and controls as `?`.
+pub const Printable = struct {
+    text: []const u8,
+
+    /// Called by `{f}`.
+    pub fn format(printable_text: Printable, writer: *std.Io.Writer) std.Io.Writer.Error!void {
+        const text = printable_text.text;
+        var index: usize = 0;
+        while (index < text.len) {
+            const length = Quoted.sequenceLength(text[index..]) orelse {
+                try writer.writeByte('?');
+                index += 1;
+                continue;
+            };
+            try writer.writeAll(text[index..][0..length]);
+            index += length;
+        }
+    }
+};
+
+/// Wraps a text for `{f}`.
+pub fn printable(text: []const u8) Printable {
+    return .{ .text = text };
+}
+
+/// Prints a name from a file in quotes, cut to `name_bytes_max`, bad UTF-8 and controls as `?`.
+pub const Quoted = struct {
+    name: []const u8,
+
+    /// Called by `{f}`.
+    pub fn format(quoted: Quoted, writer: *std.Io.Writer) std.Io.Writer.Error!void {
+        try writer.writeByte('\'');
+        var index: usize = 0;
+        while (index < quoted.name.len and index < name_bytes_max) {
+            const length = sequenceLength(quoted.name[index..]) orelse {
+                try writer.writeByte('?');
+                index += 1;
+                continue;
+            };
+            try writer.writeAll(quoted.name[index..][0..length]);
+            index += length;
+        }
+        if (index < quoted.name.len) try writer.writeAll("...");
+        try writer.writeByte('\'');
+    }
+
+    /// Bytes of the printable UTF-8 sequence at the start of `bytes`, or null.
+    fn sequenceLength(bytes: []const u8) ?usize {
+        const length = std.unicode.utf8ByteSequenceLength(bytes[0]) catch return null;
+        if (length > bytes.len) return null;
+        const code_point = std.unicode.utf8Decode(bytes[0..length]) catch return null;
+        if (code_point < 0x20 or (code_point >= 0x7f and code_point < 0xa0)) return null;
+        // Direction overrides and isolates can make a terminal show another name.
+        if (code_point >= 0x202a and code_point <= 0x202e) return null;
+        if (code_point >= 0x2066 and code_point <= 0x2069) return null;
+        return length;
+    }
+};
+
+/// Wraps a name for `{f}`.
+pub fn quote(name: []const u8) Quoted {
+    return .{ .name = name };
+}
+
+test "a message is one line, however long or wild the text" {
+    var diagnostic: Diagnostic = .{};
+    const long: [1000]u8 = @splat('x');
+    try std.testing.expectEqual(error.Bad, diagnostic.fail(error.Bad, "{s}", .{&long}));
+    try std.testing.expectEqual(message_bytes_max, diagnostic.message.text().len);
+    diagnostic.message.set("{f}", .{quote("a\n\x1b[31mb\xff\u{202e}é")});
+    try std.testing.expectEqualStrings("'a??[31mb????é'", diagnostic.message.text());
+    diagnostic.message.set("{f}", .{quote(&long)});
+    try std.testing.expect(diagnostic.message.text().len == name_bytes_max + 5);
+    diagnostic.message.set("{f}", .{quote("")});
+    try std.testing.expectEqualStrings("''", diagnostic.message.text());
+}
+
+test printable {
+    var buffer: [64]u8 = undefined;
+    var writer: std.Io.Writer = .fixed(&buffer);
+    try writer.print("{f}", .{printable("a\nb\x1b\xffé")});
+    try std.testing.expectEqualStrings("a?b??é", writer.buffered());
+}
+
+test "the same warning is said once, and their number is bounded" {
+    var diagnostic: Diagnostic = .{};
+    diagnostic.warn("textures are not read yet", .{});
+    diagnostic.warn("textures are not read yet", .{});
+    try std.testing.expectEqual(1, diagnostic.warning_count);
+    for (0..100) |index| diagnostic.warn("number {d}", .{index});
+    try std.testing.expectEqual(warning_count_max, diagnostic.warning_count);
+    try std.testing.expectEqual(101 - warning_count_max, diagnostic.warning_dropped_count);
+}

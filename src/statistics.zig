@@ -1,0 +1,59 @@
+//! What a frame cost, as plain counters that the stages fill and the report prints.
+//!
+//! A leaf that every stage may import. Counters are 64 bits wide and kept by thread while rays are
+//! traced; `add` sums them up afterwards.
+
+const std = @import("std");
+
+/// Wall-clock time of each stage in nanoseconds.
+pub const StageTimes = struct {
+    parse_ns: u64 = 0,
+    /// All of `prepare` but the tree.
+    prepare_ns: u64 = 0,
+    bvh_build_ns: u64 = 0,
+    trace_ns: u64 = 0,
+    output_ns: u64 = 0,
+    /// From the first to the last of them, what lies between included.
+    total_ns: u64 = 0,
+};
+
+/// Rays by what they are for. Continuing behind a hole or a blended surface is not a new ray.
+pub const RayCounts = struct {
+    primary: u64 = 0,
+    shadow: u64 = 0,
+    /// Reflected and refracted.
+    secondary: u64 = 0,
+
+    /// Adds another thread's counts.
+    pub fn add(counts: *RayCounts, other: RayCounts) void {
+        counts.primary += other.primary;
+        counts.shadow += other.shadow;
+        counts.secondary += other.secondary;
+    }
+};
+
+/// Intersection tests. "Issued" is the thesis's tally: every lane of every instruction counts.
+/// "Useful" counts the lanes that held both a ray under way and a box or triangle.
+pub const TestCounts = struct {
+    box_issued: u64 = 0,
+    box_useful: u64 = 0,
+    triangle_issued: u64 = 0,
+    triangle_useful: u64 = 0,
+
+    /// Adds another thread's counts.
+    pub fn add(counts: *TestCounts, other: TestCounts) void {
+        counts.box_issued += other.box_issued;
+        counts.box_useful += other.box_useful;
+        counts.triangle_issued += other.triangle_issued;
+        counts.triangle_useful += other.triangle_useful;
+    }
+};
+
+test "counts of two threads add up" {
+    var rays: RayCounts = .{ .primary = 1, .shadow = 2, .secondary = 3 };
+    rays.add(.{ .primary = 10, .shadow = 20, .secondary = 30 });
+    try std.testing.expectEqual(RayCounts{ .primary = 11, .shadow = 22, .secondary = 33 }, rays);
+    var tests: TestCounts = .{ .box_useful = 1 };
+    tests.add(.{ .box_issued = 4, .box_useful = 1, .triangle_issued = 4, .triangle_useful = 3 });
+    try std.testing.expectEqual(2, tests.box_useful);
+}
