@@ -1,0 +1,175 @@
+//! Data 1: what a scene file says, owned and checked.
+//!
+//! `parse` fills it, `prepare` reads it. Everything in it has been validated: indices are in
+//! range, numbers are finite and not denormal, triangle lists are whole. Linear units: metres,
+//! radians, candela, lux, linear RGB. Right-handed, y up, as in glTF.
+
+const std = @import("std");
+const math = @import("math.zig");
+const assert = std.debug.assert;
+const Affine = math.Affine;
+const Vec3 = math.Vec3;
+
+/// Index that stands for "none".
+pub const none: u32 = std.math.maxInt(u32);
+
+/// A node of the hierarchy: where things are. Only nodes that the shown scene reaches.
+pub const Node = struct {
+    /// Index of the parent, always lower than the node's own, or `none` for a root.
+    parent: u32,
+    /// Map from this node's space into its parent's.
+    local: Affine,
+};
+
+/// Triangles with one material, in the space of the node that shows them.
+pub const Mesh = struct {
+    positions: []const Vec3,
+    /// One a vertex, not necessarily of unit length; null: the faces are flat.
+    normals: ?[]const Vec3 = null,
+    /// Linear RGBA a vertex, multiplied with the material's base colour; null: white.
+    colors: ?[]const [4]f32 = null,
+    /// Vertex indices, counter-clockwise seen from the front.
+    triangles: []const [3]u32,
+    /// Index into `Scene.materials`.
+    material: u32,
+};
+
+/// One showing of a mesh.
+pub const Instance = struct {
+    mesh: u32,
+    node: u32,
+};
+
+/// What to do with the base colour's alpha.
+pub const AlphaMode = enum { @"opaque", mask, blend };
+
+/// glTF's metallic-roughness material with the factors of its extensions.
+pub const Material = struct {
+    /// Linear RGB and alpha, 0..1.
+    base_color: [4]f32 = .{ 1, 1, 1, 1 },
+    metallic: f32 = 1,
+    roughness: f32 = 1,
+    /// Radiance emitted, linear RGB, strength included.
+    emissive: Vec3 = .{ 0, 0, 0 },
+    alpha_mode: AlphaMode = .@"opaque",
+    /// With `AlphaMode.mask`, what has less alpha is a hole.
+    alpha_cutoff: f32 = 0.5,
+    double_sided: bool = false,
+    /// The base colour is shown as it is, without light (KHR_materials_unlit).
+    unlit: bool = false,
+    /// Index of refraction, >= 1 (KHR_materials_ior).
+    ior: f32 = 1.5,
+    /// Share of light that goes through, 0..1 (KHR_materials_transmission).
+    transmission: f32 = 0,
+    /// Whether the surface bounds a volume (KHR_materials_volume with a thickness above 0): rays
+    /// bend; otherwise the wall is thin and they go straight on.
+    volume: bool = false,
+    /// Colour that white light turns to after `attenuation_distance` inside, linear RGB.
+    attenuation_color: Vec3 = .{ 1, 1, 1 },
+    /// In metres of the scene's space; infinity: no attenuation.
+    attenuation_distance: f32 = std.math.inf(f32),
+};
+
+/// A light source (KHR_lights_punctual); it shines from its node's origin along its node's -z.
+pub const Light = struct {
+    pub const Kind = enum { point, spot, directional };
+
+    kind: Kind,
+    node: u32,
+    /// Linear RGB, times `intensity`.
+    color: Vec3 = .{ 1, 1, 1 },
+    /// Candela (point, spot) or lux (directional).
+    intensity: f32 = 1,
+    /// Distance where the light ends; infinity: never.
+    range: f32 = std.math.inf(f32),
+    /// Spot only, radians from the axis: full light within.
+    inner_cone_rad: f32 = 0,
+    /// Spot only, radians from the axis: no light beyond, > inner, <= pi / 2.
+    outer_cone_rad: f32 = std.math.pi / 4.0,
+};
+
+/// A view; it looks from its node's origin along its node's -z, y up.
+pub const Camera = struct {
+    /// Empty where the file gives none.
+    name: []const u8,
+    node: u32,
+    projection: Projection,
+
+    pub const Projection = union(enum) {
+        perspective: struct {
+            /// Full vertical angle in radians, 0 < y_fov_rad < pi.
+            y_fov_rad: f32,
+            /// Width over height; null: the image's.
+            aspect: ?f32,
+        },
+        orthographic: struct {
+            /// Half of the width and of the height, > 0.
+            half_width: f32,
+            half_height: f32,
+        },
+    };
+};
+
+/// A whole file. Everything lives in the arena.
+pub const Scene = struct {
+    arena: std.heap.ArenaAllocator,
+    nodes: []const Node = &.{},
+    meshes: []const Mesh = &.{},
+    instances: []const Instance = &.{},
+    materials: []const Material = &.{},
+    lights: []const Light = &.{},
+    cameras: []const Camera = &.{},
+    /// Index of the camera that the file itself would use, `none` without cameras.
+    camera_default: u32 = none,
+    /// Ambient radiance that the source of the scene asks for; null: by the rules of shading.
+    ambient: ?f32 = null,
+
+    /// An empty scene whose memory comes from `gpa`.
+    pub fn init(gpa: std.mem.Allocator) Scene {
+        return .{ .arena = .init(gpa) };
+    }
+
+    /// Frees everything.
+    pub fn deinit(scene: *Scene) void {
+        scene.arena.deinit();
+        scene.* = undefined;
+    }
+
+    /// Triangles drawn, every instance counted.
+    pub fn triangleCount(scene: *const Scene) u64 {
+        var count: u64 = 0;
+        for (scene.instances) |instance| count += scene.meshes[instance.mesh].triangles.len;
+        return count;
+    }
+
+    /// Asserts what the stages after `parse` rely on; for tests and debug builds (it is O(size)).
+    pub fn check(scene: *const Scene) void {
+        for (scene.nodes, 0..) |node, index| {
+            assert(node.parent == none or node.parent < index);
+            assert(node.local.isFinite());
+        }
+        for (scene.meshes) |mesh| {
+            assert(mesh.material < scene.materials.len);
+            if (mesh.normals) |normals| assert(normals.len == mesh.positions.len);
+            if (mesh.colors) |colors| assert(colors.len == mesh.positions.len);
+            for (mesh.positions) |position| assert(math.vec3.isFinite(position));
+            for (mesh.triangles) |triangle| {
+                for (triangle) |vertex| assert(vertex < mesh.positions.len);
+            }
+        }
+        for (scene.instances) |instance| {
+            assert(instance.mesh < scene.meshes.len);
+            assert(instance.node < scene.nodes.len);
+        }
+        for (scene.lights) |light| assert(light.node < scene.nodes.len);
+        for (scene.cameras) |camera| assert(camera.node < scene.nodes.len);
+        assert(scene.camera_default == none or scene.camera_default < scene.cameras.len);
+    }
+};
+
+test "an empty scene is a scene" {
+    var scene: Scene = .init(std.testing.allocator);
+    defer scene.deinit();
+    scene.check();
+    try std.testing.expectEqual(0, scene.triangleCount());
+}

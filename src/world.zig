@@ -1,0 +1,260 @@
+//! Data 2: what rays meet, as immutable aligned arrays.
+//!
+//! `prepare` fills it, `trace` reads it; nothing in it changes while rays are traced, so threads
+//! share it without locks. World space, right-handed, y up.
+//!
+//! Culling is exact by construction. The box of a triangle is the box of its three vertices grown
+//! by `World.pad`; the box of a node is the union of its triangles' boxes. A slab test is monotone
+//! in the box even in floats, so whatever the triangle test accepts within its own grown box no
+//! node above it can cull, in any order of traversal. `pad` itself only has to be large enough
+//! that a ray which passes a triangle by rounding alone still meets the grown box: it decides
+//! whether shared edges are watertight, not whether variants agree.
+
+const std = @import("std");
+const math = @import("math.zig");
+const assert = std.debug.assert;
+const Vec3 = math.Vec3;
+const Box3 = math.Box3;
+
+/// Index that stands for "none": no primitive, no child.
+pub const none: u32 = std.math.maxInt(u32);
+
+/// Levels of a tree at most; the builder keeps to it, traversal stacks are sized by it.
+pub const tree_depth_max = 64;
+
+/// Bytes that nodes and triangle blocks are aligned to: a cache line.
+pub const cache_line_bytes = 64;
+
+/// A node with `width` children, structure of arrays.
+///
+///     width 4, bytes   0..47   bounds[0]  lower x x x x | y y y y | z z z z
+///                     48..95   bounds[1]  upper x x x x | y y y y | z z z z
+///                     96..111  child      index of a node, or of the first triangle block
+///                    112..127  block_count  0: child is a node; else that many blocks
+///
+/// A missing child has the empty box (+inf, -inf), `child = none` and `block_count = 0`.
+pub fn Node(comptime width: comptime_int) type {
+    return extern struct {
+        /// [lower, upper][axis][child].
+        bounds: [2][3][width]f32 align(cache_line_bytes),
+        child: [width]u32,
+        block_count: [width]u32,
+
+        const Self = @This();
+
+        /// A node without children.
+        pub const empty: Self = .{
+            .bounds = .{ @splat(@splat(std.math.inf(f32))), @splat(@splat(-std.math.inf(f32))) },
+            .child = @splat(none),
+            .block_count = @splat(0),
+        };
+
+        /// The box of one child.
+        pub fn childBox(node: *const Self, index: usize) Box3 {
+            var box: Box3 = undefined;
+            for (0..3) |axis| {
+                box.lower[axis] = node.bounds[0][axis][index];
+                box.upper[axis] = node.bounds[1][axis][index];
+            }
+            return box;
+        }
+
+        comptime {
+            assert(@sizeOf(Self) == 32 * width);
+            assert(@alignOf(Self) == cache_line_bytes);
+        }
+    };
+}
+
+/// `width` triangles, structure of arrays: corners as they are in the scene, so that triangles that
+/// share one see it at the same place from any origin.
+///
+///     width 4, bytes   0..143  corner[3]: x x x x | y y y y | z z z z each
+///                    144..159  primitive
+///
+/// Padding lanes have `primitive = none` and three corners at the origin, which no ray hits.
+pub fn TriangleBlock(comptime width: comptime_int) type {
+    return extern struct {
+        /// [corner][axis][lane].
+        corner: [3][3][width]f32 align(16),
+        /// Index into `World.triangles`.
+        primitive: [width]u32,
+
+        /// A block without triangles.
+        pub const empty: @This() = .{
+            .corner = @splat(@splat(@splat(0))),
+            .primitive = @splat(none),
+        };
+
+        comptime {
+            assert(@sizeOf(@This()) == 40 * width);
+        }
+    };
+}
+
+/// A bounding volume hierarchy of one width. Node 0 is the root.
+pub fn Tree(comptime width: comptime_int) type {
+    return struct {
+        nodes: []align(cache_line_bytes) const Node(width),
+        blocks: []align(cache_line_bytes) const TriangleBlock(width),
+    };
+}
+
+/// The tree in the width of the variant that traces it.
+pub const AnyTree = union(enum) {
+    w4: Tree(4),
+    w8: Tree(8),
+    w16: Tree(16),
+
+    /// The tree of the given width. Asserts that it has this width.
+    pub fn get(tree: *const AnyTree, comptime width: comptime_int) *const Tree(width) {
+        return switch (width) {
+            4 => &tree.w4,
+            8 => &tree.w8,
+            16 => &tree.w16,
+            else => @compileError("trees are 4, 8 or 16 wide"),
+        };
+    }
+};
+
+/// Three corners and a material; its index in `World.triangles` is the primitive number.
+pub const Triangle = extern struct {
+    /// Indices into `World.positions` and the other arrays by vertex, counter-clockwise in front.
+    corner: [3]u32,
+    /// Index into `World.materials`.
+    material: u32,
+
+    comptime {
+        assert(@sizeOf(Triangle) == 16);
+    }
+};
+
+/// A material as shading wants it: f32 throughout so that lanes can gather any of its fields.
+pub const Material = struct {
+    /// Linear RGB and alpha.
+    base_color: [4]f32,
+    emissive: Vec3,
+    metallic: f32,
+    roughness: f32,
+    /// Reflectance at normal incidence of the dielectric part, ((n - 1) / (n + 1))^2.
+    dielectric_f0: f32,
+    ior: f32,
+    transmission: f32,
+    /// Beer-Lambert absorption inside, per metre; 0 outside of volumes.
+    absorption: Vec3,
+    /// Alpha below it is a hole; -1 for materials without holes.
+    alpha_cutoff: f32,
+    /// 1: alpha blends, 0: alpha counts as 1.
+    blend: f32,
+    /// 1: back faces are seen too, 0: they are culled from view (they still cast shadows).
+    double_sided: f32,
+    /// 1: shown without light.
+    unlit: f32,
+    /// 1: bounds a volume, rays bend; 0: thin, they go straight on.
+    volume: f32,
+};
+
+/// A light source in world space.
+pub const Light = struct {
+    pub const Kind = enum { point, spot, directional };
+
+    kind: Kind,
+    /// Of point and spot lights.
+    position: Vec3,
+    /// Unit vector the way the light travels; spot and directional.
+    direction: Vec3,
+    /// Linear RGB in candela (point, spot) or lux (directional).
+    intensity: Vec3,
+    /// 1 / range^2, 0 without a range.
+    range_inv_squared: f32,
+    /// Cone of a spot: clamp(cosine * scale + offset, 0, 1)^2; 0 and 1 for the others.
+    cone_scale: f32,
+    cone_offset: f32,
+};
+
+/// A view. The ray of the image point (x, y), both in -1..1 with y up, has
+///
+///     perspective:  origin,                  direction forward + x right + y up
+///     orthographic: origin + x right + y up, direction forward
+///
+/// `right` and `up` carry the half extents of the picture; directions are not normalised.
+pub const Camera = struct {
+    orthographic: bool,
+    origin: Vec3,
+    right: Vec3,
+    up: Vec3,
+    forward: Vec3,
+};
+
+/// What a ray that leaves the scene sees, and the light that comes from everywhere.
+pub const Surroundings = struct {
+    /// Constant radiance from all sides, gray.
+    ambient: f32,
+    /// What primary rays see where there is nothing, linear RGB.
+    background: Vec3,
+};
+
+/// Facts about the tree, for the report.
+pub const TreeStatistics = struct {
+    node_count: u32,
+    /// Levels of nodes, 1 for a root alone, 0 without triangles.
+    depth: u32,
+    /// Expected cost of a random ray: node visits plus blocks tested, weighted by area over
+    /// the root's.
+    sah_cost: f64,
+    /// Nodes and triangle blocks.
+    bytes: u64,
+};
+
+/// Everything that tracing needs.
+pub const World = struct {
+    arena: std.heap.ArenaAllocator,
+    tree: AnyTree,
+    tree_statistics: TreeStatistics,
+    /// By vertex, world space.
+    positions: []const Vec3,
+    /// By vertex, not normalised; a zero normal stands for the triangle's own. Same length.
+    normals: []const Vec3,
+    /// By vertex, linear RGBA; empty where no mesh has colours.
+    colors: []const [4]f32,
+    triangles: []const Triangle,
+    materials: []const Material,
+    lights: []const Light,
+    camera: Camera,
+    surroundings: Surroundings,
+    /// Picture size in pixels.
+    width: u32,
+    height: u32,
+    /// No camera of the file was used: the view was framed on what there is.
+    camera_is_default: bool,
+    /// The file has no light that shines: the lights are three fixed to the camera.
+    lights_are_default: bool,
+    /// By how much triangle boxes are grown, and origins of secondary rays are moved off their
+    /// surface: a bound for the rounding of the triangle test, in metres. It is
+    /// `pad_relative` times the largest distance that a ray can span, and a little for the rounding
+    /// of the coordinates themselves.
+    pad: f32,
+    /// Triangles left out because they have no area or no finite place.
+    degenerate_count: u64,
+    /// Some material lets shadow rays through in part (blend or transmission).
+    has_transparency: bool,
+    /// Some material has holes (mask).
+    has_holes: bool,
+
+    /// Frees everything.
+    pub fn deinit(world: *World) void {
+        world.arena.deinit();
+        world.* = undefined;
+    }
+};
+
+/// `World.pad` over the largest distance between a ray's origin and a corner. In units of 2^-24 of
+/// that distance a corner that is sheared into a ray's view (`trace/triangle.zig`) is off by 1 for
+/// the difference to the origin, 2 for the slope times the depth and 1 for the sum, in each of two
+/// axes; t of the plane by about 8. 32 leaves a factor of two.
+pub const pad_relative: f32 = 32.0 / 16_777_216.0;
+
+test "an empty child's box is empty" {
+    const node: Node(4) = .empty;
+    for (0..4) |child| try std.testing.expect(node.childBox(child).isEmpty());
+}
