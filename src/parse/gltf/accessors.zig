@@ -1,0 +1,250 @@
+//! A glTF accessor becomes an `Accessor` that can be decoded, or one line that says why not.
+//!
+//! In: what the JSON says of accessors, buffer views and buffers, none of it trusted. Out: slices
+//! that hold every element. All products and sums are 64 bits wide and cannot wrap: counts are
+//! below 2^31, strides below 2^8, offsets below 2^53 (glTF 2.0, sections 3.6.2.4 and 3.6.2.3).
+
+const std = @import("std");
+const c = @import("cgltf");
+const limits = @import("limits.zig");
+const accessors = @import("../accessor.zig");
+const Source = @import("source.zig");
+const Accessor = accessors.Accessor;
+const Component = accessors.Component;
+const Error = Source.Error;
+const assert = std.debug.assert;
+
+/// Checks every accessor and view of the file, drawn or not.
+pub fn checkAll(source: *Source) Error!void {
+    const views = Source.slice(source.data.buffer_views, source.data.buffer_views_count);
+    for (views, 0..) |*view, index| try checkView(source, view, index);
+    for (0..source.data.accessors_count) |index| _ = try resolve(source, index);
+    source.sparse_checked = true;
+}
+
+/// The accessor with this index; null where its buffer has no data, which is no error as long as
+/// nobody needs it.
+pub fn resolve(source: *Source, index: usize) Error!?Accessor {
+    assert(index < source.data.accessors_count);
+    const raw = Source.item(source.data.accessors, index);
+    const component = componentOf(raw.component_type) orelse
+        return source.fail("accessor {d}: unknown componentType", .{index});
+    const component_count = componentCount(raw.type) orelse
+        return source.fail("accessor {d}: unknown type", .{index});
+    if (raw.count == 0) return source.fail("accessor {d}: count is 0", .{index});
+    if (raw.count > limits.accessor_count_max) return source.fail(
+        "accessor {d}: count {d} is over the limit of {d}",
+        .{ index, raw.count, limits.accessor_count_max },
+    );
+    var accessor: Accessor = .{
+        .component = component,
+        .component_count = component_count,
+        .normalized = raw.normalized != 0,
+        .count = @intCast(raw.count),
+        .base = null,
+        .sparse = null,
+    };
+    const element_bytes = paddedBytes(raw.type, component, component_count);
+    if (raw.buffer_view) |view| {
+        const base = try resolveBase(source, index, raw, view, component, element_bytes);
+        accessor.base = base orelse return null;
+    } else if (raw.count > limits.zero_count_max) return source.fail(
+        "accessor {d}: {d} elements without data are over the limit of {d}",
+        .{ index, raw.count, limits.zero_count_max },
+    );
+    if (raw.is_sparse != 0) {
+        accessor.sparse = (try resolveSparse(source, index, accessor, element_bytes)) orelse
+            return null;
+    }
+    return accessor;
+}
+
+fn resolveBase(
+    source: *const Source,
+    index: usize,
+    raw: *const c.cgltf_accessor,
+    view: *const c.cgltf_buffer_view,
+    component: Component,
+    element_bytes: u32,
+) Error!?accessors.Strided {
+    const stride: u64 = if (view.stride == 0) element_bytes else view.stride;
+    if (stride < element_bytes) return source.fail(
+        "accessor {d}: elements of {d} bytes do not fit the byteStride {d} of buffer view {d}",
+        .{ index, element_bytes, stride, viewIndex(source, view) },
+    );
+    if (stride % component.bytes() != 0) return source.fail(
+        "accessor {d}: the byteStride {d} of buffer view {d} is no multiple of {d}",
+        .{ index, stride, viewIndex(source, view), component.bytes() },
+    );
+    const length = stride * (@as(u64, raw.count) - 1) + element_bytes;
+    const bytes = try range(source, index, "", view, raw.offset, length, component.bytes());
+    return .{ .bytes = bytes orelse return null, .stride = @intCast(stride) };
+}
+
+fn resolveSparse(
+    source: *Source,
+    index: usize,
+    accessor: Accessor,
+    element_bytes: u32,
+) Error!?accessors.Sparse {
+    const raw = &Source.item(source.data.accessors, index).sparse;
+    if (raw.count == 0 or raw.count > accessor.count) return source.fail(
+        "accessor {d}: {d} sparse values for {d} elements",
+        .{ index, raw.count, accessor.count },
+    );
+    const index_component = switch (raw.indices_component_type) {
+        c.cgltf_component_type_r_8u => Component.u8,
+        c.cgltf_component_type_r_16u => Component.u16,
+        c.cgltf_component_type_r_32u => Component.u32,
+        else => return source.fail("accessor {d}: bad componentType of sparse indices", .{index}),
+    };
+    const count: u64 = raw.count;
+    const indices = try range(
+        source,
+        index,
+        "sparse indices: ",
+        raw.indices_buffer_view,
+        raw.indices_byte_offset,
+        count * index_component.bytes(),
+        index_component.bytes(),
+    );
+    const values = try range(
+        source,
+        index,
+        "sparse values: ",
+        raw.values_buffer_view,
+        raw.values_byte_offset,
+        count * element_bytes,
+        accessor.component.bytes(),
+    );
+    const sparse: accessors.Sparse = .{
+        .count = @intCast(count),
+        .indices = indices orelse return null,
+        .index_component = index_component,
+        .values = values orelse return null,
+    };
+    if (!source.sparse_checked) try checkSparse(source, index, accessor.count, sparse);
+    return sparse;
+}
+
+fn checkSparse(
+    source: *Source,
+    index: usize,
+    count: u32,
+    sparse: accessors.Sparse,
+) Error!void {
+    try source.charge(sparse.indices.len);
+    var next: u64 = 0;
+    for (0..sparse.count) |position| {
+        const target = sparse.index(position);
+        if (target < next) return source.fail(
+            "accessor {d}: sparse indices do not increase at {d}",
+            .{ index, position },
+        );
+        if (target >= count) return source.fail(
+            "accessor {d}: sparse index {d} of {d} elements",
+            .{ index, target, count },
+        );
+        next = @as(u64, target) + 1;
+    }
+}
+
+/// Fails where a number of the accessor is not finite. For those that are not decoded.
+pub fn checkFinite(source: *Source, index: u32, accessor: Accessor) Error!void {
+    if (source.finite.contains(index)) return;
+    try source.charge(@as(u64, accessor.count) * accessor.elementBytes());
+    if (accessors.findNotFinite(accessor)) |bad| return source.fail(
+        "accessor {d}: element {d} is not finite",
+        .{ index, bad },
+    );
+    try source.finite.put(source.gpa, index, {});
+}
+
+/// `length` bytes of a view from `offset`; null where its buffer has no data.
+fn range(
+    source: *const Source,
+    index: usize,
+    part: []const u8,
+    view: *const c.cgltf_buffer_view,
+    offset: u64,
+    length: u64,
+    alignment: u32,
+) Error!?[]const u8 {
+    const view_bytes: u64 = view.size;
+    const excess = (offset +| length) -| view_bytes;
+    if (excess > 0) return source.fail(
+        "accessor {d}: {s}{d} bytes past its buffer view {d}",
+        .{ index, part, excess, viewIndex(source, view) },
+    );
+    const start = @as(u64, view.offset) + offset;
+    if (start % alignment != 0) return source.fail(
+        "accessor {d}: {s}byte {d} of buffer {d} is not aligned to {d} bytes",
+        .{ index, part, start, bufferIndex(source, view), alignment },
+    );
+    const buffer = source.buffers[bufferIndex(source, view)] orelse return null;
+    // Whole views have been checked against their buffers.
+    assert(start + length <= buffer.len);
+    return buffer[@intCast(start)..][0..@intCast(length)];
+}
+
+fn checkView(source: *const Source, view: *const c.cgltf_buffer_view, index: usize) Error!void {
+    const buffer_bytes: u64 = view.buffer[0].size;
+    const excess = (@as(u64, view.offset) +| @as(u64, view.size)) -| buffer_bytes;
+    if (excess > 0) return source.fail(
+        "buffer view {d}: {d} bytes past its buffer {d}",
+        .{ index, excess, bufferIndex(source, view) },
+    );
+    if (view.size == 0) return source.fail("buffer view {d}: byteLength is 0", .{index});
+    if (view.stride == 0) return;
+    if (view.stride < 4 or view.stride > 252) return source.fail(
+        "buffer view {d}: byteStride {d} is not in 4..252",
+        .{ index, view.stride },
+    );
+    if (view.stride % 4 != 0) source.warn(
+        "buffer view {d}: byteStride {d} is no multiple of 4",
+        .{ index, view.stride },
+    );
+}
+
+fn viewIndex(source: *const Source, view: *const c.cgltf_buffer_view) u32 {
+    return Source.indexOf(source.data.buffer_views, view);
+}
+
+fn bufferIndex(source: *const Source, view: *const c.cgltf_buffer_view) u32 {
+    return Source.indexOf(source.data.buffers, view.buffer);
+}
+
+fn componentOf(raw: c.cgltf_component_type) ?Component {
+    return switch (raw) {
+        c.cgltf_component_type_r_8 => .i8,
+        c.cgltf_component_type_r_8u => .u8,
+        c.cgltf_component_type_r_16 => .i16,
+        c.cgltf_component_type_r_16u => .u16,
+        c.cgltf_component_type_r_32u => .u32,
+        c.cgltf_component_type_r_32f => .f32,
+        else => null,
+    };
+}
+
+fn componentCount(raw: c.cgltf_type) ?u8 {
+    return switch (raw) {
+        c.cgltf_type_scalar => 1,
+        c.cgltf_type_vec2 => 2,
+        c.cgltf_type_vec3 => 3,
+        c.cgltf_type_vec4 => 4,
+        c.cgltf_type_mat2 => 4,
+        c.cgltf_type_mat3 => 9,
+        c.cgltf_type_mat4 => 16,
+        else => null,
+    };
+}
+
+/// Bytes of an element; columns of matrices start at multiples of 4 bytes.
+fn paddedBytes(raw: c.cgltf_type, component: Component, component_count: u8) u32 {
+    const column_count: u32 = switch (raw) {
+        c.cgltf_type_mat2 => 2,
+        c.cgltf_type_mat3 => 3,
+        else => return @as(u32, component.bytes()) * component_count,
+    };
+    return column_count * std.mem.alignForward(u32, component.bytes() * column_count, 4);
+}

@@ -1,0 +1,197 @@
+//! Which accessors a primitive draws from, and whether they are of the right kind.
+//!
+//! In: a primitive's attributes, indices and morph targets. Out: the accessors of its positions,
+//! normals and colours. The kinds are those of glTF 2.0, section 3.7.2.1, and of
+//! KHR_mesh_quantization; an attribute that is not drawn has to be of its kind as well.
+
+const std = @import("std");
+const c = @import("cgltf");
+const accessors = @import("../accessor.zig");
+const asset = @import("asset.zig");
+const diagnostic = @import("../../diagnostic.zig");
+const gltf_accessors = @import("accessors.zig");
+const Meshes = @import("meshes.zig");
+const Source = @import("source.zig");
+const Accessor = accessors.Accessor;
+const Error = Source.Error;
+const Place = Meshes.Place;
+
+/// Indices of accessors.
+pub const Used = struct {
+    position: ?u32 = null,
+    normal: ?u32 = null,
+    color: ?u32 = null,
+};
+
+/// Finds and checks the attributes of a primitive, and those of its morph targets. Without
+/// positions nothing is found.
+pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) Error!Used {
+    const list = Source.slice(primitive.attributes, primitive.attributes_count);
+    const position = for (list) |*attribute| {
+        if (attribute.type != c.cgltf_attribute_type_position or attribute.index != 0) continue;
+        break accessorIndex(source, attribute);
+    } else return .{};
+    const positions = try required(source, position);
+    if (positions.base == null and positions.sparse == null) {
+        if (primitive.has_draco_mesh_compression != 0) return source.fail(
+            "{f}: its data is in 'KHR_draco_mesh_compression', which is not supported",
+            .{place},
+        );
+        return source.fail("accessor {d}: positions without data", .{position});
+    }
+
+    var used: Used = .{};
+    for (list) |*attribute| {
+        const index = accessorIndex(source, attribute);
+        try checkAttribute(source, attribute, index, positions.count, place);
+        if (attribute.index != 0) continue;
+        const slot: *?u32 = switch (attribute.type) {
+            c.cgltf_attribute_type_position => &used.position,
+            c.cgltf_attribute_type_normal => &used.normal,
+            c.cgltf_attribute_type_color => &used.color,
+            else => continue,
+        };
+        if (slot.* != null) {
+            return source.fail("{f}: {f} stands twice", .{ place, quote(attribute) });
+        }
+        slot.* = index;
+    }
+    for (Source.slice(primitive.targets, primitive.targets_count)) |*target| {
+        for (Source.slice(target.attributes, target.attributes_count)) |*attribute| {
+            try checkTarget(source, attribute, positions.count, place);
+        }
+    }
+    return used;
+}
+
+/// The accessor of a primitive's indices.
+pub fn indices(source: *Source, index: u32) Error!Accessor {
+    const accessor = try required(source, index);
+    const unsigned = switch (accessor.component) {
+        .u8, .u16, .u32 => true,
+        .i8, .i16, .f32 => false,
+    };
+    if (!unsigned or accessor.component_count != 1) return source.fail(
+        "accessor {d}: indices have to be single unsigned integers",
+        .{index},
+    );
+    return accessor;
+}
+
+/// An accessor that something drawn needs.
+pub fn required(source: *Source, index: u32) Error!Accessor {
+    return try gltf_accessors.resolve(source, index) orelse
+        source.fail("accessor {d}: its buffer has no data, or only compressed data", .{index});
+}
+
+fn accessorIndex(source: *const Source, attribute: *const c.cgltf_attribute) u32 {
+    return Source.indexOf(source.data.accessors, attribute.data);
+}
+
+fn quote(attribute: *const c.cgltf_attribute) diagnostic.Quoted {
+    return diagnostic.quote(std.mem.span(@as([*:0]const u8, attribute.name)));
+}
+
+fn checkAttribute(
+    source: *Source,
+    attribute: *const c.cgltf_attribute,
+    index: u32,
+    vertex_count: u32,
+    place: Place,
+) Error!void {
+    const accessor = try required(source, index);
+    try checkCount(source, accessor, index, vertex_count, place);
+    const fits = fits: switch (kindOf(accessor, attribute.type)) {
+        .core => true,
+        .quantized => {
+            if (!asset.uses(source, "KHR_mesh_quantization")) source.warn(
+                "accessor {d}: its type needs KHR_mesh_quantization, which the file does not name",
+                .{index},
+            );
+            break :fits true;
+        },
+        .wrong => false,
+    };
+    if (!fits) return source.fail("{f}: accessor {d} has no type for {f}", .{
+        place, index, quote(attribute),
+    });
+    if (attribute.type == c.cgltf_attribute_type_texcoord) {
+        try gltf_accessors.checkFinite(source, index, accessor);
+    }
+}
+
+fn checkTarget(
+    source: *Source,
+    attribute: *const c.cgltf_attribute,
+    vertex_count: u32,
+    place: Place,
+) Error!void {
+    const index = accessorIndex(source, attribute);
+    const accessor = try gltf_accessors.resolve(source, index) orelse return;
+    try checkCount(source, accessor, index, vertex_count, place);
+    const vector = switch (attribute.type) {
+        c.cgltf_attribute_type_position,
+        c.cgltf_attribute_type_normal,
+        c.cgltf_attribute_type_tangent,
+        => true,
+        else => false,
+    };
+    if (vector and accessor.component_count != 3) return source.fail(
+        "{f}: accessor {d} has no type for a morph target's {f}",
+        .{ place, index, quote(attribute) },
+    );
+}
+
+fn checkCount(
+    source: *const Source,
+    accessor: Accessor,
+    index: u32,
+    vertex_count: u32,
+    place: Place,
+) Error!void {
+    if (accessor.count != vertex_count) return source.fail(
+        "{f}: accessor {d} has {d} elements for {d} vertices",
+        .{ place, index, accessor.count, vertex_count },
+    );
+}
+
+/// Whether a type is glTF's own for an attribute, comes with KHR_mesh_quantization, or is neither.
+const Kind = enum { core, quantized, wrong };
+
+fn kindOf(accessor: Accessor, attribute: c.cgltf_attribute_type) Kind {
+    const count = accessor.component_count;
+    const component = accessor.component;
+    const small_signed = component == .i8 or component == .i16;
+    const small_unsigned = component == .u8 or component == .u16;
+    const small = small_signed or small_unsigned;
+    const count_fits = switch (attribute) {
+        c.cgltf_attribute_type_position, c.cgltf_attribute_type_normal => count == 3,
+        c.cgltf_attribute_type_texcoord => count == 2,
+        c.cgltf_attribute_type_color => count == 3 or count == 4,
+        c.cgltf_attribute_type_tangent,
+        c.cgltf_attribute_type_joints,
+        c.cgltf_attribute_type_weights,
+        => count == 4,
+        else => return .core,
+    };
+    if (!count_fits) return .wrong;
+    switch (attribute) {
+        c.cgltf_attribute_type_joints => return if (small_unsigned) .core else .wrong,
+        else => if (component == .f32) return .core,
+    }
+    return switch (attribute) {
+        c.cgltf_attribute_type_position => if (small) .quantized else .wrong,
+        // A direction is the same whether its numbers are normalised or not.
+        c.cgltf_attribute_type_normal,
+        c.cgltf_attribute_type_tangent,
+        => if (small_signed) .quantized else .wrong,
+        c.cgltf_attribute_type_texcoord => if (small_unsigned and accessor.normalized)
+            .core
+        else if (small)
+            .quantized
+        else
+            .wrong,
+        // Colours and weights.
+        else => if (small_unsigned and accessor.normalized) .core else .wrong,
+    };
+}

@@ -1,0 +1,175 @@
+//! The node hierarchy of the shown scene, in an order where parents come before their children.
+//!
+//! In: glTF's nodes and scenes (glTF 2.0, section 3.5). Out: `scene.Node`s, and for each the glTF
+//! node it comes from. Explicit stacks: a chain may be as deep as the file is long. Every node of
+//! the file has to be in a tree, shown or not.
+
+const std = @import("std");
+const c = @import("cgltf");
+const math = @import("../../math.zig");
+const scene = @import("../../scene.zig");
+const Source = @import("source.zig");
+const Affine = math.Affine;
+const Error = Source.Error;
+const Vec3 = math.Vec3;
+const assert = std.debug.assert;
+
+/// The nodes that the shown scene reaches.
+pub const Nodes = struct {
+    /// In the scene's memory.
+    list: []const scene.Node,
+    /// Index of the glTF node of each; freed by the caller.
+    origins: []const u32,
+};
+
+/// A node that waits for its turn.
+const Pending = struct { origin: u32, parent: u32 };
+
+/// Collects the nodes of the scene that the file shows: `scene`, else the first one, else every
+/// root. The caller frees `origins` with the source's `gpa`.
+pub fn collect(source: *Source) Error!Nodes {
+    const gpa = source.gpa;
+    const node_count = source.data.nodes_count;
+    try checkTrees(source);
+    var stack: std.ArrayList(Pending) = .empty;
+    defer stack.deinit(gpa);
+    var listed = try std.DynamicBitSetUnmanaged.initEmpty(gpa, node_count);
+    defer listed.deinit(gpa);
+    try pushRoots(source, &stack, &listed);
+
+    var origins: std.ArrayList(u32) = .empty;
+    errdefer origins.deinit(gpa);
+    var parents: std.ArrayList(u32) = .empty;
+    defer parents.deinit(gpa);
+    while (stack.pop()) |pending| {
+        const index: u32 = @intCast(origins.items.len);
+        try origins.append(gpa, pending.origin);
+        try parents.append(gpa, pending.parent);
+        const node = Source.item(source.data.nodes, pending.origin);
+        const children = Source.slice(node.children, node.children_count);
+        try stack.ensureUnusedCapacity(gpa, children.len);
+        for (0..children.len) |position| stack.appendAssumeCapacity(.{
+            .origin = Source.indexOf(source.data.nodes, children[children.len - 1 - position]),
+            .parent = index,
+        });
+    }
+    assert(origins.items.len <= node_count);
+
+    const list = try source.arena.alloc(scene.Node, origins.items.len);
+    for (list, origins.items, parents.items) |*node, origin, parent| {
+        node.* = .{ .parent = parent, .local = try localTransform(source, origin) };
+    }
+    return .{ .list = list, .origins = try origins.toOwnedSlice(gpa) };
+}
+
+/// The roots of the shown scene, the first on top.
+fn pushRoots(
+    source: *const Source,
+    stack: *std.ArrayList(Pending),
+    listed: *std.DynamicBitSetUnmanaged,
+) Error!void {
+    const gpa = source.gpa;
+    const data = source.data;
+    const shown = if (data.scene) |chosen| chosen else if (data.scenes_count > 0)
+        data.scenes
+    else {
+        for (0..data.nodes_count) |reversed| {
+            const index = data.nodes_count - 1 - reversed;
+            if (data.nodes[index].parent != null) continue;
+            try stack.append(gpa, .{ .origin = @intCast(index), .parent = scene.none });
+        }
+        return;
+    };
+    const roots = Source.slice(shown[0].nodes, shown[0].nodes_count);
+    for (0..roots.len) |reversed| {
+        const index = Source.indexOf(data.nodes, roots[roots.len - 1 - reversed]);
+        if (listed.isSet(index)) return source.fail(
+            "scene {d}: lists node {d} twice",
+            .{ Source.indexOf(data.scenes, shown), index },
+        );
+        listed.set(index);
+        try stack.append(gpa, .{ .origin = index, .parent = scene.none });
+    }
+}
+
+/// Fails where nodes are their own ancestors. cgltf has refused nodes with two parents, so what no
+/// root reaches lies on a cycle or below one.
+fn checkTrees(source: *const Source) Error!void {
+    const gpa = source.gpa;
+    const data = source.data;
+    var reached = try std.DynamicBitSetUnmanaged.initEmpty(gpa, data.nodes_count);
+    defer reached.deinit(gpa);
+    var stack: std.ArrayList(u32) = .empty;
+    defer stack.deinit(gpa);
+    for (Source.slice(data.nodes, data.nodes_count), 0..) |*node, index| {
+        if (node.parent == null) try stack.append(gpa, @intCast(index));
+    }
+    while (stack.pop()) |index| {
+        reached.set(index);
+        const node = Source.item(data.nodes, index);
+        for (Source.slice(node.children, node.children_count)) |child| {
+            try stack.append(gpa, Source.indexOf(data.nodes, child));
+        }
+    }
+    var missing = reached.iterator(.{ .kind = .unset });
+    if (missing.next()) |index| return source.fail(
+        "node {d}: is its own ancestor, or hangs below a node that is",
+        .{index},
+    );
+}
+
+/// A node's map into its parent's space: its matrix, or translation, rotation and scale.
+fn localTransform(source: *const Source, index: u32) Error!Affine {
+    const node = Source.item(source.data.nodes, index);
+    var local: Affine = undefined;
+    if (node.has_matrix != 0) {
+        const also = node.has_translation != 0 or node.has_rotation != 0 or node.has_scale != 0;
+        if (also) source.warn(
+            "node {d}: has a matrix, so its other transforms are ignored",
+            .{index},
+        );
+        const m = node.matrix;
+        for ([4]f32{ m[3], m[7], m[11], m[15] }, [4]f32{ 0, 0, 0, 1 }) |value, wanted| {
+            if (!(@abs(value - wanted) <= 1e-5)) return source.fail(
+                "node {d}: matrix is not affine, its last row is {d} {d} {d} {d}",
+                .{ index, m[3], m[7], m[11], m[15] },
+            );
+        }
+        local = .{
+            .x = m[0..3].*,
+            .y = m[4..7].*,
+            .z = m[8..11].*,
+            .translation = m[12..15].*,
+        };
+    } else {
+        const rotation = try unitQuaternion(source, index, node.rotation);
+        local = .fromTrs(node.translation, rotation, node.scale);
+    }
+    inline for (.{ &local.x, &local.y, &local.z, &local.translation }) |column| {
+        for (column) |*value| value.* = math.vec3.flushDenormal(value.*);
+    }
+    if (!local.isFinite()) return source.fail("node {d}: transform is not finite", .{index});
+    return local;
+}
+
+fn unitQuaternion(source: *const Source, index: u32, rotation: [4]f32) Error![4]f32 {
+    const x: f64 = rotation[0];
+    const y: f64 = rotation[1];
+    const z: f64 = rotation[2];
+    const w: f64 = rotation[3];
+    const length = @sqrt(((x * x + y * y) + z * z) + w * w);
+    if (!std.math.isFinite(length)) {
+        return source.fail("node {d}: rotation is not finite", .{index});
+    }
+    if (length < std.math.floatMin(f32)) {
+        source.warn("node {d}: rotation is zero, taken as none", .{index});
+        return .{ 0, 0, 0, 1 };
+    }
+    if (@abs(length - 1) > 1e-3) {
+        source.warn("node {d}: rotation is not a unit quaternion, made one", .{index});
+    }
+    return .{
+        @floatCast(x / length), @floatCast(y / length),
+        @floatCast(z / length), @floatCast(w / length),
+    };
+}

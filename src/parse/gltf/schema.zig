@@ -1,0 +1,379 @@
+//! What glTF 2.0 holds where, as far as this reader and cgltf look at it.
+//!
+//! A table for json.zig: the types of the properties, which of them have to be there, and which
+//! whole numbers name elements of which list. cgltf takes a string for "no index" and loses its
+//! place in a list of the wrong kind; with this table it never sees either. Only what something
+//! depends on is required, so that files that are slightly wrong are still read.
+
+const json = @import("../json.zig");
+const Field = json.Field;
+const Rule = json.Rule;
+
+/// The counted lists.
+pub const List = enum(u8) {
+    accessors,
+    buffers,
+    buffer_views,
+    cameras,
+    images,
+    lights,
+    materials,
+    meshes,
+    nodes,
+    samplers,
+    scenes,
+    skins,
+    textures,
+    variants,
+};
+
+/// The whole document.
+pub const document: Rule = object(&.{
+    required("asset", object(&.{
+        required("version", .string),
+        optional("minVersion", .string),
+        optional("generator", .string),
+        optional("copyright", .string),
+        optional("extensions", extensions(&.{})),
+    })),
+    optional("accessors", list(.accessors, &accessor)),
+    optional("animations", many(&animation)),
+    optional("buffers", list(.buffers, &buffer)),
+    optional("bufferViews", list(.buffer_views, &buffer_view)),
+    optional("cameras", list(.cameras, &camera)),
+    optional("images", list(.images, &image)),
+    optional("materials", list(.materials, &material)),
+    optional("meshes", list(.meshes, &mesh)),
+    optional("nodes", list(.nodes, &node)),
+    optional("samplers", list(.samplers, &sampler)),
+    optional("scene", reference(.scenes)),
+    optional("scenes", list(.scenes, &scene)),
+    optional("skins", list(.skins, &skin)),
+    optional("textures", list(.textures, &texture)),
+    optional("extensionsUsed", many(&.string)),
+    optional("extensionsRequired", many(&.string)),
+    optional("extensions", extensions(&.{
+        optional("KHR_lights_punctual", object(&.{
+            required("lights", list(.lights, &light)),
+        })),
+        optional("KHR_materials_variants", object(&.{
+            optional("variants", list(.variants, &object(&.{optional("name", .string)}))),
+        })),
+    })),
+    optional("extras", .any),
+});
+
+const accessor: Rule = named(&.{
+    optional("bufferView", reference(.buffer_views)),
+    optional("byteOffset", .whole),
+    required("componentType", .whole),
+    optional("normalized", .boolean),
+    required("count", .whole),
+    required("type", .string),
+    optional("max", many(&.number)),
+    optional("min", many(&.number)),
+    optional("sparse", object(&.{
+        required("count", .whole),
+        required("indices", object(&.{
+            required("bufferView", reference(.buffer_views)),
+            optional("byteOffset", .whole),
+            required("componentType", .whole),
+        })),
+        required("values", object(&.{
+            required("bufferView", reference(.buffer_views)),
+            optional("byteOffset", .whole),
+        })),
+    })),
+});
+
+const animation: Rule = named(&.{
+    optional("channels", many(&object(&.{
+        required("sampler", .whole),
+        optional("target", object(&.{
+            optional("node", reference(.nodes)),
+            optional("path", .string),
+            optional("extensions", extensions(&.{})),
+        })),
+        optional("extensions", extensions(&.{})),
+    }))),
+    optional("samplers", many(&object(&.{
+        required("input", reference(.accessors)),
+        required("output", reference(.accessors)),
+        optional("interpolation", .string),
+        optional("extensions", extensions(&.{})),
+    }))),
+});
+
+const buffer: Rule = named(&.{
+    optional("uri", .string),
+    required("byteLength", .whole),
+});
+
+const buffer_view: Rule = namedWith(&.{
+    required("buffer", reference(.buffers)),
+    optional("byteOffset", .whole),
+    required("byteLength", .whole),
+    optional("byteStride", .whole),
+    optional("target", .whole),
+}, &.{
+    optional("EXT_meshopt_compression", meshopt),
+    optional("KHR_meshopt_compression", meshopt),
+});
+
+const meshopt: Rule = object(&.{
+    required("buffer", reference(.buffers)),
+    optional("byteOffset", .whole),
+    optional("byteLength", .whole),
+    optional("byteStride", .whole),
+    optional("count", .whole),
+    optional("mode", .string),
+    optional("filter", .string),
+});
+
+const camera: Rule = named(&.{
+    optional("type", .string),
+    optional("perspective", object(&.{
+        optional("aspectRatio", .number),
+        required("yfov", .number),
+        optional("zfar", .number),
+        optional("znear", .number),
+    })),
+    optional("orthographic", object(&.{
+        required("xmag", .number),
+        required("ymag", .number),
+        optional("zfar", .number),
+        optional("znear", .number),
+    })),
+});
+
+const image: Rule = named(&.{
+    optional("uri", .string),
+    optional("mimeType", .string),
+    optional("bufferView", reference(.buffer_views)),
+});
+
+const light: Rule = named(&.{
+    required("type", .string),
+    optional("color", .{ .vector = 3 }),
+    optional("intensity", .number),
+    optional("range", .positive),
+    optional("spot", object(&.{
+        optional("innerConeAngle", .number),
+        optional("outerConeAngle", .number),
+    })),
+});
+
+const mesh: Rule = named(&.{
+    required("primitives", many(&primitive)),
+    optional("weights", many(&.number)),
+});
+
+const primitive: Rule = namedWith(&.{
+    required("attributes", attributes),
+    optional("indices", reference(.accessors)),
+    optional("material", reference(.materials)),
+    optional("mode", .whole),
+    optional("targets", many(&attributes)),
+}, &.{
+    optional("KHR_draco_mesh_compression", object(&.{
+        required("bufferView", reference(.buffer_views)),
+        // Numbers of Draco's own, which cgltf takes for accessors.
+        required("attributes", map(&.whole)),
+    })),
+    optional("KHR_materials_variants", object(&.{
+        optional("mappings", many(&object(&.{
+            required("material", reference(.materials)),
+            required("variants", many(&.whole)),
+        }))),
+    })),
+});
+
+const attributes: Rule = map(&reference(.accessors));
+
+const node: Rule = namedWith(&.{
+    optional("camera", reference(.cameras)),
+    optional("children", many(&.{ .reference = .{
+        .list = @backingInt(List.nodes),
+        .role = .child,
+    } })),
+    optional("skin", reference(.skins)),
+    optional("matrix", .{ .vector = 16 }),
+    optional("mesh", reference(.meshes)),
+    optional("rotation", .{ .vector = 4 }),
+    optional("scale", .{ .vector = 3 }),
+    optional("translation", .{ .vector = 3 }),
+    optional("weights", many(&.number)),
+}, &.{
+    optional("KHR_lights_punctual", object(&.{optional("light", reference(.lights))})),
+    optional("EXT_mesh_gpu_instancing", object(&.{optional("attributes", attributes)})),
+});
+
+const sampler: Rule = named(&.{
+    optional("magFilter", .whole),
+    optional("minFilter", .whole),
+    optional("wrapS", .whole),
+    optional("wrapT", .whole),
+});
+
+const scene: Rule = named(&.{
+    optional("nodes", many(&.{ .reference = .{
+        .list = @backingInt(List.nodes),
+        .role = .root,
+    } })),
+});
+
+const skin: Rule = named(&.{
+    optional("inverseBindMatrices", reference(.accessors)),
+    optional("skeleton", reference(.nodes)),
+    required("joints", many(&reference(.nodes))),
+});
+
+const texture: Rule = namedWith(&.{
+    optional("sampler", reference(.samplers)),
+    optional("source", reference(.images)),
+}, &.{
+    optional("KHR_texture_basisu", object(&.{optional("source", reference(.images))})),
+    optional("EXT_texture_webp", object(&.{optional("source", reference(.images))})),
+});
+
+/// A texture as a material refers to it.
+const texture_use: Rule = namedWith(&.{
+    required("index", reference(.textures)),
+    optional("texCoord", .whole),
+    optional("scale", .number),
+    optional("strength", .number),
+}, &.{
+    optional("KHR_texture_transform", object(&.{
+        optional("offset", .{ .vector = 2 }),
+        optional("rotation", .number),
+        optional("scale", .{ .vector = 2 }),
+        optional("texCoord", .whole),
+    })),
+});
+
+const material: Rule = namedWith(&.{
+    optional("pbrMetallicRoughness", object(&.{
+        optional("baseColorFactor", .{ .vector = 4 }),
+        optional("baseColorTexture", texture_use),
+        optional("metallicFactor", .number),
+        optional("roughnessFactor", .number),
+        optional("metallicRoughnessTexture", texture_use),
+    })),
+    optional("normalTexture", texture_use),
+    optional("occlusionTexture", texture_use),
+    optional("emissiveTexture", texture_use),
+    optional("emissiveFactor", .{ .vector = 3 }),
+    optional("alphaMode", .{ .word = &.{ "OPAQUE", "MASK", "BLEND" } }),
+    optional("alphaCutoff", .number),
+    optional("doubleSided", .boolean),
+}, &material_extensions);
+
+const material_extensions = [_]Field{
+    optional("KHR_materials_ior", object(&.{optional("ior", .number)})),
+    optional("KHR_materials_emissive_strength", object(&.{
+        optional("emissiveStrength", .number),
+    })),
+    optional("KHR_materials_dispersion", object(&.{optional("dispersion", .number)})),
+    optional("KHR_materials_unlit", object(&.{})),
+    optional("KHR_materials_transmission", object(&.{
+        optional("transmissionFactor", .number),
+        optional("transmissionTexture", texture_use),
+    })),
+    optional("KHR_materials_volume", object(&.{
+        optional("thicknessFactor", .number),
+        optional("thicknessTexture", texture_use),
+        optional("attenuationDistance", .number),
+        optional("attenuationColor", .{ .vector = 3 }),
+    })),
+    optional("KHR_materials_pbrSpecularGlossiness", object(&.{
+        optional("diffuseFactor", .{ .vector = 4 }),
+        optional("diffuseTexture", texture_use),
+        optional("specularFactor", .{ .vector = 3 }),
+        optional("glossinessFactor", .number),
+        optional("specularGlossinessTexture", texture_use),
+    })),
+    optional("KHR_materials_clearcoat", object(&.{
+        optional("clearcoatFactor", .number),
+        optional("clearcoatTexture", texture_use),
+        optional("clearcoatRoughnessFactor", .number),
+        optional("clearcoatRoughnessTexture", texture_use),
+        optional("clearcoatNormalTexture", texture_use),
+    })),
+    optional("KHR_materials_specular", object(&.{
+        optional("specularFactor", .number),
+        optional("specularTexture", texture_use),
+        optional("specularColorFactor", .{ .vector = 3 }),
+        optional("specularColorTexture", texture_use),
+    })),
+    optional("KHR_materials_sheen", object(&.{
+        optional("sheenColorFactor", .{ .vector = 3 }),
+        optional("sheenColorTexture", texture_use),
+        optional("sheenRoughnessFactor", .number),
+        optional("sheenRoughnessTexture", texture_use),
+    })),
+    optional("KHR_materials_iridescence", object(&.{
+        optional("iridescenceFactor", .number),
+        optional("iridescenceTexture", texture_use),
+        optional("iridescenceIor", .number),
+        optional("iridescenceThicknessMinimum", .number),
+        optional("iridescenceThicknessMaximum", .number),
+        optional("iridescenceThicknessTexture", texture_use),
+    })),
+    optional("KHR_materials_diffuse_transmission", object(&.{
+        optional("diffuseTransmissionFactor", .number),
+        optional("diffuseTransmissionTexture", texture_use),
+        optional("diffuseTransmissionColorFactor", .{ .vector = 3 }),
+        optional("diffuseTransmissionColorTexture", texture_use),
+    })),
+    optional("KHR_materials_anisotropy", object(&.{
+        optional("anisotropyStrength", .number),
+        optional("anisotropyRotation", .number),
+        optional("anisotropyTexture", texture_use),
+    })),
+};
+
+fn optional(comptime name: []const u8, comptime rule: Rule) Field {
+    return .{ .name = name, .rule = rule };
+}
+
+fn required(comptime name: []const u8, comptime rule: Rule) Field {
+    return .{ .name = name, .rule = rule, .required = true };
+}
+
+fn object(comptime fields: []const Field) Rule {
+    return .{ .object = &.{ .fields = fields } };
+}
+
+/// An object with a name, extensions and extras, as most are.
+fn named(comptime fields: []const Field) Rule {
+    return namedWith(fields, &.{});
+}
+
+fn namedWith(comptime fields: []const Field, comptime known: []const Field) Rule {
+    return object(fields ++ [_]Field{
+        optional("name", .string),
+        optional("extensions", extensions(known)),
+        optional("extras", .any),
+    });
+}
+
+/// Extensions have names of their own choice, but are objects.
+fn extensions(comptime known: []const Field) Rule {
+    return .{ .object = &.{ .fields = known, .rest = &object(&.{}) } };
+}
+
+fn map(comptime item: *const Rule) Rule {
+    return .{ .object = &.{ .rest = item } };
+}
+
+fn many(comptime item: *const Rule) Rule {
+    return .{ .array = .{ .item = item } };
+}
+
+fn list(comptime counted: List, comptime item: *const Rule) Rule {
+    return .{ .array = .{ .item = item, .list = @backingInt(counted) } };
+}
+
+fn reference(comptime counted: List) Rule {
+    return .{ .reference = .{ .list = @backingInt(counted) } };
+}

@@ -1,0 +1,76 @@
+//! What the parts of the glTF reader share: the document, its buffers, where results go.
+//!
+//! Nothing is checked here but that a reference is one. Memory from `arena` is the scene's and
+//! stays; memory from `gpa` is given back before the reader ends.
+
+const std = @import("std");
+const c = @import("cgltf");
+const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
+const Allocator = std.mem.Allocator;
+const assert = std.debug.assert;
+const Source = @This();
+
+gpa: Allocator,
+/// The scene's memory.
+arena: Allocator,
+data: *const c.cgltf_data,
+/// Bytes of each buffer, as many as its byteLength says; null where the file gives none.
+buffers: []const ?[]const u8 = &.{},
+diagnostic: *Diagnostic,
+/// Bytes that decoded vertices and triangles may still take, and undrawn ones that are looked at.
+decoded_bytes_left: u64 = 0,
+/// Whether sparse indices are known to be in order and in range.
+sparse_checked: bool = false,
+/// Accessors without a number that is not finite, other than those that have been decoded.
+finite: std.AutoHashMapUnmanaged(u32, void) = .empty,
+
+/// See parse.zig.
+pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
+
+/// Frees what the reader has noted.
+pub fn deinit(source: *Source) void {
+    source.finite.deinit(source.gpa);
+    source.* = undefined;
+}
+
+/// Ends the reader with one line.
+pub fn fail(
+    source: *const Source,
+    comptime format: []const u8,
+    arguments: anytype,
+) error{InvalidInput} {
+    return source.diagnostic.fail(error.InvalidInput, format, arguments);
+}
+
+/// Adds a warning.
+pub fn warn(source: *const Source, comptime format: []const u8, arguments: anytype) void {
+    source.diagnostic.warn(format, arguments);
+}
+
+/// Counts decoded data before it is allocated.
+pub fn charge(source: *Source, byte_count: u64) Error!void {
+    if (byte_count > source.decoded_bytes_left) return source.fail(
+        "decoded meshes would need much more memory than the file's size explains",
+        .{},
+    );
+    source.decoded_bytes_left -= byte_count;
+}
+
+/// Index of `element` in `list`. Asserts that it is an element of it.
+pub fn indexOf(list: anytype, element: anytype) u32 {
+    const bytes = @intFromPtr(element) - @intFromPtr(list);
+    const size = @sizeOf(@typeInfo(@TypeOf(list)).pointer.child);
+    assert(bytes % size == 0);
+    return @intCast(bytes / size);
+}
+
+/// An element of cgltf's array.
+pub fn item(list: anytype, index: usize) *const @typeInfo(@TypeOf(list)).pointer.child {
+    return @ptrCast(&list[index]);
+}
+
+/// cgltf's array as a slice; it is null where the file has none.
+pub fn slice(list: anytype, count: usize) []const @typeInfo(@TypeOf(list)).pointer.child {
+    if (count == 0) return &.{};
+    return list[0..count];
+}

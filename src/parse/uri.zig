@@ -1,0 +1,171 @@
+//! URIs of glTF: data in the text itself, or the path of a file beside it.
+//!
+//! In: a URI reference (RFC 3986; data URIs: RFC 2397). Out: the bytes of a base64 data URI, or a
+//! relative path with its percent signs decoded. What names anything but a file below the scene's
+//! folder is refused after decoding, not before it.
+
+const std = @import("std");
+const Allocator = std.mem.Allocator;
+const assert = std.debug.assert;
+
+/// What a URI is.
+pub const Kind = union(enum) {
+    /// The base64 text of a data URI.
+    base64: []const u8,
+    /// A path, still percent-encoded.
+    path: []const u8,
+    /// A data URI of another encoding.
+    data_not_base64,
+    /// Something with a scheme (`http:`, `file:`).
+    scheme: []const u8,
+};
+
+/// Tells what a URI is.
+pub fn classify(uri: []const u8) Kind {
+    const colon = schemeLength(uri) orelse return .{ .path = uri };
+    if (!std.ascii.eqlIgnoreCase(uri[0..colon], "data")) return .{ .scheme = uri[0..colon] };
+    const rest = uri[colon + 1 ..];
+    const comma = std.mem.findScalar(u8, rest, ',') orelse return .data_not_base64;
+    if (!std.ascii.endsWithIgnoreCase(rest[0..comma], ";base64")) return .data_not_base64;
+    return .{ .base64 = rest[comma + 1 ..] };
+}
+
+/// Position of the colon that ends a scheme.
+fn schemeLength(uri: []const u8) ?usize {
+    if (uri.len == 0 or !std.ascii.isAlphabetic(uri[0])) return null;
+    for (uri, 0..) |byte, index| switch (byte) {
+        'a'...'z', 'A'...'Z', '0'...'9', '+', '-', '.' => {},
+        ':' => return index,
+        else => return null,
+    };
+    return null;
+}
+
+/// Decodes base64 with or without padding. The caller frees the bytes with `gpa`.
+pub fn decodeBase64(gpa: Allocator, text: []const u8) error{ OutOfMemory, NotBase64 }![]u8 {
+    var digits = text;
+    for (0..2) |_| {
+        if (std.mem.endsWith(u8, digits, "=")) digits = digits[0 .. digits.len - 1];
+    }
+    const decoder = std.base64.standard_no_pad.Decoder;
+    const length = decoder.calcSizeForSlice(digits) catch return error.NotBase64;
+    const bytes = try gpa.alloc(u8, length);
+    errdefer gpa.free(bytes);
+    decoder.decode(bytes, digits) catch return error.NotBase64;
+    return bytes;
+}
+
+/// Why a path is refused.
+pub const PathError = error{ OutOfMemory, BadEscape, HasNul, Empty, Outside };
+
+/// Decodes the percent signs of a path. With `allow_outside` it may leave the folder that it is
+/// relative to, or be absolute. The caller frees the path with `gpa`.
+pub fn decodePath(gpa: Allocator, encoded: []const u8, allow_outside: bool) PathError![]u8 {
+    var path: std.ArrayList(u8) = .empty;
+    errdefer path.deinit(gpa);
+    try path.ensureTotalCapacity(gpa, encoded.len);
+    var index: usize = 0;
+    while (index < encoded.len) : (index += 1) {
+        if (encoded[index] != '%') {
+            path.appendAssumeCapacity(encoded[index]);
+            continue;
+        }
+        if (encoded.len - index < 3) return error.BadEscape;
+        const high = std.fmt.charToDigit(encoded[index + 1], 16) catch return error.BadEscape;
+        const low = std.fmt.charToDigit(encoded[index + 2], 16) catch return error.BadEscape;
+        path.appendAssumeCapacity(high * 16 + low);
+        index += 2;
+    }
+    if (std.mem.findScalar(u8, path.items, 0) != null) return error.HasNul;
+    if (path.items.len == 0) return error.Empty;
+    if (!allow_outside and leavesFolder(path.items)) return error.Outside;
+    return path.toOwnedSlice(gpa);
+}
+
+/// Whether a path, read step by step, is ever above the folder it starts from.
+fn leavesFolder(path: []const u8) bool {
+    if (path[0] == '/') return true;
+    // A separator elsewhere, and part of no name that a portable file would use.
+    if (std.mem.findScalar(u8, path, '\\') != null) return true;
+    var depth: usize = 0;
+    var parts = std.mem.splitScalar(u8, path, '/');
+    while (parts.next()) |part| {
+        if (part.len == 0 or std.mem.eql(u8, part, ".")) continue;
+        if (!std.mem.eql(u8, part, "..")) {
+            depth += 1;
+            continue;
+        }
+        if (depth == 0) return true;
+        depth -= 1;
+    }
+    return false;
+}
+
+/// Whether the absolute path `path` lies below the absolute folder `folder`; both without links.
+pub fn isBelow(path: []const u8, folder: []const u8) bool {
+    assert(std.fs.path.isAbsolute(path) and std.fs.path.isAbsolute(folder));
+    if (!std.mem.startsWith(u8, path, folder)) return false;
+    return folder[folder.len - 1] == '/' or (path.len > folder.len and path[folder.len] == '/');
+}
+
+test classify {
+    const expectEqualStrings = std.testing.expectEqualStrings;
+    try expectEqualStrings("AAAA", classify("data:a/b;base64,AAAA").base64);
+    try expectEqualStrings("", classify("DATA:;BASE64,").base64);
+    try std.testing.expect(classify("data:text/plain,AAAA") == .data_not_base64);
+    try std.testing.expect(classify("data:a/b;base64") == .data_not_base64);
+    try expectEqualStrings("file", classify("file:///etc/hostname").scheme);
+    try expectEqualStrings("x", classify("x:y").scheme);
+    for ([_][]const u8{ "", "a.bin", "a/b:c", "1:2", "./x:y", "%41:" }) |path| {
+        try expectEqualStrings(path, classify(path).path);
+    }
+}
+
+test decodeBase64 {
+    const gpa = std.testing.allocator;
+    inline for (.{
+        .{ "", "" },       .{ "QQ==", "A" },   .{ "QQ", "A" },
+        .{ "QUI=", "AB" }, .{ "QUJD", "ABC" }, .{ "/+8=", "\xff\xef" },
+    }) |pair| {
+        const bytes = try decodeBase64(gpa, pair[0]);
+        defer gpa.free(bytes);
+        try std.testing.expectEqualStrings(pair[1], bytes);
+    }
+    for ([_][]const u8{ "Q", "Q===", "QU*D", "QU D", "QU=D", "QQ==\n" }) |text| {
+        try std.testing.expectError(error.NotBase64, decodeBase64(gpa, text));
+    }
+}
+
+test decodePath {
+    const gpa = std.testing.allocator;
+    inline for (.{
+        .{ "my%20quad.bin", "my quad.bin" }, .{ "a/../b", "a/../b" },
+        .{ "%41%2fb", "A/b" },               .{ "./a//b", "./a//b" },
+        .{ "..a", "..a" },
+    }) |pair| {
+        const path = try decodePath(gpa, pair[0], false);
+        defer gpa.free(path);
+        try std.testing.expectEqualStrings(pair[1], path);
+    }
+    const outside = [_][]const u8{
+        "..",         "../a",   "a/../../b", "/etc/hostname", "%2E%2E/a",
+        "%2e%2e%2fa", "%2Fetc", "a\\b",      "..%5ca",
+    };
+    for (outside) |encoded| {
+        try std.testing.expectError(error.Outside, decodePath(gpa, encoded, false));
+        gpa.free(try decodePath(gpa, encoded, true));
+    }
+    for ([_][]const u8{ "%", "a%2", "%zz", "%-1" }) |encoded| {
+        try std.testing.expectError(error.BadEscape, decodePath(gpa, encoded, true));
+    }
+    try std.testing.expectError(error.HasNul, decodePath(gpa, "a%00.bin", true));
+    try std.testing.expectError(error.Empty, decodePath(gpa, "", true));
+}
+
+test isBelow {
+    try std.testing.expect(isBelow("/a/b", "/a"));
+    try std.testing.expect(isBelow("/a/b", "/"));
+    try std.testing.expect(!isBelow("/ab", "/a"));
+    try std.testing.expect(!isBelow("/a", "/a"));
+    try std.testing.expect(!isBelow("/b/a", "/a"));
+}
