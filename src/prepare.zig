@@ -1,0 +1,501 @@
+//! Stage 2: `Scene` -> `World`.
+//!
+//! In: what a file says, and what the user wants to see of it. Out: triangles in world space,
+//! a bounding volume hierarchy over them, materials, lights, and a camera. All of it but the tree's
+//! width is a function of the scene and the settings alone: not of the threads, nor of the machine.
+
+const std = @import("std");
+const builtin = @import("builtin");
+const math = @import("math.zig");
+const parallel = @import("parallel.zig");
+const scene = @import("scene.zig");
+const simd = @import("simd.zig");
+const statistics = @import("statistics.zig");
+const world = @import("world.zig");
+const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const bvh_wide = @import("prepare/bvh_wide.zig");
+const check = @import("prepare/check.zig");
+const flatten = @import("prepare/flatten.zig");
+const light = @import("prepare/light.zig");
+const material = @import("prepare/material.zig");
+const pad = @import("prepare/pad.zig");
+const pose = @import("prepare/pose.zig");
+const view = @import("prepare/view.zig");
+const assert = std.debug.assert;
+const Clock = std.Io.Clock;
+const Scene = scene.Scene;
+const StageTimes = statistics.StageTimes;
+const World = world.World;
+
+/// How the user chooses a camera.
+pub const CameraChoice = view.CameraChoice;
+
+/// What the user may decide.
+pub const Settings = struct {
+    /// Width of the tree's nodes and triangle blocks: 4, 8 or 16.
+    lanes: u8,
+    /// 1..`parallel.thread_count_max`.
+    thread_count: usize,
+    camera: CameraChoice = .default,
+    /// Width and height in pixels, at least 1 each.
+    resolution: ?[2]u32 = null,
+    /// Radiance from everywhere, at least 0.
+    ambient: ?f32 = null,
+    /// Linear RGB.
+    background: ?math.Vec3 = null,
+};
+
+/// `CameraUnknown`: no camera has that name or index. `SceneTooLarge`: more than some 2 billion
+/// triangles or vertices.
+pub const Error = error{ OutOfMemory, CameraUnknown, SceneTooLarge };
+
+/// Makes the world of a scene, whose memory comes from `gpa` by way of an arena: its few large
+/// arrays are a block of `gpa` each, of which the arena asks for half as much again but touches
+/// only what is used. Fills `prepare_ns` and `bvh_build_ns` of `times`. With
+/// `error.CameraUnknown` or `error.SceneTooLarge` the diagnostic says more.
+pub fn prepare(
+    gpa: std.mem.Allocator,
+    io: std.Io,
+    from: *const Scene,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+    times: *StageTimes,
+) Error!World {
+    assert(settings.thread_count >= 1 and settings.thread_count <= parallel.thread_count_max);
+    assert(settings.lanes == 4 or settings.lanes == 8 or settings.lanes == 16);
+    const mode = simd.setFlushToZero();
+    defer simd.setFloatControl(mode);
+
+    const start = Clock.awake.now(io);
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    errdefer arena.deinit();
+    var result = try placeAll(gpa, arena.allocator(), from, settings, diagnostic);
+    const tree_start = Clock.awake.now(io);
+    try buildTree(gpa, arena.allocator(), &result, settings);
+    const end = Clock.awake.now(io);
+    times.prepare_ns = nanoseconds(start.durationTo(tree_start));
+    times.bvh_build_ns = nanoseconds(tree_start.durationTo(end));
+    result.arena = arena;
+    if (builtin.mode == .debug) try check.check(gpa, &result);
+    return result;
+}
+
+fn nanoseconds(duration: std.Io.Duration) u64 {
+    return @intCast(@max(duration.toNanoseconds(), 0));
+}
+
+/// Everything but the tree. Not inlined, so that no arithmetic moves before the mode is set.
+noinline fn placeAll(
+    gpa: std.mem.Allocator,
+    arena: std.mem.Allocator,
+    from: *const Scene,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error!World {
+    const maps = try pose.worldMaps(gpa, from.nodes);
+    defer gpa.free(maps);
+    const materials = try material.convertAll(arena, from.materials);
+    const surface = try flatten.flatten(gpa, arena, from, maps, settings.thread_count, diagnostic);
+    const seen = try view.choose(
+        gpa,
+        from,
+        maps,
+        &surface,
+        settings.camera,
+        settings.resolution,
+        diagnostic,
+    );
+    var lights = try light.place(arena, from.lights, maps, diagnostic);
+    const lights_are_default = lights.len == 0;
+    if (lights_are_default) lights = try light.placeRig(arena, &seen.camera);
+
+    var has_transparency = false;
+    var has_holes = false;
+    for (from.instances) |instance| {
+        const used = &materials[from.meshes[instance.mesh].material];
+        has_transparency = has_transparency or material.isTransparent(used);
+        has_holes = has_holes or used.alpha_cutoff >= 0;
+    }
+    return .{
+        .arena = undefined,
+        .tree = undefined,
+        .tree_statistics = undefined,
+        .positions = surface.positions,
+        .normals = surface.normals,
+        .colors = surface.colors,
+        .triangles = surface.triangles,
+        .materials = materials,
+        .lights = lights,
+        .camera = seen.camera,
+        .surroundings = light.surroundings(
+            lights_are_default,
+            from.ambient,
+            settings.ambient,
+            settings.background,
+        ),
+        .width = seen.width,
+        .height = seen.height,
+        .camera_is_default = seen.camera_is_default,
+        .lights_are_default = lights_are_default,
+        .pad = pad.rayPad(surface.bounds, &seen.camera, lights),
+        .degenerate_count = surface.dropped_count,
+        .has_transparency = has_transparency,
+        .has_holes = has_holes,
+    };
+}
+
+noinline fn buildTree(
+    gpa: std.mem.Allocator,
+    arena: std.mem.Allocator,
+    result: *World,
+    settings: Settings,
+) Error!void {
+    const input: bvh_wide.Input = .{
+        .positions = result.positions,
+        .triangles = result.triangles,
+        .pad = result.pad,
+        .thread_count = settings.thread_count,
+    };
+    const facts = &result.tree_statistics;
+    result.tree = switch (settings.lanes) {
+        4 => .{ .w4 = try bvh_wide.build(gpa, arena, &input, 4, facts) },
+        8 => .{ .w8 = try bvh_wide.build(gpa, arena, &input, 8, facts) },
+        16 => .{ .w16 = try bvh_wide.build(gpa, arena, &input, 16, facts) },
+        else => unreachable, // Asserted at the door.
+    };
+}
+
+/// A scene for tests: one node, one mesh, made in the scene's own arena.
+const TestScene = struct {
+    fn init(
+        gpa: std.mem.Allocator,
+        positions: []const math.Vec3,
+        triangles: []const [3]u32,
+    ) !Scene {
+        var from: Scene = .init(gpa);
+        errdefer from.deinit();
+        const arena = from.arena.allocator();
+        from.nodes = try arena.dupe(scene.Node, &.{.{ .parent = scene.none, .local = .identity }});
+        from.materials = try arena.dupe(scene.Material, &.{.{}});
+        from.meshes = try arena.dupe(scene.Mesh, &.{.{
+            .positions = try arena.dupe(math.Vec3, positions),
+            .triangles = try arena.dupe([3]u32, triangles),
+            .material = 0,
+        }});
+        from.instances = try arena.dupe(scene.Instance, &.{.{ .mesh = 0, .node = 0 }});
+        from.check();
+        return from;
+    }
+
+    /// Triangles with three corners of their own each.
+    fn soup(gpa: std.mem.Allocator, corners: []const [3]math.Vec3) !Scene {
+        const triangles = try gpa.alloc([3]u32, corners.len);
+        defer gpa.free(triangles);
+        for (triangles, 0..) |*triangle, index| {
+            const first: u32 = @intCast(3 * index);
+            triangle.* = .{ first, first + 1, first + 2 };
+        }
+        const positions: [*]const math.Vec3 = @ptrCast(corners.ptr);
+        return init(gpa, positions[0 .. 3 * corners.len], triangles);
+    }
+};
+
+fn testPrepare(from: *const Scene, settings: Settings) !World {
+    var diagnostic: Diagnostic = .{};
+    var times: StageTimes = .{};
+    return prepare(std.testing.allocator, std.testing.io, from, settings, &diagnostic, &times);
+}
+
+/// Prepares and checks in all widths and with several thread counts, which all must agree.
+/// Returns how many triangles are in the tree.
+fn testEverywhere(from: *const Scene) !usize {
+    const gpa = std.testing.allocator;
+    var kept: usize = 0;
+    for ([_]u8{ 4, 8, 16 }) |lanes| {
+        var reference = try testPrepare(from, .{ .lanes = lanes, .thread_count = 1 });
+        defer reference.deinit();
+        try check.check(gpa, &reference);
+        kept = reference.triangles.len;
+        for ([_]usize{ 2, 7 }) |thread_count| {
+            var other = try testPrepare(from, .{ .lanes = lanes, .thread_count = thread_count });
+            defer other.deinit();
+            try expectSameBytes(reference.positions, other.positions);
+            try expectSameBytes(reference.triangles, other.triangles);
+            switch (lanes) {
+                inline 4, 8, 16 => |width| {
+                    const a = reference.tree.get(width);
+                    const b = other.tree.get(width);
+                    try expectSameBytes(a.nodes, b.nodes);
+                    try expectSameBytes(a.blocks, b.blocks);
+                },
+                else => unreachable,
+            }
+            try std.testing.expectEqual(reference.tree_statistics, other.tree_statistics);
+            try std.testing.expectEqual(reference.pad, other.pad);
+            try std.testing.expectEqual(reference.camera, other.camera);
+        }
+    }
+    return kept;
+}
+
+fn expectSameBytes(a: anytype, b: @TypeOf(a)) !void {
+    try std.testing.expectEqual(a.len, b.len);
+    try std.testing.expect(std.mem.eql(u8, std.mem.sliceAsBytes(a), std.mem.sliceAsBytes(b)));
+}
+
+test "an empty scene has one node, a camera and the default lights" {
+    const gpa = std.testing.allocator;
+    var from: Scene = .init(gpa);
+    defer from.deinit();
+    try std.testing.expectEqual(0, try testEverywhere(&from));
+    var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
+    defer result.deinit();
+    try std.testing.expectEqual(1, result.tree.w4.nodes.len);
+    try std.testing.expectEqual(0, result.tree_statistics.depth);
+    try std.testing.expect(result.camera_is_default and result.lights_are_default);
+    try std.testing.expectEqual(3, result.lights.len);
+}
+
+test "one triangle is a root with one leaf" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    try std.testing.expectEqual(1, try testEverywhere(&from));
+    var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
+    defer result.deinit();
+    try std.testing.expectEqual(1, result.tree_statistics.depth);
+    try std.testing.expectEqual(2, result.tree_statistics.sah_cost);
+    try std.testing.expectEqual(128 + 160, result.tree_statistics.bytes);
+    try std.testing.expectEqual(@as(u32, 0), result.tree.w4.blocks[0].primitive[0]);
+}
+
+test "random soups of all sizes, in all widths, by any number of threads" {
+    const gpa = std.testing.allocator;
+    var random_state: std.Random.DefaultPrng = .init(11);
+    const random = random_state.random();
+    for ([_]usize{ 2, 4, 5, 16, 17, 64, 333, 10_000 }) |count| {
+        const corners = try gpa.alloc([3]math.Vec3, count);
+        defer gpa.free(corners);
+        for (corners) |*triangle| {
+            var middle: math.Vec3 = undefined;
+            for (&middle) |*coordinate| coordinate.* = random.float(f32) * 10;
+            for (triangle) |*corner| {
+                for (corner, middle) |*coordinate, at| coordinate.* = at + random.float(f32);
+            }
+        }
+        var from = try TestScene.soup(gpa, corners);
+        defer from.deinit();
+        try std.testing.expectEqual(count, try testEverywhere(&from));
+    }
+}
+
+test "nasty soups" {
+    const gpa = std.testing.allocator;
+    const count = 6000;
+    const corners = try gpa.alloc([3]math.Vec3, count);
+    defer gpa.free(corners);
+    const Kind = enum { coincident, line, concentric, huge_and_tiny, powers, flat };
+    for (std.enums.values(Kind)) |kind| {
+        for (corners, 0..) |*triangle, index| {
+            const at: f32 = @floatFromInt(index);
+            triangle.* = switch (kind) {
+                .coincident => .{ .{ 1, 2, 3 }, .{ 4, 5, 6 }, .{ 7, 8, 1 } },
+                .line => .{ .{ at, 0, 0 }, .{ at + 1, 0, 0 }, .{ at, 1, 0 } },
+                .concentric => .{ .{ -at - 1, 0, 1 }, .{ at + 1, 0, -1 }, .{ 0, 0, 0.5 } },
+                .huge_and_tiny => if (index == count / 2)
+                    .{ .{ -1e9, 0, -1e9 }, .{ 1e9, 0, -1e9 }, .{ 0, 0, 1e9 } }
+                else
+                    .{ .{ at, 0, 0 }, .{ at, 1e-3, 0 }, .{ at, 0, 1e-3 } },
+                // Halves over and over: cuts that take one triangle each, were they let.
+                .powers => powers: {
+                    const size = std.math.ldexp(@as(f32, 1), -@as(i32, @intCast(index % 60)));
+                    break :powers .{ .{ size, 0, 0 }, .{ 0, size, 0 }, .{ 0, 0, size } };
+                },
+                .flat => .{ .{ at, 5, 0 }, .{ at, 5, 1 }, .{ at + 1, 5, 0 } },
+            };
+        }
+        var from = try TestScene.soup(gpa, corners);
+        defer from.deinit();
+        try std.testing.expectEqual(count, try testEverywhere(&from));
+    }
+}
+
+test "triangles without area or a finite place are counted, not drawn" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{
+        .{ .{ 0, 0, 0 }, .{ 1, 1, 1 }, .{ 1, 1, 1 } },
+        .{ .{ 0, 0, 0 }, .{ 1, 2, 3 }, .{ 2, 4, 6 } },
+        .{ .{ 0, 0, 0 }, .{ 1e-25, 0, 0 }, .{ 0, 1e-25, 0 } },
+        .{ .{ 0, 0, 0 }, .{ 3e38, 0, 0 }, .{ 0, 3e38, 0 } },
+        .{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } },
+    });
+    defer from.deinit();
+    try std.testing.expectEqual(1, try testEverywhere(&from));
+    var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 2 });
+    defer result.deinit();
+    try std.testing.expectEqual(4, result.degenerate_count);
+    try std.testing.expectEqual(@as(u32, 14), result.triangles[0].corner[2]);
+    // A node that throws everything beyond all numbers leaves nothing.
+    from.nodes = &.{.{ .parent = scene.none, .local = .{
+        .x = .{ 3e38, 3e38, 0 },
+        .y = .{ 3e38, 3e38, 0 },
+        .z = .{ 0, 0, 1 },
+        .translation = .{ 3e38, 3e38, 0 },
+    } }};
+    try std.testing.expectEqual(0, try testEverywhere(&from));
+}
+
+test "a mirroring node keeps fronts and normals outward" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    const arena = from.arena.allocator();
+    from.nodes = &.{
+        .{ .parent = scene.none, .local = .fromTrs(.{ 9, 0, 0 }, .{ 0, 0, 0, 1 }, .{ -2, 1, 1 }) },
+        .{ .parent = scene.none, .local = .fromTrs(.{ 0, 0, 0 }, .{ 0, 0, 0, 1 }, .{ 1, 1, -1 }) },
+        .{ .parent = scene.none, .local = .fromTrs(.{ 0, 0, 0 }, .{ 0, 0, 0, 1 }, .{ 1, 1, 0 }) },
+    };
+    from.instances = &.{
+        .{ .mesh = 0, .node = 0 },
+        .{ .mesh = 0, .node = 1 },
+        .{ .mesh = 0, .node = 2 },
+    };
+    const mesh = try arena.create(scene.Mesh);
+    mesh.* = from.meshes[0];
+    mesh.normals = &.{ .{ 0, 0, 1 }, .{ 0.6, 0, 0.8 }, .{ 0, 0, 0 } };
+    from.meshes = mesh[0..1];
+    var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
+    defer result.deinit();
+    // Mirrored across x = 0, the front still faces +z; across z = 0, it faces -z.
+    for ([_]f32{ 1, -1, 1 }, 0..) |sign, index| {
+        const corner = result.triangles[index].corner;
+        const a = result.positions[corner[0]];
+        const normal = math.vec3.cross(
+            math.vec3.sub(result.positions[corner[1]], a),
+            math.vec3.sub(result.positions[corner[2]], a),
+        );
+        try std.testing.expect(normal[2] * sign > 0);
+        try std.testing.expect(result.normals[3 * index][2] * sign > 0);
+        try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, result.normals[3 * index + 2]);
+    }
+    // The tilted normal stays perpendicular to the stretched surface it belongs to.
+    const tilted = result.normals[1];
+    try std.testing.expectApproxEqRel(@as(f32, -0.6 / 0.8 / 2.0), tilted[0] / tilted[2], 1e-6);
+    try std.testing.expectEqual(math.Vec3{ 7, 0, 0 }, result.positions[1]);
+}
+
+test "colours are white where a mesh has none" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    var plain = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
+    try std.testing.expectEqual(0, plain.colors.len);
+    plain.deinit();
+    var meshes = [_]scene.Mesh{ from.meshes[0], from.meshes[0] };
+    meshes[1].colors = &.{ .{ 1, 0, 0, 1 }, .{ 0, 1, 0, 1 }, .{ 0, 0, 1, 0.5 } };
+    from.meshes = &meshes;
+    from.instances = &.{ .{ .mesh = 0, .node = 0 }, .{ .mesh = 1, .node = 0 } };
+    var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
+    defer result.deinit();
+    try std.testing.expectEqual([4]f32{ 1, 1, 1, 1 }, result.colors[2]);
+    try std.testing.expectEqual([4]f32{ 0, 0, 1, 0.5 }, result.colors[5]);
+}
+
+test "many instances keep their order over many chunks, gaps closed" {
+    const gpa = std.testing.allocator;
+    // Good, without area, good: moved apart by the node.
+    var from = try TestScene.soup(gpa, &.{
+        .{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } },
+        .{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 2, 0, 0 } },
+        .{ .{ 0, 0, 1 }, .{ 1, 0, 1 }, .{ 0, 1, 1 } },
+    });
+    defer from.deinit();
+    const arena = from.arena.allocator();
+    const count = 13_000;
+    const nodes = try arena.alloc(scene.Node, count);
+    for (nodes, 0..) |*node, index| node.* = .{
+        .parent = scene.none,
+        .local = .fromTrs(.{ @floatFromInt(index), 0, 0 }, .{ 0, 0, 0, 1 }, .{ 1, 1, 1 }),
+    };
+    var meshes = [_]scene.Mesh{ from.meshes[0], from.meshes[0] };
+    meshes[1].triangles = &.{};
+    from.meshes = &meshes;
+    const instances = try arena.alloc(scene.Instance, count);
+    for (instances, 0..) |*instance, index| instance.* = .{
+        .mesh = @intFromBool(index % 5 == 0), // Every fifth shows nothing.
+        .node = @intCast(index),
+    };
+    from.nodes = nodes;
+    from.instances = instances;
+    for ([_]usize{ 1, 3 }) |thread_count| {
+        var result = try testPrepare(&from, .{ .lanes = 8, .thread_count = thread_count });
+        defer result.deinit();
+        const shown_count = count - count / 5;
+        try std.testing.expectEqual(2 * shown_count, result.triangles.len);
+        try std.testing.expectEqual(shown_count, result.degenerate_count);
+        for (result.triangles, 0..) |triangle, index| {
+            const shown = index / 2; // Four in five, from node 1 on.
+            const at: f32 = @floatFromInt(shown + shown / 4 + 1);
+            const corner = result.positions[triangle.corner[1]];
+            try std.testing.expectEqual(math.Vec3{ at + 1, 0, @floatFromInt(index % 2) }, corner);
+        }
+    }
+}
+
+test "a mesh brings only the vertices from its first to its last" {
+    const gpa = std.testing.allocator;
+    var positions: [100]math.Vec3 = @splat(.{ 0, 0, 0 });
+    positions[50] = .{ 0, 0, 5 };
+    positions[52] = .{ 1, 0, 5 };
+    positions[51] = .{ 0, 1, 5 };
+    var from = try TestScene.init(gpa, &positions, &.{.{ 50, 52, 51 }});
+    defer from.deinit();
+    var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
+    defer result.deinit();
+    try std.testing.expectEqual(3, result.positions.len);
+    try std.testing.expectEqual([3]u32{ 0, 2, 1 }, result.triangles[0].corner);
+    try std.testing.expectEqual(math.Vec3{ 1, 0, 5 }, result.positions[2]);
+}
+
+test "memory that runs out is an error that leaks nothing" {
+    const gpa = std.testing.allocator;
+    // Enough of them to be cut by all threads first.
+    var corners: [5000][3]math.Vec3 = undefined;
+    for (&corners, 0..) |*triangle, index| {
+        const at: f32 = @floatFromInt(index);
+        triangle.* = .{ .{ at, 0, 0 }, .{ at + 1, 0, 0 }, .{ at, 1, 0 } };
+    }
+    var from = try TestScene.soup(gpa, &corners);
+    defer from.deinit();
+    const one = struct {
+        fn one(failing: std.mem.Allocator, scene_from: *const Scene) !void {
+            var diagnostic: Diagnostic = .{};
+            var times: StageTimes = .{};
+            const settings: Settings = .{ .lanes = 4, .thread_count = 1 };
+            var result = try prepare(
+                failing,
+                std.testing.io,
+                scene_from,
+                settings,
+                &diagnostic,
+                &times,
+            );
+            result.deinit();
+        }
+    }.one;
+    try std.testing.checkAllAllocationFailures(gpa, one, .{&from});
+}
+
+test {
+    _ = bvh_wide;
+    _ = check;
+    _ = flatten;
+    _ = light;
+    _ = material;
+    _ = pad;
+    _ = pose;
+    _ = view;
+    _ = @import("prepare/framing.zig");
+    _ = @import("prepare/bvh_split.zig");
+    _ = @import("prepare/bvh_build.zig");
+}

@@ -1,0 +1,652 @@
+//! Triangles -> a binary tree over them, by all threads.
+//!
+//! In: triangles and how far their boxes are grown. Out: nodes in pairs and references to the
+//! triangles in the order of the leaves. The tree is the same whatever the number of threads:
+//! chunks and tasks are cut by the number of triangles alone, and no result depends on the order
+//! in which they are done. Large sets are cut level by level, every thread working on every set;
+//! sets of `taskSize` and less are one thread's each. Both move references in place.
+//!
+//! I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies" (2007).
+
+const std = @import("std");
+const math = @import("../math.zig");
+const parallel = @import("../parallel.zig");
+const world = @import("../world.zig");
+const flatten = @import("flatten.zig");
+const huge_pages = @import("huge_pages.zig");
+const split = @import("bvh_split.zig");
+const assert = std.debug.assert;
+const Allocator = std.mem.Allocator;
+const Bins = split.Bins(split.bin_count_large);
+const Binning = split.Binning(split.bin_count_large);
+const Box = split.Box;
+const Box3 = math.Box3;
+const Side = split.Side;
+const Split = split.Split;
+const Vec3 = math.Vec3;
+
+/// References a thread takes at a time while large sets are cut.
+const chunk_size = 4096;
+
+/// A node of the binary tree, laid out as a `Box` with its free lanes in use:
+///
+///     bytes 0..11 lower corner, 12..15 count, 16..27 negated upper corner, 28..31 pair
+pub const Node = extern struct {
+    lower: [3]f32 align(32),
+    /// Triangles below.
+    count: u32,
+    upper_negated: [3]f32,
+    /// Children are `nodes[2 * pair]` and the next; 0: a leaf.
+    pair: u32,
+
+    /// As a box, the free lanes meaningless.
+    pub inline fn box(node: *const Node) Box {
+        return @as(*const Box, @ptrCast(node)).*;
+    }
+
+    fn of(bounds: Box, count: u32) Node {
+        const lanes: [8]f32 = bounds;
+        return .{
+            .lower = lanes[0..3].*,
+            .count = count,
+            .upper_negated = lanes[4..7].*,
+            .pair = 0,
+        };
+    }
+
+    comptime {
+        assert(@sizeOf(Node) == @sizeOf(Box));
+    }
+};
+
+/// A binary tree. The root is node 0; the references below a node stand side by side, those of its
+/// left child first.
+pub const Tree = struct {
+    /// Two a pair; a set of `count` references that starts at `begin` has its pairs within
+    /// begin + 1 .. begin + count, so that threads need not agree on who takes which.
+    nodes: []Node,
+    references: []align(64) Box,
+    /// Pairs made, by one task side by side: parents before children within a stretch.
+    stretches: []Stretch,
+    /// Pairs above all tasks, parents before children.
+    top_pairs: []u32,
+
+    /// Pairs `begin`..`end`.
+    pub const Stretch = struct { begin: u32, end: u32 };
+
+    /// Frees the arrays.
+    pub fn deinit(tree: *Tree, gpa: Allocator) void {
+        gpa.free(tree.nodes);
+        gpa.free(tree.references);
+        gpa.free(tree.stretches);
+        gpa.free(tree.top_pairs);
+        tree.* = undefined;
+    }
+};
+
+/// What is to be built on.
+pub const Input = struct {
+    positions: []const Vec3,
+    triangles: []const world.Triangle,
+    /// `World.pad`.
+    pad: f32,
+    thread_count: usize,
+};
+
+/// Triangles of the sets that one thread cuts on its own: small enough that many threads are busy,
+/// large enough that few sets are cut by all of them.
+pub fn taskSize(triangle_count: usize) usize {
+    return @max(triangle_count / 64, 4096);
+}
+
+/// Builds the tree over at least one triangle. `block_size` is how many triangles are tested at
+/// once: sets of that many and less are leaves, and cost is counted in blocks.
+pub fn build(
+    gpa: Allocator,
+    input: *const Input,
+    comptime block_size: u32,
+) error{OutOfMemory}!Tree {
+    assert(input.triangles.len > 0 and input.triangles.len <= flatten.element_count_max);
+    const count: u32 = @intCast(input.triangles.len);
+    var builder: Builder(block_size) = .{
+        .input = input,
+        .references = undefined,
+        .nodes = undefined,
+        .task_size = @intCast(taskSize(count)),
+    };
+    builder.references = try gpa.alignedAlloc(Box, .@"64", count);
+    errdefer gpa.free(builder.references);
+    huge_pages.advise(builder.references);
+    builder.nodes = try gpa.alloc(Node, 2 * @as(usize, count));
+    errdefer gpa.free(builder.nodes);
+    defer builder.deinit(gpa);
+
+    const root = try builder.makeReferences(gpa);
+    try builder.cutTop(gpa, root);
+    const stretches = try gpa.alloc(Tree.Stretch, builder.tasks.items.len);
+    errdefer gpa.free(stretches);
+    builder.runTasks(stretches);
+    return .{
+        .nodes = builder.nodes,
+        .references = builder.references,
+        .stretches = stretches,
+        .top_pairs = try builder.top_pairs.toOwnedSlice(gpa),
+    };
+}
+
+/// A set of triangles that is still to be cut.
+const Set = struct {
+    node: u32,
+    begin: u32,
+    end: u32,
+    /// Nodes from the root to this one.
+    depth: u32,
+    /// Join of the references' `centerBox`es.
+    centers: Box,
+
+    fn count(set: *const Set) u32 {
+        assert(set.begin < set.end);
+        return set.end - set.begin;
+    }
+};
+
+fn Builder(comptime block_size: u32) type {
+    return struct {
+        input: *const Input,
+        references: []align(64) Box,
+        nodes: []Node,
+        task_size: u32,
+        tasks: std.ArrayList(Set) = .empty,
+        top_pairs: std.ArrayList(u32) = .empty,
+
+        const Self = @This();
+
+        fn deinit(builder: *Self, gpa: Allocator) void {
+            builder.tasks.deinit(gpa);
+            builder.top_pairs.deinit(gpa);
+        }
+
+        /// Makes the references and the root.
+        fn makeReferences(builder: *Self, gpa: Allocator) error{OutOfMemory}!Set {
+            const count: u32 = @intCast(builder.references.len);
+            const chunk_count = (count + chunk_size - 1) / chunk_size;
+            var work: ReferenceWork = .{
+                .input = builder.input,
+                .references = builder.references,
+                .results = try gpa.alloc([2]Box, chunk_count),
+            };
+            defer gpa.free(work.results);
+            const thread_count = @min(builder.input.thread_count, chunk_count);
+            parallel.run(thread_count, &work, ReferenceWork.run);
+            var box = split.box_empty;
+            var centers = split.box_empty;
+            for (work.results) |result| {
+                box = split.join(box, result[0]);
+                centers = split.join(centers, result[1]);
+            }
+            builder.nodes[0] = .of(box, count);
+            return .{
+                .node = 0,
+                .begin = 0,
+                .end = count,
+                .depth = 1,
+                .centers = centers,
+            };
+        }
+
+        /// Cuts sets larger than a task, level by level.
+        fn cutTop(builder: *Self, gpa: Allocator, root: Set) error{OutOfMemory}!void {
+            var level: std.ArrayList(Cut) = .empty;
+            defer level.deinit(gpa);
+            var next: std.ArrayList(Set) = .empty;
+            defer next.deinit(gpa);
+            try next.append(gpa, root);
+            while (next.items.len > 0) {
+                level.clearRetainingCapacity();
+                for (next.items) |set| {
+                    if (set.count() <= builder.task_size) {
+                        try builder.tasks.append(gpa, set);
+                    } else {
+                        try level.append(gpa, .{ .set = set, .binning = .init(set.centers) });
+                    }
+                }
+                next.clearRetainingCapacity();
+                if (level.items.len == 0) break;
+                var work = try LevelWork.init(gpa, builder, level.items);
+                defer work.deinit(gpa);
+                const thread_count = @min(builder.input.thread_count, work.chunks.len);
+                parallel.run(thread_count, &work, LevelWork.fillBins);
+                work.choose();
+                work.next.store(0, .monotonic);
+                parallel.run(thread_count, &work, LevelWork.partitionChunks);
+                work.next.store(0, .monotonic);
+                parallel.run(thread_count, &work, LevelWork.exchange);
+                for (work.cuts, 0..) |*cut, index| {
+                    try builder.top_pairs.append(gpa, cut.left_end);
+                    try next.appendSlice(gpa, &work.finish(cut, @intCast(index)));
+                }
+            }
+        }
+
+        /// Cuts the sets that are tasks, the largest first.
+        fn runTasks(builder: *Self, stretches: []Tree.Stretch) void {
+            const larger = struct {
+                fn larger(_: void, a: Set, b: Set) bool {
+                    return a.count() > b.count();
+                }
+            }.larger;
+            std.mem.sort(Set, builder.tasks.items, {}, larger);
+            var work: TaskWork = .{ .builder = builder, .stretches = stretches };
+            const thread_count = @min(builder.input.thread_count, builder.tasks.items.len);
+            parallel.run(thread_count, &work, TaskWork.run);
+        }
+
+        /// Makes the two children of a set in the given pair. Returns them as sets.
+        fn makeChildren(
+            builder: *Self,
+            set: *const Set,
+            pair: u32,
+            left_count: u32,
+            boxes: [2]Box,
+            centers: [2]Box,
+        ) [2]Set {
+            const counts = [2]u32{ left_count, set.count() - left_count };
+            assert(counts[0] > 0 and counts[1] > 0);
+            assert(builder.nodes[set.node].pair == 0);
+            builder.nodes[set.node].pair = pair;
+            const middle = set.begin + left_count;
+            const begins = [2]u32{ set.begin, middle };
+            const ends = [2]u32{ middle, set.end };
+            var children: [2]Set = undefined;
+            for (&children, 0..) |*child, index| {
+                child.* = .{
+                    .node = 2 * pair + @as(u32, @intCast(index)),
+                    .begin = begins[index],
+                    .end = ends[index],
+                    .depth = set.depth + 1,
+                    .centers = centers[index],
+                };
+                builder.nodes[child.node] = .of(boxes[index], counts[index]);
+            }
+            return children;
+        }
+
+        /// Whether a set must be halved now, for its leaves to stay within `world.tree_depth_max`
+        /// however its heuristic cuts would fall.
+        fn isTooDeep(set: *const Set) bool {
+            const block_count = (set.count() + block_size - 1) / block_size;
+            return set.depth + std.math.log2_int_ceil(u32, block_count) >= world.tree_depth_max;
+        }
+
+        const LevelWork = LevelWorkOf(Self, block_size);
+
+        const TaskWork = struct {
+            builder: *Self,
+            stretches: []Tree.Stretch,
+            next: std.atomic.Value(u32) = .init(0),
+
+            fn run(work: *TaskWork, thread_index: usize) void {
+                assert(thread_index < parallel.thread_count_max);
+                while (true) {
+                    const index = work.next.fetchAdd(1, .monotonic);
+                    if (index >= work.stretches.len) return;
+                    work.stretches[index] = work.cut(work.builder.tasks.items[index]);
+                }
+            }
+
+            /// Cuts a set down to leaves. Returns the pairs made.
+            fn cut(work: *TaskWork, task: Set) Tree.Stretch {
+                const builder = work.builder;
+                // A set waits on each level at most.
+                var stack: [world.tree_depth_max]Set = undefined;
+                var stack_count: usize = 0;
+                const begin = task.begin + 1;
+                var pair = begin;
+                var set = task;
+                while (true) {
+                    if (set.count() <= block_size) {
+                        if (stack_count == 0) break;
+                        stack_count -= 1;
+                        set = stack[stack_count];
+                    } else {
+                        const children = builder.cutSet(&set, pair);
+                        pair += 1;
+                        stack[stack_count] = children[1];
+                        stack_count += 1;
+                        set = children[0];
+                    }
+                }
+                assert(pair <= task.end);
+                return .{ .begin = begin, .end = pair };
+            }
+        };
+
+        /// Cuts one set by one thread.
+        fn cutSet(builder: *Self, set: *const Set, pair: u32) [2]Set {
+            if (!isTooDeep(set)) {
+                const children = if (set.count() <= split.small_count_max)
+                    builder.cutByCost(set, pair, split.bin_count_small)
+                else
+                    builder.cutByCost(set, pair, split.bin_count_large);
+                if (children) |found| return found;
+            }
+            const left_count = set.count() / 2;
+            var sides: Sides = .empty;
+            for (builder.references[set.begin..set.end], 0..) |box, index| {
+                sides.add(@intFromBool(index >= left_count), box);
+            }
+            return builder.makeChildren(set, pair, left_count, sides.boxes, sides.centers);
+        }
+
+        /// Cuts at the cheapest plane; null where nothing separates the references.
+        fn cutByCost(
+            builder: *Self,
+            set: *const Set,
+            pair: u32,
+            comptime bin_count: comptime_int,
+        ) ?[2]Set {
+            const references = builder.references[set.begin..set.end];
+            const binning: split.Binning(bin_count) = .init(set.centers);
+            var bins: split.Bins(bin_count) = undefined;
+            bins.clear();
+            bins.add(&binning, references);
+            const chosen = bins.choose(block_size) orelse return null;
+            const side: Side = .init(&binning, &chosen);
+            // Leaves have no use for the middles of what is in them.
+            const largest = @max(chosen.left_count, set.count() - chosen.left_count);
+            const centers = if (largest > block_size)
+                partition(references, &side, chosen.left_count, true)
+            else
+                partition(references, &side, chosen.left_count, false);
+            const boxes = [2]Box{ chosen.left_box, chosen.right_box };
+            return builder.makeChildren(set, pair, chosen.left_count, boxes, centers);
+        }
+    };
+}
+
+/// Boxes of what goes left and what goes right, and of the middles of both.
+const Sides = struct {
+    boxes: [2]Box,
+    centers: [2]Box,
+
+    const empty: Sides = .{ .boxes = @splat(split.box_empty), .centers = @splat(split.box_empty) };
+
+    fn add(sides: *Sides, side: u1, box: Box) void {
+        sides.boxes[side] = split.join(box, sides.boxes[side]);
+        sides.centers[side] = split.join(split.centerBox(box), sides.centers[side]);
+    }
+
+    fn join(sides: *Sides, other: *const Sides) void {
+        for (0..2) |side| {
+            sides.boxes[side] = split.join(other.boxes[side], sides.boxes[side]);
+            sides.centers[side] = split.join(other.centers[side], sides.centers[side]);
+        }
+    }
+};
+
+/// Moves what goes left to the front and bounds the middles of each side. Lomuto's way, without a
+/// branch on the side: that is as good as random, and a wrong guess costs as much as all the rest
+/// of a round. A reference that goes right is exchanged too, with another one that does.
+fn partition(
+    references: []Box,
+    side: *const Side,
+    left_count: u32,
+    comptime with_centers: bool,
+) [2]Box {
+    assert(left_count <= references.len);
+    // What is not on a side is infinitely far from it.
+    const absence = [2]Box{ @splat(0), split.box_empty };
+    var left: usize = 0;
+    var centers: [2]Box = @splat(split.box_empty);
+    for (references) |*reference| {
+        const box = reference.*;
+        const is_left = side.isLeft(reference);
+        reference.* = references[left];
+        references[left] = box;
+        left += @intFromBool(is_left);
+        if (!with_centers) continue;
+        const center = split.centerBox(box);
+        centers[0] = split.join(center + absence[@intFromBool(!is_left)], centers[0]);
+        centers[1] = split.join(center + absence[@intFromBool(is_left)], centers[1]);
+    }
+    assert(left == left_count);
+    return centers;
+}
+
+/// Makes a reference for each triangle.
+const ReferenceWork = struct {
+    input: *const Input,
+    references: []Box,
+    /// By chunk: box and middles.
+    results: [][2]Box,
+    next: std.atomic.Value(u32) = .init(0),
+
+    fn run(work: *ReferenceWork, thread_index: usize) void {
+        assert(thread_index < parallel.thread_count_max);
+        const positions = work.input.positions;
+        while (true) {
+            const chunk = work.next.fetchAdd(1, .monotonic);
+            if (chunk >= work.results.len) return;
+            const begin = @as(usize, chunk) * chunk_size;
+            const end = @min(begin + chunk_size, work.references.len);
+            var box = split.box_empty;
+            var centers = split.box_empty;
+            for (
+                work.references[begin..end],
+                work.input.triangles[begin..end],
+                begin..,
+            ) |*reference, triangle, number| {
+                const grown = Box3.empty
+                    .include(positions[triangle.corner[0]])
+                    .include(positions[triangle.corner[1]])
+                    .include(positions[triangle.corner[2]])
+                    .grow(work.input.pad);
+                reference.* = split.reference(grown, @intCast(number));
+                box = split.join(box, reference.*);
+                centers = split.join(centers, split.centerBox(reference.*));
+            }
+            work.results[chunk] = .{ box, centers };
+        }
+    }
+};
+
+/// A large set on its way to being two.
+const Cut = struct {
+    set: Set,
+    binning: Binning,
+    /// Without one the set is halved as it stands.
+    split: ?Split = null,
+    /// First chunk of the set.
+    chunk_begin: u32 = 0,
+    /// Where the left half ends.
+    left_end: u32 = 0,
+};
+
+/// A part of a large set.
+const Chunk = struct {
+    cut: u32,
+    begin: u32,
+    end: u32,
+    /// References that go left; they stand in front once the chunk is partitioned.
+    left_count: u32 = 0,
+    /// References that go right but stand in the left half of the set, in the chunks before this.
+    wrong_before: u32 = 0,
+    sides: Sides = .empty,
+};
+
+/// One level of large sets, cut in chunks.
+fn LevelWorkOf(comptime Self: type, comptime block_size: u32) type {
+    return struct {
+        builder: *Self,
+        cuts: []Cut,
+        chunks: []Chunk,
+        /// By chunk.
+        bins: []Bins,
+        next: std.atomic.Value(u32) = .init(0),
+
+        const LevelWork = @This();
+
+        fn init(gpa: Allocator, builder: *Self, cuts: []Cut) error{OutOfMemory}!LevelWork {
+            var chunk_count: usize = 0;
+            for (cuts) |*cut| {
+                cut.chunk_begin = @intCast(chunk_count);
+                chunk_count += (cut.set.count() + chunk_size - 1) / chunk_size;
+            }
+            const chunks = try gpa.alloc(Chunk, chunk_count);
+            errdefer gpa.free(chunks);
+            for (cuts, 0..) |*cut, cut_index| {
+                var begin = cut.set.begin;
+                var chunk = cut.chunk_begin;
+                while (begin < cut.set.end) : (chunk += 1) {
+                    const end = @min(begin + chunk_size, cut.set.end);
+                    chunks[chunk] = .{ .cut = @intCast(cut_index), .begin = begin, .end = end };
+                    begin = end;
+                }
+            }
+            return .{
+                .builder = builder,
+                .cuts = cuts,
+                .chunks = chunks,
+                .bins = try gpa.alloc(Bins, chunk_count),
+            };
+        }
+
+        fn deinit(work: *LevelWork, gpa: Allocator) void {
+            gpa.free(work.chunks);
+            gpa.free(work.bins);
+        }
+
+        fn chunksOf(work: *LevelWork, cut_index: u32) []Chunk {
+            const end = if (cut_index + 1 < work.cuts.len)
+                work.cuts[cut_index + 1].chunk_begin
+            else
+                work.chunks.len;
+            return work.chunks[work.cuts[cut_index].chunk_begin..end];
+        }
+
+        fn fillBins(work: *LevelWork, thread_index: usize) void {
+            assert(thread_index < parallel.thread_count_max);
+            while (true) {
+                const index = work.next.fetchAdd(1, .monotonic);
+                if (index >= work.chunks.len) return;
+                const chunk = &work.chunks[index];
+                const cut = &work.cuts[chunk.cut];
+                const references = work.builder.references[chunk.begin..chunk.end];
+                work.bins[index].clear();
+                work.bins[index].add(&cut.binning, references);
+            }
+        }
+
+        /// Chooses the planes, and with them how many of each chunk's references go left.
+        fn choose(work: *LevelWork) void {
+            for (work.cuts, 0..) |*cut, cut_index| {
+                const chunks = work.chunksOf(@intCast(cut_index));
+                const bins = work.bins[cut.chunk_begin..][0..chunks.len];
+                cut.left_end = cut.set.begin + cut.set.count() / 2;
+                if (Self.isTooDeep(&cut.set)) continue;
+                var all = bins[0];
+                for (bins[1..]) |*other| all.addBins(other);
+                cut.split = all.choose(block_size);
+                const chosen = &(cut.split orelse continue);
+                cut.left_end = cut.set.begin + chosen.left_count;
+                var wrong_count: u32 = 0;
+                for (chunks, bins) |*chunk, *other| {
+                    chunk.left_count = other.countLeft(chosen);
+                    chunk.wrong_before = wrong_count;
+                    wrong_count += wrongRights(chunk, cut.left_end).count();
+                }
+            }
+        }
+
+        /// A stretch of references.
+        const Stretch = struct {
+            begin: u32,
+            end: u32,
+
+            fn count(stretch: Stretch) u32 {
+                return stretch.end -| stretch.begin;
+            }
+        };
+
+        /// What goes right but stands in the left half, after the chunk is partitioned.
+        fn wrongRights(chunk: *const Chunk, left_end: u32) Stretch {
+            return .{
+                .begin = chunk.begin + chunk.left_count,
+                .end = @min(chunk.end, left_end),
+            };
+        }
+
+        /// What goes left but stands in the right half, after the chunk is partitioned.
+        fn wrongLefts(chunk: *const Chunk, left_end: u32) Stretch {
+            return .{
+                .begin = @max(chunk.begin, left_end),
+                .end = chunk.begin + chunk.left_count,
+            };
+        }
+
+        /// Partitions each chunk by itself.
+        fn partitionChunks(work: *LevelWork, thread_index: usize) void {
+            assert(thread_index < parallel.thread_count_max);
+            while (true) {
+                const index = work.next.fetchAdd(1, .monotonic);
+                if (index >= work.chunks.len) return;
+                const chunk = &work.chunks[index];
+                const cut = &work.cuts[chunk.cut];
+                const references = work.builder.references[chunk.begin..chunk.end];
+                if (cut.split) |*chosen| {
+                    const side: Side = .init(&cut.binning, chosen);
+                    chunk.sides.centers = partition(references, &side, chunk.left_count, true);
+                } else {
+                    for (references, chunk.begin..) |box, at| {
+                        chunk.sides.add(@intFromBool(at >= cut.left_end), box);
+                    }
+                }
+            }
+        }
+
+        /// Exchanges what stands in the wrong half: the k-th that goes right with the k-th that
+        /// goes left, each thread for those of a chunk in the left half.
+        fn exchange(work: *LevelWork, thread_index: usize) void {
+            assert(thread_index < parallel.thread_count_max);
+            const references = work.builder.references;
+            while (true) {
+                const index = work.next.fetchAdd(1, .monotonic);
+                if (index >= work.chunks.len) return;
+                const chunk = &work.chunks[index];
+                const cut = &work.cuts[chunk.cut];
+                if (cut.split == null) continue;
+                const rights = wrongRights(chunk, cut.left_end);
+                var skip_count = chunk.wrong_before;
+                var right = rights.begin;
+                for (work.chunksOf(chunk.cut)) |*other| {
+                    if (right >= rights.end) break;
+                    const lefts = wrongLefts(other, cut.left_end);
+                    if (skip_count >= lefts.count()) {
+                        skip_count -= lefts.count();
+                        continue;
+                    }
+                    var left = lefts.begin + skip_count;
+                    skip_count = 0;
+                    while (left < lefts.end and right < rights.end) {
+                        std.mem.swap(Box, &references[left], &references[right]);
+                        left += 1;
+                        right += 1;
+                    }
+                }
+                assert(right >= rights.end);
+            }
+        }
+
+        /// The children of a set whose references have been moved.
+        fn finish(work: *LevelWork, cut: *const Cut, cut_index: u32) [2]Set {
+            var sides: Sides = .empty;
+            for (work.chunksOf(cut_index)) |*chunk| sides.join(&chunk.sides);
+            if (cut.split) |*chosen| sides.boxes = .{ chosen.left_box, chosen.right_box };
+            // No task has this pair: theirs start one after their first triangle.
+            const pair = cut.left_end;
+            const left_count = pair - cut.set.begin;
+            const builder = work.builder;
+            return builder.makeChildren(&cut.set, pair, left_count, sides.boxes, sides.centers);
+        }
+    };
+}

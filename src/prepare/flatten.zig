@@ -1,0 +1,378 @@
+//! Instances of meshes -> one list of triangles in world space.
+//!
+//! In: a scene and the world maps of its nodes. Out: vertices and triangles in the order of the
+//! instances, without those that have no area or no finite place. Fronts stay fronts under
+//! mirroring maps. The arrays are the same whatever the number of threads: work is cut into fixed
+//! chunks that write to places known before.
+
+const std = @import("std");
+const math = @import("../math.zig");
+const parallel = @import("../parallel.zig");
+const scene = @import("../scene.zig");
+const world = @import("../world.zig");
+const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const huge_pages = @import("huge_pages.zig");
+const assert = std.debug.assert;
+const vec3 = math.vec3;
+const Affine = math.Affine;
+const Box3 = math.Box3;
+const Vec3 = math.Vec3;
+
+pub const Error = error{ OutOfMemory, SceneTooLarge };
+
+/// Largest |coordinate| of a corner, in metres: the products of three differences that the
+/// triangle test forms stay within an f32 up to here.
+pub const coordinate_max: f32 = 0x1p40;
+
+/// A triangle whose doubled area has no component above this, in square metres, is degenerate:
+/// there the cross product of its edges is made of products that flush to zero.
+pub const area_twice_min: f32 = 0x1p-120;
+
+/// Triangles, and vertices, at most. The builder of the tree keeps triangles' numbers as the bits
+/// of floats, which have to be finite, and doubles them.
+pub const element_count_max = 0x7f00_0000;
+
+/// Vertices or triangles a thread takes at a time.
+const chunk_size = 1 << 14;
+
+/// All that there is to hit, in world space.
+pub const Surface = struct {
+    positions: []const Vec3,
+    normals: []const Vec3,
+    colors: []const [4]f32,
+    triangles: []const world.Triangle,
+    /// Box of the triangles' corners, empty without triangles.
+    bounds: Box3,
+    /// Triangles left out.
+    dropped_count: u64,
+};
+
+/// One instance: where its vertices and triangles come from and go to.
+const Draw = struct {
+    mesh: *const scene.Mesh,
+    map: Affine,
+    normal_map: Affine,
+    /// The map turns fronts into backs.
+    mirrored: bool,
+    /// First vertex of the mesh that a triangle uses, and how many from there.
+    vertex_source: u32,
+    vertex_count: u32,
+    /// First vertex and triangle in the surface, the latter before any is dropped.
+    vertex_target: u32,
+    triangle_target: u32,
+};
+
+/// What a chunk of triangles came to.
+const ChunkResult = struct {
+    kept_count: u32 = 0,
+    outside_count: u32 = 0,
+    bounds: Box3 = .empty,
+};
+
+/// Flattens the whole scene. `maps` holds a world map for each node. The surface's arrays come from
+/// `arena`, what is needed meanwhile from `gpa`.
+pub fn flatten(
+    gpa: std.mem.Allocator,
+    arena: std.mem.Allocator,
+    from: *const scene.Scene,
+    maps: []const Affine,
+    thread_count: usize,
+    diagnostic: *Diagnostic,
+) Error!Surface {
+    assert(maps.len == from.nodes.len);
+    const draws = try gpa.alloc(Draw, from.instances.len);
+    defer gpa.free(draws);
+    const size = try plan(gpa, from, maps, draws, diagnostic);
+
+    var work: Work = .{
+        .draws = draws,
+        .positions = try arena.alloc(Vec3, size.vertex_count),
+        .normals = try arena.alloc(Vec3, size.vertex_count),
+        .colors = try arena.alloc([4]f32, if (size.has_colors) size.vertex_count else 0),
+        .triangles = try arena.alloc(world.Triangle, size.triangle_count),
+        .chunks = try gpa.alloc(ChunkResult, chunkCount(size.triangle_count)),
+    };
+    defer gpa.free(work.chunks);
+    inline for (.{ work.positions, work.normals, work.colors, work.triangles }) |array| {
+        huge_pages.advise(array);
+    }
+    const vertex_chunk_count = chunkCount(size.vertex_count);
+    parallel.run(@min(thread_count, @max(vertex_chunk_count, 1)), &work, Work.placeVertices);
+    work.next.store(0, .monotonic);
+    parallel.run(@min(thread_count, @max(work.chunks.len, 1)), &work, Work.placeTriangles);
+    return work.finish(diagnostic);
+}
+
+const Size = struct { vertex_count: u32 = 0, triangle_count: u32 = 0, has_colors: bool = false };
+
+fn chunkCount(count: usize) usize {
+    return (count + chunk_size - 1) / chunk_size;
+}
+
+/// Fills `draws` and adds up their sizes.
+fn plan(
+    gpa: std.mem.Allocator,
+    from: *const scene.Scene,
+    maps: []const Affine,
+    draws: []Draw,
+    diagnostic: *Diagnostic,
+) Error!Size {
+    assert(draws.len == from.instances.len);
+    const ranges = try gpa.alloc(?VertexRange, from.meshes.len);
+    defer gpa.free(ranges);
+    @memset(ranges, null);
+
+    var size: Size = .{};
+    var vertex_total: u64 = 0;
+    var triangle_total: u64 = 0;
+    for (from.instances, draws) |instance, *draw| {
+        const mesh = &from.meshes[instance.mesh];
+        if (ranges[instance.mesh] == null) ranges[instance.mesh] = .of(mesh.triangles);
+        const range = ranges[instance.mesh].?;
+        const map = maps[instance.node];
+        const mirrored = map.determinant() < 0;
+        draw.* = .{
+            .mesh = mesh,
+            .map = map,
+            .normal_map = normalMap(map, mirrored),
+            .mirrored = mirrored,
+            .vertex_source = range.first,
+            .vertex_count = range.count,
+            .vertex_target = @intCast(vertex_total),
+            .triangle_target = @intCast(triangle_total),
+        };
+        vertex_total += range.count;
+        triangle_total += mesh.triangles.len;
+        if (vertex_total > element_count_max or triangle_total > element_count_max) {
+            return diagnostic.fail(
+                error.SceneTooLarge,
+                "more than {d} triangles or vertices, instances counted",
+                .{element_count_max},
+            );
+        }
+        if (mesh.colors != null and range.count > 0) size.has_colors = true;
+    }
+    size.vertex_count = @intCast(vertex_total);
+    size.triangle_count = @intCast(triangle_total);
+    return size;
+}
+
+/// The stretch of a mesh's vertices that its triangles use; files share one list of vertices among
+/// many meshes.
+const VertexRange = struct {
+    first: u32,
+    count: u32,
+
+    fn of(triangles: []const [3]u32) VertexRange {
+        if (triangles.len == 0) return .{ .first = 0, .count = 0 };
+        var lowest: u32 = std.math.maxInt(u32);
+        var highest: u32 = 0;
+        for (triangles) |triangle| {
+            for (triangle) |vertex| {
+                lowest = @min(lowest, vertex);
+                highest = @max(highest, vertex);
+            }
+        }
+        assert(lowest <= highest);
+        return .{ .first = lowest, .count = highest - lowest + 1 };
+    }
+};
+
+/// The map for normals: cofactors, which turn with a mirroring map's winding, so turned back for
+/// those, and scaled so that neither tiny nor huge maps leave the range of an f32.
+fn normalMap(map: Affine, mirrored: bool) Affine {
+    var largest: f32 = 0;
+    for ([_]Vec3{ map.x, map.y, map.z }) |axis| {
+        for (axis) |entry| largest = if (@abs(entry) > largest) @abs(entry) else largest;
+    }
+    if (!(largest > std.math.floatMin(f32)) or largest == std.math.inf(f32)) largest = 1;
+    const x = divide(map.x, largest);
+    const y = divide(map.y, largest);
+    const z = divide(map.z, largest);
+    const sign: f32 = if (mirrored) -1 else 1;
+    return .{
+        .x = vec3.scale(vec3.cross(y, z), sign),
+        .y = vec3.scale(vec3.cross(z, x), sign),
+        .z = vec3.scale(vec3.cross(x, y), sign),
+        .translation = .{ 0, 0, 0 },
+    };
+}
+
+fn divide(a: Vec3, divisor: f32) Vec3 {
+    return .{ a[0] / divisor, a[1] / divisor, a[2] / divisor };
+}
+
+/// Normals are interpolated without being made unit vectors first, which wants them in a range
+/// where sums and squares keep their digits; beyond it the length is given up.
+fn tameNormal(normal: Vec3) Vec3 {
+    const largest = vec3.maxComponent(.{ @abs(normal[0]), @abs(normal[1]), @abs(normal[2]) });
+    if (largest > 1e-12 and largest < 1e12) return normal;
+    return vec3.normalize(normal) orelse .{ 0, 0, 0 };
+}
+
+/// Shared by the threads.
+const Work = struct {
+    draws: []const Draw,
+    positions: []Vec3,
+    normals: []Vec3,
+    colors: [][4]f32,
+    triangles: []world.Triangle,
+    chunks: []ChunkResult,
+    next: std.atomic.Value(u32) = .init(0),
+
+    fn placeVertices(work: *Work, thread_index: usize) void {
+        assert(thread_index < parallel.thread_count_max);
+        while (true) {
+            const chunk = work.next.fetchAdd(1, .monotonic);
+            const begin = @as(usize, chunk) * chunk_size;
+            if (begin >= work.positions.len) return;
+            const end = @min(begin + chunk_size, work.positions.len);
+            var draw_index = lastAtOrBefore(work.draws, "vertex_target", begin);
+            var from = begin;
+            while (from < end) : (draw_index += 1) {
+                const draw = &work.draws[draw_index];
+                const to = @min(end, @as(usize, draw.vertex_target) + draw.vertex_count);
+                if (to > from) {
+                    work.placeDrawVertices(draw, from, to);
+                    from = to;
+                }
+            }
+        }
+    }
+
+    /// Places the vertices `from`..`to` of the surface, which all belong to `draw`.
+    fn placeDrawVertices(work: *Work, draw: *const Draw, from: usize, to: usize) void {
+        assert(from >= draw.vertex_target and to - draw.vertex_target <= draw.vertex_count);
+        const source = draw.vertex_source + (from - draw.vertex_target);
+        const count = to - from;
+        for (work.positions[from..to], draw.mesh.positions[source..][0..count]) |*to_p, p| {
+            to_p.* = draw.map.point(p);
+        }
+        if (draw.mesh.normals) |normals| {
+            for (work.normals[from..to], normals[source..][0..count]) |*to_n, n| {
+                to_n.* = tameNormal(draw.normal_map.direction(n));
+            }
+        } else {
+            @memset(work.normals[from..to], .{ 0, 0, 0 });
+        }
+        if (work.colors.len == 0) return;
+        if (draw.mesh.colors) |colors| {
+            @memcpy(work.colors[from..to], colors[source..][0..count]);
+        } else {
+            @memset(work.colors[from..to], .{ 1, 1, 1, 1 });
+        }
+    }
+
+    fn placeTriangles(work: *Work, thread_index: usize) void {
+        assert(thread_index < parallel.thread_count_max);
+        while (true) {
+            const chunk = work.next.fetchAdd(1, .monotonic);
+            if (chunk >= work.chunks.len) return;
+            const begin = @as(usize, chunk) * chunk_size;
+            const end = @min(begin + chunk_size, work.triangles.len);
+            var result: ChunkResult = .{};
+            var draw_index = lastAtOrBefore(work.draws, "triangle_target", begin);
+            var from = begin;
+            while (from < end) : (draw_index += 1) {
+                const draw = &work.draws[draw_index];
+                const to = @min(end, @as(usize, draw.triangle_target) + draw.mesh.triangles.len);
+                if (to > from) {
+                    const source = from - draw.triangle_target;
+                    const triangles = draw.mesh.triangles[source..][0 .. to - from];
+                    work.placeDrawTriangles(draw, triangles, begin, &result);
+                    from = to;
+                }
+            }
+            work.chunks[chunk] = result;
+        }
+    }
+
+    /// Appends those of the triangles that can be hit to what the chunk from `begin` on holds.
+    fn placeDrawTriangles(
+        work: *Work,
+        draw: *const Draw,
+        triangles: []const [3]u32,
+        begin: usize,
+        result: *ChunkResult,
+    ) void {
+        // Wraps where the source starts later than the target; the sum is right again.
+        const shift = draw.vertex_target -% draw.vertex_source;
+        for (triangles) |triangle| {
+            var corner: [3]u32 = .{
+                triangle[0] +% shift, triangle[1] +% shift, triangle[2] +% shift,
+            };
+            if (draw.mirrored) std.mem.swap(u32, &corner[1], &corner[2]);
+            const a = work.positions[corner[0]];
+            const b = work.positions[corner[1]];
+            const c = work.positions[corner[2]];
+            if (!isWithinRange(a, b, c)) {
+                result.outside_count += 1;
+            } else if (hasArea(a, b, c)) {
+                work.triangles[begin + result.kept_count] = .{
+                    .corner = corner,
+                    .material = draw.mesh.material,
+                };
+                result.kept_count += 1;
+                result.bounds = result.bounds.include(a).include(b).include(c);
+            }
+        }
+    }
+
+    /// Closes the gaps that dropped triangles left.
+    fn finish(work: *Work, diagnostic: *Diagnostic) Surface {
+        var kept_count: usize = 0;
+        var outside_count: u64 = 0;
+        var bounds: Box3 = .empty;
+        for (work.chunks, 0..) |chunk, index| {
+            const begin = index * chunk_size;
+            assert(kept_count <= begin);
+            if (kept_count < begin) std.mem.copyForwards(
+                world.Triangle,
+                work.triangles[kept_count..][0..chunk.kept_count],
+                work.triangles[begin..][0..chunk.kept_count],
+            );
+            kept_count += chunk.kept_count;
+            outside_count += chunk.outside_count;
+            bounds = bounds.join(chunk.bounds);
+        }
+        if (outside_count > 0) diagnostic.warn(
+            "{d} triangles left out: they reach farther than 2^40 m from the origin",
+            .{outside_count},
+        );
+        return .{
+            .positions = work.positions,
+            .normals = work.normals,
+            .colors = work.colors,
+            .triangles = work.triangles[0..kept_count],
+            .bounds = bounds,
+            .dropped_count = work.triangles.len - kept_count,
+        };
+    }
+};
+
+/// Index of the last draw whose `field` is at most `position`, so that what follows holds it.
+fn lastAtOrBefore(draws: []const Draw, comptime field: []const u8, position: usize) usize {
+    assert(draws.len > 0 and @field(draws[0], field) == 0);
+    var low: usize = 0;
+    var high: usize = draws.len;
+    while (high - low > 1) {
+        const middle = low + (high - low) / 2;
+        if (@field(draws[middle], field) <= position) low = middle else high = middle;
+    }
+    return low;
+}
+
+/// False for infinities and NaN too.
+fn isWithinRange(a: Vec3, b: Vec3, c: Vec3) bool {
+    var within = true;
+    inline for (.{ a, b, c }) |corner| {
+        inline for (0..3) |axis| within = within and @abs(corner[axis]) <= coordinate_max;
+    }
+    return within;
+}
+
+fn hasArea(a: Vec3, b: Vec3, c: Vec3) bool {
+    const normal = vec3.cross(vec3.sub(b, a), vec3.sub(c, a));
+    return @abs(normal[0]) > area_twice_min or @abs(normal[1]) > area_twice_min or
+        @abs(normal[2]) > area_twice_min;
+}

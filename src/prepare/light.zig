@@ -1,0 +1,218 @@
+//! Where the lights are, and what there is where they are not.
+//!
+//! In: a scene's lights and the world maps of their nodes, or none of them and a camera. Out:
+//! lights in world space, ambient and background. Scale of nodes does not count, as
+//! KHR_lights_punctual says. A scene without lights gets three that move with the camera.
+
+const std = @import("std");
+const math = @import("../math.zig");
+const scene = @import("../scene.zig");
+const world = @import("../world.zig");
+const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const assert = std.debug.assert;
+const vec3 = math.vec3;
+const Affine = math.Affine;
+const Vec3 = math.Vec3;
+
+/// Ambient radiance with the default rig.
+pub const ambient_default: f32 = 0.35;
+
+/// One light of the default rig: the way it travels in the camera's right, up and forward, and its
+/// illuminance in lux.
+const RigLight = struct { travel: Vec3, lux: f32 };
+
+/// Key from the upper left, fill from the right and a little above, rim from behind and above.
+const rig = [_]RigLight{
+    .{ .travel = .{ 0.6, -1, 0.5 }, .lux = 2.5 },
+    .{ .travel = .{ -0.9, -0.1, 0.5 }, .lux = 0.8 },
+    .{ .travel = .{ -0.25, -0.6, -0.8 }, .lux = 1.2 },
+};
+
+/// The scene's lights that shine somewhere, from `arena`; a light whose node leaves it no
+/// direction is left out with a warning.
+pub fn place(
+    arena: std.mem.Allocator,
+    lights: []const scene.Light,
+    maps: []const Affine,
+    diagnostic: *Diagnostic,
+) error{OutOfMemory}![]world.Light {
+    const placed = try arena.alloc(world.Light, lights.len);
+    var placed_count: usize = 0;
+    for (lights, 0..) |*light, index| {
+        placed[placed_count] = placeOne(light, maps[light.node]) orelse {
+            diagnostic.warn("light {d} left out: its node leaves it no place or direction", .{
+                index,
+            });
+            continue;
+        };
+        placed_count += 1;
+    }
+    assert(placed_count <= lights.len);
+    return placed[0..placed_count];
+}
+
+fn placeOne(light: *const scene.Light, map: Affine) ?world.Light {
+    const direction: Vec3 = switch (light.kind) {
+        .point => .{ 0, 0, -1 }, // Unused, but a unit vector.
+        .spot, .directional => vec3.normalize(vec3.neg(map.z)) orelse return null,
+    };
+    const position: Vec3 = switch (light.kind) {
+        .point, .spot => map.translation,
+        .directional => .{ 0, 0, 0 },
+    };
+    if (!vec3.isFinite(position)) return null;
+    var result: world.Light = .{
+        .kind = switch (light.kind) {
+            .point => .point,
+            .spot => .spot,
+            .directional => .directional,
+        },
+        .position = position,
+        .direction = direction,
+        .intensity = undefined,
+        .range_inv_squared = 0,
+        .cone_scale = 0,
+        .cone_offset = 1,
+    };
+    for (&result.intensity, light.color) |*channel, color| {
+        channel.* = finite(@as(f64, color) * light.intensity);
+    }
+    if (light.kind != .directional and light.range < std.math.inf(f32)) {
+        assert(light.range > 0);
+        result.range_inv_squared = finite(1 / (@as(f64, light.range) * light.range));
+    }
+    if (light.kind == .spot) {
+        // KHR_lights_punctual, "Inner and Outer Cone Angles".
+        const cosine_inner = math.elementary.cos(light.inner_cone_rad);
+        const cosine_outer = math.elementary.cos(light.outer_cone_rad);
+        const difference = cosine_inner - cosine_outer;
+        const scale = 1 / if (difference > 0.001) difference else 0.001;
+        result.cone_scale = @floatCast(scale);
+        result.cone_offset = @floatCast(-cosine_outer * scale);
+    }
+    return result;
+}
+
+/// The nearest f32 that is not infinite.
+fn finite(value: f64) f32 {
+    const largest: f64 = std.math.floatMax(f32);
+    assert(value >= 0);
+    return @floatCast(if (value < largest) value else largest);
+}
+
+/// The three lights of a scene without any, from `arena`. Asserts that the camera's axes are not
+/// zero.
+pub fn placeRig(
+    arena: std.mem.Allocator,
+    camera: *const world.Camera,
+) error{OutOfMemory}![]world.Light {
+    const right = vec3.normalize(camera.right).?;
+    const up = vec3.normalize(camera.up).?;
+    const forward = vec3.normalize(camera.forward).?;
+    const lights = try arena.alloc(world.Light, rig.len);
+    for (rig, lights) |from, *light| {
+        const sideways = vec3.add(
+            vec3.scale(right, from.travel[0]),
+            vec3.scale(up, from.travel[1]),
+        );
+        const travel = vec3.add(sideways, vec3.scale(forward, from.travel[2]));
+        light.* = .{
+            .kind = .directional,
+            .position = .{ 0, 0, 0 },
+            .direction = vec3.normalize(travel).?,
+            .intensity = @splat(from.lux),
+            .range_inv_squared = 0,
+            .cone_scale = 0,
+            .cone_offset = 1,
+        };
+    }
+    return lights;
+}
+
+/// Ambient light and background: the default rig comes with a grey of both, lights of the file
+/// with black, the scene may say what is ambient, and the user has the last word.
+pub fn surroundings(
+    lights_are_default: bool,
+    scene_ambient: ?f32,
+    ambient: ?f32,
+    background: ?Vec3,
+) world.Surroundings {
+    const radiance = ambient orelse scene_ambient orelse
+        if (lights_are_default) ambient_default else 0;
+    assert(radiance >= 0);
+    const shown: f32 = if (lights_are_default) radiance else 0;
+    return .{ .ambient = radiance, .background = background orelse @splat(shown) };
+}
+
+test "a spot shines along its node's -z from its node's origin, scale aside" {
+    const half = @sqrt(@as(f32, 0.5)); // A quarter turn about y: -z becomes -x.
+    const maps = [_]Affine{
+        .fromTrs(.{ 1, 2, 3 }, .{ 0, half, 0, half }, .{ 5, 5, 5 }),
+        .fromTrs(.{ 0, 0, 0 }, .{ 0, 0, 0, 1 }, .{ 1, 1, 0 }),
+    };
+    const lights = [_]scene.Light{
+        .{ .kind = .spot, .node = 0, .color = .{ 1, 0.5, 0 }, .intensity = 8, .range = 4 },
+        .{ .kind = .directional, .node = 1 },
+        .{ .kind = .point, .node = 1 },
+    };
+    var arena_state: std.heap.ArenaAllocator = .init(std.testing.allocator);
+    defer arena_state.deinit();
+    var diagnostic: Diagnostic = .{};
+    const placed = try place(arena_state.allocator(), &lights, &maps, &diagnostic);
+    // The flattened directional light has no direction; the point light needs none.
+    try std.testing.expectEqual(2, placed.len);
+    try std.testing.expectEqual(1, diagnostic.warning_count);
+    const spot = placed[0];
+    try std.testing.expectEqual(Vec3{ 1, 2, 3 }, spot.position);
+    try std.testing.expectApproxEqAbs(@as(f32, -1), spot.direction[0], 1e-6);
+    try std.testing.expectEqual(Vec3{ 8, 4, 0 }, spot.intensity);
+    try std.testing.expectEqual(0.0625, spot.range_inv_squared);
+    // Full at the inner cone (the axis), dark at the outer one.
+    const cosine_outer = @sqrt(@as(f32, 0.5));
+    try std.testing.expectApproxEqAbs(@as(f32, 1), spot.cone_scale + spot.cone_offset, 1e-6);
+    const edge = cosine_outer * spot.cone_scale + spot.cone_offset;
+    try std.testing.expectApproxEqAbs(@as(f32, 0), edge, 1e-6);
+    try std.testing.expectEqual(world.Light.Kind.point, placed[1].kind);
+}
+
+test "the rig turns with the camera" {
+    var arena_state: std.heap.ArenaAllocator = .init(std.testing.allocator);
+    defer arena_state.deinit();
+    var camera: world.Camera = .{
+        .orthographic = false,
+        .origin = .{ 5, 5, 5 },
+        .right = .{ 0.5, 0, 0 },
+        .up = .{ 0, 0.25, 0 },
+        .forward = .{ 0, 0, -1 },
+    };
+    const front = try placeRig(arena_state.allocator(), &camera);
+    camera.right = .{ 0, 0, -0.5 }; // A quarter turn to the left.
+    camera.forward = .{ -1, 0, 0 };
+    const side = try placeRig(arena_state.allocator(), &camera);
+    for (front, side) |a, b| {
+        const turned: Vec3 = .{ -b.direction[2], b.direction[1], b.direction[0] };
+        try std.testing.expectEqual(a.direction, turned);
+        try std.testing.expectApproxEqAbs(@as(f32, 1), vec3.length(a.direction), 1e-6);
+    }
+    // The key falls on what faces the camera, from above.
+    try std.testing.expect(front[0].direction[2] < 0 and front[0].direction[1] < 0);
+}
+
+test "ambient and background by their precedence" {
+    try std.testing.expectEqual(
+        world.Surroundings{ .ambient = 0.35, .background = @splat(0.35) },
+        surroundings(true, null, null, null),
+    );
+    try std.testing.expectEqual(
+        world.Surroundings{ .ambient = 0, .background = @splat(0) },
+        surroundings(false, null, null, null),
+    );
+    try std.testing.expectEqual(
+        world.Surroundings{ .ambient = 0.25, .background = @splat(0) },
+        surroundings(false, 0.25, null, null),
+    );
+    try std.testing.expectEqual(
+        world.Surroundings{ .ambient = 0.5, .background = .{ 1, 0, 0 } },
+        surroundings(false, 0.25, 0.5, .{ 1, 0, 0 }),
+    );
+}

@@ -1,0 +1,112 @@
+//! Materials as shading wants them.
+//!
+//! In: a scene's materials. Out: the world's, one for one, so that indices stay what they are.
+//! Sources: the glTF 2.0 specification, appendix B, and its extensions KHR_materials_ior,
+//! _transmission and _volume.
+
+const std = @import("std");
+const math = @import("../math.zig");
+const scene = @import("../scene.zig");
+const world = @import("../world.zig");
+const assert = std.debug.assert;
+
+/// Darkest attenuation colour: a channel at 0 would absorb without bound.
+const attenuation_color_min = 1e-4;
+
+/// The world's materials in the order of `materials`, from `arena`.
+pub fn convertAll(
+    arena: std.mem.Allocator,
+    materials: []const scene.Material,
+) error{OutOfMemory}![]world.Material {
+    const converted = try arena.alloc(world.Material, materials.len);
+    for (materials, converted) |*from, *to| to.* = convert(from);
+    return converted;
+}
+
+/// Whether light passes surfaces of this material in part.
+pub fn isTransparent(material: *const world.Material) bool {
+    return material.blend > 0 or material.transmission > 0;
+}
+
+fn convert(from: *const scene.Material) world.Material {
+    assert(from.ior >= 1);
+    var base_color = from.base_color;
+    if (from.alpha_mode == .@"opaque") base_color[3] = 1;
+    const f0_root = (from.ior - 1) / (from.ior + 1);
+    return .{
+        .base_color = base_color,
+        .emissive = from.emissive,
+        .metallic = from.metallic,
+        .roughness = from.roughness,
+        .dielectric_f0 = f0_root * f0_root,
+        .ior = from.ior,
+        .transmission = from.transmission,
+        .absorption = if (from.volume) absorption(from) else .{ 0, 0, 0 },
+        .alpha_cutoff = if (from.alpha_mode == .mask) from.alpha_cutoff else -1,
+        .blend = flag(from.alpha_mode == .blend),
+        .double_sided = flag(from.double_sided),
+        .unlit = flag(from.unlit),
+        .volume = flag(from.volume),
+    };
+}
+
+/// Beer and Lambert: -ln(color) / distance a channel, KHR_materials_volume "Attenuation".
+fn absorption(from: *const scene.Material) math.Vec3 {
+    assert(from.attenuation_distance > 0);
+    var result: math.Vec3 = .{ 0, 0, 0 };
+    if (from.attenuation_distance == std.math.inf(f32)) return result;
+    for (from.attenuation_color, &result) |color, *channel| {
+        const floor: f64 = if (color > attenuation_color_min) color else attenuation_color_min;
+        const share: f64 = if (floor < 1) floor else 1;
+        const exact = -math.elementary.log(share) / from.attenuation_distance;
+        const largest: f64 = std.math.floatMax(f32);
+        channel.* = @floatCast(if (exact < largest) exact else largest);
+    }
+    return result;
+}
+
+fn flag(condition: bool) f32 {
+    return if (condition) 1 else 0;
+}
+
+test "alpha counts only where the mode says so" {
+    const from: scene.Material = .{ .base_color = .{ 0.1, 0.2, 0.3, 0.4 } };
+    try std.testing.expectEqual([4]f32{ 0.1, 0.2, 0.3, 1 }, convert(&from).base_color);
+    try std.testing.expectEqual(-1, convert(&from).alpha_cutoff);
+    var mask = from;
+    mask.alpha_mode = .mask;
+    try std.testing.expectEqual(0.5, convert(&mask).alpha_cutoff);
+    try std.testing.expectEqual(0.4, convert(&mask).base_color[3]);
+    try std.testing.expect(!isTransparent(&convert(&mask)));
+    var blend = from;
+    blend.alpha_mode = .blend;
+    try std.testing.expectEqual(-1, convert(&blend).alpha_cutoff);
+    try std.testing.expect(isTransparent(&convert(&blend)));
+}
+
+test "reflectance of glass and of nothing" {
+    try std.testing.expectApproxEqRel(@as(f32, 0.04), convert(&.{}).dielectric_f0, 1e-6);
+    try std.testing.expectEqual(0, convert(&.{ .ior = 1 }).dielectric_f0);
+}
+
+test "white light turns to the attenuation colour after the attenuation distance" {
+    const from: scene.Material = .{
+        .volume = true,
+        .transmission = 1,
+        .attenuation_color = .{ 1, 0.5, 0 },
+        .attenuation_distance = 2,
+    };
+    const result = convert(&from);
+    try std.testing.expectEqual(0, result.absorption[0]);
+    try std.testing.expectApproxEqRel(@as(f32, 0.34657359), result.absorption[1], 1e-6);
+    try std.testing.expectApproxEqRel(@as(f32, 4.6051702), result.absorption[2], 1e-6);
+    var thin = from;
+    thin.volume = false;
+    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, convert(&thin).absorption);
+    var clear = from;
+    clear.attenuation_distance = std.math.inf(f32);
+    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, convert(&clear).absorption);
+    var dense = from;
+    dense.attenuation_distance = std.math.floatMin(f32);
+    try std.testing.expect(math.vec3.isFinite(convert(&dense).absorption));
+}

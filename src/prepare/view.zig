@@ -1,0 +1,277 @@
+//! Which camera, and how large the picture.
+//!
+//! In: the scene's cameras, the user's wishes, and the triangles to frame where no camera is
+//! wanted or there. Out: the camera of the world and the picture's size. A camera's vertical
+//! extent is kept whatever the picture's shape, and the horizontal one follows, so that pixels are
+//! square. Scale and mirroring of a camera's node do not count (glTF 2.0, section 3.10.2).
+
+const std = @import("std");
+const math = @import("../math.zig");
+const scene = @import("../scene.zig");
+const world = @import("../world.zig");
+const diagnostic_module = @import("../diagnostic.zig");
+const framing = @import("framing.zig");
+const Surface = @import("flatten.zig").Surface;
+const assert = std.debug.assert;
+const vec3 = math.vec3;
+const Affine = math.Affine;
+const Diagnostic = diagnostic_module.Diagnostic;
+const Vec3 = math.Vec3;
+
+/// How the user chooses a camera.
+pub const CameraChoice = union(enum) {
+    /// The file's own, or a framing where it has none.
+    default,
+    /// A framing of all there is.
+    auto,
+    /// By position among the file's cameras.
+    index: u32,
+    /// By name.
+    name: []const u8,
+};
+
+pub const Error = error{ OutOfMemory, CameraUnknown };
+
+/// Pixels along the longer side of the picture where the user does not say.
+pub const size_default = 1024;
+
+const aspect_default = 4.0 / 3.0;
+
+/// What the picture shows.
+pub const View = struct {
+    camera: world.Camera,
+    width: u32,
+    height: u32,
+    /// No camera of the file was used.
+    camera_is_default: bool,
+};
+
+/// Chooses. `maps` holds a world map for each node.
+pub fn choose(
+    gpa: std.mem.Allocator,
+    from: *const scene.Scene,
+    maps: []const Affine,
+    surface: *const Surface,
+    choice: CameraChoice,
+    resolution: ?[2]u32,
+    diagnostic: *Diagnostic,
+) Error!View {
+    if (try find(from, choice, diagnostic)) |index| {
+        const camera = &from.cameras[index];
+        const size = resolution orelse sizeOf(aspectOf(camera));
+        if (place(camera, maps[camera.node], aspect(size))) |placed| return .{
+            .camera = placed,
+            .width = size[0],
+            .height = size[1],
+            .camera_is_default = false,
+        };
+        diagnostic.warn("camera {d} not used: its node leaves it no place or direction", .{index});
+    }
+    const size = resolution orelse sizeOf(aspect_default);
+    return .{
+        .camera = try framing.frame(gpa, surface, from.materials, aspect(size)),
+        .width = size[0],
+        .height = size[1],
+        .camera_is_default = true,
+    };
+}
+
+/// Index of the camera to use, null for a framing.
+fn find(
+    from: *const scene.Scene,
+    choice: CameraChoice,
+    diagnostic: *Diagnostic,
+) error{CameraUnknown}!?u32 {
+    switch (choice) {
+        .auto => return null,
+        .default => return if (from.camera_default == scene.none) null else from.camera_default,
+        .index => |index| {
+            if (index < from.cameras.len) return index;
+            return unknown(from, "no camera {d}", .{index}, diagnostic);
+        },
+        .name => |name| {
+            for (from.cameras, 0..) |camera, index| {
+                if (std.mem.eql(u8, camera.name, name)) return @intCast(index);
+            }
+            return unknown(from, "no camera {f}", .{diagnostic_module.quote(name)}, diagnostic);
+        },
+    }
+}
+
+/// Prints the cameras of a file: index and name, if any.
+const CameraList = struct {
+    cameras: []const scene.Camera,
+
+    /// Called by `{f}`.
+    pub fn format(list: CameraList, writer: *std.Io.Writer) std.Io.Writer.Error!void {
+        if (list.cameras.len == 0) return writer.writeAll("the file has none");
+        try writer.writeAll("the file has ");
+        for (list.cameras, 0..) |camera, index| {
+            if (index > 0) try writer.writeAll(", ");
+            try writer.print("{d}", .{index});
+            if (camera.name.len == 0) continue;
+            try writer.print(" {f}", .{diagnostic_module.quote(camera.name)});
+        }
+    }
+};
+
+fn unknown(
+    from: *const scene.Scene,
+    comptime format: []const u8,
+    arguments: anytype,
+    diagnostic: *Diagnostic,
+) error{CameraUnknown} {
+    const list: CameraList = .{ .cameras = from.cameras };
+    return diagnostic.fail(error.CameraUnknown, format ++ "; {f}", arguments ++ .{list});
+}
+
+/// The camera's own width over height.
+fn aspectOf(camera: *const scene.Camera) f64 {
+    return switch (camera.projection) {
+        .perspective => |perspective| perspective.aspect orelse aspect_default,
+        .orthographic => |extent| @as(f64, extent.half_width) / extent.half_height,
+    };
+}
+
+/// Picture size of an aspect: the longer side as is usual, the other at least 1.
+fn sizeOf(width_over_height: f64) [2]u32 {
+    assert(width_over_height > 0);
+    if (width_over_height >= 1) return .{ size_default, side(1 / width_over_height) };
+    return .{ side(width_over_height), size_default };
+}
+
+fn side(share: f64) u32 {
+    assert(share >= 0 and share <= 1);
+    const pixels: u32 = @intFromFloat(share * size_default + 0.5);
+    return @max(pixels, 1);
+}
+
+fn aspect(size: [2]u32) f64 {
+    assert(size[0] > 0 and size[1] > 0);
+    return @as(f64, @floatFromInt(size[0])) / @as(f64, @floatFromInt(size[1]));
+}
+
+/// The camera in the world, or null where its node leaves it no place or direction.
+fn place(camera: *const scene.Camera, map: Affine, width_over_height: f64) ?world.Camera {
+    if (!vec3.isFinite(map.translation)) return null;
+    const forward = vec3.normalize(vec3.neg(map.z)) orelse return null;
+    const up_hint = vec3.normalize(map.y) orelse return null;
+    const right = vec3.normalize(vec3.cross(forward, up_hint)) orelse return null;
+    const up = vec3.cross(right, forward);
+    const half_height: f64 = switch (camera.projection) {
+        .perspective => |perspective| math.elementary.tan(perspective.y_fov_rad / 2),
+        .orthographic => |orthographic| orthographic.half_height,
+    };
+    // Within bounds that keep both sides and their squares within an f32.
+    const bounded = std.math.clamp(half_height, 1e-9, 1e9);
+    return .{
+        .orthographic = camera.projection == .orthographic,
+        .origin = map.translation,
+        .right = vec3.scale(right, @floatCast(bounded * width_over_height)),
+        .up = vec3.scale(up, @floatCast(bounded)),
+        .forward = forward,
+    };
+}
+
+const test_camera: scene.Camera = .{
+    .name = "main",
+    .node = 0,
+    .projection = .{ .perspective = .{ .y_fov_rad = std.math.pi / 2.0, .aspect = 2 } },
+};
+
+const test_surface: Surface = .{
+    .positions = &.{},
+    .normals = &.{},
+    .colors = &.{},
+    .triangles = &.{},
+    .bounds = .empty,
+    .dropped_count = 0,
+};
+
+test "size follows the camera's aspect, width follows the picture" {
+    const gpa = std.testing.allocator;
+    var from: scene.Scene = .init(gpa);
+    defer from.deinit();
+    from.nodes = &.{.{ .parent = scene.none, .local = .identity }};
+    from.cameras = &.{test_camera};
+    from.camera_default = 0;
+    // Mirrored and scaled: neither counts.
+    const maps = [_]Affine{.fromTrs(.{ 1, 2, 3 }, .{ 0, 0, 0, 1 }, .{ -2, 3, 4 })};
+    var diagnostic: Diagnostic = .{};
+    const wide = try choose(gpa, &from, &maps, &test_surface, .default, null, &diagnostic);
+    try std.testing.expectEqual(1024, wide.width);
+    try std.testing.expectEqual(512, wide.height);
+    try std.testing.expect(!wide.camera_is_default);
+    try std.testing.expectApproxEqRel(@as(f32, 2), wide.camera.right[0], 1e-6);
+    try std.testing.expectApproxEqRel(@as(f32, 1), wide.camera.up[1], 1e-6);
+    try std.testing.expectEqual(Vec3{ 1, 2, 3 }, wide.camera.origin);
+    try std.testing.expectEqual(-1, wide.camera.forward[2]);
+    const tall = try choose(gpa, &from, &maps, &test_surface, .default, .{ 1, 4 }, &diagnostic);
+    try std.testing.expectApproxEqRel(@as(f32, 0.25), tall.camera.right[0], 1e-6);
+    try std.testing.expectApproxEqRel(@as(f32, 1), tall.camera.up[1], 1e-6);
+}
+
+test "orthographic cameras keep their height" {
+    const gpa = std.testing.allocator;
+    var from: scene.Scene = .init(gpa);
+    defer from.deinit();
+    from.cameras = &.{.{
+        .name = "",
+        .node = 0,
+        .projection = .{ .orthographic = .{ .half_width = 1, .half_height = 4 } },
+    }};
+    var diagnostic: Diagnostic = .{};
+    const maps = [_]Affine{.identity};
+    const choice: CameraChoice = .{ .index = 0 };
+    const view = try choose(gpa, &from, &maps, &test_surface, choice, null, &diagnostic);
+    try std.testing.expect(view.camera.orthographic);
+    try std.testing.expectEqual(256, view.width);
+    try std.testing.expectEqual(1024, view.height);
+    try std.testing.expectEqual(Vec3{ 1, 0, 0 }, view.camera.right);
+    try std.testing.expectEqual(Vec3{ 0, 4, 0 }, view.camera.up);
+}
+
+test "cameras are found by index and name, or the message lists them" {
+    const gpa = std.testing.allocator;
+    var from: scene.Scene = .init(gpa);
+    defer from.deinit();
+    var nameless = test_camera;
+    nameless.name = "";
+    from.cameras = &.{ nameless, test_camera };
+    var diagnostic: Diagnostic = .{};
+    try std.testing.expectEqual(1, (try find(&from, .{ .name = "main" }, &diagnostic)).?);
+    try std.testing.expectEqual(null, try find(&from, .auto, &diagnostic));
+    try std.testing.expectEqual(null, try find(&from, .default, &diagnostic));
+    const by_name: CameraChoice = .{ .name = "mian" };
+    try std.testing.expectError(error.CameraUnknown, find(&from, by_name, &diagnostic));
+    try std.testing.expectEqualStrings(
+        "no camera 'mian'; the file has 0, 1 'main'",
+        diagnostic.message.text(),
+    );
+    const by_index: CameraChoice = .{ .index = 2 };
+    try std.testing.expectError(error.CameraUnknown, find(&from, by_index, &diagnostic));
+    from.cameras = &.{};
+    try std.testing.expectError(error.CameraUnknown, find(&from, by_index, &diagnostic));
+    try std.testing.expectEqualStrings("no camera 2; the file has none", diagnostic.message.text());
+}
+
+test "a flattened camera gives way to a framing" {
+    const gpa = std.testing.allocator;
+    var from: scene.Scene = .init(gpa);
+    defer from.deinit();
+    from.cameras = &.{test_camera};
+    from.camera_default = 0;
+    var diagnostic: Diagnostic = .{};
+    const maps = [_]Affine{.fromTrs(.{ 0, 0, 0 }, .{ 0, 0, 0, 1 }, .{ 1, 1, 0 })};
+    const view = try choose(gpa, &from, &maps, &test_surface, .default, null, &diagnostic);
+    try std.testing.expect(view.camera_is_default);
+    try std.testing.expectEqual(1024, view.width);
+    try std.testing.expectEqual(768, view.height);
+    try std.testing.expectEqual(1, diagnostic.warning_count);
+}
+
+test "no aspect makes a picture without pixels" {
+    try std.testing.expectEqual([2]u32{ 1024, 1 }, sizeOf(1e30));
+    try std.testing.expectEqual([2]u32{ 1, 1024 }, sizeOf(1e-30));
+    try std.testing.expectEqual([2]u32{ 1024, 1024 }, sizeOf(1));
+}
