@@ -1,0 +1,174 @@
+//! Stage 3: World -> Image. Rays are traced by all threads, a tile at a time.
+//!
+//! In: the world, which nothing changes meanwhile, and settings. Out: every pixel of the image, and
+//! how many rays it took. Nothing is allocated and no lock is taken; the tile counter is the only
+//! synchronisation. The picture is the same bits for every variant, thread count and tile size.
+
+const std = @import("std");
+const world_file = @import("world.zig");
+const statistics = @import("statistics.zig");
+const parallel = @import("parallel.zig");
+const variant_file = @import("variant.zig");
+const Image = @import("image.zig").Image;
+const whitted = @import("trace/whitted.zig");
+const Tiles = @import("trace/tiles.zig");
+const assert = std.debug.assert;
+const World = world_file.World;
+
+/// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
+pub const kernel = @import("trace/kernel.zig");
+/// Rays in lanes.
+pub const ray = @import("trace/ray.zig");
+/// The exact triangle test.
+pub const triangle = @import("trace/triangle.zig");
+/// One ray through the tree.
+pub const single = @import("trace/single.zig");
+/// A bundle of rays through the tree.
+pub const packet = @import("trace/packet.zig");
+
+/// Bounces at most.
+pub const depth_limit = whitted.depth_limit;
+
+/// What the options say about tracing.
+pub const Settings = struct {
+    thread_count: usize,
+    /// Samples a pixel, at least 1.
+    sample_count: u32 = 1,
+    /// Bounces after the primary ray, at most `depth_limit`.
+    depth_max: u32 = 6,
+    /// Side of a tile in pixels, at least 1.
+    tile_size: u32 = 32,
+    /// Leave the background clear instead of filling it.
+    transparent: bool = false,
+    /// Told of every finished tile.
+    progress: std.Progress.Node = .none,
+};
+
+/// What the frame took.
+pub const Statistics = struct {
+    rays: statistics.RayCounts = .{},
+    /// Null where they were not counted.
+    tests: ?statistics.TestCounts = null,
+    /// Pixels that came out as not a number and were made black.
+    non_finite_count: u64 = 0,
+};
+
+/// Traces the picture with variant `variant_index` of `variant.compiled`. Asserts that the image
+/// has the world's size and the tree the variant's width.
+pub fn trace(
+    variant_index: usize,
+    world: *const World,
+    image: *Image,
+    settings: Settings,
+) Statistics {
+    return dispatch(false, variant_index, world, image, settings);
+}
+
+/// The same with boxes and triangles counted, which takes longer: for a second pass, untimed.
+pub fn traceCounting(
+    variant_index: usize,
+    world: *const World,
+    image: *Image,
+    settings: Settings,
+) Statistics {
+    return dispatch(true, variant_index, world, image, settings);
+}
+
+fn dispatch(
+    comptime counting: bool,
+    variant_index: usize,
+    world: *const World,
+    image: *Image,
+    settings: Settings,
+) Statistics {
+    assert(image.width == world.width and image.height == world.height);
+    assert(settings.sample_count >= 1 and settings.depth_max <= depth_limit);
+    inline for (variant_file.compiled, 0..) |variant, index| {
+        if (index == variant_index) {
+            comptime var chosen = variant;
+            if (counting) chosen.backend = variant_file.counting_backend;
+            return Frame(kernel.Kernel(chosen, counting)).run(world, image, settings);
+        }
+    }
+    unreachable; // Asserts that the index is one of `compiled`.
+}
+
+/// One frame by one variant.
+fn Frame(comptime Kernel: type) type {
+    return struct {
+        world: *const World,
+        image: *Image,
+        settings: Settings,
+        tiles: Tiles,
+        by_thread: [parallel.thread_count_max]Statistics,
+
+        fn run(world: *const World, image: *Image, settings: Settings) Statistics {
+            var frame: @This() = .{
+                .world = world,
+                .image = image,
+                .settings = settings,
+                .tiles = .init(image.width, image.height, settings.tile_size),
+                .by_thread = @splat(.{}),
+            };
+            parallel.run(settings.thread_count, &frame, work);
+            var total: Statistics = .{};
+            var tests: statistics.TestCounts = .{};
+            for (frame.by_thread[0..settings.thread_count]) |part| {
+                total.rays.add(part.rays);
+                total.non_finite_count += part.non_finite_count;
+                if (part.tests) |counts| tests.add(counts);
+            }
+            if (Kernel.counts_tests) total.tests = tests;
+            return total;
+        }
+
+        fn work(frame: *@This(), thread_index: usize) void {
+            var tracer: whitted.Whitted(Kernel) = .{
+                .world = frame.world,
+                .settings = .{
+                    .sample_count = frame.settings.sample_count,
+                    .depth_max = frame.settings.depth_max,
+                    .transparent = frame.settings.transparent,
+                },
+            };
+            while (frame.tiles.take()) |tile| {
+                renderTile(&tracer, tile, frame.image);
+                frame.settings.progress.completeOne();
+            }
+            frame.by_thread[thread_index] = .{
+                .rays = tracer.rays,
+                .tests = if (Kernel.counts_tests) tracer.tests else null,
+                .non_finite_count = tracer.non_finite_count,
+            };
+        }
+
+        fn renderTile(
+            tracer: *whitted.Whitted(Kernel),
+            tile: whitted.Rectangle,
+            image: *Image,
+        ) void {
+            var y = tile.y0;
+            while (y < tile.y1) : (y += Kernel.bundle_height) {
+                var x = tile.x0;
+                while (x < tile.x1) : (x += Kernel.bundle_width) {
+                    tracer.render(.{
+                        .x0 = x,
+                        .y0 = y,
+                        .x1 = @min(x + Kernel.bundle_width, tile.x1),
+                        .y1 = @min(y + Kernel.bundle_height, tile.y1),
+                    }, image);
+                }
+            }
+        }
+    };
+}
+
+test {
+    _ = kernel;
+    _ = ray;
+    _ = triangle;
+    _ = single;
+    _ = packet;
+    _ = whitted;
+    _ = Tiles;
+}

@@ -1,0 +1,85 @@
+//! A line against boxes: where it enters and leaves.
+//!
+//! In: the near and far faces of boxes, a line, in the same lanes (one ray and many boxes, or many
+//! rays and one box). Out: the range of t within. Every step is monotone in the box, so a larger
+//! box always gives a range that holds the smaller one's, rounding included: culling by it is exact
+//! with respect to `triangle.zig`, which tests the triangle's own box the same way (world.zig).
+
+const std = @import("std");
+const ray = @import("ray.zig");
+
+/// Range of t of a line within a box; empty if near > far.
+pub fn Range(comptime Lanes: type) type {
+    return struct { near: Lanes.F32, far: Lanes.F32 };
+}
+
+/// The slab test (Kay and Kajiya 1986). No operand is NaN: corners are finite or, in empty boxes,
+/// infinite, origins finite, inverses finite and not 0. An empty box gives near = +inf.
+pub inline fn slab(
+    comptime Lanes: type,
+    near_corner: Lanes.Vec3,
+    far_corner: Lanes.Vec3,
+    origin: Lanes.Vec3,
+    direction_inv: Lanes.Vec3,
+) Range(Lanes) {
+    const near = near_corner.sub(origin).mul(direction_inv);
+    const far = far_corner.sub(origin).mul(direction_inv);
+    return .{
+        .near = near.x.max(near.y).max(near.z),
+        .far = far.x.min(far.y).min(far.z),
+    };
+}
+
+/// Set where a box may hold a hit strictly between `after` and `nearest`.
+pub inline fn mayHold(
+    comptime Lanes: type,
+    range: Range(Lanes),
+    after_t: Lanes.F32,
+    nearest_t: Lanes.F32,
+) Lanes.Mask {
+    return range.near.le(range.far)
+        .bitAnd(range.near.le(nearest_t))
+        .bitAnd(range.far.ge(after_t));
+}
+
+const Single = ray.Single;
+
+fn testSlab(line: ray.Line(Single), near: [3]f32, far: [3]f32) Range(Single) {
+    return slab(Single, .splat(near), .splat(far), line.origin, line.direction_inv);
+}
+
+test "an empty box is never entered, a flat one can be, a larger one gives a larger range" {
+    const Lanes = Single;
+    const inf = std.math.inf(f32);
+    const line: ray.Line(Lanes) = .init(.splat(.{ 0, 0, 0 }), .splat(.{ 1, 0, -1e-40 }));
+    const empty = testSlab(line, .{ inf, inf, -inf }, .{ -inf, -inf, inf });
+    try std.testing.expect(!mayHold(Lanes, empty, .splat(0), .splat(inf)).lane(0));
+    const flat = testSlab(line, .{ 2, -1, 1 }, .{ 2, 1, -1 });
+    try std.testing.expect(mayHold(Lanes, flat, .splat(0), .splat(inf)).lane(0));
+    try std.testing.expectEqual(2, flat.near.lane(0));
+    try std.testing.expectEqual(2, flat.far.lane(0));
+    try std.testing.expect(mayHold(Lanes, flat, .splat(0), .splat(2)).lane(0));
+    try std.testing.expect(!mayHold(Lanes, flat, .splat(0), .splat(1.9)).lane(0));
+    try std.testing.expect(!mayHold(Lanes, flat, .splat(2.1), .splat(inf)).lane(0));
+
+    var random = std.Random.DefaultPrng.init(7);
+    for (0..10_000) |_| {
+        var lower: [3]f32 = undefined;
+        var upper: [3]f32 = undefined;
+        var origin: [3]f32 = undefined;
+        for (0..3) |axis| {
+            lower[axis] = random.random().floatNorm(f32);
+            upper[axis] = lower[axis] + random.random().float(f32);
+            origin[axis] = random.random().floatNorm(f32) * 3;
+        }
+        const up: ray.Line(Lanes) = .init(.splat(origin), .splat(.{ 0.3, 1e-8, 0.7 }));
+        const inner = testSlab(up, lower, upper);
+        for (0..3) |axis| {
+            lower[axis] -= random.random().float(f32) * 1e-6;
+            upper[axis] += random.random().float(f32) * 1e-6;
+        }
+        const outer = testSlab(up, lower, upper);
+        try std.testing.expect(outer.near.lane(0) <= inner.near.lane(0));
+        try std.testing.expect(outer.far.lane(0) >= inner.far.lane(0));
+    }
+}

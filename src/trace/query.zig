@@ -1,0 +1,58 @@
+//! The variant's way to trace a bundle: in company, or every ray by itself.
+//!
+//! In: a bundle, and whether its rays are coherent (one origin or nearly one way). Out: hits in the
+//! bundle. The thesis's 2x2 packets always stay together; the large ones scatter into single rays
+//! where the rays are known to go different ways.
+
+const world_file = @import("../world.zig");
+const TestCounts = @import("../statistics.zig").TestCounts;
+const ray_file = @import("ray.zig");
+const single = @import("single.zig");
+const packet = @import("packet.zig");
+
+/// Looks for hits of all active rays; see `packet.trace` for what is left in the bundle.
+pub fn trace(
+    comptime Kernel: type,
+    comptime query: single.Query,
+    world: *const world_file.World,
+    bundle: *packet.Bundle(Kernel),
+    coherent: bool,
+    counts: *TestCounts,
+) void {
+    const tree = world.tree.get(Kernel.width);
+    switch (Kernel.variant.traversal) {
+        .single => if (bundle.groups[0].active.lane(0)) {
+            _ = single.trace(Kernel, query, tree, world.pad, &bundle.groups[0], counts);
+        },
+        .packet2x2 => packet.trace(Kernel, query, tree, world.pad, bundle, counts),
+        .packet => if (coherent) {
+            packet.trace(Kernel, query, tree, world.pad, bundle, counts);
+        } else {
+            for (&bundle.groups) |*group| {
+                traceApart(Kernel, query, tree, world.pad, group, counts);
+            }
+        },
+    }
+}
+
+/// Every active ray of a group by itself.
+fn traceApart(
+    comptime Kernel: type,
+    comptime query: single.Query,
+    tree: *const world_file.Tree(Kernel.width),
+    pad: f32,
+    group: *ray_file.Ray(Kernel.Rays),
+    counts: *TestCounts,
+) void {
+    var ts = group.nearest.t.toArray();
+    var primitives = group.nearest.primitive.toArray();
+    var bits = group.active.bits();
+    while (bits != 0) : (bits &= bits - 1) {
+        const lane = @ctz(bits);
+        var ray = group.extract(lane);
+        _ = single.trace(Kernel, query, tree, pad, &ray, counts);
+        ts[lane] = ray.nearest.t.lane(0);
+        primitives[lane] = ray.nearest.primitive.lane(0);
+    }
+    group.nearest = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };
+}

@@ -1,0 +1,300 @@
+//! The exact ray-triangle test, the same in every variant: it decides the picture.
+//!
+//! In: corners, a ray's view, in lanes that may be triangles, rays or both. Out: where the triangle
+//! is hit, and t. Watertight as in Woop, Benthin and Wald 2013 ("Watertight Ray/Triangle
+//! Intersection"): corners are sheared into the plane across the ray, the same for every triangle
+//! that shares them, and there each edge function is the difference of two products of floats,
+//! whose sign is right or the difference 0. A zero is settled exactly (`settle`), so that a ray
+//! through an edge or a corner hits exactly one of the triangles around it.
+
+const std = @import("std");
+const ray_file = @import("ray.zig");
+const box = @import("box.zig");
+const vec3 = @import("../math.zig").vec3;
+const View = ray_file.View;
+
+/// Corners as the ray sees them: x, y across the ray from it, z the share along it times t's unit.
+pub fn Projection(comptime Lanes: type) type {
+    return struct { a: Lanes.Vec3, b: Lanes.Vec3, c: Lanes.Vec3 };
+}
+
+/// Shears turned corners into the view.
+pub inline fn project(
+    comptime Lanes: type,
+    corners: [3]Lanes.Vec3,
+    view: *const View(Lanes),
+) Projection(Lanes) {
+    return .{
+        .a = shear(Lanes, corners[0], view),
+        .b = shear(Lanes, corners[1], view),
+        .c = shear(Lanes, corners[2], view),
+    };
+}
+
+inline fn shear(comptime Lanes: type, corner: Lanes.Vec3, view: *const View(Lanes)) Lanes.Vec3 {
+    const seen = corner.sub(view.origin);
+    return .{
+        .x = seen.x.sub(view.shear.x.mul(seen.z)),
+        .y = seen.y.sub(view.shear.y.mul(seen.z)),
+        .z = seen.z.mul(view.shear.z),
+    };
+}
+
+/// Edge functions: twice the areas that the ray cuts off opposite each corner, signed; in
+/// proportion to the barycentric weights of the corners.
+pub fn Weights(comptime Lanes: type) type {
+    return struct {
+        a: Lanes.F32,
+        b: Lanes.F32,
+        c: Lanes.F32,
+
+        /// Set where no two of them have opposite signs; zeros agree with both, NaN with none.
+        pub inline fn agree(weights: @This()) Lanes.Mask {
+            const zero: Lanes.F32 = .zero();
+            const front = weights.a.ge(zero).bitAnd(weights.b.ge(zero)).bitAnd(weights.c.ge(zero));
+            const back = weights.a.le(zero).bitAnd(weights.b.le(zero)).bitAnd(weights.c.le(zero));
+            return front.bitOr(back);
+        }
+
+        /// Their sum, twice the area of the triangle seen.
+        pub inline fn sum(weights: @This()) Lanes.F32 {
+            return weights.a.add(weights.b).add(weights.c);
+        }
+    };
+}
+
+/// Evaluates the edge functions.
+pub inline fn weigh(comptime Lanes: type, seen: Projection(Lanes)) Weights(Lanes) {
+    return .{
+        .a = seen.c.x.mul(seen.b.y).sub(seen.c.y.mul(seen.b.x)),
+        .b = seen.a.x.mul(seen.c.y).sub(seen.a.y.mul(seen.c.x)),
+        .c = seen.b.x.mul(seen.a.y).sub(seen.b.y.mul(seen.a.x)),
+    };
+}
+
+/// Of the lanes where the rounded edge functions agree, those that the exact ones accept. Where one
+/// came out as 0 it is replaced by the exact difference, rounded once; see `settleLane`.
+pub inline fn settle(
+    comptime Lanes: type,
+    seen: Projection(Lanes),
+    weights: *Weights(Lanes),
+    agreeing: Lanes.Mask,
+) Lanes.Mask {
+    const zero: Lanes.F32 = .zero();
+    const unsettled = weights.a.eq(zero).bitOr(weights.b.eq(zero)).bitOr(weights.c.eq(zero));
+    const rare = agreeing.bitAnd(unsettled).bits();
+    if (rare == 0) return agreeing;
+    return settleRare(Lanes, seen, weights, agreeing, rare);
+}
+
+fn settleRare(
+    comptime Lanes: type,
+    seen: Projection(Lanes),
+    weights: *Weights(Lanes),
+    agreeing: Lanes.Mask,
+    rare: u32,
+) Lanes.Mask {
+    @branchHint(.cold);
+    var a = weights.a.toArray();
+    var b = weights.b.toArray();
+    var c = weights.c.toArray();
+    var inside = agreeing.bits();
+    var rest = rare;
+    while (rest != 0) : (rest &= rest - 1) {
+        const lane = @ctz(rest);
+        const corner_a = seen.a.lane(lane);
+        const corner_b = seen.b.lane(lane);
+        const corner_c = seen.c.lane(lane);
+        const sign_a = settleLane(corner_c, corner_b, &a[lane]);
+        const sign_b = settleLane(corner_a, corner_c, &b[lane]);
+        const sign_c = settleLane(corner_b, corner_a, &c[lane]);
+        const same = sign_a == sign_b and sign_b == sign_c and sign_a != 0;
+        if (!same) inside &= ~(@as(u32, 1) << @intCast(lane));
+    }
+    weights.* = .{ .a = .fromArray(a), .b = .fromArray(b), .c = .fromArray(c) };
+    return .fromBits(inside);
+}
+
+/// The exact sign of p.x q.y - p.y q.x, and its value where the rounded one is 0. Products of two
+/// f32 are exact in f64. A true 0 means that the ray meets the edge (or its extension); then the
+/// sign is the one beside it, for a ray moved by an infinitesimal step along x and a yet smaller
+/// one along y (simulation of simplicity, Edelsbrunner and Muecke 1990). It negates when the edge
+/// is walked the other way; 0 is left for edges without length only.
+fn settleLane(p: [3]f32, q: [3]f32, weight: *f32) i2 {
+    if (weight.* > 0) return 1;
+    if (weight.* < 0) return -1;
+    const one: f64 = @as(f64, p[0]) * @as(f64, q[1]);
+    const other: f64 = @as(f64, p[1]) * @as(f64, q[0]);
+    weight.* = @floatCast(one - other);
+    if (one > other) return 1;
+    if (one < other) return -1;
+    if (p[1] != q[1]) return if (p[1] > q[1]) 1 else -1;
+    if (p[0] != q[0]) return if (q[0] > p[0]) 1 else -1;
+    return 0;
+}
+
+/// t where mask is set.
+pub fn Intersection(comptime Lanes: type) type {
+    return struct { mask: Lanes.Mask, t: Lanes.F32 };
+}
+
+/// Second half of the test, for lanes inside the edges: t of the plane, held within the t range of
+/// the triangle's own box grown by `pad`. A hit outside of this range comes from rounding alone
+/// (a triangle seen edge-on); holding it inside is what makes culling by boxes exact. Missing the
+/// box altogether is a miss. `corners` are turned but not sheared.
+pub inline fn locate(
+    comptime Lanes: type,
+    seen: Projection(Lanes),
+    weights: Weights(Lanes),
+    corners: [3]Lanes.Vec3,
+    view: *const View(Lanes),
+    pad: f32,
+) Intersection(Lanes) {
+    const F32 = Lanes.F32;
+    const area = weights.sum();
+    const depth = weights.a.mul(seen.a.z).add(weights.b.mul(seen.b.z)).add(weights.c.mul(seen.c.z));
+    const t_plane = depth.div(area);
+    // The order of comparisons is the builder's, so that both see the same box.
+    const grow: Lanes.Vec3 = .splat(@splat(pad));
+    const lower = corners[2].min(corners[1].min(corners[0])).sub(grow);
+    const upper = corners[2].max(corners[1].max(corners[0])).add(grow);
+    const range = box.slab(
+        Lanes,
+        select3(Lanes, view.negative, upper, lower),
+        select3(Lanes, view.negative, lower, upper),
+        view.origin,
+        view.direction_inv,
+    );
+    const zero: F32 = .zero();
+    const has_area = area.lt(zero).bitOr(area.gt(zero));
+    return .{
+        .mask = has_area.bitAnd(range.near.le(range.far)),
+        .t = t_plane.max(range.near).min(range.far),
+    };
+}
+
+/// By component: `a` where the mask is set, else `b`.
+pub inline fn select3(
+    comptime Lanes: type,
+    masks: [3]Lanes.Mask,
+    a: Lanes.Vec3,
+    b: Lanes.Vec3,
+) Lanes.Vec3 {
+    return .{
+        .x = Lanes.F32.select(masks[0], a.x, b.x),
+        .y = Lanes.F32.select(masks[1], a.y, b.y),
+        .z = Lanes.F32.select(masks[2], a.z, b.z),
+    };
+}
+
+/// The whole test, for callers that have no use for its parts. `corners` as in the scene.
+pub inline fn intersect(
+    comptime Lanes: type,
+    corners: [3]Lanes.Vec3,
+    line: ray_file.Line(Lanes),
+    pad: f32,
+) Intersection(Lanes) {
+    const axis: ray_file.LongAxis(Lanes) = .of(line.direction);
+    const view: View(Lanes) = .init(line, axis);
+    const turned: [3]Lanes.Vec3 = .{
+        axis.turn(corners[0]), axis.turn(corners[1]), axis.turn(corners[2]),
+    };
+    const seen = project(Lanes, turned, &view);
+    var weights = weigh(Lanes, seen);
+    const inside = settle(Lanes, seen, &weights, weights.agree());
+    const hit = locate(Lanes, seen, weights, turned, &view, pad);
+    return .{ .mask = inside.bitAnd(hit.mask), .t = hit.t };
+}
+
+const Single = ray_file.Single;
+
+fn testHit(corners: [3][3]f32, origin: [3]f32, direction: [3]f32, pad: f32) ?f32 {
+    const lanes: [3]Single.Vec3 = .{ .splat(corners[0]), .splat(corners[1]), .splat(corners[2]) };
+    const hit = intersect(Single, lanes, .init(.splat(origin), .splat(direction)), pad);
+    return if (hit.mask.lane(0)) hit.t.lane(0) else null;
+}
+
+test "a triangle in the plane z = 0, from both sides and beside it" {
+    const corners = [3][3]f32{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } };
+    try std.testing.expectEqual(2, testHit(corners, .{ 0.2, 0.2, 2 }, .{ 0, 0, -1 }, 1e-5));
+    try std.testing.expectEqual(1, testHit(corners, .{ 0.2, 0.2, -2 }, .{ 0, 0, 2 }, 1e-5));
+    try std.testing.expectEqual(null, testHit(corners, .{ 0.6, 0.5, 2 }, .{ 0, 0, -1 }, 1e-5));
+    try std.testing.expectEqual(null, testHit(corners, .{ 0.2, 0.2, 2 }, .{ 1, 0, 0 }, 1e-5));
+}
+
+test "no hit without an area, with NaN or with infinity" {
+    const nan = std.math.nan(f32);
+    const inf = std.math.inf(f32);
+    const point = [3][3]f32{ .{ 0, 0, 0 }, .{ 0, 0, 0 }, .{ 0, 0, 0 } };
+    try std.testing.expectEqual(null, testHit(point, .{ 0, 0, 1 }, .{ 0, 0, -1 }, 1e-5));
+    const line = [3][3]f32{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 2, 0, 0 } };
+    try std.testing.expectEqual(null, testHit(line, .{ 1, 0, 1 }, .{ 0, 0, -1 }, 1e-5));
+    const broken = [3][3]f32{ .{ nan, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } };
+    try std.testing.expectEqual(null, testHit(broken, .{ 0.2, 0.2, 1 }, .{ 0, 0, -1 }, 1e-5));
+    const endless = [3][3]f32{ .{ 0, 0, 0 }, .{ inf, 0, 0 }, .{ 0, 1, 0 } };
+    try std.testing.expectEqual(null, testHit(endless, .{ 0.2, 0.2, 1 }, .{ 0, 0, -1 }, 1e-5));
+    const still = [3][3]f32{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } };
+    try std.testing.expectEqual(null, testHit(still, .{ 0.2, 0.2, 1 }, .{ 0, 0, 0 }, 1e-5));
+}
+
+test "triangles so small that products of their edges vanish are hit" {
+    const size = 1e-25;
+    const corners = [3][3]f32{ .{ -size, -size, 0 }, .{ size, -size, 0 }, .{ 0, size, 0 } };
+    try std.testing.expectEqual(1, testHit(corners, .{ 0, 0, 1 }, .{ 0, 0, -1 }, 1e-5));
+    try std.testing.expectEqual(null, testHit(corners, .{ size, size, 1 }, .{ 0, 0, -1 }, 1e-5));
+}
+
+test "a ray through an edge or a corner hits exactly one of the triangles around it" {
+    // A fan of eight around the origin, seen from above, from below and aslant; half of the
+    // triangles wound the other way, as careless files have them.
+    const rim = [8][3]f32{
+        .{ 1, 0, 0 },  .{ 1, 1, 0 },   .{ 0, 1, 0 },  .{ -1, 1, 0 },
+        .{ -1, 0, 0 }, .{ -1, -1, 0 }, .{ 0, -1, 0 }, .{ 1, -1, 0 },
+    };
+    const origins = [_][3]f32{ .{ 0, 0, 2 }, .{ 0, 0, -2 }, .{ 2, 1, 4 }, .{ -1, 3, -0.5 } };
+    const targets = [_][3]f32{ .{ 0, 0, 0 }, .{ 0.5, 0, 0 }, .{ 0.25, 0.25, 0 }, .{ 0, -0.5, 0 } };
+    for (origins) |origin| for (targets) |target| for ([_]bool{ false, true }) |careless| {
+        var hit_count: u32 = 0;
+        for (rim, 0..) |first, index| {
+            const second = rim[(index + 1) % rim.len];
+            const middle = [3]f32{ 0, 0, 0 };
+            const turned = careless and index % 2 == 0;
+            const corners: [3][3]f32 = if (turned)
+                .{ middle, second, first }
+            else
+                .{ middle, first, second };
+            const direction = vec3.sub(target, origin);
+            hit_count += @intFromBool(testHit(corners, origin, direction, 1e-5) != null);
+        }
+        try std.testing.expectEqual(1, hit_count);
+    };
+}
+
+test "a ray into a cone of random triangles around a corner hits exactly one, wherever it aims" {
+    var random = std.Random.DefaultPrng.init(11);
+    const r = random.random();
+    for (0..20_000) |round| {
+        // A convex fan seen from within its cone, so that no outline passes the ray.
+        const scale: f32 = if (round % 2 == 0) 1 else 1e-3;
+        const apex: [3]f32 = .{ r.floatNorm(f32) + 100, r.floatNorm(f32) + 100, 40 };
+        var rim: [5][3]f32 = undefined;
+        for (&rim, [5][2]f32{
+            .{ 1, 0 }, .{ 0.3, 1 }, .{ -0.8, 0.6 }, .{ -0.8, -0.6 }, .{ 0.3, -1 },
+        }) |*point, place| {
+            point.* = vec3.add(apex, vec3.scale(.{
+                place[0] + r.float(f32) * 0.2, place[1] + r.float(f32) * 0.2, r.float(f32),
+            }, scale));
+        }
+        const origin: [3]f32 = .{ 100 + r.floatNorm(f32), 100 + r.floatNorm(f32), -50 };
+        const edge_end = rim[r.uintLessThan(usize, rim.len)];
+        const share: f32 = if (round % 3 == 0) 0 else r.float(f32) * 0.5;
+        const target = vec3.add(apex, vec3.scale(vec3.sub(edge_end, apex), share));
+        var hit_count: u32 = 0;
+        for (rim, 0..) |first, index| {
+            const corners = [3][3]f32{ apex, first, rim[(index + 1) % rim.len] };
+            const direction = vec3.sub(target, origin);
+            hit_count += @intFromBool(testHit(corners, origin, direction, 1e-2) != null);
+        }
+        try std.testing.expectEqual(1, hit_count);
+    }
+}
