@@ -1,0 +1,165 @@
+//! Stage 4: `Image` -> file.
+//!
+//! In: a finished frame. Out: a PNG, PPM or PFM, either the whole file in its place or nothing at
+//! all. The only stage that sees stb_image_write. Bytes depend on the frame and the settings
+//! alone.
+
+const std = @import("std");
+const Allocator = std.mem.Allocator;
+const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const Image = @import("image.zig").Image;
+const pfm = @import("output/pfm.zig");
+const png = @import("output/png.zig");
+const ppm = @import("output/ppm.zig");
+const target_file = @import("output/target.zig");
+const tonemap = @import("output/tonemap.zig");
+const assert = std.debug.assert;
+
+pub const Target = target_file.Target;
+pub const discardPending = target_file.discardPending;
+
+/// File formats.
+pub const Format = enum { png, ppm, pfm };
+
+/// How radiance becomes brightness.
+pub const Exposure = union(enum) {
+    /// Stops: radiance 2^-ev is white.
+    ev: f32,
+    /// 95 % of the pixels are no brighter than 0.8.
+    auto,
+};
+
+pub const Settings = struct {
+    format: Format = .png,
+    exposure: Exposure = .{ .ev = 0 },
+    /// Keep alpha, where the format has it; otherwise the picture is over black.
+    transparent: bool = false,
+};
+
+/// The diagnostic says why.
+pub const Error = error{ OutOfMemory, InputOutput };
+
+/// Encodes the frame and moves it to its place. Closes the target in any case.
+pub fn write(
+    gpa: Allocator,
+    image: *const Image,
+    settings: Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    defer target.abandon();
+    if (settings.format == .pfm) {
+        const file = try pfm.encode(gpa, image);
+        defer gpa.free(file);
+        return target.finish(&.{file}, diagnostic);
+    }
+    const scale = switch (settings.exposure) {
+        .ev => |ev| tonemap.scaleOf(ev),
+        .auto => try tonemap.autoScale(gpa, image),
+    };
+    const has_alpha = settings.transparent and settings.format == .png;
+    const channel_count: u8 = if (has_alpha) 4 else 3;
+    const pixels = try gpa.alloc(u8, std.math.mul(usize, image.pixels.len, channel_count) catch
+        return error.OutOfMemory);
+    defer gpa.free(pixels);
+    if (has_alpha) {
+        tonemap.encodeRgba(image.pixels, scale, std.mem.bytesAsSlice([4]u8, pixels));
+    } else {
+        tonemap.encodeRgb(image.pixels, scale, std.mem.bytesAsSlice([3]u8, pixels));
+    }
+
+    if (settings.format == .ppm) {
+        const header: ppm.Header = .init(image.width, image.height);
+        return target.finish(&.{ header.text(), pixels }, diagnostic);
+    }
+    var file = try png.encode(image.width, image.height, channel_count, pixels);
+    defer file.deinit();
+    return target.finish(&.{file.bytes}, diagnostic);
+}
+
+test {
+    _ = pfm;
+    _ = png;
+    _ = ppm;
+    _ = target_file;
+    _ = tonemap;
+}
+
+/// What `write` leaves in a file called `name`; the caller frees it.
+fn writeForTest(
+    folder: std.Io.Dir,
+    name: []const u8,
+    image: *const Image,
+    settings: Settings,
+) ![]u8 {
+    const gpa = std.testing.allocator;
+    const io = std.testing.io;
+    var path_buffer: [std.fs.max_path_bytes]u8 = undefined;
+    const folder_path = path_buffer[0..try folder.realPath(io, &path_buffer)];
+    const path = try std.fs.path.join(gpa, &.{ folder_path, name });
+    defer gpa.free(path);
+    var diagnostic: Diagnostic = .{};
+    var target: Target = try .openFile(io, path, &diagnostic);
+    try write(gpa, image, settings, &target, &diagnostic);
+    return folder.readFileAlloc(io, name, gpa, .unlimited);
+}
+
+test "the same frame in every format" {
+    const gpa = std.testing.allocator;
+    var folder = std.testing.tmpDir(.{});
+    defer folder.cleanup();
+    var image: Image = try .init(gpa, 2, 1);
+    defer image.deinit(gpa);
+    image.pixels[0] = .{ 0.25, 0.5, 0, 0.5 };
+    image.pixels[1] = .{ 1, 2, 4, 1 };
+
+    const ppm_file = try writeForTest(folder.dir, "a.ppm", &image, .{
+        .format = .ppm,
+        .exposure = .{ .ev = -1 },
+        .transparent = true,
+    });
+    defer gpa.free(ppm_file);
+    try std.testing.expectEqualSlices(u8, "P6\n2 1\n255\n" ++
+        .{ 99, 137, 0, 188, 255, 255 }, ppm_file);
+
+    const pfm_file = try writeForTest(folder.dir, "a.pfm", &image, .{
+        .format = .pfm,
+        .exposure = .auto,
+    });
+    defer gpa.free(pfm_file);
+    const linear = [_]f32{ 0.25, 0.5, 0, 1, 2, 4 };
+    try std.testing.expectEqualSlices(u8, "PF\n2 1\n-1.0\n", pfm_file[0..12]);
+    try std.testing.expectEqualSlices(u8, std.mem.asBytes(&linear), pfm_file[12..]);
+
+    for ([_]bool{ false, true }) |transparent| {
+        const file = try writeForTest(folder.dir, "a.png", &image, .{ .transparent = transparent });
+        defer gpa.free(file);
+        // The colour type in the header: RGB is 2, RGBA 6.
+        try std.testing.expectEqual(@as(u8, if (transparent) 6 else 2), file[25]);
+    }
+}
+
+test "memory that runs out leaves no file, whenever it does" {
+    var folder = std.testing.tmpDir(.{ .iterate = true });
+    defer folder.cleanup();
+    const io = std.testing.io;
+    var image: Image = try .init(std.testing.allocator, 3, 3);
+    defer image.deinit(std.testing.allocator);
+    @memset(image.pixels, .{ 1, 1, 1, 1 });
+    var path_buffer: [std.fs.max_path_bytes]u8 = undefined;
+    const folder_path = path_buffer[0..try folder.dir.realPath(io, &path_buffer)];
+    const path = try std.fs.path.join(std.testing.allocator, &.{ folder_path, "a" });
+    defer std.testing.allocator.free(path);
+    for (std.enums.values(Format)) |format| {
+        var failing: std.testing.FailingAllocator = .init(std.testing.allocator, .{
+            .fail_index = 0,
+        });
+        var diagnostic: Diagnostic = .{};
+        var target: Target = try .openFile(io, path, &diagnostic);
+        const settings: Settings = .{ .format = format, .exposure = .auto };
+        const result = write(failing.allocator(), &image, settings, &target, &diagnostic);
+        try std.testing.expectError(error.OutOfMemory, result);
+        var entries = folder.dir.iterate();
+        try std.testing.expectEqual(null, try entries.next(io));
+    }
+}
