@@ -1,0 +1,402 @@
+//! The program: the command line, the four stages in order, the report.
+//!
+//! In: arguments. Out: an image, a report, and an exit code that says how it went. Whatever a stage
+//! has to say reaches the user here, in one line; nothing else prints or exits.
+
+const std = @import("std");
+const raylane = @import("raylane");
+const Allocator = std.mem.Allocator;
+const Io = std.Io;
+const assert = std.debug.assert;
+const Diagnostic = raylane.diagnostic.Diagnostic;
+const Image = raylane.image.Image;
+const Options = raylane.options.Options;
+const Report = raylane.report.Report;
+const Target = raylane.output.Target;
+const World = raylane.world.World;
+const printable = raylane.diagnostic.printable;
+
+comptime {
+    // What the options promise the stages keep.
+    assert(raylane.options.depth_max <= raylane.trace.depth_limit);
+    assert(raylane.options.thread_count_max <= raylane.parallel.thread_count_max);
+}
+
+const ExitCode = enum(u8) {
+    ok = 0,
+    /// Files or memory.
+    failed = 1,
+    usage = 2,
+    /// The scene is invalid or asks for what is not supported.
+    invalid = 3,
+    interrupted = 130,
+};
+
+pub fn main(init: std.process.Init) u8 {
+    holdStandardFiles();
+    catchSignals();
+    _ = raylane.simd.setFlushToZero();
+    return @backingInt(run(init));
+}
+
+fn run(init: std.process.Init) ExitCode {
+    const io = init.io;
+    var diagnostic: Diagnostic = .{};
+    const arguments = init.minimal.args.toSlice(init.arena.allocator()) catch {
+        say(io, "raylane: out of memory\n", .{});
+        return .failed;
+    };
+    const own_arguments = arguments[@min(1, arguments.len)..];
+    const names = raylane.variant.names;
+    const command = raylane.options.parse(own_arguments, names, &diagnostic) catch {
+        say(io, "raylane: {s}\n", .{diagnostic.message.text()});
+        return .usage;
+    };
+    switch (command) {
+        .help => return print(io, raylane.options.help),
+        .version => return print(io, "raylane " ++ raylane.options.version ++ "\n"),
+        .list_variants => return print(io, comptime list: {
+            var list: []const u8 = "";
+            for (names) |name| list = list ++ name ++ "\n";
+            break :list list;
+        }),
+        .render => |*options| return renderAndReport(init.gpa, io, options, &diagnostic),
+    }
+}
+
+/// Renders one scene, then says what it cost or why it failed.
+fn renderAndReport(
+    gpa: Allocator,
+    io: Io,
+    options: *const Options,
+    diagnostic: *Diagnostic,
+) ExitCode {
+    const output_name = raylane.options.outputName(gpa, options) catch {
+        say(io, "raylane: out of memory\n", .{});
+        return .failed;
+    };
+    defer gpa.free(output_name);
+    var job: Job = .{
+        .gpa = gpa,
+        .io = io,
+        .options = options,
+        .output_name = output_name,
+        .diagnostic = diagnostic,
+    };
+    const outcome = job.run();
+    job.sayWarnings();
+    if (diagnostic.warning_dropped_count > 0 and !options.quiet) {
+        job.sayOfScene("warning: {d} more", .{diagnostic.warning_dropped_count});
+    }
+    const report = outcome catch |err| {
+        const file = if (err == error.OutputFailed) job.outputTitle() else options.scene;
+        const text = if (err == error.OutOfMemory) "out of memory" else diagnostic.message.text();
+        assert(text.len > 0);
+        say(io, "raylane: {f}: {s}\n", .{ printable(file), text });
+        return switch (err) {
+            error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
+            error.CameraUnknown => .usage,
+            error.InvalidInput, error.SceneTooLarge => .invalid,
+        };
+    };
+    return job.printReport(&report);
+}
+
+/// The way of one scene through the stages.
+const Job = struct {
+    gpa: Allocator,
+    io: Io,
+    options: *const Options,
+    output_name: []const u8,
+    diagnostic: *Diagnostic,
+    progress: std.Progress.Node = .none,
+    /// Warnings that the user has seen.
+    warning_count: usize = 0,
+
+    const Error = raylane.parse.Error || raylane.prepare.Error || error{OutputFailed};
+
+    fn run(job: *Job) Error!Report {
+        if (!job.options.quiet) {
+            job.progress = std.Progress.start(job.io, .{ .root_name = "raylane" });
+        }
+        defer job.progress.end();
+        return job.render();
+    }
+
+    /// parse -> Scene -> prepare -> World -> trace -> Image -> output.
+    fn render(job: *Job) Error!Report {
+        const gpa = job.gpa;
+        const io = job.io;
+        const variant_index = job.options.variant_index;
+        var times: raylane.statistics.StageTimes = .{};
+        var target = try job.openTarget();
+        defer target.abandon();
+
+        const start = Io.Clock.awake.now(io);
+        var scene = try raylane.parse.parse(gpa, io, job.options.scene, .{
+            .allow_outside = job.options.allow_outside,
+        }, job.diagnostic);
+        const triangle_count = scene.triangleCount();
+        times.parse_ns = since(io, start);
+
+        var world = prepared: {
+            defer scene.deinit();
+            break :prepared try raylane.prepare.prepare(
+                gpa,
+                io,
+                &scene,
+                job.prepareSettings(),
+                job.diagnostic,
+                &times,
+            );
+        };
+        defer world.deinit();
+        job.sayWarnings();
+        job.sayFacts(&world);
+
+        var image: Image = try .init(gpa, world.width, world.height);
+        defer image.deinit(gpa);
+        const trace_start = Io.Clock.awake.now(io);
+        const settings = job.traceSettings();
+        const traced = raylane.trace.trace(variant_index, &world, &image, settings);
+        times.trace_ns = since(io, trace_start);
+        if (traced.non_finite_count > 0) job.diagnostic.warn(
+            "{d} pixels came out as not a number and were made black",
+            .{traced.non_finite_count},
+        );
+
+        const output_start = Io.Clock.awake.now(io);
+        try job.write(&image, &target);
+        times.output_ns = since(io, output_start);
+        times.total_ns = since(io, start);
+
+        var report = job.reportOf(&world, &image);
+        report.triangle_count = triangle_count;
+        report.times = times;
+        report.rays = traced.rays;
+        if (job.options.count_tests) {
+            const counted = raylane.trace.traceCounting(variant_index, &world, &image, settings);
+            report.tests = counted.tests;
+        }
+        return report;
+    }
+
+    /// What the options and the results say; the measurements are the caller's.
+    fn reportOf(job: *const Job, world: *const World, image: *const Image) Report {
+        return .{
+            .version = raylane.options.version,
+            .scene = job.options.scene,
+            .output = job.outputTitle(),
+            .triangle_count = 0,
+            .width = image.width,
+            .height = image.height,
+            .sample_count = job.options.sample_count,
+            .depth = job.options.depth,
+            .thread_count = job.threadCount(),
+            .variant = raylane.variant.names[job.options.variant_index],
+            .times = .{},
+            .rays = .{},
+            .tests = null,
+            .bvh = .{
+                .node_count = world.tree_statistics.node_count,
+                .depth = world.tree_statistics.depth,
+                .sah_cost = world.tree_statistics.sah_cost,
+                .bytes = world.tree_statistics.bytes,
+            },
+            .memory_peak_bytes = raylane.report.memoryPeakBytes(),
+            .image_hash = image.hash(),
+            .warnings = &.{},
+        };
+    }
+
+    /// What messages call the image's place.
+    fn outputTitle(job: *const Job) []const u8 {
+        return if (job.options.toStdout()) "standard output" else job.output_name;
+    }
+
+    fn openTarget(job: *Job) error{OutputFailed}!Target {
+        if (job.options.toStdout()) return .openStdout(job.io);
+        return Target.openFile(job.io, job.output_name, job.diagnostic) catch error.OutputFailed;
+    }
+
+    fn prepareSettings(job: *const Job) raylane.prepare.Settings {
+        const options = job.options;
+        return .{
+            .lanes = raylane.variant.compiled[options.variant_index].lanes,
+            .thread_count = job.threadCount(),
+            .camera = switch (options.camera) {
+                .default => .default,
+                .auto => .auto,
+                .index => |index| .{ .index = index },
+                .name => |name| .{ .name = name },
+            },
+            .resolution = options.resolution,
+            .ambient = options.ambient,
+            .background = switch (options.background) {
+                .default => null,
+                .transparent => .{ 0, 0, 0 },
+                .linear => |color| color,
+                .srgb => |codes| color: {
+                    var color: raylane.math.Vec3 = undefined;
+                    for (&color, codes) |*light, code| light.* = raylane.math.srgb.decoded[code];
+                    break :color color;
+                },
+            },
+        };
+    }
+
+    fn traceSettings(job: *const Job) raylane.trace.Settings {
+        return .{
+            .thread_count = job.threadCount(),
+            .sample_count = job.options.sample_count,
+            .depth_max = job.options.depth,
+            .tile_size = job.options.tile_size,
+            .transparent = job.options.background == .transparent,
+            .progress = job.progress,
+        };
+    }
+
+    fn threadCount(job: *const Job) usize {
+        if (job.options.thread_count) |count| return count;
+        const cpu_count = std.Thread.getCpuCount() catch 1;
+        return @min(cpu_count, raylane.options.thread_count_max);
+    }
+
+    fn write(job: *Job, image: *const Image, target: *Target) Error!void {
+        raylane.output.write(job.gpa, image, .{
+            .format = switch (job.options.format) {
+                inline else => |format| @field(raylane.output.Format, @tagName(format)),
+            },
+            .exposure = switch (job.options.exposure) {
+                .ev => |ev| .{ .ev = ev },
+                .auto => .auto,
+            },
+            .transparent = job.options.background == .transparent,
+        }, target, job.diagnostic) catch |err| return switch (err) {
+            error.OutOfMemory => error.OutOfMemory,
+            error.InputOutput => error.OutputFailed,
+        };
+    }
+
+    /// Says the warnings that have not been said yet.
+    fn sayWarnings(job: *Job) void {
+        const diagnostic = job.diagnostic;
+        const warnings = diagnostic.warnings[0..diagnostic.warning_count];
+        if (!job.options.quiet) for (warnings[job.warning_count..]) |*warning| {
+            job.sayOfScene("warning: {s}", .{warning.text()});
+        };
+        job.warning_count = warnings.len;
+    }
+
+    /// With `--verbose`: what was chosen where the user did not.
+    fn sayFacts(job: *Job, world: *const World) void {
+        if (!job.options.verbose) return;
+        if (world.camera_is_default) job.sayOfScene("view: framed on all there is", .{});
+        if (world.lights_are_default) {
+            job.sayOfScene("lights: three directional ones fixed to the camera", .{});
+        } else {
+            job.sayOfScene("lights: {d}", .{world.lights.len});
+        }
+        job.sayOfScene("ambient radiance: {d}", .{world.surroundings.ambient});
+        job.sayOfScene("tracer: {s}, {d} threads", .{
+            raylane.variant.names[job.options.variant_index], job.threadCount(),
+        });
+        if (world.degenerate_count > 0) {
+            job.sayOfScene("{d} triangles without area left out", .{world.degenerate_count});
+        }
+    }
+
+    fn sayOfScene(job: *Job, comptime format: []const u8, arguments: anytype) void {
+        const scene = printable(job.options.scene);
+        say(job.io, "raylane: {f}: " ++ format ++ "\n", .{scene} ++ arguments);
+    }
+
+    /// Prints the report that the user wants, to standard error where the image has the output.
+    fn printReport(job: *Job, measured: *const Report) ExitCode {
+        const options = job.options;
+        const to_stdout = !options.toStdout();
+        const default: raylane.options.Stats = if (options.quiet or !to_stdout) .none else .text;
+        var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
+        const diagnostic = job.diagnostic;
+        for (diagnostic.warnings[0..diagnostic.warning_count], 0..) |*warning, index| {
+            warnings[index] = warning.text();
+        }
+        var report = measured.*;
+        report.warnings = warnings[0..diagnostic.warning_count];
+
+        var text: Io.Writer.Allocating = .init(job.gpa);
+        defer text.deinit();
+        const written = switch (options.stats orelse default) {
+            .none => return .ok,
+            .text => raylane.report.writeText(&report, &text.writer),
+            .json => raylane.report.writeJson(&report, &text.writer),
+        };
+        written catch |err| switch (err) {
+            error.WriteFailed => {
+                say(job.io, "raylane: out of memory\n", .{});
+                return .failed;
+            },
+        };
+        if (to_stdout) return print(job.io, text.written());
+        say(job.io, "{s}", .{text.written()});
+        return .ok;
+    }
+};
+
+fn since(io: Io, start: Io.Timestamp) u64 {
+    return @intCast(start.untilNow(io, .awake).toNanoseconds());
+}
+
+/// Prints what was asked for to standard output.
+fn print(io: Io, text: []const u8) ExitCode {
+    var diagnostic: Diagnostic = .{};
+    var target: Target = .openStdout(io);
+    target.finish(&.{text}, &diagnostic) catch {
+        say(io, "raylane: standard output: {s}\n", .{diagnostic.message.text()});
+        return .failed;
+    };
+    return .ok;
+}
+
+/// Writes to standard error, beside the progress that may be shown there. When that fails there is
+/// nobody left to tell.
+fn say(io: Io, comptime format: []const u8, arguments: anytype) void {
+    var buffer: [512]u8 = undefined;
+    const stderr = io.lockStderr(&buffer, null) catch return;
+    defer io.unlockStderr();
+    stderr.file_writer.interface.print(format, arguments) catch return;
+    stderr.file_writer.interface.flush() catch return;
+}
+
+/// Puts something that cannot be written in the place of standard files that are closed, lest the
+/// next file that is opened takes a message or a report for its contents.
+fn holdStandardFiles() void {
+    for (0..3) |file| {
+        if (std.c.fcntl(@intCast(file), std.c.F.GETFD) >= 0) continue;
+        _ = std.c.open("/dev/null", .{ .ACCMODE = .RDONLY });
+    }
+}
+
+/// Makes signals that end the program remove the unfinished output, and a file size limit an error
+/// of writing.
+fn catchSignals() void {
+    const interrupt: std.posix.Sigaction = .{
+        .handler = .{ .handler = interrupted },
+        .mask = std.posix.sigemptyset(),
+        .flags = 0,
+    };
+    std.posix.sigaction(.INT, &interrupt, null);
+    std.posix.sigaction(.TERM, &interrupt, null);
+    const ignore: std.posix.Sigaction = .{
+        .handler = .{ .handler = std.posix.SIG.IGN },
+        .mask = std.posix.sigemptyset(),
+        .flags = 0,
+    };
+    std.posix.sigaction(.XFSZ, &ignore, null);
+}
+
+/// Only async-signal-safe calls are made here.
+fn interrupted(_: std.posix.SIG) callconv(.c) void {
+    raylane.output.discardPending();
+    std.c._exit(@backingInt(ExitCode.interrupted));
+}

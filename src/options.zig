@@ -1,0 +1,787 @@
+//! The command line: flags -> `Command`, or one line that says what is wrong with them.
+//!
+//! In: the arguments as the system hands them over. Out: plain values, each within its range, for
+//! `main` to pass on; slices point into the arguments. The table `flags` is the whole syntax, the
+//! text `help` describes it, and a test holds the two together.
+
+const std = @import("std");
+const config = @import("config");
+const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const quote = @import("diagnostic.zig").quote;
+const assert = std.debug.assert;
+
+/// Of the program, as `--version` and the reports spell it.
+pub const version: []const u8 = config.version;
+
+/// What the user wants.
+pub const Command = union(enum) { help, version, list_variants, render: Options };
+
+/// File formats of images.
+pub const Format = enum { png, ppm, pfm };
+
+/// Form of the report.
+pub const Stats = enum { text, json, none };
+
+/// Which camera to look through.
+pub const Camera = union(enum) {
+    /// The file's own, else automatic.
+    default,
+    /// All of the scene in view.
+    auto,
+    index: u32,
+    name: []const u8,
+};
+
+/// What is seen where there is nothing.
+pub const Background = union(enum) {
+    /// As the lights have it.
+    default,
+    transparent,
+    /// Codes of red, green and blue.
+    srgb: [3]u8,
+    /// Radiance of red, green and blue, finite and >= 0.
+    linear: [3]f32,
+};
+
+/// How radiance becomes brightness.
+pub const Exposure = union(enum) {
+    /// Stops: radiance 2^-ev is white. |ev| <= `exposure_ev_max`.
+    ev: f32,
+    auto,
+};
+
+/// Largest side of a picture, in pixels.
+pub const side_max = 65_536;
+/// Most pixels of a picture.
+pub const pixel_count_max = 1 << 28;
+/// Most threads.
+pub const thread_count_max = 256;
+/// Most samples a pixel.
+pub const sample_count_max = 4096;
+/// Most bounces.
+pub const depth_max = 32;
+/// Smallest and largest side of a tile, in pixels; sides are multiples of 4.
+pub const tile_size_min = 4;
+pub const tile_size_max = 512;
+/// Largest exposure either way, in stops.
+pub const exposure_ev_max = 64;
+
+/// How to render one scene.
+pub const Options = struct {
+    scene: []const u8,
+    /// Null: the scene's name in the working directory; "-": standard output.
+    output: ?[]const u8 = null,
+    format: Format = .png,
+    /// Width and height in pixels; null: the camera's aspect, 1024 on the long side.
+    resolution: ?[2]u32 = null,
+    /// Null: as many as the system has CPUs.
+    thread_count: ?u16 = null,
+    sample_count: u32 = 1,
+    depth: u32 = 6,
+    tile_size: u32 = 32,
+    camera: Camera = .default,
+    /// Index into the variant names given to `parse`.
+    variant_index: usize = 0,
+    background: Background = .default,
+    /// Constant radiance from all sides, finite and >= 0; null: as the lights have it.
+    ambient: ?f32 = null,
+    exposure: Exposure = .{ .ev = 0 },
+    /// Null: not asked for.
+    stats: ?Stats = null,
+    count_tests: bool = false,
+    allow_outside: bool = false,
+    quiet: bool = false,
+    verbose: bool = false,
+
+    /// Whether the image goes to standard output.
+    pub fn toStdout(options: *const Options) bool {
+        return std.mem.eql(u8, options.output orelse return false, "-");
+    }
+};
+
+/// Where the image goes: as given, else the scene's file name in the working directory with the
+/// format's extension instead of its own. The caller frees it.
+pub fn outputName(
+    gpa: std.mem.Allocator,
+    options: *const Options,
+) error{OutOfMemory}![]u8 {
+    if (options.output) |output| return gpa.dupe(u8, output);
+    const prefix = "builtin:";
+    const is_builtin = std.mem.startsWith(u8, options.scene, prefix);
+    const path = if (is_builtin) options.scene[prefix.len..] else options.scene;
+    return gpa.print("{s}.{t}", .{ std.fs.path.stem(path), options.format });
+}
+
+const Id = enum {
+    allow_outside,
+    ambient,
+    background,
+    camera,
+    count_tests,
+    depth,
+    exposure,
+    format,
+    help,
+    list_variants,
+    output,
+    quiet,
+    resolution,
+    spp,
+    stats,
+    thesis,
+    threads,
+    tile_size,
+    tonemap,
+    variant,
+    verbose,
+    version,
+};
+
+const Flag = struct {
+    id: Id,
+    /// With its dashes.
+    long: []const u8,
+    /// 0: none.
+    short: u8 = 0,
+    has_value: bool = true,
+};
+
+const flags: []const Flag = &.{
+    .{ .id = .output, .long = "--output", .short = 'o' },
+    .{ .id = .format, .long = "--format" },
+    .{ .id = .resolution, .long = "--resolution", .short = 'r' },
+    .{ .id = .threads, .long = "--threads", .short = 't' },
+    .{ .id = .spp, .long = "--spp" },
+    .{ .id = .depth, .long = "--depth" },
+    .{ .id = .tile_size, .long = "--tile-size" },
+    .{ .id = .camera, .long = "--camera" },
+    .{ .id = .background, .long = "--background" },
+    .{ .id = .ambient, .long = "--ambient" },
+    .{ .id = .exposure, .long = "--exposure" },
+    .{ .id = .tonemap, .long = "--tonemap" },
+    .{ .id = .thesis, .long = "--thesis", .has_value = false },
+    .{ .id = .variant, .long = "--variant" },
+    .{ .id = .list_variants, .long = "--list-variants", .has_value = false },
+    .{ .id = .stats, .long = "--stats" },
+    .{ .id = .count_tests, .long = "--count-tests", .has_value = false },
+    .{ .id = .allow_outside, .long = "--allow-outside", .has_value = false },
+    .{ .id = .quiet, .long = "--quiet", .short = 'q', .has_value = false },
+    .{ .id = .verbose, .long = "--verbose", .short = 'v', .has_value = false },
+    .{ .id = .help, .long = "--help", .short = 'h', .has_value = false },
+    .{ .id = .version, .long = "--version", .has_value = false },
+};
+
+/// What `--help` prints.
+pub const help: []const u8 = "raylane " ++ version ++
+    \\: renders a glTF scene to an image on the CPU
+    \\
+    \\usage: raylane [render] SCENE [options]
+    \\
+    \\SCENE is a glTF 2.0 file (.gltf, .glb) or builtin:NAME, NAME being cornell,
+    \\atrium, nave or handles. The image is written to the working directory under
+    \\the scene's name, as a whole or not at all; a report goes to standard output.
+    \\
+    \\Image
+    \\  -o, --output FILE        name ending in .png, .ppm or .pfm; - is standard
+    \\                           output
+    \\      --format FORMAT      png, ppm (8 bits) or pfm (linear floats)
+    \\  -r, --resolution WxH     size in pixels (default: 1024 on the long side, in
+    \\                           the camera's aspect)
+    \\      --exposure EV|auto   brighten by EV stops, or so that 95 % of the pixels
+    \\                           are no brighter than 0.8 (default: 0)
+    \\      --tonemap linear     clamp, then encode as sRGB: the only way there is
+    \\      --background COLOR   transparent, #rrggbb (sRGB) or R,G,B (linear)
+    \\
+    \\Scene
+    \\      --camera WHICH       name or index of a camera, or auto: all in view
+    \\      --ambient L          radiance from all sides (default: 0.35 for scenes
+    \\                           without lights, otherwise 0)
+    \\      --allow-outside      let the scene name files outside of its own folder
+    \\
+    \\Rendering
+    \\      --spp N              samples a pixel, 1 to 4096 (default: 1)
+    \\      --depth N            reflections and refractions in a row, 0 to 32
+    \\                           (default: 6)
+    \\      --thesis             1024x1024, 1 sample, depth 3, all CPUs; what follows
+    \\                           it still counts
+    \\  -t, --threads N          1 to 256 (default: as many as CPUs)
+    \\      --tile-size N        pixels on the side of a piece of work, 4 to 512 in
+    \\                           steps of 4 (default: 32)
+    \\      --variant NAME       how rays are traced; the image is always the same
+    \\      --list-variants      print the names of the variants, the default first
+    \\
+    \\Messages
+    \\      --stats FORM         report as text, json or none (default: text, or none
+    \\                           when the image goes to standard output)
+    \\      --count-tests        count intersection tests, in a second, untimed pass
+    \\  -q, --quiet              no warnings, no progress, no report but by --stats
+    \\  -v, --verbose            say what was chosen by default
+    \\  -h, --help               print this
+    \\      --version            print the version
+    \\
+    \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
+    \\supported, 130 interrupted.
+    \\
+;
+
+pub const Error = error{UsageInvalid};
+
+/// Reads the arguments that follow the program's name. `variant_names` is what `--variant` accepts.
+/// On an error the diagnostic holds the line to print.
+pub fn parse(
+    arguments: []const [:0]const u8,
+    variant_names: []const []const u8,
+    diagnostic: *Diagnostic,
+) Error!Command {
+    assert(variant_names.len >= 1);
+    // Help wins over everything, for it is what somebody asks for who got the rest wrong.
+    for (arguments) |argument| {
+        if (std.mem.eql(u8, argument, "--")) break;
+        if (std.mem.eql(u8, argument, "-h") or std.mem.eql(u8, argument, "--help")) return .help;
+    }
+    var parser: Parser = .{
+        .arguments = arguments,
+        .variant_names = variant_names,
+        .diagnostic = diagnostic,
+    };
+    return parser.run();
+}
+
+const Parser = struct {
+    arguments: []const [:0]const u8,
+    variant_names: []const []const u8,
+    diagnostic: *Diagnostic,
+    /// Of the next argument.
+    index: usize = 0,
+    options: Options = .{ .scene = "" },
+    scene: ?[]const u8 = null,
+    /// The explicit `--format`.
+    format: ?Format = null,
+    /// Set by the flags that print something and end.
+    other: ?Command = null,
+
+    fn run(parser: *Parser) Error!Command {
+        var flags_ended = false;
+        var command_seen = false;
+        while (parser.index < parser.arguments.len) {
+            const argument = parser.arguments[parser.index];
+            parser.index += 1;
+            if (flags_ended or argument.len < 2 or argument[0] != '-') {
+                const is_command = std.mem.eql(u8, argument, "render") and !flags_ended and
+                    !command_seen and parser.scene == null;
+                if (is_command) command_seen = true else try parser.positional(argument);
+            } else if (std.mem.eql(u8, argument, "--")) {
+                flags_ended = true;
+            } else if (argument[1] == '-') {
+                try parser.long(argument);
+            } else {
+                try parser.short(argument);
+            }
+        }
+        if (parser.other) |command| return command;
+        parser.options.scene = parser.scene orelse return parser.fail("no scene given", .{});
+        try parser.settleFormat();
+        return .{ .render = parser.options };
+    }
+
+    fn fail(parser: *Parser, comptime format: []const u8, arguments: anytype) Error {
+        return parser.diagnostic.fail(
+            error.UsageInvalid,
+            format ++ " (see --help)",
+            arguments,
+        );
+    }
+
+    fn positional(parser: *Parser, argument: []const u8) Error!void {
+        if (argument.len == 0) return parser.fail("the scene's name is empty", .{});
+        if (parser.scene) |scene| {
+            return parser.fail("one scene at a time: {f} and {f}", .{
+                quote(scene), quote(argument),
+            });
+        }
+        parser.scene = argument;
+    }
+
+    /// `--flag`, `--flag=value` or `--flag value`.
+    fn long(parser: *Parser, argument: []const u8) Error!void {
+        const equals = std.mem.findScalar(u8, argument, '=');
+        const name = argument[0 .. equals orelse argument.len];
+        for (flags) |flag| {
+            if (!std.mem.eql(u8, flag.long, name)) continue;
+            if (!flag.has_value) {
+                if (equals == null) return parser.set(flag, "");
+                return parser.fail("option '{s}' takes no value", .{flag.long});
+            }
+            const value = if (equals) |at| argument[at + 1 ..] else try parser.next(flag.long);
+            return parser.set(flag, value);
+        }
+        var names: [flags.len][]const u8 = undefined;
+        for (&names, flags) |*candidate, flag| candidate.* = flag.long;
+        if (nearest(name, &names)) |candidate| {
+            return parser.fail("unknown option {f}, did you mean '{s}'?", .{
+                quote(name), candidate,
+            });
+        }
+        return parser.fail("unknown option {f}", .{quote(name)});
+    }
+
+    /// `-f`, `-fvalue`, `-f value`, or several flags without values in one.
+    fn short(parser: *Parser, argument: []const u8) Error!void {
+        var at: usize = 1;
+        while (at < argument.len) : (at += 1) {
+            const flag = for (flags) |flag| {
+                if (flag.short == argument[at]) break flag;
+            } else return parser.fail("unknown option {f}", .{quote(argument)});
+            const name = [_]u8{ '-', flag.short };
+            if (flag.has_value) {
+                const rest = argument[at + 1 ..];
+                return parser.set(flag, if (rest.len > 0) rest else try parser.next(&name));
+            }
+            try parser.set(flag, "");
+        }
+    }
+
+    fn next(parser: *Parser, flag_name: []const u8) Error![]const u8 {
+        if (parser.index == parser.arguments.len) {
+            return parser.fail("option '{s}' needs a value", .{flag_name});
+        }
+        parser.index += 1;
+        return parser.arguments[parser.index - 1];
+    }
+
+    fn set(parser: *Parser, flag: Flag, value: []const u8) Error!void {
+        const options = &parser.options;
+        switch (flag.id) {
+            .output => {
+                if (value.len == 0) return parser.bad(flag, value, "a file name or -");
+                options.output = value;
+            },
+            .format => parser.format = std.meta.stringToEnum(Format, value) orelse
+                return parser.bad(flag, value, "png, ppm or pfm"),
+            .resolution => options.resolution = resolutionOf(value) orelse
+                return parser.bad(flag, value, "WxH, each 1 to 65536, 2^28 pixels at most"),
+            .threads => options.thread_count = integer(u16, value, 1, thread_count_max) orelse
+                return parser.bad(flag, value, "1 to 256"),
+            .spp => options.sample_count = integer(u32, value, 1, sample_count_max) orelse
+                return parser.bad(flag, value, "1 to 4096"),
+            .depth => options.depth = integer(u32, value, 0, depth_max) orelse
+                return parser.bad(flag, value, "0 to 32"),
+            .tile_size => options.tile_size = tileSizeOf(value) orelse
+                return parser.bad(flag, value, "4 to 512, a multiple of 4"),
+            .camera => options.camera = cameraOf(value) orelse
+                return parser.bad(flag, value, "a camera's name, its index, or auto"),
+            .background => options.background = backgroundOf(value) orelse
+                return parser.bad(flag, value, "transparent, #rrggbb, or R,G,B of 0 or more"),
+            .ambient => options.ambient = radiance(value) orelse
+                return parser.bad(flag, value, "a number of 0 or more"),
+            .exposure => options.exposure = exposureOf(value) orelse
+                return parser.bad(flag, value, "-64 to 64, or auto"),
+            .tonemap => if (!std.mem.eql(u8, value, "linear")) {
+                return parser.bad(flag, value, "linear");
+            },
+            .stats => options.stats = std.meta.stringToEnum(Stats, value) orelse
+                return parser.bad(flag, value, "text, json or none"),
+            .thesis => {
+                options.resolution = .{ 1024, 1024 };
+                options.sample_count = 1;
+                options.depth = 3;
+                options.thread_count = null;
+            },
+            .variant => options.variant_index = try parser.variantOf(value),
+            .count_tests => options.count_tests = true,
+            .allow_outside => options.allow_outside = true,
+            .quiet => options.quiet = true,
+            .verbose => options.verbose = true,
+            .help => parser.other = .help,
+            .version => parser.other = parser.other orelse .version,
+            .list_variants => parser.other = parser.other orelse .list_variants,
+        }
+    }
+
+    fn bad(parser: *Parser, flag: Flag, value: []const u8, comptime expected: []const u8) Error {
+        return parser.fail("option '{s}': {f} is not " ++ expected, .{ flag.long, quote(value) });
+    }
+
+    fn variantOf(parser: *Parser, name: []const u8) Error!usize {
+        for (parser.variant_names, 0..) |candidate, index| {
+            if (std.mem.eql(u8, candidate, name)) return index;
+        }
+        if (nearest(name, parser.variant_names)) |candidate| {
+            return parser.fail("no variant {f}, did you mean '{s}'?", .{ quote(name), candidate });
+        }
+        return parser.fail("no variant {f}; --list-variants names them", .{quote(name)});
+    }
+
+    /// The format comes from `--format` or the output's extension, which may not disagree.
+    fn settleFormat(parser: *Parser) Error!void {
+        const options = &parser.options;
+        options.format = parser.format orelse .png;
+        const output = options.output orelse return;
+        if (options.toStdout()) return;
+        const extension = std.fs.path.extension(output);
+        const implied: ?Format = for (std.enums.values(Format)) |format| {
+            if (extension.len == 0) break null;
+            if (std.ascii.eqlIgnoreCase(extension[1..], @tagName(format))) break format;
+        } else null;
+        if (parser.format) |format| {
+            if (implied == null or implied == format) return;
+            return parser.fail("'--format {t}' contradicts the name {f}", .{
+                format, quote(output),
+            });
+        }
+        options.format = implied orelse return parser.fail(
+            "the name {f} ends in none of .png, .ppm and .pfm, and no --format says which",
+            .{quote(output)},
+        );
+    }
+};
+
+/// A decimal integer in minimum..maximum, digits only.
+fn integer(comptime Int: type, text: []const u8, minimum: Int, maximum: Int) ?Int {
+    if (text.len == 0) return null;
+    for (text) |byte| if (!std.ascii.isDigit(byte)) return null;
+    const value = std.fmt.parseInt(Int, text, 10) catch return null;
+    return if (value >= minimum and value <= maximum) value else null;
+}
+
+/// A finite decimal number; a denormal one is zero, as everywhere in the renderer.
+fn number(text: []const u8) ?f32 {
+    for (text) |byte| switch (byte) {
+        '0'...'9', '+', '-', '.', 'e', 'E' => {},
+        else => return null, // The parser knows "nan", "inf", "0x" and "_" besides.
+    };
+    const value = std.fmt.parseFloat(f32, text) catch return null;
+    if (!std.math.isFinite(value)) return null;
+    return if (@abs(value) < std.math.floatMin(f32)) 0 else value;
+}
+
+fn radiance(text: []const u8) ?f32 {
+    const value = number(text) orelse return null;
+    return if (value >= 0) value else null;
+}
+
+fn resolutionOf(text: []const u8) ?[2]u32 {
+    const at = std.mem.findAny(u8, text, "xX") orelse return null;
+    const width = integer(u32, text[0..at], 1, side_max) orelse return null;
+    const height = integer(u32, text[at + 1 ..], 1, side_max) orelse return null;
+    if (@as(u64, width) * height > pixel_count_max) return null;
+    return .{ width, height };
+}
+
+fn tileSizeOf(text: []const u8) ?u32 {
+    const size = integer(u32, text, tile_size_min, tile_size_max) orelse return null;
+    return if (size % 4 == 0) size else null;
+}
+
+fn cameraOf(text: []const u8) ?Camera {
+    if (text.len == 0) return null;
+    if (std.mem.eql(u8, text, "auto")) return .auto;
+    const index = integer(u32, text, 0, std.math.maxInt(u32)) orelse return .{ .name = text };
+    return .{ .index = index };
+}
+
+fn backgroundOf(text: []const u8) ?Background {
+    if (std.mem.eql(u8, text, "transparent")) return .transparent;
+    if (text.len == 7 and text[0] == '#') {
+        var codes: [3]u8 = undefined;
+        _ = std.fmt.hexToBytes(&codes, text[1..]) catch return null;
+        return .{ .srgb = codes };
+    }
+    var color: [3]f32 = undefined;
+    var parts = std.mem.splitScalar(u8, text, ',');
+    for (&color) |*component| {
+        component.* = radiance(parts.next() orelse return null) orelse return null;
+    }
+    return if (parts.next() == null) .{ .linear = color } else null;
+}
+
+fn exposureOf(text: []const u8) ?Exposure {
+    if (std.mem.eql(u8, text, "auto")) return .auto;
+    const ev = number(text) orelse return null;
+    return if (@abs(ev) <= exposure_ev_max) .{ .ev = ev } else null;
+}
+
+/// Changes of one character, up to which a name counts as misspelt.
+const misspelling_distance_max = 2;
+
+/// The candidate that `name` was most likely meant to be.
+fn nearest(name: []const u8, candidates: []const []const u8) ?[]const u8 {
+    var best: ?[]const u8 = null;
+    var best_distance: usize = misspelling_distance_max + 1;
+    for (candidates) |candidate| {
+        const distance = editDistance(name, candidate) orelse continue;
+        if (distance >= best_distance) continue;
+        best_distance = distance;
+        best = candidate;
+    }
+    return best;
+}
+
+/// Insertions, removals and replacements between two names (Wagner and Fischer 1974); null where
+/// they are too long or too different in length to be of interest.
+fn editDistance(a: []const u8, b: []const u8) ?usize {
+    const length_max = 32;
+    if (a.len > length_max or b.len > length_max) return null;
+    if (@max(a.len, b.len) - @min(a.len, b.len) > misspelling_distance_max) return null;
+    var row: [length_max + 1]usize = undefined;
+    for (row[0 .. b.len + 1], 0..) |*cell, column| cell.* = column;
+    for (a, 1..) |a_byte, line| {
+        var diagonal = row[0];
+        row[0] = line;
+        for (b, 1..) |b_byte, column| {
+            const replaced = diagonal + @intFromBool(a_byte != b_byte);
+            diagonal = row[column];
+            row[column] = @min(replaced, @min(diagonal, row[column - 1]) + 1);
+        }
+    }
+    return row[b.len];
+}
+
+const test_names: []const []const u8 = &.{ "vector-packet-8", "scalar-single-4" };
+
+fn parseForTest(arguments: []const [:0]const u8) Error!Command {
+    var diagnostic: Diagnostic = .{};
+    return parse(arguments, test_names, &diagnostic);
+}
+
+/// The options of a valid command line that renders "s.glb".
+fn optionsForTest(arguments: []const [:0]const u8) !Options {
+    var all: [8][:0]const u8 = undefined;
+    @memcpy(all[0..arguments.len], arguments);
+    all[arguments.len] = "s.glb";
+    const command = try parseForTest(all[0 .. arguments.len + 1]);
+    try std.testing.expectEqualStrings("s.glb", command.render.scene);
+    return command.render;
+}
+
+/// Expects a usage error that says `needle`, in one line that points to the help.
+fn expectUsage(needle: []const u8, arguments: []const [:0]const u8) !void {
+    var diagnostic: Diagnostic = .{};
+    try std.testing.expectError(error.UsageInvalid, parse(arguments, test_names, &diagnostic));
+    const text = diagnostic.message.text();
+    errdefer std.debug.print("{s}\n", .{text});
+    try std.testing.expect(std.mem.find(u8, text, needle) != null);
+    try std.testing.expect(std.mem.endsWith(u8, text, " (see --help)"));
+}
+
+test "a scene alone is rendered by the defaults" {
+    const options = try optionsForTest(&.{});
+    try std.testing.expectEqualDeep(Options{ .scene = "s.glb" }, options);
+    const named = try parseForTest(&.{ "render", "render" });
+    try std.testing.expectEqualStrings("render", named.render.scene);
+    try expectUsage("no scene", &.{"render"});
+    try expectUsage("no scene", &.{});
+    try expectUsage("no scene", &.{ "-q", "--" });
+    try expectUsage("empty", &.{""});
+    try expectUsage("'a' and 'b'", &.{ "a", "b" });
+    try expectUsage("'a' and 'render'", &.{ "a", "render" });
+}
+
+test "after -- everything is a scene, and a lone dash always" {
+    for ([_][:0]const u8{ "-q", "--help", "render", "--", "-" }) |name| {
+        const command = try parseForTest(&.{ "--", name });
+        try std.testing.expectEqualStrings(name, command.render.scene);
+        try std.testing.expect(!command.render.quiet);
+    }
+    try std.testing.expectEqualStrings("-", (try parseForTest(&.{"-"})).render.scene);
+}
+
+test "help wins over mistakes, the other questions do not" {
+    try std.testing.expectEqual(.help, try parseForTest(&.{"--help"}));
+    try std.testing.expectEqual(.help, try parseForTest(&.{ "--no-such", "-h" }));
+    try std.testing.expectEqual(.help, try parseForTest(&.{"-qh"}));
+    try std.testing.expectEqual(.version, try parseForTest(&.{"--version"}));
+    try std.testing.expectEqual(.version, try parseForTest(&.{ "--version", "s.glb" }));
+    try std.testing.expectEqual(.list_variants, try parseForTest(&.{"--list-variants"}));
+    try expectUsage("--no-such", &.{ "--version", "--no-such" });
+}
+
+test "a long option takes its value joined or apart, a short one also attached" {
+    const spellings = [_][]const [:0]const u8{
+        &.{ "--resolution", "3x4" }, &.{"--resolution=3x4"},
+        &.{ "-r", "3x4" },           &.{"-r3x4"},
+        &.{"-qr3x4"},                &.{ "-vqr", "3X4" },
+    };
+    for (spellings) |spelling| {
+        const options = try optionsForTest(spelling);
+        try std.testing.expectEqual([2]u32{ 3, 4 }, options.resolution.?);
+    }
+    inline for (flags) |flag| {
+        const argument = flag.long ++ if (flag.has_value) "" else "=1";
+        const needle = "'" ++ flag.long ++ if (flag.has_value) "' needs a" else "' takes no";
+        if (flag.id != .help) try expectUsage(needle ++ " value", &.{ "s", argument });
+    }
+    try expectUsage("'-t' needs a value", &.{ "s", "-t" });
+    try expectUsage("'--threads': '' is not 1 to 256", &.{ "s", "--threads=" });
+}
+
+test "unknown options are named, misspelt ones are recognised" {
+    try expectUsage("unknown option '--foo' (", &.{"--foo"});
+    try expectUsage("unknown option '--foo' (", &.{"--foo=bar"});
+    try expectUsage("unknown option '-x' (", &.{"-x"});
+    try expectUsage("unknown option '-qx' (", &.{"-qx"});
+    try expectUsage("did you mean '--resolution'?", &.{"--resolutoin=1x1"});
+    try expectUsage("did you mean '--depth'?", &.{"--dept"});
+    try expectUsage("did you mean '--spp'?", &.{"--ssp"});
+    const long: [500:0]u8 = @splat('-');
+    try expectUsage("unknown option '--", &.{&long});
+    try expectUsage("unknown option '--\xc3\xa4?'", &.{"--\xc3\xa4\x1b"});
+}
+
+test "numbers keep to their ranges" {
+    const Case = struct { flag: []const u8, good: []const []const u8, bad: []const []const u8 };
+    const cases = [_]Case{
+        .{
+            .flag = "--threads",
+            .good = &.{ "1", "256", "007" },
+            .bad = &.{ "0", "257", "-1", "+1", "1.0", "1_0", "x", " 1", "99999999999999999999" },
+        },
+        .{ .flag = "--spp", .good = &.{ "1", "4096" }, .bad = &.{ "0", "4097", "" } },
+        .{ .flag = "--depth", .good = &.{ "0", "32" }, .bad = &.{ "33", "-1" } },
+        .{ .flag = "--tile-size", .good = &.{ "4", "36", "512" }, .bad = &.{ "0", "2", "516" } },
+        .{
+            .flag = "--resolution",
+            .good = &.{ "1x1", "65536x1", "1x65536", "16384x16384" },
+            .bad = &.{ "0x1", "1x0", "65537x1", "16384x16385", "1", "x", "1x", "1x1x1", "1*1" },
+        },
+        .{
+            .flag = "--ambient",
+            .good = &.{ "0", "-0", "1e-45", "0.35", ".5", "3e38" },
+            .bad = &.{ "-1", "nan", "inf", "1e39", "0x1", "", "1_0", "1,0" },
+        },
+        .{
+            .flag = "--exposure",
+            .good = &.{ "auto", "0", "-2.5", "+1", "64", "-64" },
+            .bad = &.{ "Auto", "64.1", "-65", "nan", "" },
+        },
+        .{
+            .flag = "--background",
+            .good = &.{ "transparent", "#000000", "#FFaa01", "0,0,0", "1,0.5,1e3" },
+            .bad = &.{ "#fff", "#gggggg", "#0000000", "red", "1,2", "1,2,3,4", "1,2,-1", ",,", "" },
+        },
+        .{ .flag = "--tonemap", .good = &.{"linear"}, .bad = &.{ "aces", "" } },
+        .{ .flag = "--stats", .good = &.{ "text", "json", "none" }, .bad = &.{ "JSON", "" } },
+        .{ .flag = "--format", .good = &.{ "png", "ppm", "pfm" }, .bad = &.{ "PNG", "jpg", "" } },
+        .{ .flag = "--variant", .good = test_names, .bad = &.{ "vector", "", "vector-packet-16" } },
+        .{ .flag = "--camera", .good = &.{ "auto", "0", "4294967296", "b c" }, .bad = &.{""} },
+        .{ .flag = "--output", .good = &.{ "-", "a.png", "b/A.PPM" }, .bad = &.{ "", "png" } },
+    };
+    for (cases) |case| {
+        var buffer: [128]u8 = undefined;
+        for (case.good) |value| {
+            const parts = .{ case.flag, value };
+            errdefer std.debug.print("{s} {s}\n", parts);
+            const argument = try std.mem.printSentinel(&buffer, "{s}={s}", parts, 0);
+            _ = try optionsForTest(&.{argument});
+        }
+        for (case.bad) |value| {
+            const parts = .{ case.flag, value };
+            errdefer std.debug.print("{s} {s}\n", parts);
+            const argument = try std.mem.printSentinel(&buffer, "{s}={s}", parts, 0);
+            try expectUsage("", &.{ argument, "s.glb" });
+        }
+    }
+}
+
+test "values arrive as they were meant" {
+    try std.testing.expectEqual(7, (try optionsForTest(&.{"--camera=7"})).camera.index);
+    try std.testing.expectEqual(.auto, (try optionsForTest(&.{"--camera=auto"})).camera);
+    try std.testing.expectEqualStrings("7a", (try optionsForTest(&.{"--camera=7a"})).camera.name);
+    const background = (try optionsForTest(&.{"--background=#FF8001"})).background;
+    try std.testing.expectEqual([3]u8{ 255, 128, 1 }, background.srgb);
+    const linear = (try optionsForTest(&.{"--background=0,0.5,2"})).background;
+    try std.testing.expectEqual([3]f32{ 0, 0.5, 2 }, linear.linear);
+    const denormal = (try optionsForTest(&.{"--ambient=1e-40"})).ambient;
+    try std.testing.expectEqual(0, denormal);
+    const exposure = (try optionsForTest(&.{ "--exposure", "-1.5" })).exposure;
+    try std.testing.expectEqual(-1.5, exposure.ev);
+    const variant = try optionsForTest(&.{"--variant=scalar-single-4"});
+    try std.testing.expectEqual(1, variant.variant_index);
+    try expectUsage("did you mean 'vector-packet-8'?", &.{ "--variant=vector-paket-8", "s" });
+    const switches = try optionsForTest(&.{ "-qv", "--count-tests", "--allow-outside" });
+    try std.testing.expect(switches.quiet and switches.verbose);
+    try std.testing.expect(switches.count_tests and switches.allow_outside);
+}
+
+test "the last of several options counts, around --thesis too" {
+    try std.testing.expectEqual(2, (try optionsForTest(&.{ "--spp=1", "--spp=2" })).sample_count);
+    const thesis = try optionsForTest(&.{ "--depth=9", "-t7", "--thesis" });
+    try std.testing.expectEqual([2]u32{ 1024, 1024 }, thesis.resolution.?);
+    try std.testing.expectEqual(3, thesis.depth);
+    try std.testing.expectEqual(1, thesis.sample_count);
+    try std.testing.expectEqual(null, thesis.thread_count);
+    const changed = try optionsForTest(&.{ "--thesis", "--depth=9", "-t7" });
+    try std.testing.expectEqual(9, changed.depth);
+    try std.testing.expectEqual(7, changed.thread_count);
+    try std.testing.expectEqual([2]u32{ 1024, 1024 }, changed.resolution.?);
+}
+
+test "the format follows the name, unless said otherwise" {
+    try std.testing.expectEqual(.pfm, (try optionsForTest(&.{"-oa.pfm"})).format);
+    try std.testing.expectEqual(.ppm, (try optionsForTest(&.{"-oA.PPM"})).format);
+    try std.testing.expectEqual(.png, (try optionsForTest(&.{ "-o", "-" })).format);
+    try std.testing.expectEqual(.ppm, (try optionsForTest(&.{ "-o", "-", "--format=ppm" })).format);
+    try std.testing.expectEqual(.pfm, (try optionsForTest(&.{ "--format=pfm", "-oa.dat" })).format);
+    try std.testing.expectEqual(.pfm, (try optionsForTest(&.{ "--format=pfm", "-oa" })).format);
+    try expectUsage("contradicts", &.{ "--format=pfm", "-oa.png", "s" });
+    try expectUsage("'a.tiff' ends in none of", &.{ "-oa.tiff", "s" });
+}
+
+test outputName {
+    const gpa = std.testing.allocator;
+    const cases = [_][2][]const u8{
+        .{ "a.glb", "a.png" },                   .{ "/x/y.z/a.b.gltf", "a.b.png" },
+        .{ "a", "a.png" },                       .{ "builtin:cornell", "cornell.png" },
+        .{ "builtin:x/cornell", "cornell.png" }, .{ ".glb", ".glb.png" },
+        .{ "", ".png" },                         .{ "/", ".png" },
+    };
+    for (cases) |case| {
+        const name = try outputName(gpa, &.{ .scene = case[0] });
+        defer gpa.free(name);
+        try std.testing.expectEqualStrings(case[1], name);
+    }
+    const given = try outputName(gpa, &.{ .scene = "a.glb", .output = "b/c.ppm", .format = .ppm });
+    defer gpa.free(given);
+    try std.testing.expectEqualStrings("b/c.ppm", given);
+    const pfm = try outputName(gpa, &.{ .scene = "a.glb", .format = .pfm });
+    defer gpa.free(pfm);
+    try std.testing.expectEqualStrings("a.pfm", pfm);
+}
+
+test "the help names every option and fits a screen" {
+    var line_count: usize = 0;
+    var lines = std.mem.splitScalar(u8, help, '\n');
+    while (lines.next()) |line| : (line_count += 1) try std.testing.expect(line.len <= 80);
+    try std.testing.expect(line_count <= 60);
+    for (flags) |flag| {
+        var buffer: [40]u8 = undefined;
+        const entry = if (flag.short == 0)
+            try std.mem.print(&buffer, "\n      {s} ", .{flag.long})
+        else
+            try std.mem.print(&buffer, "\n  -{c}, {s}", .{ flag.short, flag.long });
+        errdefer std.debug.print("{s}\n", .{entry});
+        try std.testing.expect(std.mem.find(u8, help, entry) != null);
+    }
+}
+
+test "limits in texts are those of the code" {
+    const help_limits = .{
+        .{ "1 to {d} (default: 1)", sample_count_max },
+        .{ "0 to {d}\n", depth_max },
+        .{ "1 to {d} (default: as many", thread_count_max },
+    };
+    inline for (help_limits) |limit| {
+        const text = std.fmt.comptimePrint(limit[0], .{limit[1]});
+        try std.testing.expect(std.mem.find(u8, help, text) != null);
+    }
+    const tiles = std.fmt.comptimePrint("{d} to {d} in", .{ tile_size_min, tile_size_max });
+    try std.testing.expect(std.mem.find(u8, help, tiles) != null);
+}
+
+test editDistance {
+    try std.testing.expectEqual(0, editDistance("", ""));
+    try std.testing.expectEqual(1, editDistance("", "a"));
+    try std.testing.expectEqual(2, editDistance("ab", "ba"));
+    try std.testing.expectEqual(3, editDistance("abc", "xyz"));
+    try std.testing.expectEqual(null, editDistance("a", "abcd"));
+}

@@ -1,0 +1,27 @@
+//! Raylane as a library: `@import("raylane")`.
+//!
+//! The way of the data, parse -> Scene -> prepare -> World -> trace -> Image -> output, with one
+//! declaration for each top-level file. Programs, tests and tools import this root and nothing
+//! below it; its test block pulls in the tests of every file.
+
+const std = @import("std");
+
+pub const diagnostic = @import("diagnostic.zig");
+pub const image = @import("image.zig");
+pub const math = @import("math.zig");
+pub const options = @import("options.zig");
+pub const output = @import("output.zig");
+pub const parallel = @import("parallel.zig");
+pub const parse = @import("parse.zig");
+pub const prepare = @import("prepare.zig");
+pub const report = @import("report.zig");
+pub const scene = @import("scene.zig");
+pub const simd = @import("simd.zig");
+pub const statistics = @import("statistics.zig");
+pub const trace = @import("trace.zig");
+pub const variant = @import("variant.zig");
+pub const world = @import("world.zig");
+
+test {
+    std.testing.refAllDecls(@This());
+}

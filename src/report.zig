@@ -1,0 +1,366 @@
+//! What a frame cost, as text for people and as JSON for programs.
+//!
+//! In: plain values that `main` collects from the stages. Out: a few aligned lines, or one JSON
+//! object in one line. Keys of the JSON grow in number but never change their meaning.
+
+const std = @import("std");
+const Writer = std.Io.Writer;
+const printable = @import("diagnostic.zig").printable;
+const statistics = @import("statistics.zig");
+
+/// One frame.
+pub const Report = struct {
+    /// Of the program.
+    version: []const u8,
+    /// As on the command line.
+    scene: []const u8,
+    /// Where the image went, as on the command line.
+    output: []const u8,
+    triangle_count: u64,
+    width: u32,
+    height: u32,
+    /// Samples a pixel.
+    sample_count: u32,
+    /// Most bounces.
+    depth: u32,
+    thread_count: usize,
+    variant: []const u8,
+    times: statistics.StageTimes,
+    rays: statistics.RayCounts,
+    /// Null: not counted.
+    tests: ?statistics.TestCounts,
+    bvh: Bvh,
+    memory_peak_bytes: u64,
+    image_hash: u64,
+    warnings: []const []const u8,
+
+    /// Facts about the tree.
+    pub const Bvh = struct {
+        node_count: u64,
+        /// Levels of nodes.
+        depth: u32,
+        sah_cost: f64,
+        bytes: u64,
+    };
+
+    fn rayCount(report: *const Report) u64 {
+        return report.rays.primary + report.rays.shadow + report.rays.secondary;
+    }
+};
+
+/// The largest amount of memory that the process has held so far.
+pub fn memoryPeakBytes() u64 {
+    // Linux counts in KiB.
+    return @as(u64, @intCast(std.posix.getrusage(std.posix.rusage.SELF).maxrss)) * 1024;
+}
+
+/// Writes the report as lines for people.
+pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
+    const times = &report.times;
+    try writer.print("scene        {f}, {d} triangles\n", .{
+        printable(report.scene), report.triangle_count,
+    });
+    try writer.print("image        {f}, {d} x {d}, {d} {s} a pixel, depth {d}\n", .{
+        printable(report.output),
+        report.width,
+        report.height,
+        report.sample_count,
+        if (report.sample_count == 1) "sample" else "samples",
+        report.depth,
+    });
+    try writer.print("tracer       {s}, {d} {s}\n\n", .{
+        report.variant,
+        report.thread_count,
+        if (report.thread_count == 1) "thread" else "threads",
+    });
+    inline for (.{
+        .{ "parse", times.parse_ns },
+        .{ "prepare", times.prepare_ns },
+        .{ "BVH build", times.bvh_build_ns },
+        .{ "trace", times.trace_ns },
+        .{ "output", times.output_ns },
+        .{ "total", times.total_ns },
+    }) |row| try writer.print("{s:<9} {d:>12.3} ms\n", .{ row[0], milliseconds(row[1]) });
+
+    try writer.print("\nrays         {d}", .{report.rayCount()});
+    try writeRate(writer, report.rayCount(), times.trace_ns);
+    try writer.print("\n             {d} primary, {d} shadow, {d} secondary\n", .{
+        report.rays.primary, report.rays.shadow, report.rays.secondary,
+    });
+    if (report.tests) |tests| {
+        inline for (.{
+            .{ "box tests   ", tests.box_issued, tests.box_useful },
+            .{ "triangles   ", tests.triangle_issued, tests.triangle_useful },
+        }) |row| {
+            try writer.print("{s} {d} tested", .{ row[0], row[1] });
+            try writeRate(writer, row[1], times.trace_ns);
+            try writer.print(", {d} useful", .{row[2]});
+            if (row[1] > 0) try writer.print(" ({d:.1} %)", .{100 * float(row[2]) / float(row[1])});
+            try writer.writeByte('\n');
+        }
+    } else {
+        try writer.writeAll("tests        not counted: --count-tests does, in a second pass\n");
+    }
+    try writer.print("BVH          {d} nodes, depth {d}, SAH cost {d:.2}, ", .{
+        report.bvh.node_count, report.bvh.depth, report.bvh.sah_cost,
+    });
+    try writeBytes(writer, report.bvh.bytes);
+    try writer.writeAll("\nmemory       ");
+    try writeBytes(writer, report.memory_peak_bytes);
+    try writer.writeAll(" at most\n");
+    try writer.print("image hash   {x:0>16}\n", .{report.image_hash});
+}
+
+/// A size in KiB or MiB, whichever is readable.
+fn writeBytes(writer: *Writer, bytes: u64) Writer.Error!void {
+    const is_large = bytes >= 1 << 20;
+    const unit: f64 = if (is_large) 1 << 20 else 1 << 10;
+    try writer.print("{d:.1} {s}", .{ float(bytes) / unit, if (is_large) "MiB" else "KiB" });
+}
+
+/// `, x M/s` where a rate has a meaning.
+fn writeRate(writer: *Writer, count: u64, time_ns: u64) Writer.Error!void {
+    if (time_ns == 0) return;
+    try writer.print(", {d:.2} M/s", .{float(count) * 1e3 / float(time_ns)});
+}
+
+/// Writes the report as one JSON object and a line end.
+pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
+    const times = &report.times;
+    try writer.writeAll("{\"version\":");
+    try writeString(writer, report.version);
+    try writer.writeAll(",\"scene\":");
+    try writeString(writer, report.scene);
+    try writer.print(",\"triangles\":{d},\"width\":{d},\"height\":{d},\"samples\":{d}", .{
+        report.triangle_count, report.width, report.height, report.sample_count,
+    });
+    try writer.print(",\"depth\":{d},\"threads\":{d},\"variant\":", .{
+        report.depth, report.thread_count,
+    });
+    try writeString(writer, report.variant);
+    try writer.writeAll(",\"time_ms\":{");
+    inline for (.{
+        .{ "parse", times.parse_ns },
+        .{ "prepare", times.prepare_ns },
+        .{ "bvh_build", times.bvh_build_ns },
+        .{ "trace", times.trace_ns },
+        .{ "output", times.output_ns },
+        .{ "total", times.total_ns },
+    }, 0..) |row, index| {
+        if (index > 0) try writer.writeByte(',');
+        try writer.print("\"" ++ row[0] ++ "\":{d:.6}", .{milliseconds(row[1])});
+    }
+    try writer.writeByte('}');
+    try writer.print(",\"rays\":{{\"primary\":{d},\"shadow\":{d},\"secondary\":{d}}}", .{
+        report.rays.primary, report.rays.shadow, report.rays.secondary,
+    });
+    if (report.tests) |tests| {
+        try writer.print(",\"tests\":{{\"box_issued\":{d},\"box_useful\":{d}", .{
+            tests.box_issued, tests.box_useful,
+        });
+        try writer.print(",\"triangle_issued\":{d},\"triangle_useful\":{d}}}", .{
+            tests.triangle_issued, tests.triangle_useful,
+        });
+    } else {
+        try writer.writeAll(",\"tests\":null");
+    }
+    try writer.print(",\"bvh\":{{\"nodes\":{d},\"depth\":{d},\"sah_cost\":", .{
+        report.bvh.node_count, report.bvh.depth,
+    });
+    // JSON has no infinity, which the cost of a degenerate tree may reach.
+    if (std.math.isFinite(report.bvh.sah_cost)) {
+        try writer.print("{d:.6}", .{report.bvh.sah_cost});
+    } else {
+        try writer.writeAll("null");
+    }
+    try writer.print(",\"bytes\":{d}}},\"memory_peak_bytes\":{d},\"image_hash\":\"{x:0>16}\"", .{
+        report.bvh.bytes, report.memory_peak_bytes, report.image_hash,
+    });
+    try writer.writeAll(",\"warnings\":[");
+    for (report.warnings, 0..) |warning, index| {
+        if (index > 0) try writer.writeByte(',');
+        try writeString(writer, warning);
+    }
+    try writer.writeAll("]}\n");
+}
+
+/// A JSON string. Bytes that are not UTF-8, which a file name may hold, become U+FFFD.
+fn writeString(writer: *Writer, text: []const u8) Writer.Error!void {
+    try writer.writeByte('"');
+    var index: usize = 0;
+    while (index < text.len) {
+        const byte = text[index];
+        switch (byte) {
+            '"', '\\' => try writer.writeAll(&.{ '\\', byte }),
+            0...0x1f, 0x7f => try writer.print("\\u{x:0>4}", .{byte}),
+            else => if (sequenceLength(text[index..])) |length| {
+                try writer.writeAll(text[index..][0..length]);
+                index += length;
+                continue;
+            } else try writer.writeAll("\u{fffd}"),
+        }
+        index += 1;
+    }
+    try writer.writeByte('"');
+}
+
+/// Bytes of the UTF-8 sequence at the start of `text`, or null.
+fn sequenceLength(text: []const u8) ?usize {
+    const length = std.unicode.utf8ByteSequenceLength(text[0]) catch return null;
+    if (length > text.len) return null;
+    return if (std.unicode.utf8ValidateSlice(text[0..length])) length else null;
+}
+
+fn milliseconds(time_ns: u64) f64 {
+    return float(time_ns) / 1e6;
+}
+
+fn float(count: u64) f64 {
+    return @floatFromInt(count);
+}
+
+const report_for_test: Report = .{
+    .version = "0.1.0",
+    .scene = "a \"b\"\n\xff.glb",
+    .output = "a.png",
+    .triangle_count = 34,
+    .width = 1024,
+    .height = 768,
+    .sample_count = 1,
+    .depth = 6,
+    .thread_count = 4,
+    .variant = "vector-packet-4",
+    .times = .{
+        .parse_ns = 1_500_000,
+        .prepare_ns = 1,
+        .bvh_build_ns = 0,
+        .trace_ns = 2_000_000,
+        .output_ns = 12_345_678_901,
+        .total_ns = 12_349_178_902,
+    },
+    .rays = .{ .primary = 786_432, .shadow = 1000, .secondary = 68 },
+    .tests = .{
+        .box_issued = 4000,
+        .box_useful = 3000,
+        .triangle_issued = 0,
+        .triangle_useful = 0,
+    },
+    .bvh = .{ .node_count = 5, .depth = 3, .sah_cost = 12.3456, .bytes = 3 << 10 },
+    .memory_peak_bytes = 5 << 20,
+    .image_hash = 0xabc,
+    .warnings = &.{ "one", "two" },
+};
+
+fn expectText(expected: []const u8, report: *const Report) !void {
+    var text: Writer.Allocating = .init(std.testing.allocator);
+    defer text.deinit();
+    try writeText(report, &text.writer);
+    try std.testing.expectEqualStrings(expected, text.written());
+}
+
+test "the text, with and without tests counted" {
+    const head =
+        \\scene        a "b"??.glb, 34 triangles
+        \\image        a.png, 1024 x 768, 1 sample a pixel, depth 6
+        \\tracer       vector-packet-4, 4 threads
+        \\
+        \\parse            1.500 ms
+        \\prepare          0.000 ms
+        \\BVH build        0.000 ms
+        \\trace            2.000 ms
+        \\output       12345.679 ms
+        \\total        12349.179 ms
+        \\
+        \\rays         787500, 393.75 M/s
+        \\             786432 primary, 1000 shadow, 68 secondary
+        \\
+    ;
+    const tail =
+        \\BVH          5 nodes, depth 3, SAH cost 12.35, 3.0 KiB
+        \\memory       5.0 MiB at most
+        \\image hash   0000000000000abc
+        \\
+    ;
+    var report = report_for_test;
+    try expectText(head ++
+        \\box tests    4000 tested, 2.00 M/s, 3000 useful (75.0 %)
+        \\triangles    0 tested, 0.00 M/s, 0 useful
+        \\
+    ++ tail, &report);
+    report.tests = null;
+    try expectText(head ++
+        \\tests        not counted: --count-tests does, in a second pass
+        \\
+    ++ tail, &report);
+}
+
+test "the JSON has every key and nothing else" {
+    const Parsed = struct {
+        version: []const u8,
+        scene: []const u8,
+        triangles: u64,
+        width: u32,
+        height: u32,
+        samples: u32,
+        depth: u32,
+        threads: u32,
+        variant: []const u8,
+        time_ms: struct {
+            parse: f64,
+            prepare: f64,
+            bvh_build: f64,
+            trace: f64,
+            output: f64,
+            total: f64,
+        },
+        rays: statistics.RayCounts,
+        tests: ?statistics.TestCounts,
+        bvh: struct { nodes: u64, depth: u32, sah_cost: ?f64, bytes: u64 },
+        memory_peak_bytes: u64,
+        image_hash: []const u8,
+        warnings: []const []const u8,
+    };
+    const gpa = std.testing.allocator;
+    for ([_]bool{ false, true }) |is_bare| {
+        var report = report_for_test;
+        if (is_bare) {
+            report.tests = null;
+            report.bvh.sah_cost = std.math.inf(f64);
+            report.warnings = &.{};
+        }
+        var text: Writer.Allocating = .init(gpa);
+        defer text.deinit();
+        try writeJson(&report, &text.writer);
+        const line = text.written();
+        try std.testing.expectEqual(line.len - 1, std.mem.findScalar(u8, line, '\n'));
+
+        const parsed = try std.json.parseFromSlice(Parsed, gpa, line, .{});
+        defer parsed.deinit();
+        const value = parsed.value;
+        try std.testing.expectEqualStrings("a \"b\"\n\u{fffd}.glb", value.scene);
+        try std.testing.expectEqualStrings("0000000000000abc", value.image_hash);
+        try std.testing.expectEqual(1.5, value.time_ms.parse);
+        try std.testing.expectEqual(0.000001, value.time_ms.prepare);
+        try std.testing.expectEqual(12_345.678901, value.time_ms.output);
+        try std.testing.expectEqual(786_432, value.rays.primary);
+        try std.testing.expectEqual(5 << 20, value.memory_peak_bytes);
+        try std.testing.expectEqualDeep(report.tests, value.tests);
+        try std.testing.expectEqualDeep(report.warnings, value.warnings);
+        try std.testing.expectEqual(@as(?f64, if (is_bare) null else 12.3456), value.bvh.sah_cost);
+    }
+}
+
+test "nothing traced in no time is not a division by zero" {
+    var report = report_for_test;
+    report.times = .{};
+    report.rays = .{};
+    var text: Writer.Allocating = .init(std.testing.allocator);
+    defer text.deinit();
+    try writeText(&report, &text.writer);
+    try std.testing.expect(std.mem.find(u8, text.written(), "nan") == null);
+    try std.testing.expect(std.mem.find(u8, text.written(), "\nrays         0\n") != null);
+}
+
+test "the peak of memory is that of a program" {
+    try std.testing.expect(memoryPeakBytes() > 64 << 10);
+}
