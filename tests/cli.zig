@@ -1,0 +1,558 @@
+//! Tests of the command line: the real program, in a fresh folder, under qemu where it is foreign.
+//!
+//! In: the environment, RAYLANE_PROGRAM (the program's path) and RAYLANE_EMULATOR (what runs it,
+//! with its arguments, if anything does), as build/tests.zig sets them. Each test opens a `Sandbox`
+//! and looks at exit codes, at both output streams and at the files left behind.
+
+const std = @import("std");
+const Io = std.Io;
+const testing = std.testing;
+const io = testing.io;
+
+/// A run that takes longer is ended, and is an error.
+const run_s_max = 300;
+
+/// What the program left when it ended.
+const Ending = struct {
+    exit_code: u8,
+    stdout: []const u8,
+    stderr: []const u8,
+};
+
+/// A fresh folder in which the program runs; everything is freed by `deinit`.
+const Sandbox = struct {
+    folder: testing.TmpDir,
+    arena_state: std.heap.ArenaAllocator,
+
+    fn init() Sandbox {
+        return .{
+            .folder = testing.tmpDir(.{ .iterate = true }),
+            .arena_state = .init(testing.allocator),
+        };
+    }
+
+    fn deinit(sandbox: *Sandbox) void {
+        sandbox.arena_state.deinit();
+        sandbox.folder.cleanup();
+        sandbox.* = undefined;
+    }
+
+    /// Runs the program with `arguments` in the folder. Death by a signal is an error.
+    fn run(sandbox: *Sandbox, arguments: []const []const u8) !Ending {
+        return sandbox.runShell("exec \"$@\"", arguments);
+    }
+
+    /// Runs a shell script in the folder, whose arguments are the program and its `arguments`.
+    fn runShell(
+        sandbox: *Sandbox,
+        script: []const u8,
+        arguments: []const []const u8,
+    ) !Ending {
+        const result = try std.process.run(sandbox.arena_state.allocator(), io, .{
+            .argv = try sandbox.shellCommand(script, arguments),
+            .cwd = .{ .dir = sandbox.folder.dir },
+            .timeout = .{ .duration = .{ .raw = .fromSeconds(run_s_max), .clock = .awake } },
+        });
+        return switch (result.term) {
+            .exited => |code| .{
+                .exit_code = code,
+                .stdout = result.stdout,
+                .stderr = result.stderr,
+            },
+            else => {
+                std.debug.print("{f}\n{s}", .{ result.term, result.stderr });
+                return error.ProgramDied;
+            },
+        };
+    }
+
+    fn shellCommand(
+        sandbox: *Sandbox,
+        script: []const u8,
+        arguments: []const []const u8,
+    ) ![]const []const u8 {
+        const arena = sandbox.arena_state.allocator();
+        var command: std.ArrayList([]const u8) = .empty;
+        try command.appendSlice(arena, &.{ "sh", "-c", script, "sh" });
+        if (testing.environ.getPosix("RAYLANE_EMULATOR")) |emulator| {
+            var words = std.mem.tokenizeScalar(u8, emulator, ' ');
+            while (words.next()) |word| try command.append(arena, word);
+        }
+        try command.append(arena, testing.environ.getPosix("RAYLANE_PROGRAM") orelse
+            return error.ProgramNotNamed);
+        try command.appendSlice(arena, arguments);
+        return command.items;
+    }
+
+    /// Runs the program and expects this exit code; shows stderr where it is another.
+    fn expectExit(sandbox: *Sandbox, exit_code: u8, arguments: []const []const u8) !Ending {
+        const ending = try sandbox.run(arguments);
+        if (ending.exit_code != exit_code) std.debug.print("{s}", .{ending.stderr});
+        try testing.expectEqual(exit_code, ending.exit_code);
+        return ending;
+    }
+
+    /// Expects that the folder holds nothing.
+    fn expectEmpty(sandbox: *Sandbox) !void {
+        try sandbox.expectFiles(&.{});
+    }
+
+    /// Expects that the folder holds these files and nothing else.
+    fn expectFiles(sandbox: *Sandbox, names: []const []const u8) !void {
+        var found_count: usize = 0;
+        var iterator = sandbox.folder.dir.iterate();
+        while (try iterator.next(io)) |entry| : (found_count += 1) {
+            for (names) |name| {
+                if (std.mem.eql(u8, name, entry.name)) break;
+            } else {
+                std.debug.print("left behind: {s}\n", .{entry.name});
+                return error.UnexpectedFile;
+            }
+        }
+        try testing.expectEqual(names.len, found_count);
+    }
+
+    fn write(sandbox: *Sandbox, name: []const u8, bytes: []const u8) !void {
+        try sandbox.folder.dir.writeFile(io, .{ .sub_path = name, .data = bytes });
+    }
+
+    fn read(sandbox: *Sandbox, name: []const u8) ![]const u8 {
+        const arena = sandbox.arena_state.allocator();
+        return sandbox.folder.dir.readFileAlloc(io, name, arena, .unlimited);
+    }
+};
+
+/// A scene of nothing: what is seen is the background.
+const empty_scene =
+    \\{"asset":{"version":"2.0"}}
+;
+
+/// A GLB of one triangle, 36 bytes of positions.
+fn triangleScene(arena: std.mem.Allocator) ![]const u8 {
+    const json =
+        \\{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        \\"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"buffers":[{"byteLength":36}],
+        \\"bufferViews":[{"buffer":0,"byteLength":36}],"accessors":[{"bufferView":0,"count":3,
+        \\"componentType":5126,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}]}
+    ;
+    const corners = [_]f32{ 0, 0, 0, 1, 0, 0, 0, 1, 0 };
+    const padding = "   "[0 .. (4 - json.len % 4) % 4];
+    var file: Io.Writer.Allocating = .init(arena);
+    const writer = &file.writer;
+    try writer.writeAll("glTF");
+    const json_bytes: u32 = json.len + padding.len;
+    for ([_]u32{ 2, 12 + 8 + json_bytes + 8 + 36, json_bytes, 0x4e4f534a }) |word| {
+        try writer.writeInt(u32, word, .little);
+    }
+    try writer.writeAll(json ++ padding);
+    for ([_]u32{ 36, 0x004e4942 }) |word| try writer.writeInt(u32, word, .little);
+    for (corners) |coordinate| try writer.writeInt(u32, @bitCast(coordinate), .little);
+    return file.written();
+}
+
+/// Expects what every error must be: one line `raylane: ...`, ended, and nothing on stdout.
+fn expectOneErrorLine(ending: Ending) !void {
+    try testing.expectStringStartsWith(ending.stderr, "raylane: ");
+    try testing.expectStringEndsWith(ending.stderr, "\n");
+    try testing.expectEqual(1, std.mem.countScalar(u8, ending.stderr, '\n'));
+    try testing.expectEqualStrings("", ending.stdout);
+}
+
+test "--version prints one line to stdout" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const ending = try sandbox.expectExit(0, &.{"--version"});
+    try testing.expectStringStartsWith(ending.stdout, "raylane ");
+    try testing.expectEqual(1, std.mem.countScalar(u8, ending.stdout, '\n'));
+    try testing.expectEqualStrings("", ending.stderr);
+}
+
+test "an unknown flag is a usage error" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const ending = try sandbox.expectExit(2, &.{"--no-such-flag"});
+    try expectOneErrorLine(ending);
+    try testing.expect(std.mem.find(u8, ending.stderr, "--no-such-flag") != null);
+    try sandbox.expectEmpty();
+}
+
+test "mistakes on the command line are usage errors in one line" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    for ([_][]const []const u8{
+        &.{},
+        &.{"render"},
+        &.{ "builtin:cornell", "builtin:cornell" },
+        &.{ "builtin:cornell", "-o", "a.jpg" },
+        &.{ "builtin:cornell", "-o" },
+        &.{ "builtin:cornell", "-r", "0x1" },
+        &.{ "builtin:cornell", "--threads=0" },
+        &.{ "builtin:cornell", "--variant=fast" },
+        &.{ "builtin:cornell", "--stats=xml" },
+        &.{ "builtin:cornell", "-r8x8", "--camera=no such camera" },
+        &.{ "builtin:cornell", "-r8x8", "--camera=99" },
+    }) |arguments| {
+        const ending = try sandbox.expectExit(2, arguments);
+        try expectOneErrorLine(ending);
+        try sandbox.expectEmpty();
+    }
+    const near = try sandbox.expectExit(2, &.{"--resolutoin=8x8"});
+    try testing.expect(std.mem.find(u8, near.stderr, "'--resolution'") != null);
+}
+
+test "help is for everybody, fits a screen and keeps its promises" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const help = try sandbox.expectExit(0, &.{"--help"});
+    try testing.expectEqualStrings("", help.stderr);
+    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 60);
+    const again = try sandbox.expectExit(0, &.{ "absent.glb", "--no-such-flag", "-h" });
+    try testing.expectEqualStrings(help.stdout, again.stdout);
+    // The built-in scenes that the help names are those that there are.
+    const unknown = try sandbox.expectExit(3, &.{"builtin:no such scene"});
+    try expectOneErrorLine(unknown);
+    const list = std.mem.cut(u8, std.mem.trimEnd(u8, unknown.stderr, "\n"), "there are: ").?[1];
+    var names = std.mem.splitSequence(u8, list, ", ");
+    while (names.next()) |name| {
+        errdefer std.debug.print("{s}\n", .{name});
+        try testing.expect(std.mem.find(u8, help.stdout, name) != null);
+    }
+    try sandbox.expectEmpty();
+}
+
+test "a scene is rendered to its name, with a report on stdout" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const ending = try sandbox.expectExit(0, &.{ "builtin:cornell", "-r16x9" });
+    try testing.expectEqualStrings("", ending.stderr);
+    for ([_][]const u8{ "builtin:cornell", "cornell.png", "16 x 9", "image hash" }) |word| {
+        try testing.expect(std.mem.find(u8, ending.stdout, word) != null);
+    }
+    try sandbox.expectFiles(&.{"cornell.png"});
+    const png = try sandbox.read("cornell.png");
+    try testing.expectStringStartsWith(png, "\x89PNG\r\n\x1a\n");
+    try testing.expectEqual(16, std.mem.readInt(u32, png[16..20], .big));
+    try testing.expectEqual(9, std.mem.readInt(u32, png[20..24], .big));
+}
+
+test "a file elsewhere is rendered to the working directory, replacing what is there" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.folder.dir.createDir(io, "sub", .default_dir);
+    try sandbox.write("sub/tri.angle.glb", try triangleScene(sandbox.arena_state.allocator()));
+    try sandbox.write("tri.angle.png", "old");
+    _ = try sandbox.expectExit(0, &.{ "render", "sub/tri.angle.glb", "-r8x8" });
+    try sandbox.expectFiles(&.{ "sub", "tri.angle.png" });
+    try testing.expectStringStartsWith(try sandbox.read("tri.angle.png"), "\x89PNG");
+    _ = try sandbox.expectExit(0, &.{ "-r8x8", "-o", "sub/b.pfm", "--", "sub/tri.angle.glb" });
+    const pfm = try sandbox.read("sub/b.pfm");
+    try testing.expectStringStartsWith(pfm, "PF\n8 8\n-1.0\n");
+    try testing.expectEqual(12 + 8 * 8 * 12, pfm.len);
+}
+
+/// The part of the JSON report that these tests look at.
+const Stats = struct {
+    version: []const u8,
+    scene: []const u8,
+    triangles: u64,
+    width: u32,
+    height: u32,
+    samples: u32,
+    depth: u32,
+    threads: u32,
+    variant: []const u8,
+    time_ms: struct { total: f64 },
+    rays: struct { primary: u64, shadow: u64, secondary: u64 },
+    tests: ?struct {
+        box_issued: u64,
+        box_useful: u64,
+        triangle_issued: u64,
+        triangle_useful: u64,
+    },
+    bvh: struct { nodes: u64, depth: u32, sah_cost: ?f64, bytes: u64 },
+    memory_peak_bytes: u64,
+    image_hash: []const u8,
+    warnings: []const []const u8,
+};
+
+fn statsOf(sandbox: *Sandbox, json: []const u8) !Stats {
+    try testing.expectEqual(1, std.mem.countScalar(u8, json, '\n'));
+    return std.json.parseFromSliceLeaky(Stats, sandbox.arena_state.allocator(), json, .{
+        .ignore_unknown_fields = true,
+    });
+}
+
+test "the report as JSON says what was done" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const ending = try sandbox.expectExit(0, &.{
+        "builtin:cornell", "-q", "--stats=json", "--thesis", "-r16x8", "-t3", "--count-tests",
+    });
+    try testing.expectEqualStrings("", ending.stderr);
+    const stats = try statsOf(&sandbox, ending.stdout);
+    try testing.expectEqualStrings("builtin:cornell", stats.scene);
+    try testing.expectEqual([2]u32{ 16, 8 }, [2]u32{ stats.width, stats.height });
+    try testing.expectEqual([3]u32{ 1, 3, 3 }, [3]u32{ stats.samples, stats.depth, stats.threads });
+    try testing.expectEqual(16 * 8, stats.rays.primary);
+    try testing.expect(stats.rays.shadow > 0 and stats.triangles > 0);
+    try testing.expect(stats.tests.?.box_useful <= stats.tests.?.box_issued);
+    try testing.expect(stats.tests.?.triangle_useful > 0);
+    try testing.expect(stats.bvh.nodes > 0 and stats.bvh.bytes > 0 and stats.bvh.sah_cost.? > 0);
+    try testing.expect(stats.memory_peak_bytes > 0 and stats.time_ms.total > 0);
+    try testing.expectEqual(16, stats.image_hash.len);
+
+    const plain = try sandbox.expectExit(0, &.{
+        "builtin:cornell", "--stats", "json", "-r16x8", "--depth=3", "-t1", "--tile-size=4",
+    });
+    const plain_stats = try statsOf(&sandbox, plain.stdout);
+    try testing.expectEqual(null, plain_stats.tests);
+    try testing.expectEqualStrings(stats.image_hash, plain_stats.image_hash);
+}
+
+test "every variant is listed, accepted, and gives the same picture" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const listed = try sandbox.expectExit(0, &.{"--list-variants"});
+    try testing.expectEqualStrings("", listed.stderr);
+    var names = std.mem.tokenizeScalar(u8, listed.stdout, '\n');
+    const scene_arguments = [_][]const u8{ "builtin:cornell", "-r9x7", "-q", "--stats=json" };
+    const first = try sandbox.expectExit(0, &scene_arguments);
+    const expected = try statsOf(&sandbox, first.stdout);
+    try testing.expectEqualStrings(expected.variant, names.peek().?);
+    while (names.next()) |name| {
+        errdefer std.debug.print("{s}\n", .{name});
+        const ending = try sandbox.expectExit(0, &(scene_arguments ++ .{ "--variant", name }));
+        const stats = try statsOf(&sandbox, ending.stdout);
+        try testing.expectEqualStrings(name, stats.variant);
+        try testing.expectEqualStrings(expected.image_hash, stats.image_hash);
+    }
+}
+
+test "-o - puts the image and nothing else on stdout" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const png = try sandbox.expectExit(0, &.{ "builtin:cornell", "-r8x8", "-o", "-" });
+    try testing.expectStringStartsWith(png.stdout, "\x89PNG\r\n\x1a\n");
+    try testing.expectStringEndsWith(png.stdout, "IEND\xae\x42\x60\x82");
+    try testing.expectEqualStrings("", png.stderr);
+    const ppm = try sandbox.expectExit(0, &.{
+        "builtin:cornell", "-r8x8", "-o-", "--format=ppm", "--stats=json",
+    });
+    try testing.expectStringStartsWith(ppm.stdout, "P6\n8 8\n255\n");
+    try testing.expectEqual(11 + 8 * 8 * 3, ppm.stdout.len);
+    try testing.expectEqual(8, (try statsOf(&sandbox, ppm.stderr)).width);
+    try sandbox.expectEmpty();
+}
+
+test "background, exposure and transparency reach the pixels" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("empty.gltf", empty_scene);
+    const to_stdout = [_][]const u8{ "empty.gltf", "-q", "-r1x1", "-o-" };
+    const Case = struct { arguments: []const []const u8, pixel: [3]u8 };
+    for ([_]Case{
+        .{ .arguments = &.{"--background=#ff8001"}, .pixel = .{ 255, 128, 1 } },
+        .{ .arguments = &.{"--background=0,0.5,1"}, .pixel = .{ 0, 188, 255 } },
+        .{ .arguments = &.{ "--background=0,0.5,1", "--exposure=-1" }, .pixel = .{ 0, 137, 188 } },
+        .{ .arguments = &.{ "--background=9,9,9", "--exposure=auto" }, .pixel = @splat(231) },
+        .{ .arguments = &.{"--background=transparent"}, .pixel = .{ 0, 0, 0 } },
+    }) |case| {
+        const arena = sandbox.arena_state.allocator();
+        const ending = try sandbox.expectExit(0, try std.mem.concat(arena, []const u8, &.{
+            &to_stdout, &.{"--format=ppm"}, case.arguments,
+        }));
+        try testing.expectEqualSlices(u8, &case.pixel, ending.stdout["P6\n1 1\n255\n".len..]);
+    }
+    const opaque_png = try sandbox.expectExit(0, &to_stdout);
+    const clear_png = try sandbox.expectExit(0, &(to_stdout ++ .{"--background=transparent"}));
+    // The header's colour type: RGB and RGBA.
+    try testing.expectEqual(2, opaque_png.stdout[25]);
+    try testing.expectEqual(6, clear_png.stdout[25]);
+}
+
+test "warnings go to stderr, and nowhere with -q" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("empty.gltf", empty_scene);
+    const loud = try sandbox.expectExit(0, &.{ "empty.gltf", "-r1x1", "--stats=json" });
+    try testing.expectStringStartsWith(loud.stderr, "raylane: empty.gltf: warning: ");
+    try testing.expect((try statsOf(&sandbox, loud.stdout)).warnings.len > 0);
+    const quiet = try sandbox.expectExit(0, &.{ "empty.gltf", "-r1x1", "-q" });
+    try testing.expectEqualStrings("", quiet.stderr);
+    try testing.expectEqualStrings("", quiet.stdout);
+    const verbose = try sandbox.expectExit(0, &.{ "empty.gltf", "-r1x1", "-v", "--stats=none" });
+    try testing.expect(std.mem.find(u8, verbose.stderr, "lights") != null);
+    try testing.expectEqualStrings("", verbose.stdout);
+}
+
+test "a scene that cannot be read is an error that leaves the old image" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.folder.dir.createDir(io, "folder", .default_dir);
+    try sandbox.write("a.png", "old");
+    try sandbox.write("broken.gltf", "{");
+    try sandbox.write("picture.glb", "\x89PNG\r\n\x1a\n");
+    try sandbox.write("empty.glb", "");
+    for ([_]struct { []const u8, u8 }{
+        .{ "absent.gltf", 1 },
+        .{ "absent/a.gltf", 1 },
+        .{ "broken.gltf", 3 },
+        .{ "picture.glb", 3 },
+        .{ "empty.glb", 3 },
+    }) |case| {
+        const ending = try sandbox.expectExit(case[1], &.{ case[0], "-o", "a.png" });
+        try expectOneErrorLine(ending);
+        try testing.expectStringStartsWith(ending.stderr["raylane: ".len..], case[0]);
+    }
+    const folder = try sandbox.run(&.{ "folder", "-o", "a.png" });
+    try testing.expect(folder.exit_code == 1 or folder.exit_code == 3);
+    try expectOneErrorLine(folder);
+    try sandbox.expectFiles(&.{ "a.png", "broken.gltf", "empty.glb", "folder", "picture.glb" });
+    try testing.expectEqualStrings("old", try sandbox.read("a.png"));
+}
+
+test "a file name cannot break the line of a message" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const ending = try sandbox.expectExit(1, &.{"a\nraylane: b\x1b[31m\xff.glb"});
+    try expectOneErrorLine(ending);
+    try testing.expectStringStartsWith(ending.stderr, "raylane: a?raylane: b?[31m?.glb: ");
+}
+
+test "a GLB cut anywhere is invalid" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const whole = try triangleScene(sandbox.arena_state.allocator());
+    const lengths = [_]usize{
+        1, 4, 11, 12, 19, 20, 21, 200, whole.len - 44, whole.len - 36, whole.len - 1,
+    };
+    for (lengths) |length| {
+        errdefer std.debug.print("{d} bytes\n", .{length});
+        try sandbox.write("cut.glb", whole[0..length]);
+        try expectOneErrorLine(try sandbox.expectExit(3, &.{"cut.glb"}));
+    }
+    try sandbox.expectFiles(&.{"cut.glb"});
+}
+
+test "an output that cannot be written is an error at once" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.folder.dir.createDir(io, "folder.png", .default_dir);
+    try sandbox.folder.dir.symLink(io, "/dev/null", "link.png", .{});
+    const outputs = [_][]const u8{
+        "absent/a.png", "folder.png", "link.png", "folder.png/", "/proc/a.png",
+    };
+    for (outputs) |output| {
+        // Enough samples for a day: the error comes before the work.
+        const ending = try sandbox.expectExit(1, &.{
+            "builtin:cornell", "--spp=4096", "-r16384x16384", "-o", output, "--format=png",
+        });
+        try expectOneErrorLine(ending);
+        try testing.expectStringStartsWith(ending.stderr["raylane: ".len..], output);
+    }
+    try sandbox.expectFiles(&.{ "folder.png", "link.png" });
+}
+
+test "a folder without permission to write is an error" {
+    if (std.posix.system.geteuid() == 0) return error.SkipZigTest; // Nothing is forbidden to root.
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const script = "mkdir locked && chmod 555 locked && \"$@\"; code=$?; rmdir locked; exit $code";
+    const ending = try sandbox.runShell(script, &.{ "builtin:cornell", "-r8x8", "-olocked/a.png" });
+    try testing.expectEqual(1, ending.exit_code);
+    try expectOneErrorLine(ending);
+    try sandbox.expectEmpty();
+}
+
+test "a full disk is an error that leaves the old image" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("a.ppm", "old");
+    // One block of 512 bytes (1024 in some shells).
+    const ending = try sandbox.runShell("ulimit -f 1; exec \"$@\"", &.{
+        "builtin:cornell", "-r64x64", "-o", "a.ppm",
+    });
+    try testing.expectEqual(1, ending.exit_code);
+    try expectOneErrorLine(ending);
+    try testing.expectStringStartsWith(ending.stderr, "raylane: a.ppm: ");
+    try sandbox.expectFiles(&.{"a.ppm"});
+    try testing.expectEqualStrings("old", try sandbox.read("a.ppm"));
+}
+
+test "a stdout that takes nothing is an error in one line" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    for ([_][]const u8{
+        "exec \"$@\" >/dev/full",
+        "exec \"$@\" >&-",
+        // A pipe whose reader has gone.
+        "mkfifo pipe; (: <pipe) & exec 5>pipe; wait; rm pipe; exec \"$@\" >&5",
+    }) |script| {
+        for ([_][]const []const u8{
+            &.{"--help"},
+            &.{"--list-variants"},
+            &.{ "builtin:cornell", "-r64x64", "-o-" },
+        }) |arguments| {
+            errdefer std.debug.print("{s} {s}\n", .{ script, arguments[0] });
+            const ending = try sandbox.runShell(script, arguments);
+            try testing.expectEqual(1, ending.exit_code);
+            try expectOneErrorLine(ending);
+            try sandbox.expectEmpty();
+        }
+    }
+}
+
+test "closed standard files do not turn the image into a log" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("empty.gltf", empty_scene);
+    const script = "exec \"$@\" 0>&- 2>&-";
+    const arguments = [_][]const u8{ "empty.gltf", "-r1x1", "-v", "-oa.ppm", "--background=0,0,0" };
+    const ending = try sandbox.runShell(script, &arguments);
+    try testing.expectEqual(0, ending.exit_code);
+    try testing.expectEqualSlices(u8, "P6\n1 1\n255\n\x00\x00\x00", try sandbox.read("a.ppm"));
+}
+
+test "exhausted memory is an error in one line" {
+    // An emulator needs the address space itself.
+    if (testing.environ.getPosix("RAYLANE_EMULATOR") != null) return error.SkipZigTest;
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    // 16 bytes a pixel: 256 MiB for the picture alone.
+    const ending = try sandbox.runShell("ulimit -v 200000; exec \"$@\"", &.{
+        "builtin:cornell", "-r4096x4096", "-t1",
+    });
+    try testing.expectEqual(1, ending.exit_code);
+    try expectOneErrorLine(ending);
+    try testing.expect(std.mem.find(u8, ending.stderr, "out of memory") != null);
+    try sandbox.expectEmpty();
+}
+
+test "signals end a long render and leave nothing behind" {
+    for ([_]std.posix.SIG{ .INT, .TERM }) |signal| {
+        var sandbox: Sandbox = .init();
+        defer sandbox.deinit();
+        // Should the signal not end it, the limit of CPU seconds does.
+        const command = try sandbox.shellCommand("ulimit -t 60; exec \"$@\"", &.{
+            "builtin:cornell", "-r512x512", "--spp=4096", "-t2",
+        });
+        var child = try std.process.spawn(io, .{
+            .argv = command,
+            .cwd = .{ .dir = sandbox.folder.dir },
+            .stdin = .ignore,
+            .stdout = .ignore,
+            .stderr = .ignore,
+        });
+        // Its unfinished file shows that it is under way.
+        const started = for (0..2000) |_| {
+            var iterator = sandbox.folder.dir.iterate();
+            if (try iterator.next(io) != null) break true;
+            try io.sleep(.fromMilliseconds(10), .awake);
+        } else false;
+        try std.posix.kill(child.id.?, signal);
+        const term = try child.wait(io);
+        try testing.expect(started);
+        try testing.expectEqual(std.process.Child.Term{ .exited = 130 }, term);
+        try sandbox.expectEmpty();
+    }
+}

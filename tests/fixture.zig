@@ -1,0 +1,253 @@
+//! Small scenes made in memory, and the way from a scene to a picture, for the other tests.
+//!
+//! In: quads, spheres and triangles with materials. Out: a `Scene`, or the linear image that some
+//! variant makes of it.
+
+const std = @import("std");
+const raylane = @import("raylane");
+const Affine = raylane.math.Affine;
+const Scene = raylane.scene.Scene;
+const Image = raylane.image.Image;
+const World = raylane.world.World;
+const vec3 = raylane.math.vec3;
+const gpa = std.testing.allocator;
+
+/// A scene under construction.
+pub const Builder = struct {
+    scene: Scene,
+    nodes: std.ArrayList(raylane.scene.Node) = .empty,
+    meshes: std.ArrayList(raylane.scene.Mesh) = .empty,
+    instances: std.ArrayList(raylane.scene.Instance) = .empty,
+    materials: std.ArrayList(raylane.scene.Material) = .empty,
+    lights: std.ArrayList(raylane.scene.Light) = .empty,
+    cameras: std.ArrayList(raylane.scene.Camera) = .empty,
+
+    /// Node 0 is the world's origin.
+    pub fn init() !Builder {
+        var builder: Builder = .{ .scene = .init(gpa) };
+        _ = try builder.addNode(.identity);
+        return builder;
+    }
+
+    fn arena(builder: *Builder) std.mem.Allocator {
+        return builder.scene.arena.allocator();
+    }
+
+    /// A root node.
+    pub fn addNode(builder: *Builder, local: Affine) !u32 {
+        const parent = raylane.scene.none;
+        try builder.nodes.append(builder.arena(), .{ .parent = parent, .local = local });
+        return @intCast(builder.nodes.items.len - 1);
+    }
+
+    /// Triangles with flat faces, or with the given normals.
+    pub fn addMesh(
+        builder: *Builder,
+        material: raylane.scene.Material,
+        positions: []const [3]f32,
+        normals: ?[]const [3]f32,
+        triangles: []const [3]u32,
+    ) !void {
+        const allocator = builder.arena();
+        try builder.materials.append(allocator, material);
+        try builder.meshes.append(allocator, .{
+            .positions = try allocator.dupe([3]f32, positions),
+            .normals = if (normals) |n| try allocator.dupe([3]f32, n) else null,
+            .triangles = try allocator.dupe([3]u32, triangles),
+            .material = @intCast(builder.materials.items.len - 1),
+        });
+        const mesh: u32 = @intCast(builder.meshes.items.len - 1);
+        try builder.instances.append(allocator, .{ .mesh = mesh, .node = 0 });
+    }
+
+    /// The parallelogram center +- across +- upward; its front is across x upward.
+    pub fn addQuad(
+        builder: *Builder,
+        material: raylane.scene.Material,
+        center: [3]f32,
+        across: [3]f32,
+        upward: [3]f32,
+    ) !void {
+        const left = vec3.sub(center, across);
+        const right = vec3.add(center, across);
+        try builder.addMesh(material, &.{
+            vec3.sub(left, upward),  vec3.sub(right, upward),
+            vec3.add(right, upward), vec3.add(left, upward),
+        }, null, &.{ .{ 0, 1, 2 }, .{ 0, 2, 3 } });
+    }
+
+    /// A closed sphere of `rows` x 2 `rows` cells with smooth normals.
+    pub fn addSphere(
+        builder: *Builder,
+        material: raylane.scene.Material,
+        center: [3]f32,
+        radius: f32,
+        comptime rows: u32,
+    ) !void {
+        const columns = 2 * rows;
+        const ring_count = rows - 1;
+        var normals: [ring_count * columns + 2][3]f32 = undefined;
+        var triangles: std.ArrayList([3]u32) = .empty;
+        const allocator = builder.arena();
+        const elementary = raylane.math.elementary;
+        for (0..ring_count) |ring| for (0..columns) |column| {
+            const polar = std.math.pi * @as(f64, @floatFromInt(ring + 1)) / rows;
+            const turn = 2 * std.math.pi * @as(f64, @floatFromInt(column)) / columns;
+            normals[ring * columns + column] = .{
+                @floatCast(elementary.sin(polar) * elementary.sin(turn)),
+                @floatCast(elementary.cos(polar)),
+                @floatCast(elementary.sin(polar) * elementary.cos(turn)),
+            };
+        };
+        const north = ring_count * columns;
+        const south = north + 1;
+        normals[north] = .{ 0, 1, 0 };
+        normals[south] = .{ 0, -1, 0 };
+        for (0..columns) |column_index| {
+            const column: u32 = @intCast(column_index);
+            const next = (column + 1) % columns;
+            try triangles.append(allocator, .{ north, column, next });
+            const last = (ring_count - 1) * columns;
+            try triangles.append(allocator, .{ south, last + next, last + column });
+            for (0..ring_count - 1) |ring_index| {
+                const upper: u32 = @intCast(ring_index * columns);
+                const lower = upper + columns;
+                try triangles.append(allocator, .{ upper + column, lower + column, lower + next });
+                try triangles.append(allocator, .{ upper + column, lower + next, upper + next });
+            }
+        }
+        var positions: [normals.len][3]f32 = undefined;
+        for (&positions, normals) |*position, normal| {
+            position.* = vec3.add(center, vec3.scale(normal, radius));
+        }
+        try builder.addMesh(material, &positions, &normals, triangles.items);
+    }
+
+    /// A point light.
+    pub fn addPointLight(builder: *Builder, position: [3]f32, intensity: f32) !void {
+        var map: Affine = .identity;
+        map.translation = position;
+        const node = try builder.addNode(map);
+        try builder.lights.append(builder.arena(), .{
+            .kind = .point,
+            .node = node,
+            .intensity = intensity,
+        });
+    }
+
+    /// A camera at `eye` that looks along -z with a vertical angle of 2 atan(`half_height`).
+    pub fn addCamera(builder: *Builder, eye: [3]f32, half_height: f32) !void {
+        var map: Affine = .identity;
+        map.translation = eye;
+        const node = try builder.addNode(map);
+        try builder.cameras.append(builder.arena(), .{
+            .name = "",
+            .node = node,
+            .projection = .{ .perspective = .{
+                .y_fov_rad = 2 * std.math.atan(half_height),
+                .aspect = null,
+            } },
+        });
+    }
+
+    /// The scene, checked; the builder is used up.
+    pub fn finish(builder: *Builder) Scene {
+        builder.scene.nodes = builder.nodes.items;
+        builder.scene.meshes = builder.meshes.items;
+        builder.scene.instances = builder.instances.items;
+        builder.scene.materials = builder.materials.items;
+        builder.scene.lights = builder.lights.items;
+        builder.scene.cameras = builder.cameras.items;
+        if (builder.cameras.items.len > 0) builder.scene.camera_default = 0;
+        builder.scene.check();
+        return builder.scene;
+    }
+};
+
+/// How a test wants its picture.
+pub const Options = struct {
+    width: u32 = 32,
+    height: u32 = 32,
+    depth_max: u32 = 6,
+    sample_count: u32 = 1,
+    tile_size: u32 = 16,
+    thread_count: usize = 1,
+    ambient: ?f32 = null,
+    background: ?[3]f32 = null,
+    transparent: bool = false,
+    /// Index into `variant.compiled`.
+    variant: usize = 0,
+};
+
+/// The world of a scene in the given width of tree.
+pub fn prepare(scene: *const Scene, lanes: u8, options: Options) !World {
+    var diagnostic: raylane.diagnostic.Diagnostic = .{};
+    var times: raylane.statistics.StageTimes = .{};
+    const mode = raylane.simd.setFlushToZero();
+    defer raylane.simd.setFloatControl(mode);
+    return raylane.prepare.prepare(gpa, std.testing.io, scene, .{
+        .lanes = lanes,
+        .thread_count = options.thread_count,
+        .resolution = .{ options.width, options.height },
+        .ambient = options.ambient,
+        .background = options.background,
+    }, &diagnostic, &times);
+}
+
+/// The picture of a scene.
+pub fn render(scene: *const Scene, options: Options) !Image {
+    const lanes = raylane.variant.compiled[options.variant].lanes;
+    var world = try prepare(scene, lanes, options);
+    defer world.deinit();
+    return renderWorld(&world, options);
+}
+
+/// The picture of a world that has the variant's width of tree.
+pub fn renderWorld(world: *const World, options: Options) !Image {
+    var image: Image = try .init(gpa, world.width, world.height);
+    // Every pixel must be written.
+    @memset(image.pixels, @splat(std.math.nan(f32)));
+    const traced = raylane.trace.trace(options.variant, world, &image, .{
+        .thread_count = options.thread_count,
+        .sample_count = options.sample_count,
+        .depth_max = options.depth_max,
+        .tile_size = options.tile_size,
+        .transparent = options.transparent,
+    });
+    try std.testing.expectEqual(0, traced.non_finite_count);
+    return image;
+}
+
+/// A material without reflection, lit or shining by itself only.
+pub fn matte(color: [3]f32) raylane.scene.Material {
+    return .{
+        .base_color = .{ color[0], color[1], color[2], 1 },
+        .metallic = 0,
+        .roughness = 1,
+        .ior = 1,
+        .double_sided = true,
+    };
+}
+
+/// A material that shows one colour whatever the light.
+pub fn flat(color: [3]f32) raylane.scene.Material {
+    var material = matte(color);
+    material.unlit = true;
+    return material;
+}
+
+test "a sphere is closed and faces outward" {
+    var builder: Builder = try .init();
+    try builder.addSphere(matte(.{ 1, 1, 1 }), .{ 0, 0, 0 }, 1, 6);
+    var scene = builder.finish();
+    defer scene.deinit();
+    const mesh = scene.meshes[0];
+    try std.testing.expectEqual(2 * 12 * 5, mesh.triangles.len);
+    for (mesh.triangles) |t| {
+        const a = mesh.positions[t[0]];
+        const b = mesh.positions[t[1]];
+        const c = mesh.positions[t[2]];
+        const normal = vec3.cross(vec3.sub(b, a), vec3.sub(c, a));
+        try std.testing.expect(vec3.dot(normal, vec3.add(a, vec3.add(b, c))) > 0);
+    }
+}

@@ -1,0 +1,40 @@
+//! The index of the tests that see Raylane from outside: `@import("raylane")` and nothing below it.
+//!
+//! Each file of tests beside this one is named here once; a file that is not is never compiled.
+//! Golden pictures are decoded by stb_image, which is not what wrote them.
+
+const std = @import("std");
+const testing = std.testing;
+const stb_image = @import("stb_image");
+
+test {
+    _ = @import("analytic.zig");
+    _ = @import("malformed.zig");
+    _ = @import("output.zig");
+    _ = @import("samples.zig");
+    _ = @import("soup.zig");
+    _ = @import("variants.zig");
+}
+
+test "the decoder of the golden pictures decodes a PNG, and no other format" {
+    // Two by one pixels of RGB: red, then (0, 128, 255).
+    const png = "\x89PNG\r\n\x1a\n" ++
+        "\x00\x00\x00\x0dIHDR\x00\x00\x00\x02\x00\x00\x00\x01\x08\x02\x00\x00\x00" ++
+        "\x7b\x40\xe8\xdd" ++
+        "\x00\x00\x00\x12IDAT\x78\x01\x01\x07\x00\xf8\xff" ++
+        "\x00\xff\x00\x00\x00\x80\xff\x08\x00\x02\x7f\xd5\x70\x6e\xaa" ++
+        "\x00\x00\x00\x00IEND\xae\x42\x60\x82";
+    var width: c_int = 0;
+    var height: c_int = 0;
+    var channels: c_int = 0;
+    const pixels = stb_image.stbi_load_from_memory(png, png.len, &width, &height, &channels, 3);
+    try testing.expect(pixels != null);
+    defer stb_image.stbi_image_free(pixels);
+    try testing.expectEqual(2, width);
+    try testing.expectEqual(1, height);
+    try testing.expectEqualSlices(u8, &.{ 255, 0, 0, 0, 128, 255 }, pixels[0..6]);
+
+    const ppm = "P6 1 1 255\nabc";
+    const none = stb_image.stbi_load_from_memory(ppm, ppm.len, &width, &height, &channels, 3);
+    try testing.expect(none == null);
+}

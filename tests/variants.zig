@@ -1,0 +1,147 @@
+//! One picture, bit for bit: every variant, thread count and tile size gives the same hash.
+//!
+//! The golden hashes below hold across architectures too: the same tests run natively and under
+//! qemu. Where a change of shading means to change pictures, they are renewed from the failing
+//! test's own output, after a look at the pictures.
+
+const std = @import("std");
+const fixture = @import("fixture.zig");
+const raylane = @import("raylane");
+const gpa = std.testing.allocator;
+
+const Golden = struct { scene: []const u8, width: u32, height: u32, hash: u64 };
+
+/// Small pictures of scenes that take every path of shading and traversal.
+const goldens = [_]Golden{
+    .{ .scene = "builtin:cornell", .width = 61, .height = 47, .hash = 0xdc0e82bd6c082b49 },
+    .{ .scene = "builtin:atrium", .width = 53, .height = 40, .hash = 0xf52feb797c46c13d },
+    .{ .scene = "builtin:nave", .width = 53, .height = 40, .hash = 0x2b9a36d333e4e1fc },
+    .{ .scene = "builtin:handles", .width = 40, .height = 53, .hash = 0xd42ac607bc4f3081 },
+};
+
+fn parse(name: []const u8) !raylane.scene.Scene {
+    var diagnostic: raylane.diagnostic.Diagnostic = .{};
+    return raylane.parse.parse(gpa, std.testing.io, name, .{}, &diagnostic);
+}
+
+fn expectHash(expected: u64, image: *const raylane.image.Image, what: []const u8) !void {
+    if (image.hash() == expected) return;
+    std.debug.print("{s}: expected {x:0>16}, found {x:0>16}\n", .{ what, expected, image.hash() });
+    return error.TestExpectedHash;
+}
+
+fn expectAllVariants(scene: *const raylane.scene.Scene, base: fixture.Options, hash: u64) !void {
+    inline for (.{ 4, 8, 16 }) |lanes| {
+        var world: ?raylane.world.World = null;
+        defer if (world) |*prepared| prepared.deinit();
+        for (raylane.variant.compiled, raylane.variant.names, 0..) |variant, name, index| {
+            if (variant.lanes != lanes) continue;
+            if (world == null) world = try fixture.prepare(scene, lanes, base);
+            var options = base;
+            options.variant = index;
+            var image = try fixture.renderWorld(&world.?, options);
+            defer image.deinit(gpa);
+            try expectHash(hash, &image, name);
+        }
+    }
+}
+
+test "every variant renders the built-in scenes to the golden hash" {
+    for (goldens) |golden| {
+        var scene = try parse(golden.scene);
+        defer scene.deinit();
+        errdefer std.debug.print("scene {s}\n", .{golden.scene});
+        try expectAllVariants(&scene, .{
+            .width = golden.width,
+            .height = golden.height,
+            .thread_count = 2,
+        }, golden.hash);
+    }
+}
+
+test "the file in the repository is the built-in scene" {
+    var built_in = try parse("builtin:cornell");
+    defer built_in.deinit();
+    var file = try parse("scenes/cornell.gltf");
+    defer file.deinit();
+    const options: fixture.Options = .{ .width = 40, .height = 40 };
+    var expected = try fixture.render(&built_in, options);
+    defer expected.deinit(gpa);
+    var image = try fixture.render(&file, options);
+    defer image.deinit(gpa);
+    try expectHash(expected.hash(), &image, "scenes/cornell.gltf");
+}
+
+test "threads, tiles and samples: the hash depends on the samples alone" {
+    var scene = try parse("builtin:cornell");
+    defer scene.deinit();
+    for ([_]u32{ 1, 3 }) |sample_count| {
+        const base: fixture.Options = .{ .width = 37, .height = 29, .sample_count = sample_count };
+        var first = try fixture.render(&scene, base);
+        defer first.deinit(gpa);
+        for ([_]usize{ 1, 2, 7 }) |thread_count| for ([_]u32{ 1, 4, 16, 100 }) |tile_size| {
+            var options = base;
+            options.thread_count = thread_count;
+            options.tile_size = tile_size;
+            var image = try fixture.render(&scene, options);
+            defer image.deinit(gpa);
+            try expectHash(first.hash(), &image, "threads or tiles");
+        };
+        try expectAllVariants(&scene, base, first.hash());
+    }
+}
+
+test "orthographic views, directional and spot lights, holes, veils and absorbing glass" {
+    var builder: fixture.Builder = try .init();
+    var glass = fixture.matte(.{ 0.9, 1, 0.9 });
+    glass.ior = 1.5;
+    glass.roughness = 0;
+    glass.transmission = 1;
+    glass.volume = true;
+    glass.attenuation_color = .{ 0.3, 0.9, 0.5 };
+    glass.attenuation_distance = 0.7;
+    var veil = fixture.matte(.{ 0.9, 0.2, 0.1 });
+    veil.alpha_mode = .blend;
+    veil.base_color[3] = 0.4;
+    var hole = fixture.matte(.{ 1, 1, 1 });
+    hole.alpha_mode = .mask;
+    hole.base_color[3] = 0.1;
+    var brass = fixture.matte(.{ 0.9, 0.7, 0.3 });
+    brass.metallic = 1;
+    brass.roughness = 0.22;
+    brass.double_sided = false;
+    const floor = fixture.matte(.{ 0.6, 0.6, 0.6 });
+    try builder.addQuad(floor, .{ 0, -1, -3 }, .{ 4, 0, 0 }, .{ 0, 0, -4 });
+    try builder.addSphere(glass, .{ -0.8, 0, -3 }, 0.9, 12);
+    try builder.addSphere(brass, .{ 0.9, 0, -3.4 }, 0.8, 12);
+    try builder.addQuad(veil, .{ 0.4, 0.2, -2 }, .{ 0.8, 0.1, 0 }, .{ 0, 0.7, 0.2 });
+    try builder.addQuad(hole, .{ 0, 0, -1 }, .{ 4, 0, 0 }, .{ 0, 4, 0 });
+    try builder.addPointLight(.{ 1, 3, -1 }, 30);
+    const arena = builder.scene.arena.allocator();
+    const tilted = try builder.addNode(.fromTrs(.{ -2, 3, 0 }, .{ -0.6, 0, 0, 0.8 }, .{ 1, 1, 1 }));
+    try builder.lights.append(arena, .{ .kind = .directional, .node = tilted, .intensity = 1.5 });
+    try builder.lights.append(arena, .{
+        .kind = .spot,
+        .node = tilted,
+        .intensity = 60,
+        .range = 9,
+        .inner_cone_rad = 0.2,
+        .outer_cone_rad = 0.9,
+    });
+    try builder.cameras.append(arena, .{ .name = "flat", .node = 0, .projection = .{
+        .orthographic = .{ .half_width = 2, .half_height = 1.6 },
+    } });
+    var scene = builder.finish();
+    defer scene.deinit();
+    const base: fixture.Options = .{ .width = 50, .height = 40, .ambient = 0.2 };
+    var first = try fixture.render(&scene, base);
+    defer first.deinit(gpa);
+    try expectHash(0x5bf0ad8a0901a615, &first, "the mixed scene");
+    try expectAllVariants(&scene, base, first.hash());
+    var clear = base;
+    clear.transparent = true;
+    clear.sample_count = 2;
+    var second = try fixture.render(&scene, clear);
+    defer second.deinit(gpa);
+    try expectAllVariants(&scene, clear, second.hash());
+}
