@@ -171,4 +171,7 @@ test {
     _ = packet;
     _ = whitted;
     _ = Tiles;
+    _ = @import("trace/camera.zig");
+    _ = @import("trace/exponential.zig");
+    _ = @import("trace/shade.zig");
 }

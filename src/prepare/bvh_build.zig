@@ -12,7 +12,6 @@ const std = @import("std");
 const math = @import("../math.zig");
 const parallel = @import("../parallel.zig");
 const world = @import("../world.zig");
-const flatten = @import("flatten.zig");
 const huge_pages = @import("huge_pages.zig");
 const split = @import("bvh_split.zig");
 const assert = std.debug.assert;
@@ -106,7 +105,7 @@ pub fn build(
     input: *const Input,
     comptime block_size: u32,
 ) error{OutOfMemory}!Tree {
-    assert(input.triangles.len > 0 and input.triangles.len <= flatten.element_count_max);
+    assert(input.triangles.len > 0 and input.triangles.len <= split.number_limit);
     const count: u32 = @intCast(input.triangles.len);
     var builder: Builder(block_size) = .{
         .input = input,

@@ -13,8 +13,8 @@ const assert = std.debug.assert;
 const Box3 = math.Box3;
 
 /// A box: x, y, z of the lower corner, a free lane, the negated upper corner, a free lane. Joining
-/// two is one `min` of eight lanes. In references the first free lane holds the bits of the
-/// triangle's number.
+/// two is one `min` of eight lanes. In references the first free lane holds the
+/// triangle's number (`reference`).
 pub const Box = @Vector(8, f32);
 
 const Vec4 = @Vector(4, f32);
@@ -27,22 +27,32 @@ pub const box_empty: Box = @splat(std.math.inf(f32));
 
 const Lanes8 = simd.Lanes(.vector, 8).F32;
 
+/// Added to a triangle's number to make it the bits of a normal float. By itself it would be a
+/// denormal one, and those become 0 wherever the compiler lets the free lane take part in the
+/// arithmetic of its neighbours: it may, as x - 0 is x, knowing nothing of flush-to-zero.
+const number_bias: u32 = 0x4000_0000;
+
+/// Triangles that references can tell apart: beyond, bits would be those of an infinity.
+pub const number_limit = 0x7f80_0000 - number_bias;
+
 /// The smallest box that holds both; free lanes mean nothing.
 pub inline fn join(a: Box, b: Box) Box {
     return Lanes8.minFast(.{ .v = a }, .{ .v = b }).v;
 }
 
-/// A reference to triangle `number` within `box`.
+/// A reference to triangle `number` within `box`. Asserts that the number is below `number_limit`.
 pub inline fn reference(box: Box3, number: u32) Box {
+    assert(number < number_limit);
     return .{
-        box.lower[0],  box.lower[1],  box.lower[2],  @bitCast(number),
+        box.lower[0],  box.lower[1],  box.lower[2],  @bitCast(number + number_bias),
         -box.upper[0], -box.upper[1], -box.upper[2], 0,
     };
 }
 
 /// The triangle that a reference stands for.
 pub inline fn triangleNumber(box: Box) u32 {
-    return @bitCast(box[3]);
+    const bits: u32 = @bitCast(box[3]);
+    return bits - number_bias;
 }
 
 /// The box with named corners.
@@ -372,6 +382,16 @@ test "two heaps are cut apart" {
     second.add(&binning, references[7..]);
     second.addBins(&first);
     try std.testing.expectEqual(split.bin, second.choose(4).?.bin);
+}
+
+test "a triangle's number is no float that arithmetic would change" {
+    const box: Box3 = .{ .lower = .{ -1, 0, 1 }, .upper = .{ 2, 3, 4 } };
+    for ([_]u32{ 0, 1, 0x7f_ffff, 0x80_0000, number_limit - 1 }) |number| {
+        const made = reference(box, number);
+        try std.testing.expectEqual(number, triangleNumber(made));
+        try std.testing.expect(std.math.isNormal(made[3]));
+        try std.testing.expectEqual(box, toBox3(made));
+    }
 }
 
 test "middles that are the same have no plane between them" {

@@ -11,6 +11,7 @@ const parallel = @import("../parallel.zig");
 const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const bvh_split = @import("bvh_split.zig");
 const huge_pages = @import("huge_pages.zig");
 const assert = std.debug.assert;
 const vec3 = math.vec3;
@@ -28,9 +29,8 @@ pub const coordinate_max: f32 = 0x1p40;
 /// there the cross product of its edges is made of products that flush to zero.
 pub const area_twice_min: f32 = 0x1p-120;
 
-/// Triangles, and vertices, at most. The builder of the tree keeps triangles' numbers as the bits
-/// of floats, which have to be finite, and doubles them.
-pub const element_count_max = 0x7f00_0000;
+/// Triangles, and vertices, at most: what the builder of the tree can number, and double.
+pub const element_count_max = bvh_split.number_limit;
 
 /// Vertices or triangles a thread takes at a time.
 const chunk_size = 1 << 14;

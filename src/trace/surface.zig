@@ -2,8 +2,8 @@
 //!
 //! In: rays with their nearest primitive. Out: what shading needs. The barycentric weights come
 //! from the very edge functions that decided the hit; the position is their mix of the corners,
-//! which lies on the triangle within a few units in the last place whatever the ray's length (pbrt, 4th
-//! edition, section 6.8.4).
+//! which lies on the triangle within a few units in the last place whatever the ray's length
+//! (pbrt, 4th edition, section 6.8.4).
 
 const std = @import("std");
 const world_file = @import("../world.zig");

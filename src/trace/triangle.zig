@@ -95,9 +95,9 @@ fn settleRare(
     rare: u32,
 ) Lanes.Mask {
     @branchHint(.cold);
-    var a = weights.a.toArray();
-    var b = weights.b.toArray();
-    var c = weights.c.toArray();
+    var settled: [3][Lanes.F32.count]f32 = .{
+        weights.a.toArray(), weights.b.toArray(), weights.c.toArray(),
+    };
     var inside = agreeing.bits();
     var rest = rare;
     while (rest != 0) : (rest &= rest - 1) {
@@ -105,33 +105,66 @@ fn settleRare(
         const corner_a = seen.a.lane(lane);
         const corner_b = seen.b.lane(lane);
         const corner_c = seen.c.lane(lane);
-        const sign_a = settleLane(corner_c, corner_b, &a[lane]);
-        const sign_b = settleLane(corner_a, corner_c, &b[lane]);
-        const sign_c = settleLane(corner_b, corner_a, &c[lane]);
-        const same = sign_a == sign_b and sign_b == sign_c and sign_a != 0;
+        const edges: [3]Edge = .{
+            .init(corner_c, corner_b), .init(corner_a, corner_c), .init(corner_b, corner_a),
+        };
+        const sides = [3]Side{ edges[0].side(), edges[1].side(), edges[2].side() };
+        const same = sides[0] == sides[1] and sides[1] == sides[2] and sides[0] != .none;
         if (!same) inside &= ~(@as(u32, 1) << @intCast(lane));
+        const rounded = [3]f32{ settled[0][lane], settled[1][lane], settled[2][lane] };
+        for (&settled, settleLane(rounded, edges)) |*weight, value| weight[lane] = value;
     }
-    weights.* = .{ .a = .fromArray(a), .b = .fromArray(b), .c = .fromArray(c) };
+    weights.* = .{
+        .a = .fromArray(settled[0]),
+        .b = .fromArray(settled[1]),
+        .c = .fromArray(settled[2]),
+    };
     return .fromBits(inside);
 }
 
-/// The exact sign of p.x q.y - p.y q.x, and its value where the rounded one is 0. Products of two
-/// f32 are exact in f64. A true 0 means that the ray meets the edge (or its extension); then the
-/// sign is the one beside it, for a ray moved by an infinitesimal step along x and a yet smaller
-/// one along y (simulation of simplicity, Edelsbrunner and Muecke 1990). It negates when the edge
-/// is walked the other way; 0 is left for edges without length only.
-fn settleLane(p: [3]f32, q: [3]f32, weight: *f32) i2 {
-    if (weight.* > 0) return 1;
-    if (weight.* < 0) return -1;
-    const one: f64 = @as(f64, p[0]) * @as(f64, q[1]);
-    const other: f64 = @as(f64, p[1]) * @as(f64, q[0]);
-    weight.* = @floatCast(one - other);
-    if (one > other) return 1;
-    if (one < other) return -1;
-    if (p[1] != q[1]) return if (p[1] > q[1]) 1 else -1;
-    if (p[0] != q[0]) return if (q[0] > p[0]) 1 else -1;
-    return 0;
+/// The edge functions as floats, up to a factor common to all three: 1, unless the area would come
+/// out as 0 although it is not.
+fn settleLane(rounded: [3]f32, edges: [3]Edge) [3]f32 {
+    var values: [3]f32 = undefined;
+    for (&values, rounded, edges) |*value, weight, edge| {
+        value.* = if (weight == 0) @floatCast(edge.value) else weight;
+    }
+    if (values[0] + values[1] + values[2] != 0) return values;
+    const greatest = @max(@abs(edges[0].value), @abs(edges[1].value), @abs(edges[2].value));
+    if (greatest == 0) return values;
+    for (&values, edges) |*value, edge| value.* = @floatCast(edge.value / greatest);
+    return values;
 }
+
+/// The side of an edge on which a ray passes.
+const Side = enum { none, left, right };
+
+/// The exact edge function p.x q.y - p.y q.x: products of two f32 are exact in f64, so the sign of
+/// their difference is, and 0 means that the ray meets the edge or its extension.
+const Edge = struct {
+    p: [3]f32,
+    q: [3]f32,
+    value: f64,
+
+    fn init(p: [3]f32, q: [3]f32) Edge {
+        const one: f64 = @as(f64, p[0]) * @as(f64, q[1]);
+        const other: f64 = @as(f64, p[1]) * @as(f64, q[0]);
+        return .{ .p = p, .q = q, .value = one - other };
+    }
+
+    /// On a true 0 it is the side beside it, for a ray moved by an infinitesimal step along x and
+    /// a yet smaller one along y (simulation of simplicity, Edelsbrunner and Muecke 1990). It
+    /// changes when the edge is walked the other way; `none` is left for edges without length.
+    fn side(edge: Edge) Side {
+        if (edge.value > 0) return .left;
+        if (edge.value < 0) return .right;
+        const p = edge.p;
+        const q = edge.q;
+        if (p[1] != q[1]) return if (p[1] > q[1]) .left else .right;
+        if (p[0] != q[0]) return if (q[0] > p[0]) .left else .right;
+        return .none;
+    }
+};
 
 /// t where mask is set.
 pub fn Intersection(comptime Lanes: type) type {
@@ -166,7 +199,7 @@ pub inline fn locate(
         view.direction_inv,
     );
     const zero: F32 = .zero();
-    const has_area = area.lt(zero).bitOr(area.gt(zero));
+    const has_area = area.abs().gt(zero).bitAnd(area.abs().lt(.splat(std.math.inf(f32))));
     return .{
         .mask = has_area.bitAnd(range.near.le(range.far)),
         .t = t_plane.max(range.near).min(range.far),
