@@ -74,13 +74,13 @@ pub fn init(
         .imports = &.{
             .{ .name = "config", .module = config.createModule() },
             .{ .name = "cgltf", .module = package.cgltf() },
-            .{ .name = "stb_image_write", .module = package.stbImageWrite() },
         },
     });
     package.raylane.addCSourceFile(.{
         .file = b.path("src/simd/intrinsics.c"),
         .flags = own_c_flags,
     });
+    package.addThirdParty(package.raylane, "src/output/stb_image_write.c");
     return package;
 }
 
@@ -127,13 +127,6 @@ fn cgltf(package: Package) *Module {
     const b = package.owner;
     const module = package.translate(b.path("src/parse/cgltf_shim.h")).createModule();
     package.addThirdParty(module, "src/parse/cgltf.c");
-    return module;
-}
-
-fn stbImageWrite(package: Package) *Module {
-    const header = package.headers.path(package.owner, "stb_image_write.h");
-    const module = package.translate(header).createModule();
-    package.addThirdParty(module, "src/output/stb_image_write.c");
     return module;
 }
 

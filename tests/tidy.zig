@@ -28,7 +28,7 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
         .may_import = &.{ "world", "image", "options", "variant", "simd", "parallel" },
     },
     .{ .part = "image", .may_import = &.{} },
-    .{ .part = "output", .may_import = &.{ "image", "stb_image_write", "parallel" } },
+    .{ .part = "output", .may_import = &.{ "image", "parallel" } },
     .{ .part = "report", .may_import = &.{ "config", "options", "variant", "world" } },
     .{ .part = "energy", .may_import = &.{ "options", "variant" } },
     .{ .part = "diagnostic", .may_import = &.{} },
