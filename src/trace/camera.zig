@@ -5,6 +5,9 @@
 
 const std = @import("std");
 const world_file = @import("../world.zig");
+const vec3 = @import("../math.zig").vec3;
+const ray_file = @import("ray.zig");
+const primary = @import("beam/primary.zig");
 const assert = std.debug.assert;
 
 /// A sample's place in its pixel, 0..1 from the upper left corner.
@@ -53,6 +56,29 @@ pub inline fn generate(
         .{ .origin = point, .direction = forward }
     else
         .{ .origin = origin, .direction = point };
+}
+
+/// The directions of the rays around the one through (x, y), pixel by pixel; null where rays do not
+/// share an origin.
+pub fn grid(world: *const world_file.World, x: f32, y: f32) ?primary.Grid {
+    const camera = &world.camera;
+    if (camera.orthographic) return null;
+    const width: f32 = @floatFromInt(world.width);
+    const height: f32 = @floatFromInt(world.height);
+    const right = vec3.scale(camera.right, 2 / width);
+    const down = vec3.scale(camera.up, -2 / height);
+    const start = generate(ray_file.Single, world, .splat(x), .splat(y));
+    var extent: f32 = 0;
+    for (camera.right ++ camera.up ++ camera.forward) |component| extent += @abs(component);
+    return .{
+        .origin = camera.origin,
+        .corner = start.direction.lane(0),
+        .right = right,
+        .down = down,
+        // `generate` rounds x and y 3 times, their products and two sums once; `start` as well,
+        // and steps of up to a tile are as many again.
+        .deviation_roundings = 12 * extent,
+    };
 }
 
 test "one sample is in the middle, many fill every stratum of both axes" {

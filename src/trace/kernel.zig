@@ -10,8 +10,10 @@ const world = @import("../world.zig");
 const Variant = @import("../variant.zig").Variant;
 const assert = std.debug.assert;
 
-/// Pixels along each side of a bundle of the traversal `packet`.
-const packet_side = 8;
+/// Pixels along each side of a beam, and of the blocks that it is cut into.
+pub const beam_side = 16;
+/// See `beam_side`.
+pub const block_side = 4;
 
 /// Everything below `trace` is generic over this.
 pub fn Kernel(comptime chosen: Variant, comptime counting: bool) type {
@@ -30,23 +32,46 @@ pub fn Kernel(comptime chosen: Variant, comptime counting: bool) type {
         pub const ray_count = if (chosen.traversal == .single) 1 else width;
         /// Lane values over rays.
         pub const Rays = simd.Lanes(chosen.backend, ray_count);
-        /// Pixels of a group.
-        pub const group_width = switch (ray_count) {
-            1 => 1,
-            4 => 2,
-            8, 16 => 4,
-            else => unreachable,
+        /// Pixels of a group: 2x2 as the thesis has it, rows of a block in beams.
+        pub const group_width = switch (chosen.traversal) {
+            .single => 1,
+            .packet2x2 => 2,
+            .packet => block_side,
         };
         /// See `group_width`.
         pub const group_height = ray_count / group_width;
         /// Pixels of a bundle.
-        pub const bundle_width = if (chosen.traversal == .packet) packet_side else group_width;
+        pub const bundle_width = if (chosen.traversal == .packet) beam_side else group_width;
         /// See `bundle_width`.
-        pub const bundle_height = if (chosen.traversal == .packet) packet_side else group_height;
-        /// Groups side by side in a bundle.
-        pub const groups_across = bundle_width / group_width;
+        pub const bundle_height = if (chosen.traversal == .packet) beam_side else group_height;
+        /// Groups of a block of 4x4 pixels; they follow each other from top to bottom.
+        pub const block_groups = if (chosen.traversal == .packet)
+            block_side / group_height
+        else
+            1;
+        /// Blocks of a bundle; they follow each other in rows.
+        pub const block_count = if (chosen.traversal == .packet)
+            beam_side * beam_side / (block_side * block_side)
+        else
+            1;
         /// Groups of a bundle.
-        pub const group_count = groups_across * (bundle_height / group_height);
+        pub const group_count = block_count * block_groups;
+
+        /// Column of a pixel in its bundle.
+        pub fn pixelX(group: usize, lane: usize) u32 {
+            const block = group / block_groups;
+            const across = bundle_width / group_width;
+            return @intCast(block % across * group_width + lane % group_width);
+        }
+
+        /// Row of a pixel in its bundle.
+        pub fn pixelY(group: usize, lane: usize) u32 {
+            const block = group / block_groups;
+            const across = bundle_width / group_width;
+            const block_height = block_groups * group_height;
+            const row = group % block_groups * group_height + lane / group_width;
+            return @intCast(block / across * block_height + row);
+        }
 
         comptime {
             assert(group_width * group_height == ray_count);
@@ -54,4 +79,24 @@ pub fn Kernel(comptime chosen: Variant, comptime counting: bool) type {
             assert(group_count <= 64); // Traversal keeps sets of groups in a word.
         }
     };
+}
+
+test "every pixel of a bundle is one lane" {
+    inline for (.{
+        Variant{ .backend = .vector, .traversal = .packet, .lanes = 4 },
+        Variant{ .backend = .vector, .traversal = .packet, .lanes = 8 },
+        Variant{ .backend = .vector, .traversal = .packet, .lanes = 16 },
+        Variant{ .backend = .vector, .traversal = .packet2x2, .lanes = 4 },
+        Variant{ .backend = .vector, .traversal = .single, .lanes = 4 },
+    }) |variant| {
+        const K = Kernel(variant, false);
+        var seen: [K.bundle_height][K.bundle_width]bool = @splat(@splat(false));
+        for (0..K.group_count) |group| {
+            for (0..K.ray_count) |lane| {
+                const place = &seen[K.pixelY(group, lane)][K.pixelX(group, lane)];
+                try std.testing.expect(!place.*);
+                place.* = true;
+            }
+        }
+    }
 }

@@ -16,6 +16,7 @@ const surface_file = @import("surface.zig");
 const shade = @import("shade.zig");
 const light_file = @import("light.zig");
 const exponential = @import("exponential.zig");
+const Grid = @import("beam/primary.zig").Grid;
 const assert = std.debug.assert;
 const World = world_file.World;
 
@@ -67,6 +68,8 @@ pub fn Whitted(comptime Kernel: type) type {
         radiance: [group_count]Vec3 = undefined,
         /// Share of the sample's primary ray that left the scene.
         escaped: [group_count]F32 = undefined,
+        /// Directions of the primary rays of the sample under way, where they share an origin.
+        grid: ?Grid = null,
         pending: [pending_max]Pending = undefined,
         pending_count: usize = 0,
 
@@ -144,8 +147,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 const blue = sum.z.div(count).toArray();
                 const covered = F32.splat(1).sub(escaped.div(count)).max(.zero()).toArray();
                 for (0..Kernel.ray_count) |lane| {
-                    const x = rectangle.x0 + pixelX(group, lane);
-                    const y = rectangle.y0 + pixelY(group, lane);
+                    const x = rectangle.x0 + Kernel.pixelX(group, lane);
+                    const y = rectangle.y0 + Kernel.pixelY(group, lane);
                     if (x >= rectangle.x1 or y >= rectangle.y1) continue;
                     const alpha = if (tracer.settings.transparent) covered[lane] else 1;
                     const pixel = [4]f32{ red[lane], green[lane], blue[lane], alpha };
@@ -162,18 +165,13 @@ pub fn Whitted(comptime Kernel: type) type {
             return .{ 0, 0, 0, 1 };
         }
 
-        fn pixelX(group: usize, lane: usize) u32 {
-            const column = group % Kernel.groups_across;
-            return @intCast(column * Kernel.group_width + lane % Kernel.group_width);
-        }
-
-        fn pixelY(group: usize, lane: usize) u32 {
-            const row = group / Kernel.groups_across;
-            return @intCast(row * Kernel.group_height + lane / Kernel.group_width);
-        }
-
         fn pushPrimary(tracer: *Self, rectangle: Rectangle, sample: u32) void {
             const offset = camera.sampleOffset(sample, tracer.settings.sample_count);
+            tracer.grid = camera.grid(
+                tracer.world,
+                @as(f32, @floatFromInt(rectangle.x0)) + offset.x,
+                @as(f32, @floatFromInt(rectangle.y0)) + offset.y,
+            );
             assert(tracer.pending_count == 0);
             const pending = tracer.push(0, 0);
             for (&pending.bundle.groups, 0..) |*ray, group| {
@@ -181,8 +179,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 var y: [Kernel.ray_count]f32 = undefined;
                 var inside: [Kernel.ray_count]bool = undefined;
                 for (0..Kernel.ray_count) |lane| {
-                    const column = rectangle.x0 + pixelX(group, lane);
-                    const row = rectangle.y0 + pixelY(group, lane);
+                    const column = rectangle.x0 + Kernel.pixelX(group, lane);
+                    const row = rectangle.y0 + Kernel.pixelY(group, lane);
                     inside[lane] = column < rectangle.x1 and row < rectangle.y1;
                     x[lane] = @as(f32, @floatFromInt(column)) + offset.x;
                     y[lane] = @as(f32, @floatFromInt(row)) + offset.y;
@@ -214,8 +212,13 @@ pub fn Whitted(comptime Kernel: type) type {
         /// Traces rays, adds what they see, and pushes what has to be traced because of it.
         fn step(tracer: *Self, pending_before: Pending) void {
             var pending = pending_before;
-            const coherent = pending.depth == 0;
-            query.trace(Kernel, .nearest, tracer.world, &pending.bundle, coherent, &tracer.tests);
+            const company: query.Company = if (pending.depth > 0)
+                .scattered
+            else if (pending.layer == 0 and tracer.grid != null)
+                .{ .pencil = &tracer.grid.? }
+            else
+                .coherent;
+            query.trace(Kernel, .nearest, tracer.world, &pending.bundle, company, &tracer.tests);
             var points: [group_count]Point = undefined;
             var any_seen = false;
             for (&points, 0..) |*point, group| {
@@ -349,13 +352,14 @@ pub fn Whitted(comptime Kernel: type) type {
                 any_lit = any_lit or arrives.any();
             }
             if (!any_lit) return;
-            const coherent = pending.depth == 0;
+            const company: query.Company =
+                if (pending.depth == 0) .{ .light = light } else .scattered;
             var passing: [group_count]Vec3 = undefined;
             const active = activeMasks(&bundle);
             if (tracer.world.has_transparency or tracer.world.has_holes) {
-                tracer.filter(&bundle, coherent, &passing);
+                tracer.filter(&bundle, company, &passing);
             } else {
-                tracer.block(&bundle, coherent, &passing);
+                tracer.block(&bundle, company, &passing);
             }
             for (active, passing, light_seen, 0..) |arrives, share, seen, group| {
                 if (arrives.none()) continue;
@@ -374,10 +378,10 @@ pub fn Whitted(comptime Kernel: type) type {
         fn block(
             tracer: *Self,
             bundle: *packet.Bundle(Kernel),
-            coherent: bool,
+            company: query.Company,
             passing: *[group_count]Vec3,
         ) void {
-            query.trace(Kernel, .any, tracer.world, bundle, coherent, &tracer.tests);
+            query.trace(Kernel, .any, tracer.world, bundle, company, &tracer.tests);
             for (&bundle.groups, passing) |*ray, *share| {
                 if (ray.active.none()) continue;
                 const free = ray.nearest.primitive.eq(.splat(ray_file.no_primitive));
@@ -389,7 +393,7 @@ pub fn Whitted(comptime Kernel: type) type {
         fn filter(
             tracer: *Self,
             bundle: *packet.Bundle(Kernel),
-            coherent: bool,
+            company: query.Company,
             passing: *[group_count]Vec3,
         ) void {
             passing.* = @splat(.splat(.{ 1, 1, 1 }));
@@ -397,7 +401,7 @@ pub fn Whitted(comptime Kernel: type) type {
             var limits: [group_count]ray_file.Hit(Rays) = undefined;
             for (&limits, &bundle.groups) |*limit, *ray| limit.* = ray.nearest;
             for (0..layer_max) |_| {
-                query.trace(Kernel, .nearest, tracer.world, bundle, coherent, &tracer.tests);
+                query.trace(Kernel, .nearest, tracer.world, bundle, company, &tracer.tests);
                 var any_left = false;
                 for (&bundle.groups, passing, &weakened, limits) |*ray, *share, *count, limit| {
                     if (ray.active.none()) continue;

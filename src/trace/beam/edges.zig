@@ -1,0 +1,119 @@
+//! Triangles as a beam sees them from the point that its rays share: three edge functions and 1/t,
+//! all linear in a ray's direction, each with a bound on what rounding may have done to it.
+//!
+//! In: a block of triangles, the rays' origin. Out: per triangle the vectors whose dot products with
+//! a direction D are the edge functions and 1/t (Davidovic et al., "3D Rasterization: A Bridge
+//! between Rasterization and Ray Casting", 2012). Edges are taken in Pluecker form,
+//! (c + b) x (c - b) = 2 b x c, with the difference of the corners as they are in the scene: then
+//! the rounding of an edge is in proportion to its length, not to its distance.
+//!
+//! What is decided here is a filter. Where |edge function| exceeds `slack` |D|, or 1/t differs by
+//! more than its own bounds, the exact test (`triangle.zig`) must come to the same answer; anything
+//! nearer is in doubt and asks the exact test itself.
+//!
+//! The bounds, with u = 2^-24, R the largest distance of a corner, L the longest edge, N the normal
+//! and det = a . N. Of an edge function, in units of u R L |D|: 8 from rounding b, c and their sum,
+//! 2 from the edge, 5 from the cross product, 6 from the dot product, 16 from its evaluation
+//! on a grid; and for the exact test, whose corners move by up to 4 sqrt(2) u R across the ray
+//! and whose plane is stretched by up to sqrt(3): 80. With a quarter more for what is of second
+//! order and for the square roots below: 150. Of 1/t, relative to itself and in units of
+//! u R L^2 / |det|: 9 from det, 96 and 6 from the exact test's t; and absolutely, in units of
+//! u L^2 / |det|: 12 |D|.
+
+const std = @import("std");
+const assert = std.debug.assert;
+
+/// Half a unit in the last place of 1.
+pub const unit_roundoff: f32 = 0x1p-24;
+
+/// Bounds of an edge function by `slack`, of 1/t relative to itself and by itself; see above.
+pub const edge_roundings = 150.0;
+pub const inverse_relative_roundings = 128.0;
+/// Twice what is derived above: the relative part is taken of the rounded value.
+pub const inverse_absolute_roundings = 24.0;
+
+/// 1/t whose relative error may reach this is left to the exact test. It also makes sure that the
+/// sign of det is right: 8.5 u R L^2 bounds its error.
+pub const relative_error_max = 0.125;
+
+/// Outside of this range of L^2 and R, in metres, products may leave the range of floats.
+pub const length_squared_min = 0x1p-80;
+/// See `length_squared_min`.
+pub const reach_max = 1e11;
+
+/// Triangles of a block in lanes, turned so that edge functions are positive within.
+pub fn Edges(comptime Lanes: type) type {
+    const F32 = Lanes.F32;
+    const Vec3 = Lanes.Vec3;
+    return struct {
+        /// Edge function i of a ray with direction D is `normal[i]` . D.
+        normal: [3]Vec3,
+        /// 1/t of it is `inverse` . D.
+        inverse: Vec3,
+        /// Bound of the error of an edge function over u |D|, without its factor of roundings.
+        slack: F32,
+        /// Bound of the relative error of 1/t.
+        inverse_relative: F32,
+        /// Bound of the rest of its error over u |D|, without its factor of roundings.
+        inverse_absolute: F32,
+        /// Lanes whose bounds hold and are worth anything; others are up to the exact test.
+        decisive: Lanes.Mask,
+
+        /// Sets up the triangles of a block, or of one lane of it in all lanes.
+        pub inline fn init(corners: [3]Vec3, origin: Vec3) @This() {
+            const a = corners[0].sub(origin);
+            const b = corners[1].sub(origin);
+            const c = corners[2].sub(origin);
+            const edges: [3]Vec3 = .{
+                corners[2].sub(corners[1]),
+                corners[0].sub(corners[2]),
+                corners[1].sub(corners[0]),
+            };
+            const plane = cross(Lanes, edges[1], edges[2]);
+            const det = dot(Lanes, a, plane);
+            const det_inv = F32.splat(1).div(det);
+            const flip: F32 = .select(det.lt(.zero()), .splat(-1), .splat(1));
+            const length_squared = longestSquared(Lanes, edges);
+            const reach = longestSquared(Lanes, .{ a, b, c }).sqrt();
+            const length = length_squared.sqrt();
+            const steepness = length_squared.mul(det_inv.abs());
+            const relative = steepness.mul(reach)
+                .mul(.splat(inverse_relative_roundings * unit_roundoff));
+            const second_order: F32 = .splat(2 * unit_roundoff);
+            return .{
+                .normal = .{
+                    cross(Lanes, c.add(b), edges[0]).scale(flip),
+                    cross(Lanes, a.add(c), edges[1]).scale(flip),
+                    cross(Lanes, b.add(a), edges[2]).scale(flip),
+                },
+                .inverse = plane.scale(det_inv),
+                .slack = reach.mul(reach.mulAdd(second_order, length)),
+                .inverse_relative = relative,
+                .inverse_absolute = steepness,
+                .decisive = relative.lt(.splat(relative_error_max))
+                    .bitAnd(length_squared.gt(.splat(length_squared_min)))
+                    .bitAnd(reach.lt(.splat(reach_max))),
+            };
+        }
+    };
+}
+
+/// a . b, fused where the target can: for culling only.
+pub inline fn dot(comptime Lanes: type, a: Lanes.Vec3, b: Lanes.Vec3) Lanes.F32 {
+    return a.x.mulAdd(b.x, a.y.mulAdd(b.y, a.z.mul(b.z)));
+}
+
+/// The square of the longest of three vectors.
+pub inline fn longestSquared(comptime Lanes: type, vectors: [3]Lanes.Vec3) Lanes.F32 {
+    return dot(Lanes, vectors[0], vectors[0]).maxFast(dot(Lanes, vectors[1], vectors[1]))
+        .maxFast(dot(Lanes, vectors[2], vectors[2]));
+}
+
+/// a x b, fused where the target can: for culling only.
+pub inline fn cross(comptime Lanes: type, a: Lanes.Vec3, b: Lanes.Vec3) Lanes.Vec3 {
+    return .{
+        .x = a.z.neg().mulAdd(b.y, a.y.mul(b.z)),
+        .y = a.x.neg().mulAdd(b.z, a.z.mul(b.x)),
+        .z = a.y.neg().mulAdd(b.x, a.x.mul(b.y)),
+    };
+}

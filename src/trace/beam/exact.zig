@@ -1,0 +1,62 @@
+//! The exact test where a beam is in doubt, and for what it has found.
+//!
+//! In: rays of a bundle, triangles by their slot. Out: whether and where one is hit, by
+//! `triangle.zig` alone, so that beams give the bits that every other traversal gives.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const ray_file = @import("../ray.zig");
+const triangle = @import("../triangle.zig");
+const assert = std.debug.assert;
+
+/// Where a triangle stands in the tree: block times width plus lane. Of a ray without a hit: -1.
+pub const Slot = i32;
+/// See `Slot`.
+pub const no_slot: Slot = -1;
+
+/// The block and lane of a slot.
+pub inline fn place(comptime width: u32, slot: Slot) struct { block: u32, lane: u32 } {
+    const number: u32 = @intCast(slot);
+    return .{ .block = number / width, .lane = number % width };
+}
+
+/// Number of the triangle in a slot.
+pub inline fn primitiveAt(comptime width: u32, tree: *const world_file.Tree(width), slot: Slot) i32 {
+    const at = place(width, slot);
+    return @bitCast(tree.blocks[at.block].primitive[at.lane]);
+}
+
+/// A corner of the triangle in a slot.
+pub inline fn cornerAt(
+    comptime width: u32,
+    tree: *const world_file.Tree(width),
+    slot: Slot,
+    corner: usize,
+) [3]f32 {
+    const at = place(width, slot);
+    const components = &tree.blocks[at.block].corner[corner];
+    return .{ components[0][at.lane], components[1][at.lane], components[2][at.lane] };
+}
+
+/// t of the exact hit of one ray with the triangle in a slot, or null.
+pub fn hitAt(
+    comptime Kernel: type,
+    tree: *const world_file.Tree(Kernel.width),
+    pad: f32,
+    group: *const ray_file.Ray(Kernel.Rays),
+    lane: usize,
+    slot: Slot,
+) ?f32 {
+    @branchHint(.cold);
+    const Single = ray_file.Single;
+    const line: ray_file.Line(Single) = .init(
+        .splat(group.line.origin.lane(lane)),
+        .splat(group.line.direction.lane(lane)),
+    );
+    var corners: [3]Single.Vec3 = undefined;
+    for (&corners, 0..) |*corner, index| {
+        corner.* = .splat(cornerAt(Kernel.width, tree, slot, index));
+    }
+    const hit = triangle.intersect(Single, corners, line, pad);
+    return if (hit.mask.lane(0)) hit.t.lane(0) else null;
+}

@@ -1,0 +1,537 @@
+//! The rays of a square of pixels, as one: which triangle each of them meets first.
+//!
+//! In: a bundle of 16x16 rays from one origin whose directions are linear in the pixel. Out: the
+//! nearest hit of every ray. The tree is travelled once for all of them, front to back. Where a
+//! triangle may be seen, its edge functions and 1/t are stepped over blocks of 4x4 pixels, then
+//! over the pixels of those that it may touch, in lanes (edges.zig). What that leaves in doubt, an
+//! edge or a depth too close to tell, the exact test decides; the winner's t is always its.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const TestCounts = @import("../../statistics.zig").TestCounts;
+const kernel_file = @import("../kernel.zig");
+const ray_file = @import("../ray.zig");
+const packet = @import("../packet.zig");
+const stack = @import("../stack.zig");
+const vec3 = @import("../../math.zig").vec3;
+const triangle = @import("../triangle.zig");
+const edges_file = @import("edges.zig");
+const exact = @import("exact.zig");
+const Frustum = @import("frustum.zig").Frustum;
+const assert = std.debug.assert;
+
+const side = kernel_file.beam_side;
+const block_side = kernel_file.block_side;
+const block_count = (side / block_side) * (side / block_side);
+const block_pixels = block_side * block_side;
+const pixel_count = side * side;
+const last: f32 = side - 1;
+const block_last: f32 = block_side - 1;
+
+/// Directions of a beam's rays: corner + x right + y down for the pixel in column x, row y.
+pub const Grid = struct {
+    origin: [3]f32,
+    corner: [3]f32,
+    right: [3]f32,
+    down: [3]f32,
+    /// Bound of what every ray's direction differs from that, in units of 2^-24.
+    deviation_roundings: f32,
+};
+
+/// Finds the nearest hits of a bundle's rays, which have none yet, start at `grid.origin` and
+/// leave nothing out. Returns false, having done nothing, where the rays are too far apart.
+pub fn trace(
+    comptime Kernel: type,
+    world: *const world_file.World,
+    grid: *const Grid,
+    bundle: *packet.Bundle(Kernel),
+    counts: *TestCounts,
+) bool {
+    var search = Search(Kernel).init(world, grid, bundle, counts) orelse return false;
+    search.travel();
+    search.finish();
+    return true;
+}
+
+/// Coefficients of one triangle over the beam's pixels.
+const Coverage = struct {
+    /// Three edge functions, then 1/t: value at the first pixel, step right, step down.
+    base: [4]f32,
+    right: [4]f32,
+    down: [4]f32,
+    /// Error bound of the edge functions.
+    slack: f32,
+    /// 1/t is within value * (1 +- relative) +- absolute.
+    relative: f32,
+    absolute: f32,
+    slot: exact.Slot,
+};
+
+fn Search(comptime Kernel: type) type {
+    const Boxes = Kernel.Boxes;
+    const Rays = Kernel.Rays;
+    const width = Kernel.width;
+    const lanes = Kernel.ray_count;
+    return struct {
+        world: *const world_file.World,
+        tree: *const world_file.Tree(width),
+        grid: *const Grid,
+        bundle: *packet.Bundle(Kernel),
+        counts: *TestCounts,
+        frustum: Frustum,
+        /// Longest direction times roundings, for edge functions and for 1/t.
+        edge_scale: f32,
+        inverse_scale: f32,
+        /// By pixel, in the order of groups and lanes: what is hit, and bounds of 1/t there.
+        slot: [pixel_count]exact.Slot align(64),
+        lower: [pixel_count]f32 align(64),
+        upper: [pixel_count]f32 align(64),
+        /// Least `lower` of every block and of all.
+        block_lower: [block_count]f32 align(64),
+        tile_lower: f32,
+
+        const Self = @This();
+        const F32 = Rays.F32;
+        /// Columns and rows of the blocks' first pixels.
+        const block_x = blockPlaces(false);
+        const block_y = blockPlaces(true);
+
+        fn blockPlaces(comptime rows: bool) [block_count]f32 {
+            var places: [block_count]f32 = undefined;
+            for (&places, 0..) |*to, block| {
+                const across = side / block_side;
+                to.* = @floatFromInt(block_side * (if (rows) block / across else block % across));
+            }
+            return places;
+        }
+
+        fn init(
+            world: *const world_file.World,
+            grid: *const Grid,
+            bundle: *packet.Bundle(Kernel),
+            counts: *TestCounts,
+        ) ?Self {
+            const scale = length1(grid.corner) + last * (length1(grid.right) + length1(grid.down));
+            const roundings = grid.deviation_roundings;
+            const unit = edges_file.unit_roundoff;
+            var search: Self = .{
+                .world = world,
+                .tree = world.tree.get(width),
+                .grid = grid,
+                .bundle = bundle,
+                .counts = counts,
+                .frustum = frustumOf(grid, world.pad) orelse return null,
+                // A direction off by d moves an edge function by 2 R L d, 1/t by L^2 / |det| d.
+                .edge_scale = unit * (edges_file.edge_roundings * scale + 2 * roundings),
+                .inverse_scale = unit *
+                    (edges_file.inverse_absolute_roundings * scale + 2 * roundings),
+                .slot = undefined,
+                .lower = undefined,
+                .upper = undefined,
+                .block_lower = @splat(0),
+                .tile_lower = 0,
+            };
+            search.clear();
+            return search;
+        }
+
+        /// No hit yet anywhere; a pixel without a ray has one at no distance.
+        fn clear(search: *Self) void {
+            search.slot = @splat(exact.no_slot);
+            const zero: F32 = .zero();
+            const endless: F32 = .splat(std.math.inf(f32));
+            for (&search.bundle.groups, 0..) |*group, index| {
+                const bound: F32 = .select(group.active, zero, endless);
+                bound.storeAligned(@alignCast(search.lower[index * lanes ..][0..lanes]));
+                bound.storeAligned(@alignCast(search.upper[index * lanes ..][0..lanes]));
+            }
+        }
+
+        fn travel(search: *Self) void {
+            var entries: [Kernel.stack_max]stack.Entry = undefined;
+            entries[0] = .{ .child = 0, .block_count = 0, .near = -std.math.inf(f32) };
+            var entry_count: usize = 1;
+            var depth_max = std.math.inf(f32);
+            while (entry_count > 0) {
+                entry_count -= 1;
+                const entry = entries[entry_count];
+                if (entry.near > depth_max) continue;
+                if (entry.block_count == 0) {
+                    assert(entry_count + width <= Kernel.stack_max);
+                    const node = &search.tree.nodes[entry.child];
+                    if (Kernel.counts_tests) search.countNode(node);
+                    entry_count = search.frustum
+                        .pushChildren(Boxes, node, depth_max, &entries, entry_count);
+                } else {
+                    for (entry.child..entry.child + entry.block_count) |block| {
+                        search.meetBlock(@intCast(block));
+                    }
+                    depth_max = search.depthMax();
+                }
+            }
+        }
+
+        fn countNode(search: *Self, node: *const world_file.Node(width)) void {
+            search.counts.box_issued += width;
+            for (node.child) |child| {
+                search.counts.box_useful += @intFromBool(child != world_file.none);
+            }
+        }
+
+        /// t beyond which nothing can be seen any more.
+        inline fn depthMax(search: *Self) f32 {
+            var least: F32 = .load(search.block_lower[0..lanes]);
+            inline for (1..block_count / lanes) |part| {
+                least = least.minFast(.load(search.block_lower[part * lanes ..][0..lanes]));
+            }
+            search.tile_lower = least.reduceMin();
+            if (search.tile_lower == 0) return std.math.inf(f32);
+            return 1 / search.tile_lower * (1 + 4 * edges_file.unit_roundoff);
+        }
+
+        /// Sets up the triangles of a block and goes on with those that the beam may see.
+        fn meetBlock(search: *Self, block_index: u32) void {
+            @setEvalBranchQuota(2000);
+            const block = &search.tree.blocks[block_index];
+            if (Kernel.counts_tests) search.countBlock(block);
+            var corners: [3]Boxes.Vec3 = undefined;
+            inline for (&corners, &block.corner) |*corner, *components| corner.* = .{
+                .x = .load(&components[0]),
+                .y = .load(&components[1]),
+                .z = .load(&components[2]),
+            };
+            const grid = search.grid;
+            const edges: edges_file.Edges(Boxes) = .init(corners, .splat(grid.origin));
+            const vectors = edges.normal ++ .{edges.inverse};
+            const zero: Boxes.F32 = .zero();
+            var base: [4]Boxes.F32 = undefined;
+            var right: [4]Boxes.F32 = undefined;
+            var down: [4]Boxes.F32 = undefined;
+            var most: [4]Boxes.F32 = undefined;
+            inline for (vectors, 0..) |vector, index| {
+                base[index] = edges_file.dot(Boxes, vector, .splat(grid.corner));
+                right[index] = edges_file.dot(Boxes, vector, .splat(grid.right));
+                down[index] = edges_file.dot(Boxes, vector, .splat(grid.down));
+                const reach = right[index].maxFast(zero).add(down[index].maxFast(zero));
+                most[index] = reach.mulAdd(.splat(last), base[index]);
+            }
+            const slack = edges.slack.mul(.splat(search.edge_scale));
+            const relative = edges.inverse_relative;
+            const absolute = edges.inverse_absolute.mul(.splat(search.inverse_scale));
+            const nearest = most[3].mulAdd(relative, most[3].add(absolute));
+            const seen = most[0].minFast(most[1]).minFast(most[2]).ge(slack.neg())
+                .bitAnd(nearest.gt(.splat(search.tile_lower)));
+            const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
+            const there = primitive.gt(.splat(ray_file.no_primitive));
+            const open = there.andNot(edges.decisive);
+            var undecided: u32 = 0;
+            if (open.any()) undecided = open.bitAnd(mayTouch(&base, &right, &down, slack)).bits();
+            var rest = there.bitAnd(edges.decisive).bitAnd(seen).bits();
+            const first: exact.Slot = @intCast(block_index * width);
+            if (rest | undecided == 0) return;
+            var table: Table = undefined;
+            inline for (0..4) |index| {
+                base[index].store(&table.base[index]);
+                right[index].store(&table.right[index]);
+                down[index].store(&table.down[index]);
+            }
+            slack.store(&table.slack);
+            relative.store(&table.relative);
+            absolute.store(&table.absolute);
+            while (rest != 0) : (rest &= rest - 1) {
+                search.cover(&table.at(@ctz(rest), first));
+            }
+            while (undecided != 0) : (undecided &= undecided - 1) {
+                search.coverUndecided(&table.at(@ctz(undecided), first));
+            }
+        }
+
+        /// Lanes of triangles whose orientation is not known that the beam may touch: unless some
+        /// edge function is surely negative all over, and another surely positive.
+        fn mayTouch(
+            base: *const [4]Boxes.F32,
+            right: *const [4]Boxes.F32,
+            down: *const [4]Boxes.F32,
+            slack: Boxes.F32,
+        ) Boxes.Mask {
+            const zero: Boxes.F32 = .zero();
+            var negative: Boxes.Mask = .splat(false);
+            var positive: Boxes.Mask = .splat(false);
+            for (base[0..3], right[0..3], down[0..3]) |b, r, d| {
+                const most = r.max(zero).add(d.max(zero)).mulAdd(.splat(last), b);
+                const least = r.min(zero).add(d.min(zero)).mulAdd(.splat(last), b);
+                negative = negative.bitOr(most.lt(slack.neg()));
+                positive = positive.bitOr(least.gt(slack));
+            }
+            return negative.bitAnd(positive).bitNot();
+        }
+
+        /// What lanes hold of several triangles, by lane.
+        const Table = struct {
+            base: [4][width]f32,
+            right: [4][width]f32,
+            down: [4][width]f32,
+            slack: [width]f32,
+            relative: [width]f32,
+            absolute: [width]f32,
+
+            inline fn at(table: *const Table, lane: u6, first: exact.Slot) Coverage {
+                var coverage: Coverage = .{
+                    .base = undefined,
+                    .right = undefined,
+                    .down = undefined,
+                    .slack = table.slack[lane],
+                    .relative = table.relative[lane],
+                    .absolute = table.absolute[lane],
+                    .slot = first + @as(exact.Slot, lane),
+                };
+                inline for (0..4) |index| {
+                    coverage.base[index] = table.base[index][lane];
+                    coverage.right[index] = table.right[index][lane];
+                    coverage.down[index] = table.down[index][lane];
+                }
+                return coverage;
+            }
+        };
+
+        fn countBlock(search: *Self, block: *const world_file.TriangleBlock(width)) void {
+            search.counts.triangle_issued += width;
+            for (block.primitive) |primitive| {
+                search.counts.triangle_useful += @intFromBool(primitive != world_file.none);
+            }
+        }
+
+        /// Steps a triangle over the blocks of pixels and goes on with those it may be seen in.
+        inline fn cover(search: *Self, coverage: *const Coverage) void {
+            var start: [4]F32 = undefined;
+            inline for (&start, coverage.base, coverage.right, coverage.down) |*to, b, r, d| {
+                const most = b + block_last * ((if (r > 0) r else 0) + (if (d > 0) d else 0));
+                to.* = .splat(most);
+            }
+            const slack: F32 = .splat(-coverage.slack);
+            const relative: F32 = .splat(coverage.relative);
+            const absolute: F32 = .splat(coverage.absolute);
+            var candidates: u32 = 0;
+            inline for (0..block_count / lanes) |part| {
+                const x: F32 = .fromArray(block_x[part * lanes ..][0..lanes].*);
+                const y: F32 = .fromArray(block_y[part * lanes ..][0..lanes].*);
+                var value: [4]F32 = undefined;
+                inline for (&value, start, coverage.right, coverage.down) |*to, from, r, d| {
+                    to.* = x.mulAdd(.splat(r), y.mulAdd(.splat(d), from));
+                }
+                const inside = value[0].minFast(value[1]).minFast(value[2]).ge(slack);
+                const nearest = value[3].mulAdd(relative, value[3].add(absolute));
+                const known: F32 = .loadAligned(@alignCast(
+                    search.block_lower[part * lanes ..][0..lanes],
+                ));
+                const bits = inside.bitAnd(nearest.gt(known)).bits();
+                candidates |= bits << @intCast(part * lanes);
+            }
+            while (candidates != 0) : (candidates &= candidates - 1) {
+                search.coverBlock(coverage, @ctz(candidates));
+            }
+        }
+
+        /// Steps a triangle over the pixels of a block.
+        inline fn coverBlock(search: *Self, coverage: *const Coverage, block: u32) void {
+            const x: F32 = .fromArray(lanePlaces(false));
+            const y: F32 = .fromArray(lanePlaces(true));
+            var value: [4]F32 = undefined;
+            var step: [4]F32 = undefined;
+            inline for (0..4) |index| {
+                const r = coverage.right[index];
+                const d = coverage.down[index];
+                const base = coverage.base[index] + block_x[block] * r + block_y[block] * d;
+                var start: F32 = .splat(base);
+                if (Kernel.group_height > 1) start = y.mulAdd(.splat(d), start);
+                value[index] = x.mulAdd(.splat(r), start);
+                step[index] = .splat(d * Kernel.group_height);
+            }
+            const slack: F32 = .splat(coverage.slack);
+            const relative: F32 = .splat(coverage.relative);
+            const absolute: F32 = .splat(coverage.absolute);
+            var changed = false;
+            inline for (0..Kernel.block_groups) |row| {
+                if (row > 0) inline for (&value, step) |*to, by| {
+                    to.* = to.add(by);
+                };
+                const group = block * Kernel.block_groups + row;
+                const lower = search.bounds("lower", group);
+                const margin = value[3].mulAdd(relative, absolute);
+                const least = value[0].minFast(value[1]).minFast(value[2]);
+                const known: F32 = .loadAligned(lower);
+                const possible = least.ge(slack.neg()).bitAnd(value[3].add(margin).gt(known));
+                if (possible.any()) {
+                    const upper = search.bounds("upper", group);
+                    const certain = least.gt(slack)
+                        .bitAnd(value[3].sub(margin).gt(.loadAligned(upper)));
+                    const slots = search.bounds("slot", group);
+                    F32.select(certain, value[3].sub(margin), known).storeAligned(lower);
+                    F32.select(certain, value[3].add(margin), .loadAligned(upper))
+                        .storeAligned(upper);
+                    Rays.I32.select(certain, .splat(coverage.slot), .loadAligned(slots))
+                        .storeAligned(slots);
+                    const doubtful = possible.andNot(certain).bits();
+                    if (doubtful != 0) search.decide(coverage.slot, group, doubtful);
+                    changed = true;
+                }
+            }
+            if (changed) search.boundBlock(block);
+        }
+
+        fn lanePlaces(comptime rows: bool) [lanes]f32 {
+            var places: [lanes]f32 = undefined;
+            for (&places, 0..) |*to, lane| to.* = @floatFromInt(if (rows)
+                lane / Kernel.group_width
+            else
+                lane % Kernel.group_width);
+            return places;
+        }
+
+        /// A group's part of one of the arrays by pixel.
+        inline fn bounds(
+            search: *Self,
+            comptime name: []const u8,
+            group: usize,
+        ) *align(lanes * 4) [lanes]std.meta.Elem(@FieldType(Self, name)) {
+            return @alignCast(@field(search, name)[group * lanes ..][0..lanes]);
+        }
+
+        inline fn boundBlock(search: *Self, block: u32) void {
+            const first = block * Kernel.block_groups;
+            var least: F32 = .loadAligned(search.bounds("lower", first));
+            inline for (1..Kernel.block_groups) |row| {
+                least = least.minFast(.loadAligned(search.bounds("lower", first + row)));
+            }
+            search.block_lower[block] = least.reduceMin();
+        }
+
+        /// Asks the exact test about single rays.
+        fn decide(search: *Self, slot: exact.Slot, group: usize, doubtful: u32) void {
+            @branchHint(.unlikely);
+            var rest = doubtful;
+            while (rest != 0) : (rest &= rest - 1) {
+                const lane = @ctz(rest);
+                const ray = &search.bundle.groups[group];
+                const pad = search.world.pad;
+                const tree = search.tree;
+                const t = exact.hitAt(Kernel, tree, pad, ray, lane, slot) orelse continue;
+                if (!(t > 0)) continue;
+                const pixel = group * lanes + lane;
+                const before = search.slot[pixel];
+                if (before != exact.no_slot) {
+                    // What was certain to the filter is so to the exact test.
+                    const other = exact.hitAt(Kernel, tree, pad, ray, lane, before).?;
+                    if (other < t) continue;
+                    const number = exact.primitiveAt(width, tree, slot);
+                    const number_before = exact.primitiveAt(width, tree, before);
+                    if (other == t and number_before <= number) continue;
+                }
+                search.slot[pixel] = slot;
+                search.lower[pixel] = 1 / t * (1 - 4 * edges_file.unit_roundoff);
+                search.upper[pixel] = 1 / t * (1 + 4 * edges_file.unit_roundoff);
+            }
+        }
+
+        /// A triangle seen edge-on, or out of all measure: pixels are left to the exact test unless
+        /// some edge function is surely negative and another surely positive.
+        fn coverUndecided(search: *Self, coverage: *const Coverage) void {
+            @branchHint(.unlikely);
+            const slack: F32 = .splat(coverage.slack);
+            const x: F32 = .fromArray(lanePlaces(false));
+            const y: F32 = .fromArray(lanePlaces(true));
+            for (&search.bundle.groups, 0..) |*ray, group| {
+                const first_x: F32 = .splat(@floatFromInt(Kernel.pixelX(group, 0)));
+                const first_y: F32 = .splat(@floatFromInt(Kernel.pixelY(group, 0)));
+                var negative: Rays.Mask = .splat(false);
+                var positive: Rays.Mask = .splat(false);
+                for (coverage.base[0..3], coverage.right[0..3], coverage.down[0..3]) |b, r, d| {
+                    const value = first_x.add(x)
+                        .mulAdd(.splat(r), first_y.add(y).mulAdd(.splat(d), .splat(b)));
+                    negative = negative.bitOr(value.lt(slack.neg()));
+                    positive = positive.bitOr(value.gt(slack));
+                }
+                const doubtful = ray.active.andNot(negative.bitAnd(positive)).bits();
+                if (doubtful != 0) search.decide(coverage.slot, group, doubtful);
+            }
+            for (0..block_count) |block| search.boundBlock(@intCast(block));
+        }
+
+        /// Leaves the exact hits in the bundle.
+        fn finish(search: *Self) void {
+            for (&search.bundle.groups, 0..) |*group, index| {
+                const slots = search.bounds("slot", index).*;
+                const found = Rays.I32.fromArray(slots).gt(.splat(exact.no_slot));
+                if (found.none()) continue;
+                var corners: [3]Rays.Vec3 = undefined;
+                var primitive: Rays.I32 = undefined;
+                search.gather(&slots, &corners, &primitive);
+                const hit = triangle.intersect(Rays, corners, group.line, search.world.pad);
+                assert(found.andNot(hit.mask).none());
+                group.nearest = .{
+                    .t = .select(found, hit.t, group.nearest.t),
+                    .primitive = .select(found, primitive, group.nearest.primitive),
+                };
+            }
+        }
+
+        /// Corners and numbers of the triangles in slots; of slot 0 where there is none.
+        inline fn gather(
+            search: *const Self,
+            slots: *const [lanes]exact.Slot,
+            corners: *[3]Rays.Vec3,
+            primitive: *Rays.I32,
+        ) void {
+            const same = Rays.I32.fromArray(slots.*).eq(.splat(slots[0]));
+            if (same.all()) {
+                inline for (corners, 0..) |*corner, index| {
+                    corner.* = .splat(exact.cornerAt(width, search.tree, slots[0], index));
+                }
+                primitive.* = .splat(exact.primitiveAt(width, search.tree, slots[0]));
+                return;
+            }
+            var components: [3][3][lanes]f32 = undefined;
+            var numbers: [lanes]i32 = undefined;
+            for (slots, 0..) |slot, lane| {
+                const there = if (slot == exact.no_slot) 0 else slot;
+                inline for (&components, 0..) |*corner, index| {
+                    const position = exact.cornerAt(width, search.tree, there, index);
+                    inline for (corner, position) |*component, value| component[lane] = value;
+                }
+                numbers[lane] = exact.primitiveAt(width, search.tree, there);
+            }
+            inline for (corners, components) |*corner, component| corner.* = .{
+                .x = .fromArray(component[0]),
+                .y = .fromArray(component[1]),
+                .z = .fromArray(component[2]),
+            };
+            primitive.* = .fromArray(numbers);
+        }
+    };
+}
+
+fn length1(vector: [3]f32) f32 {
+    return @abs(vector[0]) + @abs(vector[1]) + @abs(vector[2]);
+}
+
+/// The pyramid around a beam's rays, or null where they are too far apart for one.
+fn frustumOf(grid: *const Grid, pad: f32) ?Frustum {
+    const spread = last * (length1(grid.right) + length1(grid.down));
+    if (!(spread <= 0.5 * length1(grid.corner))) return null;
+    const to_right = vec3.add(grid.corner, vec3.scale(grid.right, last));
+    const down = vec3.scale(grid.down, last);
+    const corners = [4][3]f32{
+        grid.corner, to_right, vec3.add(to_right, down), vec3.add(grid.corner, down),
+    };
+    var normals: [4][3]f32 = undefined;
+    for (&normals, 0..) |*normal, index| {
+        // By the step, not by the next corner: two corners are nearly parallel.
+        const across = vec3.cross(corners[index], if (index % 2 == 0) grid.right else grid.down);
+        const inward = vec3.dot(across, corners[(index + 2) % 4]) >= 0;
+        normal.* = vec3.scale(across, if (inward) 1 else -1);
+    }
+    const facing = vec3.cross(grid.right, grid.down);
+    const share = vec3.dot(facing, grid.corner);
+    if (!(@abs(share) > 0.1 * length1(facing) * length1(grid.corner))) return null;
+    return .init(grid.origin, normals, vec3.scale(facing, 1 / share), pad);
+}

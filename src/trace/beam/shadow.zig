@@ -1,0 +1,866 @@
+//! Shadow rays of one light, as few beams: which points does it not reach?
+//!
+//! In: a bundle whose active rays come from a point light, or go parallel to a directional one.
+//! Out: which of them meet anything. Seen from the light, points lie on a plane (footprint.zig),
+//! where those of a block of 4x4 pixels have bounds: a parallelogram, since a flat surface seen
+//! aslant is one. A beam is a set of rays; where depth jumps the set covers far more of the plane
+//! than its blocks do, and is cut in two there. A beam that meets too many blocks of triangles, or
+//! has few rays, is left to single rays. In doubt, the exact test decides.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const TestCounts = @import("../../statistics.zig").TestCounts;
+const kernel_file = @import("../kernel.zig");
+const ray_file = @import("../ray.zig");
+const packet = @import("../packet.zig");
+const single = @import("../single.zig");
+const stack = @import("../stack.zig");
+const edges_file = @import("edges.zig");
+const exact = @import("exact.zig");
+const footprint_file = @import("footprint.zig");
+const frustum_file = @import("frustum.zig");
+const assert = std.debug.assert;
+const Frustum = frustum_file.Frustum;
+const Plane = frustum_file.Plane;
+const Projection = footprint_file.Projection;
+
+const side = kernel_file.beam_side;
+const block_count = kernel_file.beam_side * kernel_file.beam_side /
+    (kernel_file.block_side * kernel_file.block_side);
+const block_pixels = kernel_file.block_side * kernel_file.block_side;
+const pixel_count = side * side;
+
+/// A beam is cut where its bounds cover more than this many times what its blocks do.
+const cut_ratio = 2.0;
+/// Cuts of a beam at most, one after the other.
+const cut_depth_max = 4;
+/// Blocks of triangles that a beam may meet before its rays go on alone.
+const meeting_max = 160;
+/// Beams of fewer rays are not worth their set-up.
+const beam_rays_min = 8;
+/// Slopes at most; rays that go more sideways make a beam of their own.
+const slope_limit = 4.0;
+/// With no more blocks than this, triangles are not tested against each of them first.
+const few_blocks = 3;
+
+/// A set of rays: a bit for each pixel of each block.
+const Members = [block_count]u16;
+
+/// Finds which rays meet anything; `nearest.primitive` of those becomes a number. Asserts that
+/// all active rays start at the light's place, or go against its direction.
+pub fn trace(
+    comptime Kernel: type,
+    world: *const world_file.World,
+    light: *const world_file.Light,
+    bundle: *packet.Bundle(Kernel),
+    counts: *TestCounts,
+) void {
+    var search: Search(Kernel) = .{
+        .world = world,
+        .tree = world.tree.get(Kernel.width),
+        .light = light,
+        .bundle = bundle,
+        .counts = counts,
+    };
+    search.run();
+}
+
+/// Bounds on the light's plane, in the axes of the parallelogram.
+const Bounds = struct {
+    u: [2]f32 = .{ std.math.inf(f32), -std.math.inf(f32) },
+    v: [2]f32 = .{ std.math.inf(f32), -std.math.inf(f32) },
+    depth: f32 = -std.math.inf(f32),
+
+    fn area(bounds: Bounds) f32 {
+        return (bounds.u[1] - bounds.u[0]) * (bounds.v[1] - bounds.v[0]);
+    }
+
+    fn join(a: Bounds, b: Bounds) Bounds {
+        return .{
+            .u = .{ @min(a.u[0], b.u[0]), @max(a.u[1], b.u[1]) },
+            .v = .{ @min(a.v[0], b.v[0]), @max(a.v[1], b.v[1]) },
+            .depth = @max(a.depth, b.depth),
+        };
+    }
+};
+
+/// Axes of the parallelogram, and the way back: U = i00 u + i01 v, V = i10 u + i11 v.
+const Basis = struct {
+    b00: f32 = 1,
+    b01: f32 = 0,
+    b10: f32 = 0,
+    b11: f32 = 1,
+    i00: f32 = 1,
+    i01: f32 = 0,
+    i10: f32 = 0,
+    i11: f32 = 1,
+
+    /// The axes (x0, y0) and (x1, y1), unit vectors that are not parallel.
+    fn init(x0: f32, y0: f32, x1: f32, y1: f32) Basis {
+        const scale = 1 / (x0 * y1 - x1 * y0);
+        return .{
+            .b00 = x0,
+            .b01 = x1,
+            .b10 = y0,
+            .b11 = y1,
+            .i00 = y1 * scale,
+            .i01 = -x1 * scale,
+            .i10 = -y0 * scale,
+            .i11 = x0 * scale,
+        };
+    }
+
+    fn norm(basis: *const Basis) f32 {
+        return @abs(basis.i00) + @abs(basis.i01) + @abs(basis.i10) + @abs(basis.i11);
+    }
+};
+
+fn Search(comptime Kernel: type) type {
+    const Boxes = Kernel.Boxes;
+    const Rays = Kernel.Rays;
+    const width = Kernel.width;
+    const lanes = Kernel.ray_count;
+    return struct {
+        world: *const world_file.World,
+        tree: *const world_file.Tree(width),
+        light: *const world_file.Light,
+        bundle: *packet.Bundle(Kernel),
+        counts: *TestCounts,
+        projection: Projection = undefined,
+        basis: Basis = .{},
+        slope_max: f32 = 0,
+        bounds: Bounds = .{},
+        /// Points on the light's plane by pixel, and how near to the light they are there;
+        /// infinitely near if there is no ray or it has met something.
+        u: [pixel_count]f32 align(64) = undefined,
+        v: [pixel_count]f32 align(64) = undefined,
+        nearness: [pixel_count]f32 align(64) = undefined,
+        /// Bounds of every block; empty ones of blocks that are done.
+        block_u: [2][block_count]f32 align(64) = undefined,
+        block_v: [2][block_count]f32 align(64) = undefined,
+        block_depth: [block_count]f32 align(64) = undefined,
+        /// Blocks with rays that have met nothing yet.
+        live: u32 = 0,
+
+        const Self = @This();
+        const F32 = Rays.F32;
+        const Mask = Rays.Mask;
+        const inf = std.math.inf(f32);
+
+        const Waiting = struct { members: Members, depth: u32 };
+
+        fn run(search: *Self) void {
+            // A cut leaves two sets for one; rays that do not fit leave one more, at most 3 times.
+            var waiting: [4 * cut_depth_max + 8]Waiting = undefined;
+            waiting[0] = .{ .members = search.active(), .depth = 0 };
+            var waiting_count: usize = 1;
+            while (waiting_count > 0) {
+                waiting_count -= 1;
+                var set = waiting[waiting_count];
+                if (rayCount(&set.members) < beam_rays_min or waiting_count + 3 > waiting.len) {
+                    search.apart(&set.members);
+                    continue;
+                }
+                const rest = search.place(&set.members);
+                if (rayCount(&rest) > 0) {
+                    if (rayCount(&set.members) == 0) {
+                        search.apart(&rest);
+                        continue;
+                    }
+                    waiting[waiting_count] = .{ .members = rest, .depth = set.depth };
+                    waiting_count += 1;
+                }
+                if (set.depth < cut_depth_max) {
+                    if (search.cut(&set.members)) |below| {
+                        var half = below;
+                        for (&half, &set.members) |*one, *both| {
+                            one.* &= both.*;
+                            both.* &= ~one.*;
+                        }
+                        const depth = set.depth + 1;
+                        waiting[waiting_count] = .{ .members = half, .depth = depth };
+                        waiting[waiting_count + 1] = .{ .members = set.members, .depth = depth };
+                        waiting_count += 2;
+                        continue;
+                    }
+                }
+                search.travel(&set.members);
+            }
+        }
+
+        fn rayCount(members: *const Members) u32 {
+            var count: u32 = 0;
+            for (members) |block| count += @popCount(block);
+            return count;
+        }
+
+        fn active(search: *const Self) Members {
+            var members: Members = @splat(0);
+            for (&search.bundle.groups, 0..) |*group, index| {
+                setGroup(&members, index, group.active.bits());
+            }
+            return members;
+        }
+
+        inline fn setGroup(members: *Members, group: usize, bits: u32) void {
+            const shift: u4 = @intCast(group % Kernel.block_groups * lanes);
+            members[group / Kernel.block_groups] |= @as(u16, @truncate(bits)) << shift;
+        }
+
+        inline fn groupOf(members: *const Members, group: usize) Mask {
+            const shift: u4 = @intCast(group % Kernel.block_groups * lanes);
+            const all: u16 = @intCast((@as(u32, 1) << lanes) - 1);
+            return .fromBits(members[group / Kernel.block_groups] >> shift & all);
+        }
+
+        /// Rays of a set, each by itself.
+        fn apart(search: *Self, members: *const Members) void {
+            const pad = search.world.pad;
+            for (&search.bundle.groups, 0..) |*group, index| {
+                var bits = groupOf(members, index).bits();
+                while (bits != 0) : (bits &= bits - 1) {
+                    const lane = @ctz(bits);
+                    var ray = group.extract(lane);
+                    if (single.trace(Kernel, .any, search.tree, pad, &ray, search.counts)) {
+                        search.blockRay(index, lane, ray.nearest.primitive.lane(0));
+                    }
+                }
+            }
+        }
+
+        /// A ray has met a triangle.
+        fn blockRay(search: *Self, group: usize, lane: usize, primitive: i32) void {
+            const ray = &search.bundle.groups[group];
+            var numbers = ray.nearest.primitive.toArray();
+            numbers[lane] = primitive;
+            ray.nearest.primitive = .fromArray(numbers);
+        }
+
+        /// Puts the rays of a set on the plane of the axis that suits most of them, and takes out
+        /// those that do not fit on it, which are returned.
+        fn place(search: *Self, members: *Members) Members {
+            search.choosePlane(members);
+            const projection = &search.projection;
+            var rest: Members = @splat(0);
+            var fitting: Members = @splat(0);
+            var steepest: F32 = .zero();
+            for (&search.bundle.groups, 0..) |*group, index| {
+                const member = groupOf(members, index);
+                const first = index * lanes;
+                if (member.none()) {
+                    F32.splat(inf).storeAligned(@alignCast(search.nearness[first..][0..lanes]));
+                    continue;
+                }
+                const on_plane = search.placeGroup(group);
+                const steep = on_plane.u.abs().maxFast(on_plane.v.abs());
+                var fits = member;
+                if (projection.slope == null) fits = fits.bitAnd(on_plane.depth.gt(.zero()))
+                    .bitAnd(steep.le(.splat(slope_limit)));
+                setGroup(&fitting, index, fits.bits());
+                setGroup(&rest, index, member.andNot(fits).bits());
+                steepest = steepest.maxFast(.select(fits, steep, .zero()));
+                const near = if (projection.slope == null)
+                    F32.splat(1).div(on_plane.depth)
+                else
+                    on_plane.depth.neg();
+                on_plane.u.storeAligned(@alignCast(search.u[first..][0..lanes]));
+                on_plane.v.storeAligned(@alignCast(search.v[first..][0..lanes]));
+                F32.select(fits, near, .splat(inf))
+                    .storeAligned(@alignCast(search.nearness[first..][0..lanes]));
+            }
+            members.* = fitting;
+            search.slope_max = if (projection.slope) |slope|
+                @max(@abs(slope[0]), @abs(slope[1]))
+            else
+                steepest.reduceMax();
+            search.chooseBasis(members);
+            search.bound(members);
+            return rest;
+        }
+
+        inline fn placeGroup(
+            search: *Self,
+            group: *const ray_file.Ray(Rays),
+        ) footprint_file.Place(Rays) {
+            const projection = &search.projection;
+            // A point light's rays reach their points at t = 1; a directional one's start there.
+            const point = if (projection.slope == null)
+                group.line.direction
+            else
+                group.line.origin.sub(.splat(projection.origin));
+            return footprint_file.project(Rays, projection, point);
+        }
+
+        /// The axis along which the light's way to these points is longest.
+        fn choosePlane(search: *Self, members: *const Members) void {
+            const directional = search.light.kind == .directional;
+            var sum: Rays.Vec3 = .splat(.{ 0, 0, 0 });
+            var some: ?[3]f32 = null;
+            for (&search.bundle.groups, 0..) |*group, index| {
+                const member = groupOf(members, index);
+                if (member.none()) continue;
+                const vector = if (directional) group.line.origin else group.line.direction;
+                if (some == null) some = vector.lane(@ctz(member.bits()));
+                sum = sum.add(.select(member, vector, .splat(.{ 0, 0, 0 })));
+            }
+            const way = if (directional)
+                search.light.direction
+            else
+                [3]f32{ sum.x.reduceSum(), sum.y.reduceSum(), sum.z.reduceSum() };
+            var axis: u2 = 0;
+            for (1..3) |other| {
+                if (@abs(way[other]) > @abs(way[axis])) axis = @intCast(other);
+            }
+            search.projection = .{
+                .origin = if (directional) some.? else search.light.position,
+                .axis = axis,
+                .sign = if (way[axis] < 0) -1 else 1,
+                .slope = if (directional) .{
+                    way[ray_file.turnedIndex(axis, 0)] / way[axis],
+                    way[ray_file.turnedIndex(axis, 1)] / way[axis],
+                } else null,
+            };
+            if (directional) search.projection.reach = search.reachOf(members);
+        }
+
+        /// The largest distance of a directional light's points from the origin of the plane.
+        fn reachOf(search: *const Self, members: *const Members) f32 {
+            var farthest: F32 = .zero();
+            for (&search.bundle.groups, 0..) |*group, index| {
+                const member = groupOf(members, index);
+                if (member.none()) continue;
+                const apart_ = group.line.origin.sub(.splat(search.projection.origin));
+                const distance = apart_.dot(apart_);
+                farthest = farthest.maxFast(.select(member, distance, .zero()));
+            }
+            return @sqrt(farthest.reduceMax());
+        }
+
+        /// Axes along the rows and columns of pixels, if the corners of the bundle are members.
+        fn chooseBasis(search: *Self, members: *const Members) void {
+            search.basis = .{};
+            const corners = comptime cornerPixels();
+            for (corners) |pixel| {
+                if (members[pixel / block_pixels] >> @intCast(pixel % block_pixels) & 1 == 0) return;
+            }
+            const u = [4]f32{
+                search.u[corners[0]], search.u[corners[1]],
+                search.u[corners[2]], search.u[corners[3]],
+            };
+            const v = [4]f32{
+                search.v[corners[0]], search.v[corners[1]],
+                search.v[corners[2]], search.v[corners[3]],
+            };
+            var x0 = u[1] - u[0] + u[3] - u[2];
+            var y0 = v[1] - v[0] + v[3] - v[2];
+            var x1 = u[2] - u[0] + u[3] - u[1];
+            var y1 = v[2] - v[0] + v[3] - v[1];
+            const length0 = @sqrt(x0 * x0 + y0 * y0);
+            const length1 = @sqrt(x1 * x1 + y1 * y1);
+            if (!(length0 > 0 and length1 > 0)) return;
+            x0 /= length0;
+            y0 /= length0;
+            x1 /= length1;
+            y1 /= length1;
+            if (@abs(x0 * y1 - x1 * y0) > 0.15) {
+                search.basis = .init(x0, y0, x1, y1);
+            } else if (length0 > length1) {
+                search.basis = .init(x0, y0, -y0, x0);
+            } else {
+                search.basis = .init(x1, y1, -y1, x1);
+            }
+        }
+
+        /// Pixels of the bundle's corners: upper left, upper right, lower left, lower right.
+        fn cornerPixels() [4]usize {
+            @setEvalBranchQuota(20_000);
+            var corners: [4]usize = undefined;
+            for (0..Kernel.group_count) |group| {
+                for (0..lanes) |lane| {
+                    const x = Kernel.pixelX(group, lane);
+                    const y = Kernel.pixelY(group, lane);
+                    if (x % (side - 1) != 0 or y % (side - 1) != 0) continue;
+                    corners[x / (side - 1) + 2 * (y / (side - 1))] = group * lanes + lane;
+                }
+            }
+            return corners;
+        }
+
+        /// Bounds of blocks and of all.
+        fn bound(search: *Self, members: *const Members) void {
+            const basis = &search.basis;
+            const margin = 64 * edges_file.unit_roundoff * (1 + 2 * search.slope_max) *
+                basis.norm() * (if (search.projection.slope == null) 1 else search.projection.reach);
+            search.bounds = .{};
+            search.live = 0;
+            for (0..block_count) |index| {
+                var u: [2]F32 = .{ .splat(inf), .splat(-inf) };
+                var v = u;
+                var nearest: F32 = .splat(inf);
+                var here: Bounds = .{};
+                if (members[index] != 0) {
+                    for (0..Kernel.block_groups) |row| {
+                        const first = index * block_pixels + row * lanes;
+                        const near: F32 = .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
+                        const there = near.lt(.splat(inf));
+                        const x: F32 = .loadAligned(@alignCast(search.u[first..][0..lanes]));
+                        const y: F32 = .loadAligned(@alignCast(search.v[first..][0..lanes]));
+                        const along_u = x.mul(.splat(basis.i00)).add(y.mul(.splat(basis.i01)));
+                        const along_v = x.mul(.splat(basis.i10)).add(y.mul(.splat(basis.i11)));
+                        u[0] = u[0].minFast(.select(there, along_u, .splat(inf)));
+                        u[1] = u[1].maxFast(.select(there, along_u, .splat(-inf)));
+                        v[0] = v[0].minFast(.select(there, along_v, .splat(inf)));
+                        v[1] = v[1].maxFast(.select(there, along_v, .splat(-inf)));
+                        nearest = nearest.minFast(near);
+                    }
+                    search.live |= @as(u32, 1) << @intCast(index);
+                    const near = nearest.reduceMin();
+                    here = .{
+                        .u = .{ u[0].reduceMin() - margin, u[1].reduceMax() + margin },
+                        .v = .{ v[0].reduceMin() - margin, v[1].reduceMax() + margin },
+                        .depth = if (search.projection.slope == null) 1 / near else -near,
+                    };
+                }
+                search.bounds = search.bounds.join(here);
+                search.setBlock(index, here);
+            }
+        }
+
+        fn setBlock(search: *Self, index: usize, bounds: Bounds) void {
+            for (0..2) |end| {
+                search.block_u[end][index] = bounds.u[end];
+                search.block_v[end][index] = bounds.v[end];
+            }
+            search.block_depth[index] = bounds.depth;
+        }
+
+        /// Half of the set if it should be cut: what lies below the middle of the longer extent, in
+        /// units of the median block.
+        fn cut(search: *const Self, members: *const Members) ?Members {
+            var areas: [block_count]f32 = undefined;
+            var extents: [2][block_count]f32 = undefined;
+            var count: usize = 0;
+            for (0..block_count) |index| {
+                if (search.live >> @intCast(index) & 1 == 0) continue;
+                extents[0][count] = search.block_u[1][index] - search.block_u[0][index];
+                extents[1][count] = search.block_v[1][index] - search.block_v[0][index];
+                areas[count] = extents[0][count] * extents[1][count];
+                count += 1;
+            }
+            if (count == 0) return null;
+            const share: f32 = @floatFromInt(count);
+            if (!(search.bounds.area() > cut_ratio * share * median(areas[0..count]))) return null;
+            const along_u = (search.bounds.u[1] - search.bounds.u[0]) * median(extents[1][0..count]) >
+                (search.bounds.v[1] - search.bounds.v[0]) * median(extents[0][0..count]);
+            const basis = &search.basis;
+            const range = if (along_u) search.bounds.u else search.bounds.v;
+            const middle: F32 = .splat(0.5 * (range[0] + range[1]));
+            const by_u: F32 = .splat(if (along_u) basis.i00 else basis.i10);
+            const by_v: F32 = .splat(if (along_u) basis.i01 else basis.i11);
+            var half: Members = @splat(0);
+            for (0..Kernel.group_count) |group| {
+                const u: F32 = .loadAligned(@alignCast(search.u[group * lanes ..][0..lanes]));
+                const v: F32 = .loadAligned(@alignCast(search.v[group * lanes ..][0..lanes]));
+                setGroup(&half, group, u.mul(by_u).add(v.mul(by_v)).lt(middle).bits());
+            }
+            const below = count: {
+                var both: Members = half;
+                for (&both, members) |*one, all| one.* &= all;
+                break :count rayCount(&both);
+            };
+            if (below == 0 or below == rayCount(members)) return null;
+            return half;
+        }
+
+        fn median(values: []f32) f32 {
+            std.mem.sort(f32, values, {}, std.sort.asc(f32));
+            return values[values.len / 2];
+        }
+
+        fn travel(search: *Self, members: *const Members) void {
+            const frustum = search.frustumOf();
+            var entries: [Kernel.stack_max]stack.Entry = undefined;
+            entries[0] = .{ .child = 0, .block_count = 0, .near = -inf };
+            var entry_count: usize = 1;
+            var meeting_count: u32 = 0;
+            while (entry_count > 0 and search.live != 0) {
+                entry_count -= 1;
+                const entry = entries[entry_count];
+                if (entry.block_count == 0) {
+                    assert(entry_count + width <= Kernel.stack_max);
+                    const node = &search.tree.nodes[entry.child];
+                    if (Kernel.counts_tests) search.countNode(node);
+                    entry_count = frustum
+                        .pushChildren(Boxes, node, search.bounds.depth, &entries, entry_count);
+                    continue;
+                }
+                meeting_count += entry.block_count;
+                if (meeting_count > meeting_max) return search.apart(&search.left(members));
+                for (entry.child..entry.child + entry.block_count) |index| {
+                    search.meetBlock(@intCast(index));
+                }
+            }
+        }
+
+        /// Members that have met nothing yet.
+        fn left(search: *const Self, members: *const Members) Members {
+            var rest: Members = @splat(0);
+            for (0..Kernel.group_count) |group| {
+                const near: F32 = .loadAligned(@alignCast(
+                    search.nearness[group * lanes ..][0..lanes],
+                ));
+                setGroup(&rest, group, near.lt(.splat(inf)).bits());
+            }
+            for (&rest, members) |*one, all| one.* &= all;
+            return rest;
+        }
+
+        fn countNode(search: *Self, node: *const world_file.Node(width)) void {
+            search.counts.box_issued += width;
+            for (node.child) |child| {
+                search.counts.box_useful += @intFromBool(child != world_file.none);
+            }
+        }
+
+        /// Four planes around the beam, and depth along the light's way.
+        fn frustumOf(search: *const Self) Frustum {
+            const projection = &search.projection;
+            const basis = &search.basis;
+            const pad = search.world.pad;
+            const bounds = &search.bounds;
+            const rows = [4][3]f32{
+                .{ basis.i00, basis.i01, -bounds.u[0] },
+                .{ -basis.i00, -basis.i01, bounds.u[1] },
+                .{ basis.i10, basis.i11, -bounds.v[0] },
+                .{ -basis.i10, -basis.i11, bounds.v[1] },
+            };
+            var frustum: Frustum = undefined;
+            for (&frustum.sides, rows) |*plane, row| {
+                // u - u0 >= 0 is x - u0 z >= 0 in front of a point light, and x - m z - u0 >= 0
+                // along a directional one of slope m.
+                var normal: [3]f32 = undefined;
+                const last = if (projection.slope) |slope|
+                    -(row[0] * slope[0] + row[1] * slope[1])
+                else
+                    row[2];
+                const scale = if (projection.slope == null) projection.sign else 1;
+                normal[projection.axisAt(0)] = row[0] * scale;
+                normal[projection.axisAt(1)] = row[1] * scale;
+                normal[projection.axisAt(2)] = last * scale;
+                plane.* = .init(normal, projection.origin, frustum_file.slack_pads * pad);
+                if (projection.slope != null) plane.offset += row[2];
+            }
+            var along: [3]f32 = @splat(0);
+            along[projection.axis] = projection.sign;
+            frustum.depth = .init(along, projection.origin, -frustum_file.slack_pads * pad);
+            return frustum;
+        }
+
+        /// Sets up the triangles of a block and goes on with those that may stand in the way.
+        fn meetBlock(search: *Self, block_index: u32) void {
+            @setEvalBranchQuota(4000);
+            const block_ = &search.tree.blocks[block_index];
+            if (Kernel.counts_tests) search.countBlock(block_);
+            var corners: [3]Boxes.Vec3 = undefined;
+            inline for (&corners, &block_.corner) |*corner, *components| corner.* = .{
+                .x = .load(&components[0]),
+                .y = .load(&components[1]),
+                .z = .load(&components[2]),
+            };
+            const print: footprint_file.Footprint(Boxes) =
+                .init(corners, &search.projection, search.slope_max);
+            const basis = &search.basis;
+            const bounds = &search.bounds;
+            const B = Boxes.F32;
+            var seen = print.slack.eq(print.slack);
+            var along_u: [4]B = undefined;
+            var along_v: [4]B = undefined;
+            var one: [4]B = undefined;
+            const linear = print.edge ++ .{print.nearness};
+            inline for (linear, 0..) |form, index| {
+                along_u[index] = form.u.mulAdd(.splat(basis.b00), form.v.mul(.splat(basis.b10)));
+                along_v[index] = form.u.mulAdd(.splat(basis.b01), form.v.mul(.splat(basis.b11)));
+                one[index] = form.one;
+                const most = maxOver(along_u[index], bounds.u)
+                    .add(maxOver(along_v[index], bounds.v)).add(form.one);
+                if (index < 3) {
+                    seen = seen.bitAnd(most.ge(print.slack.neg()));
+                } else {
+                    const farthest = if (search.projection.slope == null)
+                        1 / bounds.depth
+                    else
+                        -bounds.depth;
+                    const nearest = most.mulAdd(print.relative, most.add(print.absolute));
+                    seen = seen.bitAnd(nearest.gt(.splat(farthest)));
+                }
+            }
+            const primitive: Boxes.I32 = .load(@ptrCast(&block_.primitive));
+            const there = primitive.gt(.splat(ray_file.no_primitive));
+            const open = there.andNot(print.decisive);
+            var undecided: u32 = 0;
+            if (open.any()) undecided = open
+                .bitAnd(search.mayTouch(&along_u, &along_v, &one, print.slack)).bits();
+            var rest = there.bitAnd(print.decisive).bitAnd(seen).bits();
+            const first: exact.Slot = @intCast(block_index * width);
+            if (rest | undecided == 0) return;
+            var table: Table = undefined;
+            inline for (0..4) |index| {
+                linear[index].u.store(&table.u[index]);
+                linear[index].v.store(&table.v[index]);
+                one[index].store(&table.one[index]);
+            }
+            inline for (0..3) |index| {
+                along_u[index].store(&table.along_u[index]);
+                along_v[index].store(&table.along_v[index]);
+            }
+            print.slack.store(&table.slack);
+            print.relative.store(&table.relative);
+            print.absolute.store(&table.absolute);
+            while (rest != 0) : (rest &= rest - 1) {
+                const lane = @ctz(rest);
+                search.cover(&table.at(lane, first, block_.primitive[lane]));
+            }
+            while (undecided != 0) : (undecided &= undecided - 1) {
+                const lane = @ctz(undecided);
+                search.coverUndecided(&table.at(lane, first, block_.primitive[lane]));
+            }
+        }
+
+        /// Lanes of triangles whose orientation is not known that the beam may touch: unless some
+        /// edge function is surely negative all over, and another surely positive.
+        fn mayTouch(
+            search: *const Self,
+            along_u: *const [4]Boxes.F32,
+            along_v: *const [4]Boxes.F32,
+            one: *const [4]Boxes.F32,
+            slack: Boxes.F32,
+        ) Boxes.Mask {
+            const bounds = &search.bounds;
+            var negative: Boxes.Mask = .splat(false);
+            var positive: Boxes.Mask = .splat(false);
+            for (along_u[0..3], along_v[0..3], one[0..3]) |u, v, c| {
+                const most = maxOver(u, bounds.u).add(maxOver(v, bounds.v)).add(c);
+                const least = maxOver(u.neg(), bounds.u).add(maxOver(v.neg(), bounds.v)).sub(c);
+                negative = negative.bitOr(most.lt(slack.neg()));
+                positive = positive.bitOr(least.lt(slack.neg()));
+            }
+            return negative.bitAnd(positive).bitNot();
+        }
+
+        /// What lanes hold of several triangles, by lane.
+        const Table = struct {
+            u: [4][width]f32,
+            v: [4][width]f32,
+            one: [4][width]f32,
+            along_u: [3][width]f32,
+            along_v: [3][width]f32,
+            slack: [width]f32,
+            relative: [width]f32,
+            absolute: [width]f32,
+
+            inline fn at(
+                table: *const Table,
+                lane: u6,
+                first: exact.Slot,
+                primitive: u32,
+            ) Coverage {
+                var coverage: Coverage = .{
+                    .u = undefined,
+                    .v = undefined,
+                    .one = undefined,
+                    .along_u = undefined,
+                    .along_v = undefined,
+                    .slack = table.slack[lane],
+                    .relative = table.relative[lane],
+                    .absolute = table.absolute[lane],
+                    .slot = first + @as(exact.Slot, lane),
+                    .primitive = @bitCast(primitive),
+                };
+                inline for (0..4) |index| {
+                    coverage.u[index] = table.u[index][lane];
+                    coverage.v[index] = table.v[index][lane];
+                    coverage.one[index] = table.one[index][lane];
+                }
+                inline for (0..3) |index| {
+                    coverage.along_u[index] = table.along_u[index][lane];
+                    coverage.along_v[index] = table.along_v[index][lane];
+                }
+                return coverage;
+            }
+        };
+
+        inline fn maxOver(factor: Boxes.F32, range: [2]f32) Boxes.F32 {
+            return factor.mul(.splat(range[0])).maxFast(factor.mul(.splat(range[1])));
+        }
+
+        fn countBlock(search: *Self, block_: *const world_file.TriangleBlock(width)) void {
+            search.counts.triangle_issued += width;
+            for (block_.primitive) |primitive| {
+                search.counts.triangle_useful += @intFromBool(primitive != world_file.none);
+            }
+        }
+
+        /// One triangle's edge functions and nearness.
+        const Coverage = struct {
+            u: [4]f32,
+            v: [4]f32,
+            one: [4]f32,
+            /// Edge functions in the axes of the parallelogram.
+            along_u: [3]f32,
+            along_v: [3]f32,
+            slack: f32,
+            relative: f32,
+            absolute: f32,
+            slot: exact.Slot,
+            primitive: i32,
+        };
+
+        /// Goes on with the blocks of rays that a triangle may stand before.
+        inline fn cover(search: *Self, coverage: *const Coverage) void {
+            var candidates = search.live;
+            if (@popCount(candidates) > few_blocks) candidates &= search.blocksOf(coverage);
+            while (candidates != 0) : (candidates &= candidates - 1) {
+                search.coverBlock(coverage, @ctz(candidates));
+            }
+        }
+
+        inline fn blocksOf(search: *Self, coverage: *const Coverage) u32 {
+            var blocks: u32 = 0;
+            inline for (0..block_count / lanes) |part| {
+                const first = part * lanes;
+                var least: F32 = .splat(inf);
+                inline for (0..3) |index| {
+                    const du = coverage.along_u[index];
+                    const dv = coverage.along_v[index];
+                    const u: F32 = .loadAligned(@alignCast(
+                        search.block_u[@intFromBool(du > 0)][first..][0..lanes],
+                    ));
+                    const v: F32 = .loadAligned(@alignCast(
+                        search.block_v[@intFromBool(dv > 0)][first..][0..lanes],
+                    ));
+                    const most = u.mulAdd(.splat(du), v.mulAdd(.splat(dv), .splat(
+                        coverage.one[index],
+                    )));
+                    least = least.minFast(most);
+                }
+                blocks |= least.ge(.splat(-coverage.slack)).bits() << first;
+            }
+            return blocks;
+        }
+
+        /// Tests a triangle against the rays of a block.
+        inline fn coverBlock(search: *Self, coverage: *const Coverage, index: u32) void {
+            const slack: F32 = .splat(coverage.slack);
+            var any_met = false;
+            inline for (0..Kernel.block_groups) |row| {
+                const group = index * Kernel.block_groups + row;
+                const first = group * lanes;
+                const u: F32 = .loadAligned(@alignCast(search.u[first..][0..lanes]));
+                const v: F32 = .loadAligned(@alignCast(search.v[first..][0..lanes]));
+                var value: [4]F32 = undefined;
+                inline for (&value, coverage.u, coverage.v, coverage.one) |*to, cu, cv, c1| {
+                    to.* = u.mulAdd(.splat(cu), v.mulAdd(.splat(cv), .splat(c1)));
+                }
+                const near: F32 = .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
+                const margin = value[3].mulAdd(.splat(coverage.relative), .splat(coverage.absolute));
+                const least = value[0].minFast(value[1]).minFast(value[2]);
+                var possible = least.ge(slack.neg()).bitAnd(value[3].add(margin).gt(near));
+                if (possible.any()) {
+                    const own = search.bundle.groups[group].skip.eq(.splat(coverage.primitive));
+                    possible = possible.andNot(own);
+                    const certain = possible.bitAnd(least.gt(slack))
+                        .bitAnd(value[3].sub(margin).gt(near));
+                    any_met = search.meet(coverage.slot, group, possible, certain) or any_met;
+                }
+            }
+            if (any_met) search.checkBlock(index);
+        }
+
+        /// Takes rays out that have met a triangle. Returns whether there were any.
+        inline fn meet(
+            search: *Self,
+            slot: exact.Slot,
+            group: usize,
+            possible: Mask,
+            certain: Mask,
+        ) bool {
+            var met = certain;
+            const doubtful = possible.andNot(certain).bits();
+            if (doubtful != 0) met = met.bitOr(.fromBits(search.decide(slot, group, doubtful)));
+            if (met.none()) return false;
+            const first = group * lanes;
+            const near: F32 = .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
+            F32.select(met, .splat(inf), near)
+                .storeAligned(@alignCast(search.nearness[first..][0..lanes]));
+            const ray = &search.bundle.groups[group];
+            ray.nearest.primitive = .select(met, .zero(), ray.nearest.primitive);
+            return true;
+        }
+
+        /// Marks a block as done when all its rays are.
+        inline fn checkBlock(search: *Self, index: u32) void {
+            const first = index * block_pixels;
+            var least: F32 = .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
+            inline for (1..Kernel.block_groups) |row| {
+                least = least.minFast(.loadAligned(@alignCast(
+                    search.nearness[first + row * lanes ..][0..lanes],
+                )));
+            }
+            if (least.lt(.splat(inf)).any()) return;
+            search.live &= ~(@as(u32, 1) << @intCast(index));
+            search.setBlock(index, .{});
+        }
+
+        /// Asks the exact test about single rays. Returns those that meet the triangle.
+        fn decide(search: *Self, slot: exact.Slot, group: usize, doubtful: u32) u32 {
+            @branchHint(.unlikely);
+            var met: u32 = 0;
+            var rest = doubtful;
+            while (rest != 0) : (rest &= rest - 1) {
+                const lane = @ctz(rest);
+                const ray = &search.bundle.groups[group];
+                const t = exact.hitAt(
+                    Kernel,
+                    search.tree,
+                    search.world.pad,
+                    ray,
+                    lane,
+                    slot,
+                ) orelse continue;
+                if (t > 0 and t < ray.nearest.t.lane(lane)) {
+                    met |= @as(u32, 1) << @intCast(lane);
+                }
+            }
+            return met;
+        }
+
+        /// A triangle seen edge-on, or out of all measure: rays are left to the exact test unless
+        /// some edge function is surely negative and another surely positive.
+        fn coverUndecided(search: *Self, coverage: *const Coverage) void {
+            @branchHint(.unlikely);
+            const slack: F32 = .splat(coverage.slack);
+            for (0..Kernel.group_count) |group| {
+                const block = group / Kernel.block_groups;
+                if (search.live >> @intCast(block) & 1 == 0) continue;
+                const first = group * lanes;
+                const u: F32 = .loadAligned(@alignCast(search.u[first..][0..lanes]));
+                const v: F32 = .loadAligned(@alignCast(search.v[first..][0..lanes]));
+                const near: F32 = .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
+                var negative: Mask = .splat(false);
+                var positive: Mask = .splat(false);
+                for (coverage.u[0..3], coverage.v[0..3], coverage.one[0..3]) |cu, cv, c1| {
+                    const value = u.mulAdd(.splat(cu), v.mulAdd(.splat(cv), .splat(c1)));
+                    negative = negative.bitOr(value.lt(slack.neg()));
+                    positive = positive.bitOr(value.gt(slack));
+                }
+                const own = search.bundle.groups[group].skip.eq(.splat(coverage.primitive));
+                const possible = near.lt(.splat(inf)).andNot(own)
+                    .andNot(negative.bitAnd(positive));
+                if (possible.none()) continue;
+                if (search.meet(coverage.slot, group, possible, .splat(false))) {
+                    search.checkBlock(@intCast(block));
+                }
+            }
+        }
+    };
+}
