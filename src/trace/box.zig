@@ -44,14 +44,15 @@ pub inline fn mayHold(
 
 const Single = ray.Single;
 
-fn testSlab(line: ray.Line(Single), near: [3]f32, far: [3]f32) Range(Single) {
+fn testSlab(line: ray.Slabs(Single), near: [3]f32, far: [3]f32) Range(Single) {
     return slab(Single, .splat(near), .splat(far), line.origin, line.direction_inv);
 }
 
 test "an empty box is never entered, a flat one can be, a larger one gives a larger range" {
     const Lanes = Single;
     const inf = std.math.inf(f32);
-    const line: ray.Line(Lanes) = .init(.splat(.{ 0, 0, 0 }), .splat(.{ 1, 0, -1e-40 }));
+    const line: ray.Slabs(Lanes) =
+        .init(.init(.splat(.{ 0, 0, 0 }), .splat(.{ 1, 0, -1e-40 })));
     const empty = testSlab(line, .{ inf, inf, -inf }, .{ -inf, -inf, inf });
     try std.testing.expect(!mayHold(Lanes, empty, .splat(0), .splat(inf)).lane(0));
     const flat = testSlab(line, .{ 2, -1, 1 }, .{ 2, 1, -1 });
@@ -72,7 +73,8 @@ test "an empty box is never entered, a flat one can be, a larger one gives a lar
             upper[axis] = lower[axis] + random.random().float(f32);
             origin[axis] = random.random().floatNorm(f32) * 3;
         }
-        const up: ray.Line(Lanes) = .init(.splat(origin), .splat(.{ 0.3, 1e-8, 0.7 }));
+        const up: ray.Slabs(Lanes) =
+            .init(.init(.splat(origin), .splat(.{ 0.3, 1e-8, 0.7 })));
         const inner = testSlab(up, lower, upper);
         for (0..3) |axis| {
             lower[axis] -= random.random().float(f32) * 1e-6;

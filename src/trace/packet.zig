@@ -23,6 +23,7 @@ pub fn Bundle(comptime Kernel: type) type {
 /// How triangles look to a group.
 fn GroupView(comptime Rays: type) type {
     return struct {
+        slabs: ray_file.Slabs(Rays),
         axis: ray_file.LongAxis(Rays),
         /// The one axis of all active rays, if there is one.
         uniform: ?u2,
@@ -57,7 +58,16 @@ pub fn trace(
             assert(stack_count + Kernel.width <= Kernel.stack_max);
             const node = &tree.nodes[entry.child];
             const group = entry.group;
-            stack_count = pushChildren(Kernel, bundle, node, group, &stack, stack_count, counts);
+            stack_count = pushChildren(
+                Kernel,
+                bundle,
+                &views,
+                node,
+                group,
+                &stack,
+                stack_count,
+                counts,
+            );
         } else {
             for (tree.blocks[entry.child..][0..entry.block_count]) |*block| {
                 intersectBlock(Kernel, query, bundle, &views, block, entry.groups, pad, counts);
@@ -71,6 +81,7 @@ fn viewOf(comptime Rays: type, group: *const ray_file.Ray(Rays)) GroupView(Rays)
     if (group.active.none()) return undefined;
     const axis: ray_file.LongAxis(Rays) = .of(group.line.direction);
     return .{
+        .slabs = .init(group.line),
         .axis = axis,
         .uniform = axis.uniform(group.active),
         .view = .init(group.line, axis),
@@ -97,6 +108,7 @@ fn allFound(comptime Kernel: type, bundle: *const Bundle(Kernel)) bool {
 inline fn pushChildren(
     comptime Kernel: type,
     bundle: *const Bundle(Kernel),
+    views: *const [Kernel.group_count]GroupView(Kernel.Rays),
     node: *const world_file.Node(Kernel.width),
     group_first: u32,
     stack: []Entry,
@@ -114,14 +126,17 @@ inline fn pushChildren(
             .groups = 0,
         };
         while (entry.group < Kernel.group_count) : (entry.group += 1) {
-            const near = enter(Kernel, &bundle.groups[entry.group], node, child, counts);
+            const at = entry.group;
+            const near = enter(Kernel, &bundle.groups[at], &views[at].slabs, node, child, counts);
             entry.near = near orelse continue;
             break;
         } else continue;
         if (entry.block_count > 0) {
             entry.groups = @as(u64, 1) << @intCast(entry.group);
             for (entry.group + 1..Kernel.group_count) |group| {
-                if (enter(Kernel, &bundle.groups[group], node, child, counts) == null) continue;
+                const ray = &bundle.groups[group];
+                const near = enter(Kernel, ray, &views[group].slabs, node, child, counts);
+                if (near == null) continue;
                 entry.groups |= @as(u64, 1) << @intCast(group);
             }
         }
@@ -139,25 +154,25 @@ inline fn pushChildren(
 inline fn enter(
     comptime Kernel: type,
     group: *const ray_file.Ray(Kernel.Rays),
+    slabs: *const ray_file.Slabs(Kernel.Rays),
     node: *const world_file.Node(Kernel.width),
     child: usize,
     counts: *TestCounts,
 ) ?f32 {
     const Rays = Kernel.Rays;
-    const line = &group.line;
     const lower: Rays.Vec3 = .splat(.{
         node.bounds[0][0][child], node.bounds[0][1][child], node.bounds[0][2][child],
     });
     const upper: Rays.Vec3 = .splat(.{
         node.bounds[1][0][child], node.bounds[1][1][child], node.bounds[1][2][child],
     });
-    const near = triangle.select3(Rays, line.negative, upper, lower);
-    const far = triangle.select3(Rays, line.negative, lower, upper);
+    const near = triangle.select3(Rays, slabs.negative, upper, lower);
+    const far = triangle.select3(Rays, slabs.negative, lower, upper);
     if (Kernel.counts_tests) {
         counts.box_issued += Kernel.ray_count;
         counts.box_useful += group.active.popCount();
     }
-    const range = box.slab(Rays, near, far, line.origin, line.direction_inv);
+    const range = box.slab(Rays, near, far, slabs.origin, slabs.direction_inv);
     const entered = box.mayHold(Rays, range, group.after.t, group.nearest.t).bitAnd(group.active);
     if (entered.none()) return null;
     return Rays.F32.select(entered, range.near, .splat(std.math.inf(f32))).reduceMin();

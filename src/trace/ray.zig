@@ -55,28 +55,39 @@ pub fn Hit(comptime Lanes: type) type {
     };
 }
 
-/// What of a ray boxes are tested against.
+/// A ray's course.
 pub fn Line(comptime Lanes: type) type {
     return struct {
         origin: Lanes.Vec3,
         /// Not normalised.
         direction: Lanes.Vec3,
+
+        /// Names the two.
+        pub inline fn init(origin: Lanes.Vec3, direction: Lanes.Vec3) @This() {
+            return .{ .origin = origin, .direction = direction };
+        }
+    };
+}
+
+/// What of a ray boxes are tested against; made only where they are.
+pub fn Slabs(comptime Lanes: type) type {
+    return struct {
+        origin: Lanes.Vec3,
         /// 1 / direction, finite and never 0.
         direction_inv: Lanes.Vec3,
         /// Where the direction points down an axis: the upper face of a box is the near one.
         negative: [3]Lanes.Mask,
 
         /// Gathers what tests need.
-        pub inline fn init(origin: Lanes.Vec3, direction: Lanes.Vec3) @This() {
+        pub inline fn init(line: Line(Lanes)) @This() {
             const inverse: Lanes.Vec3 = .{
-                .x = invert(direction.x),
-                .y = invert(direction.y),
-                .z = invert(direction.z),
+                .x = invert(line.direction.x),
+                .y = invert(line.direction.y),
+                .z = invert(line.direction.z),
             };
             const zero: Lanes.F32 = .zero();
             return .{
-                .origin = origin,
-                .direction = direction,
+                .origin = line.origin,
                 .direction_inv = inverse,
                 .negative = .{ inverse.x.lt(zero), inverse.y.lt(zero), inverse.z.lt(zero) },
             };
@@ -153,9 +164,9 @@ pub fn View(comptime Lanes: type) type {
     return struct {
         /// Turned.
         origin: Lanes.Vec3,
-        /// Turned, see `Line`.
+        /// Turned, see `Slabs`.
         direction_inv: Lanes.Vec3,
-        /// Turned, see `Line`.
+        /// Turned, see `Slabs`.
         negative: [3]Lanes.Mask,
         /// Turned direction's x / z, y / z and 1 / z.
         shear: Lanes.Vec3,
@@ -163,10 +174,11 @@ pub fn View(comptime Lanes: type) type {
         /// The view of a line whose longest axis is the given one.
         pub inline fn init(line: Line(Lanes), axis: LongAxis(Lanes)) @This() {
             const direction = axis.turn(line.direction);
+            const slabs: Slabs(Lanes) = .init(line);
             return .{
                 .origin = axis.turn(line.origin),
-                .direction_inv = axis.turn(line.direction_inv),
-                .negative = axis.turnMasks(line.negative),
+                .direction_inv = axis.turn(slabs.direction_inv),
+                .negative = axis.turnMasks(slabs.negative),
                 .shear = .{
                     .x = direction.x.div(direction.z),
                     .y = direction.y.div(direction.z),
@@ -261,7 +273,8 @@ test "the long axis comes last, in cyclic order" {
             try std.testing.expectEqual(direction[turnedIndex(expected, place)], turned[place]);
         }
         const line: Line(Single) = .init(.splat(.{ 7, 8, 9 }), v);
-        const masks = axis.turnMasks(line.negative);
+        const slabs: Slabs(Single) = .init(line);
+        const masks = axis.turnMasks(slabs.negative);
         for (masks, turned) |mask, component| {
             try std.testing.expectEqual(component < 0, mask.lane(0));
         }
@@ -271,10 +284,11 @@ test "the long axis comes last, in cyclic order" {
 test "inverse directions are finite and keep their sign" {
     const directions = [_]f32{ 0, -0.0, 1e-39, -1e-39, 1e-30, -1e-20, 1, -1e18 };
     for (directions) |direction| {
-        const line: Line(Single) = .init(.splat(.{ 0, 0, 0 }), .splat(@splat(direction)));
-        const inverse = line.direction_inv.x.lane(0);
+        const slabs: Slabs(Single) =
+            .init(.init(.splat(.{ 0, 0, 0 }), .splat(@splat(direction))));
+        const inverse = slabs.direction_inv.x.lane(0);
         try std.testing.expect(std.math.isFinite(inverse) and inverse != 0);
         try std.testing.expectEqual(std.math.signbit(direction), std.math.signbit(inverse));
-        try std.testing.expectEqual(std.math.signbit(direction), line.negative[0].lane(0));
+        try std.testing.expectEqual(std.math.signbit(direction), slabs.negative[0].lane(0));
     }
 }

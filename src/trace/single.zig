@@ -10,7 +10,9 @@ const TestCounts = @import("../statistics.zig").TestCounts;
 const ray_file = @import("ray.zig");
 const box = @import("box.zig");
 const triangle = @import("triangle.zig");
+const stack_file = @import("stack.zig");
 const assert = std.debug.assert;
+const Entry = stack_file.Entry;
 const Single = ray_file.Single;
 
 /// What a ray wants to know.
@@ -21,14 +23,11 @@ pub const Query = enum {
     any,
 };
 
-/// A child still to be visited.
-const Entry = struct { child: u32, block_count: u32, near: f32 };
-
 /// The nearest hit so far, and what the tree holds of the ray in the lanes of boxes.
 fn Search(comptime Kernel: type) type {
     const Boxes = Kernel.Boxes;
     return struct {
-        line: ray_file.Line(Boxes),
+        slabs: ray_file.Slabs(Boxes),
         view: ray_file.View(Boxes),
         /// The ray's longest axis.
         axis: u2,
@@ -84,10 +83,11 @@ inline fn begin(comptime Kernel: type, ray: *const ray_file.Ray(Single), pad: f3
             return .splat(v.lane(0));
         }
     };
+    const slabs: ray_file.Slabs(Single) = .init(ray.line);
     var near_side: [3]u1 = undefined;
     var negative: [3]Boxes.Mask = undefined;
     for (0..3) |axis| {
-        const down = ray.line.negative[axis].lane(0);
+        const down = slabs.negative[axis].lane(0);
         near_side[axis] = @intFromBool(down);
         negative[axis] = .splat(down);
     }
@@ -96,10 +96,9 @@ inline fn begin(comptime Kernel: type, ray: *const ray_file.Ray(Single), pad: f3
     var view_negative: [3]Boxes.Mask = undefined;
     for (&view_negative, view.negative) |*spreaded, mask| spreaded.* = .splat(mask.lane(0));
     return .{
-        .line = .{
-            .origin = spread.vec3(ray.line.origin),
-            .direction = spread.vec3(ray.line.direction),
-            .direction_inv = spread.vec3(ray.line.direction_inv),
+        .slabs = .{
+            .origin = spread.vec3(slabs.origin),
+            .direction_inv = spread.vec3(slabs.direction_inv),
             .negative = negative,
         },
         .view = .{
@@ -142,30 +141,13 @@ inline fn pushChildren(
         .y = .load(&node.bounds[1 - near_side[1]][1]),
         .z = .load(&node.bounds[1 - near_side[2]][2]),
     };
-    const range = box.slab(Boxes, near, far, search.line.origin, search.line.direction_inv);
+    const range = box.slab(Boxes, near, far, search.slabs.origin, search.slabs.direction_inv);
     const hits = box.mayHold(Boxes, range, search.after.t, .splat(search.nearest_t));
     if (Kernel.counts_tests) {
         counts.box_issued += Kernel.width;
         for (node.child) |child| counts.box_useful += @intFromBool(child != world_file.none);
     }
-    const nears = range.near.toArray();
-    var stack_count = stack_count_before;
-    var bits = hits.bits();
-    while (bits != 0) : (bits &= bits - 1) {
-        const child = @ctz(bits);
-        const entry: Entry = .{
-            .child = node.child[child],
-            .block_count = node.block_count[child],
-            .near = nears[child],
-        };
-        var slot = stack_count;
-        while (slot > stack_count_before and stack[slot - 1].near < entry.near) : (slot -= 1) {
-            stack[slot] = stack[slot - 1];
-        }
-        stack[slot] = entry;
-        stack_count += 1;
-    }
-    return stack_count;
+    return stack_file.push(Boxes, node, hits.bits(), range.near, stack, stack_count_before);
 }
 
 /// Tests the triangles of a block and keeps the nearest hit. Returns whether there was one.
