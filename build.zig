@@ -32,6 +32,7 @@ pub fn build(b: *std.Build) void {
         .check = b.step("check", "Compile the program and its tests, write nothing"),
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
+        .bench_rays = b.step("bench:rays", "Time rays: zig build bench:rays -- SCENE [options]"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
         .vendor = b.step("vendor", "Fetch and check the third-party headers"),
     };
@@ -59,6 +60,8 @@ pub fn build(b: *std.Build) void {
     run.addPassthruArgs();
     steps.run.dependOn(&run.step);
     steps.@"asm".dependOn(&b.addInstallFile(program.getEmittedAsm(), "raylane.s").step);
+
+    addBenchmark(steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
 
     const tests: Tests = .init(b, resolve(b, .{}), filters orelse &.{});
     const test_packages: TestPackages = .{
@@ -177,6 +180,15 @@ const TestPackages = struct {
         }) catch @panic("OOM");
     }
 };
+
+/// Makes `step` install a benchmark and run it with the arguments that follow `--`.
+fn addBenchmark(step: *std.Build.Step, benchmark: *Compile) void {
+    const b = step.owner;
+    const run = runOn(b, benchmark);
+    run.addPassthruArgs();
+    step.dependOn(&b.addInstallArtifact(benchmark, .{}).step);
+    step.dependOn(&run.step);
+}
 
 /// Runs a program where it is, or under qemu-user when it is built for another machine.
 fn runOn(b: *std.Build, program: *Compile) *Run {

@@ -91,6 +91,14 @@ pub fn program(package: Package) *std.Build.Step.Compile {
     return exe;
 }
 
+/// A benchmark: compiled and linked like the program, but with its symbols, for profilers.
+pub fn benchmark(package: Package, name: []const u8, root: []const u8) *std.Build.Step.Compile {
+    const exe = package.addProgram(name, root);
+    exe.root_module.strip = false;
+    if (package.optimize == .fast) exe.lto = .full;
+    return exe;
+}
+
 /// A program of its own that imports `raylane`: the renderer, or a tool beside it.
 pub fn addProgram(package: Package, name: []const u8, root: []const u8) *std.Build.Step.Compile {
     const b = package.owner;

@@ -144,7 +144,9 @@ noinline fn placeAll(
     };
 }
 
-noinline fn buildTree(
+/// Gives a world that has all else a tree of `settings.lanes`, and the facts about it; its memory
+/// comes from `arena`. For `prepare` and benchmarks of the build.
+pub noinline fn buildTree(
     gpa: std.mem.Allocator,
     arena: std.mem.Allocator,
     result: *World,

@@ -25,6 +25,8 @@ pub const triangle = @import("trace/triangle.zig");
 pub const single = @import("trace/single.zig");
 /// A bundle of rays through the tree.
 pub const packet = @import("trace/packet.zig");
+/// A bundle in the variant's own way.
+pub const query = @import("trace/query.zig");
 
 /// Bounces at most.
 pub const depth_limit = whitted.depth_limit;
@@ -169,6 +171,7 @@ test {
     _ = triangle;
     _ = single;
     _ = packet;
+    _ = query;
     _ = whitted;
     _ = Tiles;
     _ = @import("trace/camera.zig");

@@ -1,0 +1,347 @@
+//! The ray benchmark: how fast rays of each kind go through a scene, by each variant.
+//!
+//! In: a scene, a camera. Out: times by phase and rays a second, the tree's cost, and counts with a
+//! hash that all variants must agree on (exit code 4 if not). See bench/README.md.
+
+const std = @import("std");
+const raylane = @import("raylane");
+const dump = @import("rays/dump.zig");
+const input = @import("rays/input.zig");
+const observer_file = @import("rays/observer.zig");
+const options_file = @import("rays/options.zig");
+const phases = @import("rays/phases.zig");
+const processors = @import("rays/processors.zig");
+const report_file = @import("rays/report.zig");
+const workload = @import("rays/workload.zig");
+const Allocator = std.mem.Allocator;
+const Diagnostic = raylane.diagnostic.Diagnostic;
+const Io = std.Io;
+const Marks = phases.Marks;
+const Observer = observer_file.Observer;
+const Options = options_file.Options;
+const Phase = phases.Phase;
+const Spread = report_file.Spread;
+const World = raylane.world.World;
+const compiled = raylane.variant.compiled;
+const assert = std.debug.assert;
+
+/// Widths of trees.
+const widths = [_]u8{ 4, 8, 16 };
+
+pub fn main(init: std.process.Init) u8 {
+    _ = raylane.simd.setFlushToZero();
+    var diagnostic: Diagnostic = .{};
+    const arena = init.arena.allocator();
+    const all_arguments = init.minimal.args.toSlice(arena) catch
+        return say(init.io, "out of memory", 1);
+    const arguments = all_arguments[@min(1, all_arguments.len)..];
+    const counting = init.environ_map.get("RAYLANE_COUNT") != null;
+    const options = options_file.parse(arguments, counting, &diagnostic) catch |err| switch (err) {
+        error.Usage => return say(init.io, diagnostic.message.text(), 2),
+        error.Help => return printHelp(init.io),
+    };
+    var bench: Bench = .{
+        .gpa = init.gpa,
+        .arena = arena,
+        .io = init.io,
+        .options = &options,
+        .diagnostic = &diagnostic,
+    };
+    const agreed = bench.run() catch |err| {
+        const text = diagnostic.message.text();
+        return say(init.io, if (text.len > 0) text else @errorName(err), 1);
+    };
+    if (!agreed) return say(init.io, "the variants do not agree", 4);
+    return 0;
+}
+
+fn printHelp(io: Io) u8 {
+    var buffer: [256]u8 = undefined;
+    var stdout: Io.File.Writer = .initStreaming(.stdout(), io, &buffer);
+    stdout.interface.writeAll(options_file.help) catch return 1;
+    stdout.interface.flush() catch return 1;
+    return 0;
+}
+
+/// One line to standard error.
+fn say(io: Io, text: []const u8, exit_code: u8) u8 {
+    var buffer: [256]u8 = undefined;
+    var stderr: Io.File.Writer = .initStreaming(.stderr(), io, &buffer);
+    stderr.interface.print("rays: {s}\n", .{text}) catch return 1;
+    stderr.interface.flush() catch return 1;
+    return exit_code;
+}
+
+/// Makes a picture with one variant.
+const RunFn = *const fn (
+    io: Io,
+    setup: *const workload.Setup,
+    settings: workload.Settings,
+    world: *const World,
+    pixels: []f32,
+    observer: ?*Observer,
+) workload.Times;
+
+const run_fns: [compiled.len]RunFn = fns: {
+    var fns: [compiled.len]RunFn = undefined;
+    for (&fns, compiled) |*to, variant| {
+        to.* = workload.Workload(raylane.trace.kernel.Kernel(variant, false)).run;
+    }
+    break :fns fns;
+};
+
+const Bench = struct {
+    gpa: Allocator,
+    arena: Allocator,
+    io: Io,
+    options: *const Options,
+    diagnostic: *Diagnostic,
+    /// The scene with a tree of each width that is needed.
+    worlds: [widths.len]?World = @splat(null),
+    setup: workload.Setup = undefined,
+    pixels: []f32 = &.{},
+    processor_buffer: [processors.count_max]u32 = undefined,
+    processor_list: []const u32 = &.{},
+
+    /// Whether all variants came to the same results.
+    fn run(bench: *Bench) !bool {
+        const options = bench.options;
+        if (!options.count) bench.processor_list = processors.allowed(&bench.processor_buffer);
+        processors.pin(bench.processor_list, 0);
+        var base = try bench.prepare();
+        defer base.deinit();
+        var tree_arena: std.heap.ArenaAllocator = .init(bench.gpa);
+        defer tree_arena.deinit();
+        const builds = try bench.buildAll(tree_arena.allocator(), &base);
+        bench.setup = try input.setUp(bench.arena, &base, bench.diagnostic);
+        if (options.dump) |path| try dump.write(bench.gpa, bench.io, path, &base, &bench.setup);
+
+        const runs = if (options.build_only) &.{} else try bench.runAll();
+        if (options.image) |path| try bench.writeImage(path);
+        try bench.print(&.{
+            .scene = std.fs.path.basename(options.scene),
+            .triangles = base.triangles.len,
+            .size = options.size,
+            .depth = options.depth,
+            .threads = options.thread_count,
+            .build_threads = options.build_thread_count,
+            .repetitions = options.repetition_count,
+            .builds = builds,
+            .runs = runs,
+        });
+        for (runs) |*other| if (!std.mem.eql(u8, runs[0].hash, other.hash)) return false;
+        return true;
+    }
+
+    /// The world without a tree that counts: each width gets its own below.
+    fn prepare(bench: *Bench) !World {
+        const options = bench.options;
+        const diagnostic = bench.diagnostic;
+        const parsed = raylane.parse.parse(bench.gpa, bench.io, options.scene, .{}, diagnostic);
+        var scene = parsed catch |err| return bench.named(options.scene, err);
+        defer scene.deinit();
+        if (options.camera) |path| {
+            input.placeCamera(bench.io, &scene, path, diagnostic) catch |err|
+                return bench.named(path, err);
+        }
+        for (0..options.subdivide) |_| try input.subdivide(&scene);
+        var times: raylane.statistics.StageTimes = .{};
+        return raylane.prepare.prepare(bench.gpa, bench.io, &scene, .{
+            .lanes = compiled[options.chosen()[0]].lanes,
+            .thread_count = options.build_thread_count,
+            .resolution = .{ options.size, options.size },
+        }, diagnostic, &times) catch |err| bench.named(options.scene, err);
+    }
+
+    /// Puts the file's name before the message.
+    fn named(bench: *Bench, path: []const u8, err: anytype) @TypeOf(err) {
+        const message = bench.diagnostic.message;
+        const text = if (message.length > 0) message.text() else @errorName(err);
+        bench.diagnostic.message.set("{s}: {s}", .{ path, text });
+        return err;
+    }
+
+    /// Builds the trees that the chosen variants need, over and over.
+    fn buildAll(bench: *Bench, arena: Allocator, base: *const World) ![]const report_file.Build {
+        var builds: std.ArrayList(report_file.Build) = .empty;
+        for (widths, &bench.worlds) |lanes, *world| {
+            const needed = for (bench.options.chosen()) |variant| {
+                if (compiled[variant].lanes == lanes) break true;
+            } else false;
+            if (!needed) continue;
+            world.* = base.*;
+            const first_tag = firstTag(builds.items.len);
+            try builds.append(bench.arena, try bench.build(arena, &world.*.?, lanes, first_tag));
+        }
+        return builds.items;
+    }
+
+    fn build(
+        bench: *Bench,
+        arena: Allocator,
+        world: *World,
+        lanes: u8,
+        first_tag: u32,
+    ) !report_file.Build {
+        const options = bench.options;
+        const settings: raylane.prepare.Settings = .{
+            .lanes = lanes,
+            .thread_count = options.build_thread_count,
+        };
+        var times_ms: [options_file.repetitions_max]f64 = undefined;
+        for (times_ms[0..options.repetition_count], 1..) |*time_ms, repetition| {
+            var own_arena: std.heap.ArenaAllocator = .init(bench.gpa);
+            defer own_arena.deinit();
+            const last = repetition == options.repetition_count;
+            const used = if (last) arena else own_arena.allocator();
+            var marks: Marks = .init(if (options.count) .{ .tags = first_tag } else .clock);
+            const start = Io.Clock.awake.now(bench.io);
+            marks.to(.build);
+            try raylane.prepare.buildTree(bench.gpa, used, world, settings);
+            marks.to(.other);
+            time_ms.* = milliseconds(start.untilNow(bench.io, .awake).toNanoseconds());
+        }
+        const spread: Spread = .of(times_ms[0..options.repetition_count]);
+        const facts = &world.tree_statistics;
+        const triangle_count: f64 = @floatFromInt(world.triangles.len);
+        return .{
+            .lanes = lanes,
+            .first_tag = first_tag,
+            .time_ms = if (options.count) null else spread,
+            .mtriangles_per_s = if (options.count) null else triangle_count / spread.min * 1e-3,
+            .bytes_per_triangle = @as(f64, @floatFromInt(facts.bytes)) / triangle_count,
+            .sah_cost = facts.sah_cost,
+            .nodes = facts.node_count,
+            .blocks = switch (world.tree) {
+                inline else => |*tree| tree.blocks.len,
+            },
+        };
+    }
+
+    fn worldOf(bench: *const Bench, variant: usize) *const World {
+        const index = std.mem.findScalar(u8, &widths, compiled[variant].lanes).?;
+        return &bench.worlds[index].?;
+    }
+
+    /// Makes the picture once by each variant to see what comes out, then in turns for the times.
+    fn runAll(bench: *Bench) ![]const report_file.Run {
+        const options = bench.options;
+        bench.pixels = try bench.arena.alloc(f32, @as(usize, options.size) * options.size);
+        const chosen = options.chosen();
+        const observers = try bench.arena.alloc(Observer, chosen.len);
+        for (observers, 0..) |*observer, position| {
+            observer.* = .{};
+            _ = bench.runOne(position, observer);
+        }
+        const times = try bench.arena.alloc([]workload.Times, chosen.len);
+        for (times) |*of| of.* = try bench.arena.alloc(workload.Times, options.repetition_count);
+        for (0..options.repetition_count) |repetition| {
+            for (times, 0..) |of, position| of[repetition] = bench.runOne(position, null);
+        }
+        const runs = try bench.arena.alloc(report_file.Run, chosen.len);
+        for (runs, observers, times, 0..) |*result, *observer, of, position| {
+            result.* = try bench.reportOf(position, observer, of);
+        }
+        return runs;
+    }
+
+    /// `position` is that among the chosen variants. With an observer nothing is marked.
+    fn runOne(bench: *Bench, position: usize, observer: ?*Observer) workload.Times {
+        const options = bench.options;
+        const variant = options.chosen()[position];
+        const tag = firstTag(position);
+        const settings: workload.Settings = .{
+            .depth_max = options.depth,
+            .thread_count = if (observer == null) options.thread_count else 1,
+            .mode = if (options.count and observer == null) .{ .tags = tag } else .clock,
+            .processors = bench.processor_list,
+        };
+        const world = bench.worldOf(variant);
+        return run_fns[variant](bench.io, &bench.setup, settings, world, bench.pixels, observer);
+    }
+
+    fn firstTag(position: usize) u32 {
+        return @intCast(position * phases.tags_per_run);
+    }
+
+    fn reportOf(
+        bench: *Bench,
+        position: usize,
+        observer: *Observer,
+        times: []const workload.Times,
+    ) !report_file.Run {
+        const counting = bench.options.count;
+        const counts = observer.counts;
+        const frame_ms = try bench.arena.alloc(f64, times.len);
+        for (frame_ms, times) |*to, time| to.* = milliseconds(time.total_ns);
+        const spread: Spread = .of(frame_ms);
+        const shadow_count = counts.hits + counts.reflection_hits;
+        const ray_count = bench.pixels.len + counts.reflections + shadow_count;
+        var result: report_file.Run = .{
+            .name = raylane.variant.names[bench.options.chosen()[position]],
+            .first_tag = firstTag(position),
+            .frame_ms = if (counting) null else spread,
+            .mrays_per_s = if (counting) null else perMicrosecond(ray_count, spread.min),
+            .generation = undefined,
+            .primary = undefined,
+            .shading = undefined,
+            .shadow = undefined,
+            .bounce = undefined,
+            .bounce_shadow = undefined,
+            .bounce_shading = undefined,
+            .hits = counts.hits,
+            .occluded = counts.occluded,
+            .t_sum = counts.t_sum,
+            .reflections = counts.reflections,
+            .reflection_hits = counts.reflection_hits,
+            .reflection_occluded = counts.reflection_occluded,
+            .hash = try bench.arena.print("{x:0>16}", .{observer.hash.final()}),
+        };
+        const phase_ms = try bench.arena.alloc(f64, times.len);
+        inline for (phases.frame_phases) |phase| {
+            for (phase_ms, times) |*to, *time| to.* = time.by_phase_ns.get(phase) * 1e-6;
+            const phase_spread: Spread = .of(phase_ms);
+            const rays = report_file.rayCount(phase, bench.pixels.len, &counts);
+            @field(result, @tagName(phase)) = .{
+                .rays = rays,
+                .time_ms = if (counting) null else phase_spread,
+                .mrays_per_s = if (counting) null else perMicrosecond(rays, phase_spread.min),
+            };
+        }
+        return result;
+    }
+
+    fn writeImage(bench: *Bench, path: []const u8) !void {
+        const size = bench.options.size;
+        var image: raylane.image.Image = try .init(bench.gpa, size, size);
+        defer image.deinit(bench.gpa);
+        for (image.pixels, bench.pixels) |*pixel, grey| pixel.* = .{ grey, grey, grey, 1 };
+        var target = try raylane.output.Target.openFile(bench.io, path, bench.diagnostic);
+        defer target.abandon();
+        try raylane.output.write(bench.gpa, &image, .{
+            .format = .pfm,
+            .exposure = .{ .ev = 0 },
+            .transparent = false,
+        }, &target, bench.diagnostic);
+    }
+
+    fn print(bench: *Bench, report: *const report_file.Report) !void {
+        var buffer: [4096]u8 = undefined;
+        var stdout: Io.File.Writer = .initStreaming(.stdout(), bench.io, &buffer);
+        if (bench.options.json) {
+            try report_file.writeJson(&stdout.interface, report);
+        } else {
+            try report_file.writeTable(&stdout.interface, report);
+        }
+        try stdout.interface.flush();
+    }
+};
+
+fn milliseconds(duration_ns: anytype) f64 {
+    return @as(f64, @floatFromInt(duration_ns)) * 1e-6;
+}
+
+/// Millions a second.
+fn perMicrosecond(count: u64, time_ms: f64) f64 {
+    return if (time_ms > 0) @as(f64, @floatFromInt(count)) / time_ms * 1e-3 else 0;
+}
