@@ -25,6 +25,10 @@ pub const triangle = @import("trace/triangle.zig");
 pub const single = @import("trace/single.zig");
 /// A bundle of rays through the tree.
 pub const packet = @import("trace/packet.zig");
+/// Primary rays as a beam.
+pub const primary = @import("trace/beam/primary.zig");
+/// What primary rays have in common.
+pub const Grid = primary.Grid;
 /// A bundle in the variant's own way.
 pub const query = @import("trace/query.zig");
 

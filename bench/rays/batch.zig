@@ -1,47 +1,88 @@
-//! The rays of a tile: 16x16 pixels in Morton order, structure of arrays.
+//! The rays of a tile: 16x16 pixels, in groups of as many as a lane value holds.
 //!
-//! What the workload hands to a tracer and gets back. Any 4, 16, 64 of them from a multiple of as
-//! many on are a square of pixels, any 8 are two squares side by side.
+//! What the workload hands to a tracer and gets back. The order of pixels is the variant's own:
+//! that of beams, or for the thesis's packets squares of 2x2.
 
 const std = @import("std");
 const raylane = @import("raylane");
+const ray_file = raylane.trace.ray;
 
 /// Pixels along a side of a tile.
-pub const side = 16;
+pub const side = raylane.trace.kernel.beam_side;
 /// Rays in a batch.
 pub const ray_count = side * side;
-/// Of `Batch.primitive`: nothing was hit.
-pub const none: i32 = raylane.trace.ray.no_primitive;
+/// Of `primitive`: nothing was hit.
+pub const none: i32 = ray_file.no_primitive;
 
-/// Three components of each ray.
-pub const Vectors = [3][ray_count]f32;
+/// In and out of a tracer.
+pub fn Batch(comptime Kernel: type) type {
+    return struct {
+        /// Laid out as a beam's bundle.
+        groups: [group_count]ray_file.Ray(Lanes),
+        /// Barycentric weights of the second and the third corner of what was hit; not of shadow
+        /// rays.
+        shares: [group_count][2]Lanes.F32,
 
-/// In and out of a tracer. Of rays that are not active nothing is read, and what comes out of them
-/// is unspecified.
-pub const Batch = struct {
-    /// Of reflection rays. Rays from the eye or from a light have one origin, given apart.
-    origin: Vectors align(64),
-    /// Not normalised.
-    direction: Vectors align(64),
-    /// In: where a ray ends. Out: where it hit, in units of its direction; unspecified for shadow
-    /// rays, and where nothing was hit.
-    t: [ray_count]f32 align(64),
-    /// Out: barycentric weights of the second and the third corner; not of shadow rays.
-    u: [ray_count]f32 align(64),
-    v: [ray_count]f32 align(64),
-    /// Out: the nearest primitive or `none`; of shadow rays anything but `none` if they hit.
-    primitive: [ray_count]i32 align(64),
-    /// In: a primitive that a ray passes, or `none`.
-    skip: [ray_count]i32 align(64),
-    /// In: -1 for a ray to be traced, 0 for none.
-    active: [ray_count]i32 align(64),
-};
+        pub const Lanes = Kernel.Boxes;
+        pub const group_count = ray_count / Lanes.count;
+        const Self = @This();
+        const Bundle = raylane.trace.packet.Bundle(Kernel);
 
-/// Column and row within the tile of the ray at `index`.
-pub fn place(index: usize) [2]u32 {
+        /// As a bundle of the traversal `packet`.
+        pub fn bundle(batch: *Self) *Bundle {
+            comptime std.debug.assert(@sizeOf(Bundle) == @sizeOf(@FieldType(Self, "groups")));
+            return @ptrCast(&batch.groups);
+        }
+
+        /// What was hit by the ray of a pixel, or null.
+        pub fn hitAt(batch: *const Self, column: usize, row: usize) ?struct { u32, f32 } {
+            const index = order[row][column];
+            const group = &batch.groups[index / Lanes.count];
+            const lane = index % Lanes.count;
+            const primitive = group.nearest.primitive.lane(lane);
+            if (!group.active.lane(lane) or primitive == none) return null;
+            return .{ @intCast(primitive), group.nearest.t.lane(lane) };
+        }
+
+        /// Whether a pixel has a ray.
+        pub fn isActive(batch: *const Self, column: usize, row: usize) bool {
+            const index = order[row][column];
+            return batch.groups[index / Lanes.count].active.lane(index % Lanes.count);
+        }
+
+        /// Column and row of each ray within the tile.
+        pub const places: [ray_count][2]u32 = places: {
+            @setEvalBranchQuota(20_000);
+            var list: [ray_count][2]u32 = undefined;
+            for (&list, 0..) |*place, index| place.* = if (Kernel.variant.traversal == .packet2x2)
+                morton(index)
+            else
+                .{
+                    BeamKernel.pixelX(index / Lanes.count, index % Lanes.count),
+                    BeamKernel.pixelY(index / Lanes.count, index % Lanes.count),
+                };
+            break :places list;
+        };
+
+        const BeamKernel = raylane.trace.kernel.Kernel(.{
+            .backend = Kernel.variant.backend,
+            .traversal = .packet,
+            .lanes = Kernel.variant.lanes,
+        }, false);
+
+        /// By row and column, where a pixel's ray is.
+        const order: [side][side]u32 = order: {
+            var table: [side][side]u32 = undefined;
+            for (places, 0..) |place, index| table[place[1]][place[0]] = index;
+            break :order table;
+        };
+    };
+}
+
+fn morton(index: usize) [2]u32 {
     var column: u32 = 0;
     var row: u32 = 0;
-    inline for (0..4) |bit| {
+    for (0..4) |bit| {
         column |= @as(u32, @intCast(index >> 2 * bit & 1)) << bit;
         row |= @as(u32, @intCast(index >> 2 * bit + 1 & 1)) << bit;
     }

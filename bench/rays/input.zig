@@ -5,7 +5,6 @@
 
 const std = @import("std");
 const raylane = @import("raylane");
-const batch_file = @import("batch.zig");
 const Setup = @import("workload.zig").Setup;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Scene = raylane.scene.Scene;
@@ -133,13 +132,6 @@ pub fn setUp(
     const across = vec3.scale(camera.right, pixel_share);
     const down = vec3.scale(camera.up, -pixel_share);
     const upper_left = vec3.add(vec3.sub(camera.forward, camera.right), camera.up);
-    const spread = try arena.alignedAlloc(batch_file.Vectors, .@"64", 1);
-    for (0..batch_file.ray_count) |ray| {
-        const column, const row = batch_file.place(ray);
-        for (&spread[0], across, down) |*axis, a, d| {
-            axis[ray] = a * @as(f32, @floatFromInt(column)) + d * @as(f32, @floatFromInt(row));
-        }
-    }
     return .{
         .size = world.width,
         .eye = camera.origin,
@@ -149,7 +141,6 @@ pub fn setUp(
         .light = lightOf(world),
         .offset = offset_relative * diagonal(world),
         .normals = try normalsOf(arena, world),
-        .spread = &spread[0],
     };
 }
 

@@ -5,7 +5,6 @@
 
 const std = @import("std");
 const batch_file = @import("batch.zig");
-const Batch = batch_file.Batch;
 const XxHash64 = std.hash.XxHash64;
 
 /// Counts of a picture.
@@ -26,25 +25,29 @@ pub const Observer = struct {
     hash: XxHash64 = .init(0),
 
     /// Primary rays were traced.
-    pub fn sawPrimary(observer: *Observer, rays: *const Batch) void {
+    pub fn sawPrimary(observer: *Observer, rays: anytype) void {
         observer.counts.hits += observer.sawHits(rays);
         for (0..batch_file.ray_count) |index| {
-            if (isHit(rays, index)) observer.counts.t_sum += rays.t[index];
+            const hit = hitAt(rays, index) orelse continue;
+            observer.counts.t_sum += hit[1];
         }
     }
 
     /// Reflection rays were traced.
-    pub fn sawReflections(observer: *Observer, rays: *const Batch) void {
-        for (rays.active) |active| observer.counts.reflections += @intFromBool(active != 0);
+    pub fn sawReflections(observer: *Observer, rays: anytype) void {
+        for (0..batch_file.ray_count) |index| {
+            const is_active = rays.isActive(index % batch_file.side, index / batch_file.side);
+            observer.counts.reflections += @intFromBool(is_active);
+        }
         observer.counts.reflection_hits += observer.sawHits(rays);
     }
 
     /// Shadow rays of the hits after `depth` bounces were traced.
-    pub fn sawShadows(observer: *Observer, rays: *const Batch, depth: u32) void {
+    pub fn sawShadows(observer: *Observer, rays: anytype, depth: u32) void {
         var occluded: [batch_file.ray_count]u8 = undefined;
         var count: u64 = 0;
         for (&occluded, 0..) |*flag, index| {
-            flag.* = @intFromBool(isHit(rays, index));
+            flag.* = @intFromBool(hitAt(rays, index) != null);
             count += flag.*;
         }
         observer.hash.update(&occluded);
@@ -55,19 +58,21 @@ pub const Observer = struct {
         }
     }
 
-    fn sawHits(observer: *Observer, rays: *const Batch) u64 {
+    fn sawHits(observer: *Observer, rays: anytype) u64 {
         var hits: [batch_file.ray_count][2]u32 = @splat(.{ std.math.maxInt(u32), 0 });
         var count: u64 = 0;
         for (&hits, 0..) |*hit, index| {
-            if (!isHit(rays, index)) continue;
-            hit.* = .{ @bitCast(rays.primitive[index]), @bitCast(rays.t[index]) };
+            const number, const t = hitAt(rays, index) orelse continue;
+            hit.* = .{ number, @bitCast(t) };
             count += 1;
         }
         observer.hash.update(std.mem.sliceAsBytes(&hits));
         return count;
     }
 
-    fn isHit(rays: *const Batch, index: usize) bool {
-        return rays.active[index] != 0 and rays.primitive[index] != batch_file.none;
+    /// The hit of a pixel, row by row.
+    fn hitAt(rays: anytype, index: usize) ?struct { u32, f32 } {
+        const hit = rays.hitAt(index % batch_file.side, index / batch_file.side) orelse return null;
+        return .{ hit[0], hit[1] };
     }
 };

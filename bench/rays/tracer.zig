@@ -3,98 +3,84 @@
 //! In: a batch. Out: its hits. The one file to change for another kind of traversal: the workload
 //! knows no more of tracing than these three functions.
 
+const std = @import("std");
 const raylane = @import("raylane");
 const batch_file = @import("batch.zig");
-const Batch = batch_file.Batch;
-const Query = raylane.trace.single.Query;
-const Vec3 = raylane.math.Vec3;
-const World = raylane.world.World;
 const packet = raylane.trace.packet;
 const query_file = raylane.trace.query;
 const ray_file = raylane.trace.ray;
 const triangle = raylane.trace.triangle;
+const Company = query_file.Company;
+const Grid = raylane.trace.Grid;
+const Query = raylane.trace.single.Query;
+const World = raylane.world.World;
 
 /// Traces batches with one variant.
 pub fn Tracer(comptime Kernel: type) type {
-    const Rays = Kernel.Rays;
     const Lanes = Kernel.Boxes;
+    const Batch = batch_file.Batch(Kernel);
     return struct {
         world: *const World,
+        /// The benchmark's point light.
+        light: raylane.world.Light,
         tests: raylane.statistics.TestCounts = .{},
 
         const Self = @This();
-        const bundle_ray_count = Kernel.group_count * Kernel.ray_count;
 
-        /// Nearest hits of rays from the eye, one through each pixel of a tile: all are active, and
-        /// their directions are affine in the pixel's place.
-        pub fn primary(tracer: *Self, batch: *Batch, eye: Vec3) void {
-            tracer.trace(.nearest, batch, eye);
-            tracer.weighHits(batch, eye);
+        /// Nearest hits of rays from the eye, one through each pixel of a tile, all active.
+        pub fn primary(tracer: *Self, batch: *Batch, grid: *const Grid) void {
+            if (Kernel.variant.traversal == .packet) {
+                const world = tracer.world;
+                const tests = &tracer.tests;
+                const bundle = batch.bundle();
+                if (raylane.trace.primary.trace(Kernel, world, grid, bundle, &batch.shares, tests))
+                    return;
+            }
+            tracer.trace(.nearest, batch, .{ .pencil = grid });
+            tracer.weighHits(batch);
         }
 
-        /// Whether rays from a light hit anything on the way to their ends at `batch.t`.
-        pub fn occluded(tracer: *Self, batch: *Batch, light: Vec3) void {
-            tracer.trace(.any, batch, light);
+        /// Whether rays from the light hit anything on the way to their ends.
+        pub fn occluded(tracer: *Self, batch: *Batch) void {
+            tracer.trace(.any, batch, .{ .light = &tracer.light });
         }
 
         /// Nearest hits of rays that have little in common.
         pub fn reflect(tracer: *Self, batch: *Batch) void {
-            tracer.trace(.nearest, batch, null);
-            tracer.weighHits(batch, null);
+            tracer.trace(.nearest, batch, .scattered);
+            tracer.weighHits(batch);
         }
 
-        /// `apex` is the origin of all rays, if they have one.
-        fn trace(tracer: *Self, comptime query: Query, batch: *Batch, apex: ?Vec3) void {
-            var first: usize = 0;
-            while (first < batch_file.ray_count) : (first += bundle_ray_count) {
-                var bundle: packet.Bundle(Kernel) = undefined;
-                var any = false;
-                for (&bundle.groups, 0..) |*group, index| {
-                    group.* = load(batch, first + index * Kernel.ray_count, apex);
-                    any = any or group.active.any();
-                }
-                if (!any) continue;
-                const coherent = apex != null;
-                query_file.trace(Kernel, query, tracer.world, &bundle, coherent, &tracer.tests);
-                for (&bundle.groups, 0..) |*group, index| {
-                    const at = first + index * Kernel.ray_count;
-                    group.nearest.primitive.store(batch.primitive[at..][0..Kernel.ray_count]);
-                    if (query == .any) continue;
-                    group.nearest.t.store(batch.t[at..][0..Kernel.ray_count]);
-                }
+        fn trace(
+            tracer: *Self,
+            comptime query: Query,
+            batch: *Batch,
+            company: Company,
+        ) void {
+            const world = tracer.world;
+            const tests = &tracer.tests;
+            switch (Kernel.variant.traversal) {
+                .packet => query_file.trace(Kernel, query, world, batch.bundle(), company, tests),
+                .packet2x2 => for (&batch.groups) |*group| {
+                    var bundle: packet.Bundle(Kernel) = .{ .groups = .{group.*} };
+                    query_file.trace(Kernel, query, world, &bundle, company, tests);
+                    group.* = bundle.groups[0];
+                },
+                .single => for (&batch.groups) |*group| {
+                    query_file.traceApart(Kernel, query, world, group, tests);
+                },
             }
         }
 
-        inline fn load(batch: *const Batch, at: usize, apex: ?Vec3) ray_file.Ray(Rays) {
-            const count = Kernel.ray_count;
-            const origin: Rays.Vec3 =
-                if (apex) |point| .splat(point) else loadVec3(Rays, &batch.origin, at);
-            return .{
-                .line = .init(origin, loadVec3(Rays, &batch.direction, at)),
-                .after = .start(),
-                .nearest = .before(.load(batch.t[at..][0..count])),
-                .skip = .load(batch.skip[at..][0..count]),
-                .active = Rays.I32.load(batch.active[at..][0..count]).lt(.zero()),
-            };
-        }
-
         /// Barycentric weights of the nearest hits, by the edge functions that decided them.
-        fn weighHits(tracer: *const Self, batch: *Batch, apex: ?Vec3) void {
-            var at: usize = 0;
-            while (at < batch_file.ray_count) : (at += Lanes.count) {
-                const active = Lanes.I32.load(batch.active[at..][0..Lanes.count]).lt(.zero());
-                const primitive: Lanes.I32 = .load(batch.primitive[at..][0..Lanes.count]);
-                const hit = active.andNot(primitive.lt(.zero()));
+        fn weighHits(tracer: *const Self, batch: *Batch) void {
+            for (&batch.groups, &batch.shares) |*group, *shares| {
+                const hit = group.active.andNot(group.nearest.primitive.lt(.zero()));
                 if (hit.none()) continue;
-                const corners = tracer.gather(Lanes.I32.select(hit, primitive, .zero()));
-                const origin: Lanes.Vec3 =
-                    if (apex) |point| .splat(point) else loadVec3(Lanes, &batch.origin, at);
-                const line: ray_file.Line(Lanes) =
-                    .init(origin, loadVec3(Lanes, &batch.direction, at));
-                const weights = weigh(corners, line, hit);
+                const primitive: Lanes.I32 = .select(hit, group.nearest.primitive, .zero());
+                const weights = weigh(tracer.gather(primitive), group.line, hit);
                 const share = Lanes.F32.splat(1).div(weights.sum());
-                weights.b.mul(share).store(batch.u[at..][0..Lanes.count]);
-                weights.c.mul(share).store(batch.v[at..][0..Lanes.count]);
+                shares.* = .{ weights.b.mul(share), weights.c.mul(share) };
             }
         }
 
@@ -129,18 +115,5 @@ pub fn Tracer(comptime Kernel: type) type {
             _ = triangle.settle(Lanes, seen, &weights, hit);
             return weights;
         }
-    };
-}
-
-/// Three components of as many rays as `Lanes` has, from the one at `at` on.
-pub inline fn loadVec3(
-    comptime Lanes: type,
-    vectors: *const batch_file.Vectors,
-    at: usize,
-) Lanes.Vec3 {
-    return .{
-        .x = .load(vectors[0][at..][0..Lanes.count]),
-        .y = .load(vectors[1][at..][0..Lanes.count]),
-        .z = .load(vectors[2][at..][0..Lanes.count]),
     };
 }

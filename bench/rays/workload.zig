@@ -12,7 +12,6 @@ const phases = @import("phases.zig");
 const tracer_file = @import("tracer.zig");
 const observer_file = @import("observer.zig");
 const processors = @import("processors.zig");
-const Batch = batch_file.Batch;
 const Marks = phases.Marks;
 const Observer = observer_file.Observer;
 const Vec3 = raylane.math.Vec3;
@@ -40,8 +39,6 @@ pub const Setup = struct {
     offset: f32,
     /// Unit normals of the triangles, in `normals[1..]`; the first stands for no hit.
     normals: []align(16) const [4]f32,
-    /// [axis][ray]: by how much directions differ from that of the tile's first pixel.
-    spread: *align(64) const batch_file.Vectors,
 };
 
 /// How a picture is made.
@@ -76,6 +73,9 @@ pub fn Workload(comptime Kernel: type) type {
         const Lanes = Kernel.Boxes;
         const F32 = Lanes.F32;
         const I32 = Lanes.I32;
+        const Batch = batch_file.Batch(Kernel);
+        const Vec3x = Lanes.Vec3;
+        const group_count = Batch.group_count;
 
         /// Makes the picture. With an observer, asserts one thread.
         pub fn run(
@@ -117,16 +117,22 @@ pub fn Workload(comptime Kernel: type) type {
             processors.pin(workload.settings.processors, thread_index);
             var worker: Worker = .{
                 .shared = workload,
-                .tracer = .{ .world = workload.world },
+                .tracer = .{ .world = workload.world, .light = .{
+                    .kind = .point,
+                    .position = workload.setup.light,
+                    .direction = .{ 0, 0, -1 },
+                    .intensity = .{ 1, 1, 1 },
+                    .range_inv_squared = 0,
+                    .cone_scale = 0,
+                    .cone_offset = 1,
+                } },
                 .marks = .init(workload.settings.mode),
                 .rays = undefined,
                 .shadows = undefined,
-                .normal = undefined,
                 .brightness = undefined,
                 .color = undefined,
             };
-            worker.rays.skip = @splat(batch_file.none);
-            worker.shadows.skip = @splat(batch_file.none);
+            worker.prepare();
             // Tiles in Morton order of the smallest square of a power of two that holds them all.
             const columns = workload.setup.size / side;
             const square = std.math.ceilPowerOfTwoAssert(u32, columns);
@@ -148,18 +154,28 @@ pub fn Workload(comptime Kernel: type) type {
             marks: Marks,
             rays: Batch,
             shadows: Batch,
-            normal: batch_file.Vectors align(64),
-            brightness: [ray_count]f32 align(64),
-            color: [ray_count]f32 align(64),
+            brightness: [group_count]F32,
+            color: [group_count]F32,
+
+            /// What stays the same from tile to tile.
+            fn prepare(worker: *Worker) void {
+                const setup = worker.shared.setup;
+                for (&worker.rays.groups, &worker.shadows.groups) |*ray, *shadow| {
+                    ray.after = .start();
+                    ray.skip = .splat(batch_file.none);
+                    ray.line.origin = .splat(setup.eye);
+                    shadow.* = ray.*;
+                    shadow.line.origin = .splat(setup.light);
+                }
+            }
 
             /// One tile, from its first pixel on.
             fn render(worker: *Worker, x: u32, y: u32) void {
-                const setup = worker.shared.setup;
                 const observer = worker.shared.observer;
                 worker.marks.to(.generation);
-                worker.generate(x, y);
+                const grid = worker.generate(x, y);
                 worker.marks.to(.primary);
-                worker.tracer.primary(&worker.rays, setup.eye);
+                worker.tracer.primary(&worker.rays, &grid);
                 if (observer) |o| o.sawPrimary(&worker.rays);
                 worker.marks.to(.shading);
                 var depth: u32 = 0;
@@ -167,7 +183,7 @@ pub fn Workload(comptime Kernel: type) type {
                     const last = depth == worker.shared.settings.depth_max;
                     if (!worker.shade(depth, last)) break;
                     worker.marks.to(if (depth == 0) .shadow else .bounce_shadow);
-                    worker.tracer.occluded(&worker.shadows, setup.light);
+                    worker.tracer.occluded(&worker.shadows);
                     if (observer) |o| o.sawShadows(&worker.shadows, depth);
                     worker.marks.to(if (depth == 0) .shading else .bounce_shading);
                     worker.addLight();
@@ -182,137 +198,141 @@ pub fn Workload(comptime Kernel: type) type {
                 worker.marks.to(.other);
             }
 
-            fn generate(worker: *Worker, x: u32, y: u32) void {
+            fn generate(worker: *Worker, x: u32, y: u32) raylane.trace.Grid {
                 const setup = worker.shared.setup;
-                const rays = &worker.rays;
                 const column: f32 = @floatFromInt(x);
                 const row: f32 = @floatFromInt(y);
                 var first: Vec3 = undefined;
                 for (&first, setup.corner, setup.across, setup.down) |*to, corner, a, d| {
                     to.* = corner + (a * column + d * row);
                 }
-                for (0..3) |axis| {
-                    const start: F32 = .splat(first[axis]);
-                    var at: usize = 0;
-                    while (at < ray_count) : (at += Lanes.count) {
-                        const spread: F32 = .load(setup.spread[axis][at..][0..Lanes.count]);
-                        start.add(spread).store(rays.direction[axis][at..][0..Lanes.count]);
-                    }
+                const bounces = worker.shared.settings.depth_max > 0;
+                const across: Vec3x = .splat(setup.across);
+                const down: Vec3x = .splat(setup.down);
+                for (&worker.rays.groups, 0..) |*ray, index| {
+                    const places = &place_table[index];
+                    const spread = across.scale(.load(&places[0])).add(down.scale(.load(&places[1])));
+                    ray.line.direction = Vec3x.splat(first).add(spread);
+                    ray.nearest = .before(.splat(std.math.inf(f32)));
+                    ray.active = .splat(true);
+                    if (bounces) ray.line.origin = .splat(setup.eye);
+                    worker.color[index] = .zero();
                 }
-                rays.t = @splat(std.math.inf(f32));
-                rays.active = @splat(-1);
-                worker.color = @splat(0);
+                var size: f32 = 0;
+                for (first ++ setup.across ++ setup.down) |component| size += @abs(component);
+                return .{
+                    .origin = setup.eye,
+                    .corner = first,
+                    .right = setup.across,
+                    .down = setup.down,
+                    // Two products and two sums; steps are up to 15 long.
+                    .deviation_roundings = 4 * size,
+                };
             }
+
+            /// Columns and rows of each group's pixels.
+            const place_table: [group_count][2][Lanes.count]f32 = table: {
+                @setEvalBranchQuota(20_000);
+                var table: [group_count][2][Lanes.count]f32 = undefined;
+                for (Batch.places, 0..) |place, index| {
+                    const group = &table[index / Lanes.count];
+                    group[0][index % Lanes.count] = @floatFromInt(place[0]);
+                    group[1][index % Lanes.count] = @floatFromInt(place[1]);
+                }
+                break :table table;
+            };
 
             /// Makes shadow rays to the hits, and turns the rays into their reflections unless
             /// these are the last. Returns whether there is any hit.
             fn shade(worker: *Worker, depth: u32, last: bool) bool {
-                worker.gatherNormals();
                 const weight: f32 = if (depth == 0) 1 else bounce_weight;
-                const apex: ?Vec3 = if (depth == 0) worker.shared.setup.eye else null;
                 var any: Lanes.Mask = .splat(false);
-                var at: usize = 0;
-                while (at < ray_count) : (at += Lanes.count) {
-                    const hit = worker.shadeLanes(at, apex, weight, last);
-                    any = any.bitOr(hit);
+                for (0..group_count) |group| {
+                    any = any.bitOr(worker.shadeGroup(group, weight, last));
                 }
                 return any.any();
             }
 
-            inline fn shadeLanes(
-                worker: *Worker,
-                at: usize,
-                apex: ?Vec3,
-                weight: f32,
-                last: bool,
-            ) Lanes.Mask {
-                const count = Lanes.count;
+            inline fn shadeGroup(worker: *Worker, group: usize, weight: f32, last: bool) Lanes.Mask {
                 const setup = worker.shared.setup;
-                const rays = &worker.rays;
-                const shadows = &worker.shadows;
-                const direction = tracer_file.loadVec3(Lanes, &rays.direction, at);
-                const origin: Lanes.Vec3 = if (apex) |point|
-                    .splat(point)
-                else
-                    tracer_file.loadVec3(Lanes, &rays.origin, at);
-                const primitive: I32 = .load(rays.primitive[at..][0..count]);
-                const active = I32.load(rays.active[at..][0..count]).lt(.zero());
-                const hit = active.andNot(primitive.lt(.zero()));
-                const t = F32.select(hit, .load(rays.t[at..][0..count]), .zero());
-
-                const outward = tracer_file.loadVec3(Lanes, &worker.normal, at);
+                const ray = &worker.rays.groups[group];
+                const shadow = &worker.shadows.groups[group];
+                const direction = ray.line.direction;
+                const hit = ray.active.andNot(ray.nearest.primitive.lt(.zero()));
+                const t = F32.select(hit, ray.nearest.t, .zero());
+                const outward = worker.normalsOf(ray.nearest.primitive);
                 const sign = F32.splat(1).copySign(outward.dot(direction).neg());
                 const normal = outward.scale(sign);
-                const away = normal.scale(.splat(setup.offset));
-                const point = origin.add(direction.scale(t)).add(away);
+                const point = ray.line.origin.add(direction.scale(t))
+                    .add(normal.scale(.splat(setup.offset)));
                 const from_light = point.sub(.splat(setup.light));
                 const cosine = normal.dot(from_light).neg().max(.zero());
                 const brightness = cosine.div(from_light.length()).mul(.splat(weight));
 
-                const yes: I32 = .select(hit, .splat(-1), .zero());
-                F32.select(hit, brightness, .zero()).store(worker.brightness[at..][0..count]);
-                storeVec3(&shadows.direction, at, from_light);
-                F32.splat(shadow_end).store(shadows.t[at..][0..count]);
-                yes.store(shadows.active[at..][0..count]);
+                worker.brightness[group] = .select(hit, brightness, .zero());
+                shadow.line.direction = from_light;
+                shadow.nearest = .before(.splat(shadow_end));
+                shadow.active = hit;
                 if (last) return hit;
 
                 const along = normal.dot(direction).mul(.splat(2));
-                storeVec3(&rays.origin, at, point);
-                storeVec3(&rays.direction, at, direction.sub(normal.scale(along)));
-                F32.splat(std.math.inf(f32)).store(rays.t[at..][0..count]);
-                yes.store(rays.active[at..][0..count]);
+                ray.line = .init(point, direction.sub(normal.scale(along)));
+                ray.nearest = .before(.splat(std.math.inf(f32)));
+                ray.active = hit;
                 return hit;
             }
 
-            /// Normals of the hit triangles, four rows of four floats at a time.
-            fn gatherNormals(worker: *Worker) void {
-                const Four = raylane.simd.Lanes(Kernel.variant.backend, 4);
+            /// Unit normals of triangles; anything where there is none.
+            inline fn normalsOf(worker: *const Worker, primitives: I32) Vec3x {
                 const normals = worker.shared.setup.normals;
-                var at: usize = 0;
-                while (at < ray_count) : (at += 4) {
+                const numbers = primitives.toArray();
+                if (primitives.eq(.splat(numbers[0])).all()) {
+                    const normal = &normals[@intCast(numbers[0] + 1)];
+                    return .splat(normal[0..3].*);
+                }
+                // Four rows of four floats at a time.
+                const Four = raylane.simd.Lanes(Kernel.variant.backend, 4);
+                var arrays: [3][Lanes.count]f32 = undefined;
+                inline for (0..Lanes.count / 4) |part| {
                     var rows: [4]Four.F32 = undefined;
                     inline for (&rows, 0..) |*row, lane| {
-                        const primitive = worker.rays.primitive[at + lane];
-                        row.* = .loadAligned(@alignCast(&normals[@intCast(primitive + 1)]));
+                        const number = numbers[part * 4 + lane];
+                        row.* = .loadAligned(@alignCast(&normals[@intCast(number + 1)]));
                     }
                     const columns = Four.transpose4x4(rows);
-                    inline for (&worker.normal, columns[0..3]) |*axis, column| {
-                        column.store(axis[at..][0..4]);
+                    inline for (&arrays, columns[0..3]) |*axis, column| {
+                        column.store(axis[part * 4 ..][0..4]);
                     }
                 }
+                return .{
+                    .x = .load(&arrays[0]),
+                    .y = .load(&arrays[1]),
+                    .z = .load(&arrays[2]),
+                };
             }
 
             fn addLight(worker: *Worker) void {
-                const count = Lanes.count;
-                var at: usize = 0;
-                while (at < ray_count) : (at += count) {
-                    const free = I32.load(worker.shadows.primitive[at..][0..count]).lt(.zero());
-                    const share: F32 = .select(free, .splat(1), .splat(shadow_share));
-                    const brightness: F32 = .load(worker.brightness[at..][0..count]);
-                    const color: F32 = .load(worker.color[at..][0..count]);
-                    color.add(brightness.mul(share)).store(worker.color[at..][0..count]);
+                const lit: F32 = .splat(1);
+                for (&worker.shadows.groups, worker.brightness, &worker.color) |*s, b, *color| {
+                    const free = s.nearest.primitive.lt(.zero());
+                    color.* = color.add(b.mul(.select(free, lit, .splat(shadow_share))));
                 }
             }
 
-            /// Morton order to rows: four colours are a square of pixels.
+            /// From the order of groups to rows.
             fn write(worker: *const Worker, x: u32, y: u32) void {
                 const size = worker.shared.setup.size;
-                var index: usize = 0;
-                while (index < ray_count) : (index += 4) {
-                    const column, const row = batch_file.place(index);
-                    const first = @as(usize, y + row) * size + x + column;
-                    const pixels = worker.shared.pixels[first..];
-                    pixels[0..2].* = worker.color[index..][0..2].*;
-                    pixels[size..][0..2].* = worker.color[index + 2 ..][0..2].*;
+                const span = if (Kernel.variant.traversal == .packet2x2) 2 else 4;
+                inline for (0..group_count) |group| {
+                    const colors = worker.color[group].toArray();
+                    inline for (0..Lanes.count / span) |part| {
+                        const place = Batch.places[group * Lanes.count + part * span];
+                        const first = @as(usize, y + place[1]) * size + x + place[0];
+                        worker.shared.pixels[first..][0..span].* = colors[part * span ..][0..span].*;
+                    }
                 }
             }
         };
-
-        inline fn storeVec3(to: *batch_file.Vectors, at: usize, vector: Lanes.Vec3) void {
-            vector.x.store(to[0][at..][0..Lanes.count]);
-            vector.y.store(to[1][at..][0..Lanes.count]);
-            vector.z.store(to[2][at..][0..Lanes.count]);
-        }
     };
 }
 

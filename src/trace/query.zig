@@ -43,7 +43,7 @@ pub fn trace(
         .packet => switch (company) {
             .pencil => |grid| {
                 if (query == .nearest and
-                    primary.trace(Kernel, world, grid, bundle, counts)) return;
+                    primary.trace(Kernel, world, grid, bundle, null, counts)) return;
                 packet.trace(Kernel, query, tree, world.pad, bundle, counts);
             },
             .light => |light| {
@@ -52,28 +52,28 @@ pub fn trace(
             },
             .coherent => packet.trace(Kernel, query, tree, world.pad, bundle, counts),
             .scattered => for (&bundle.groups) |*group| {
-                traceApart(Kernel, query, tree, world.pad, group, counts);
+                traceApart(Kernel, query, world, group, counts);
             },
         },
     }
 }
 
 /// Every active ray of a group by itself.
-fn traceApart(
+pub fn traceApart(
     comptime Kernel: type,
     comptime query: single.Query,
-    tree: *const world_file.Tree(Kernel.width),
-    pad: f32,
-    group: *ray_file.Ray(Kernel.Rays),
+    world: *const world_file.World,
+    group: anytype,
     counts: *TestCounts,
 ) void {
+    const tree = world.tree.get(Kernel.width);
     var ts = group.nearest.t.toArray();
     var primitives = group.nearest.primitive.toArray();
     var bits = group.active.bits();
     while (bits != 0) : (bits &= bits - 1) {
         const lane = @ctz(bits);
         var ray = group.extract(lane);
-        _ = single.trace(Kernel, query, tree, pad, &ray, counts);
+        _ = single.trace(Kernel, query, tree, world.pad, &ray, counts);
         ts[lane] = ray.nearest.t.lane(0);
         primitives[lane] = ray.nearest.primitive.lane(0);
     }

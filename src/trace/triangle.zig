@@ -171,6 +171,21 @@ pub fn Intersection(comptime Lanes: type) type {
     return struct { mask: Lanes.Mask, t: Lanes.F32 };
 }
 
+/// The same and what decided it.
+pub fn WeightedIntersection(comptime Lanes: type) type {
+    return struct {
+        mask: Lanes.Mask,
+        t: Lanes.F32,
+        weights: Weights(Lanes),
+
+        /// Barycentric weights of the second and the third corner.
+        pub inline fn shares(hit: @This()) [2]Lanes.F32 {
+            const share = Lanes.F32.splat(1).div(hit.weights.sum());
+            return .{ hit.weights.b.mul(share), hit.weights.c.mul(share) };
+        }
+    };
+}
+
 /// Second half of the test, for lanes inside the edges: t of the plane, held within the t range of
 /// the triangle's own box grown by `pad`. A hit outside of this range comes from rounding alone
 /// (a triangle seen edge-on); holding it inside is what makes culling by boxes exact. Missing the
@@ -226,7 +241,7 @@ pub inline fn intersect(
     corners: [3]Lanes.Vec3,
     line: ray_file.Line(Lanes),
     pad: f32,
-) Intersection(Lanes) {
+) WeightedIntersection(Lanes) {
     const axis: ray_file.LongAxis(Lanes) = .of(line.direction);
     const view: View(Lanes) = .init(line, axis);
     const turned: [3]Lanes.Vec3 = .{
@@ -236,7 +251,7 @@ pub inline fn intersect(
     var weights = weigh(Lanes, seen);
     const inside = settle(Lanes, seen, &weights, weights.agree());
     const hit = locate(Lanes, seen, weights, turned, &view, pad);
-    return .{ .mask = inside.bitAnd(hit.mask), .t = hit.t };
+    return .{ .mask = inside.bitAnd(hit.mask), .t = hit.t, .weights = weights };
 }
 
 const Single = ray_file.Single;

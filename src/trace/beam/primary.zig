@@ -40,16 +40,18 @@ pub const Grid = struct {
 
 /// Finds the nearest hits of a bundle's rays, which have none yet, start at `grid.origin` and
 /// leave nothing out. Returns false, having done nothing, where the rays are too far apart.
+/// `shares` is null, or where barycentric weights go: of the second and the third corner, by group.
 pub fn trace(
     comptime Kernel: type,
     world: *const world_file.World,
     grid: *const Grid,
     bundle: *packet.Bundle(Kernel),
+    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
 ) bool {
     var search = Search(Kernel).init(world, grid, bundle, counts) orelse return false;
     search.travel();
-    search.finish();
+    search.finish(shares);
     return true;
 }
 
@@ -458,7 +460,7 @@ fn Search(comptime Kernel: type) type {
         }
 
         /// Leaves the exact hits in the bundle.
-        fn finish(search: *Self) void {
+        fn finish(search: *Self, shares: ?*[Kernel.group_count][2]F32) void {
             for (&search.bundle.groups, 0..) |*group, index| {
                 const slots = search.bounds("slot", index).*;
                 const found = Rays.I32.fromArray(slots).gt(.splat(exact.no_slot));
@@ -468,6 +470,7 @@ fn Search(comptime Kernel: type) type {
                 search.gather(&slots, &corners, &primitive);
                 const hit = triangle.intersect(Rays, corners, group.line, search.world.pad);
                 assert(found.andNot(hit.mask).none());
+                if (shares) |all| all[index] = hit.shares();
                 group.nearest = .{
                     .t = .select(found, hit.t, group.nearest.t),
                     .primitive = .select(found, primitive, group.nearest.primitive),
