@@ -22,8 +22,18 @@ pub inline fn slab(
     origin: Lanes.Vec3,
     direction_inv: Lanes.Vec3,
 ) Range(Lanes) {
-    const near = near_corner.sub(origin).mul(direction_inv);
-    const far = far_corner.sub(origin).mul(direction_inv);
+    return slabOffsets(Lanes, near_corner.sub(origin), far_corner.sub(origin), direction_inv);
+}
+
+/// The same of corners given from the line's origin.
+pub inline fn slabOffsets(
+    comptime Lanes: type,
+    near_offset: Lanes.Vec3,
+    far_offset: Lanes.Vec3,
+    direction_inv: Lanes.Vec3,
+) Range(Lanes) {
+    const near = near_offset.mul(direction_inv);
+    const far = far_offset.mul(direction_inv);
     return .{
         .near = near.x.max(near.y).max(near.z),
         .far = far.x.min(far.y).min(far.z),

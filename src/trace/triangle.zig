@@ -24,19 +24,31 @@ pub inline fn project(
     corners: [3]Lanes.Vec3,
     view: *const View(Lanes),
 ) Projection(Lanes) {
+    return projectOffsets(Lanes, .{
+        corners[0].sub(view.origin),
+        corners[1].sub(view.origin),
+        corners[2].sub(view.origin),
+    }, view.shear);
+}
+
+/// The same of corners given from the ray's origin.
+pub inline fn projectOffsets(
+    comptime Lanes: type,
+    offsets: [3]Lanes.Vec3,
+    shear: Lanes.Vec3,
+) Projection(Lanes) {
     return .{
-        .a = shear(Lanes, corners[0], view),
-        .b = shear(Lanes, corners[1], view),
-        .c = shear(Lanes, corners[2], view),
+        .a = sheared(Lanes, offsets[0], shear),
+        .b = sheared(Lanes, offsets[1], shear),
+        .c = sheared(Lanes, offsets[2], shear),
     };
 }
 
-inline fn shear(comptime Lanes: type, corner: Lanes.Vec3, view: *const View(Lanes)) Lanes.Vec3 {
-    const seen = corner.sub(view.origin);
+inline fn sheared(comptime Lanes: type, offset: Lanes.Vec3, shear: Lanes.Vec3) Lanes.Vec3 {
     return .{
-        .x = seen.x.sub(view.shear.x.mul(seen.z)),
-        .y = seen.y.sub(view.shear.y.mul(seen.z)),
-        .z = seen.z.mul(view.shear.z),
+        .x = offset.x.sub(shear.x.mul(offset.z)),
+        .y = offset.y.sub(shear.y.mul(offset.z)),
+        .z = offset.z.mul(shear.z),
     };
 }
 
@@ -198,21 +210,31 @@ pub inline fn locate(
     view: *const View(Lanes),
     pad: f32,
 ) Intersection(Lanes) {
-    const F32 = Lanes.F32;
-    const area = weights.sum();
-    const depth = weights.a.mul(seen.a.z).add(weights.b.mul(seen.b.z)).add(weights.c.mul(seen.c.z));
-    const t_plane = depth.div(area);
     // The order of comparisons is the builder's, so that both see the same box.
     const grow: Lanes.Vec3 = .splat(@splat(pad));
     const lower = corners[2].min(corners[1].min(corners[0])).sub(grow);
     const upper = corners[2].max(corners[1].max(corners[0])).add(grow);
-    const range = box.slab(
+    const near = select3(Lanes, view.negative, upper, lower);
+    const far = select3(Lanes, view.negative, lower, upper);
+    return locateWithin(Lanes, seen, weights, box.slabOffsets(
         Lanes,
-        select3(Lanes, view.negative, upper, lower),
-        select3(Lanes, view.negative, lower, upper),
-        view.origin,
+        near.sub(view.origin),
+        far.sub(view.origin),
         view.direction_inv,
-    );
+    ));
+}
+
+/// The same with the range of the triangle's grown box given.
+pub inline fn locateWithin(
+    comptime Lanes: type,
+    seen: Projection(Lanes),
+    weights: Weights(Lanes),
+    range: box.Range(Lanes),
+) Intersection(Lanes) {
+    const F32 = Lanes.F32;
+    const area = weights.sum();
+    const depth = weights.a.mul(seen.a.z).add(weights.b.mul(seen.b.z)).add(weights.c.mul(seen.c.z));
+    const t_plane = depth.div(area);
     const zero: F32 = .zero();
     const has_area = area.abs().gt(zero).bitAnd(area.abs().lt(.splat(std.math.inf(f32))));
     return .{

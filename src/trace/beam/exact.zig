@@ -60,3 +60,36 @@ pub fn hitAt(
     const hit = triangle.intersect(Single, corners, line, pad);
     return if (hit.mask.lane(0)) hit.t.lane(0) else null;
 }
+
+/// Corners and number of the triangle of each lane.
+pub fn Gathered(comptime Lanes: type) type {
+    return struct { corners: [3]Lanes.Vec3, primitive: Lanes.I32 };
+}
+
+/// The triangles in slots; of slot 0 in lanes where there is none.
+pub inline fn gather(
+    comptime Kernel: type,
+    tree: *const world_file.Tree(Kernel.width),
+    slots: *const [Kernel.ray_count]Slot,
+) Gathered(Kernel.Rays) {
+    var components: [3][3][Kernel.ray_count]f32 = undefined;
+    var numbers: [Kernel.ray_count]i32 = undefined;
+    for (slots, 0..) |slot, lane| {
+        const there = if (slot == no_slot) 0 else slot;
+        inline for (&components, 0..) |*corner, index| {
+            const position = cornerAt(Kernel.width, tree, there, index);
+            inline for (corner, position) |*component, value| component[lane] = value;
+        }
+        numbers[lane] = primitiveAt(Kernel.width, tree, there);
+    }
+    var gathered: Gathered(Kernel.Rays) = .{
+        .corners = undefined,
+        .primitive = .fromArray(numbers),
+    };
+    inline for (&gathered.corners, components) |*corner, component| corner.* = .{
+        .x = .fromArray(component[0]),
+        .y = .fromArray(component[1]),
+        .z = .fromArray(component[2]),
+    };
+    return gathered;
+}

@@ -14,9 +14,9 @@ const ray_file = @import("../ray.zig");
 const packet = @import("../packet.zig");
 const stack = @import("../stack.zig");
 const vec3 = @import("../../math.zig").vec3;
-const triangle = @import("../triangle.zig");
 const edges_file = @import("edges.zig");
 const exact = @import("exact.zig");
+const resolve = @import("resolve.zig");
 const Frustum = @import("frustum.zig").Frustum;
 const assert = std.debug.assert;
 
@@ -49,23 +49,26 @@ pub fn trace(
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
 ) bool {
-    var search = Search(Kernel).init(world, grid, bundle, counts) orelse return false;
+    // In place: it is too large to be handed around.
+    var search: Search(Kernel) = undefined;
+    if (!search.init(world, grid, bundle, counts)) return false;
     search.travel();
-    search.finish(shares);
+    resolve.resolve(Kernel, world, grid, &search.slot, bundle, shares);
     return true;
 }
 
 /// Coefficients of one triangle over the beam's pixels.
 const Coverage = struct {
-    /// Three edge functions, then 1/t: value at the first pixel, step right, step down.
+    /// Three edge functions, then 1/t: value at the first pixel, step right, step down; upper
+    /// bounds of all of them.
     base: [4]f32,
     right: [4]f32,
     down: [4]f32,
-    /// Error bound of the edge functions.
+    /// How far below them lower bounds are: by as much for edge functions, by a factor and then as
+    /// much for 1/t.
     slack: f32,
-    /// 1/t is within value * (1 +- relative) +- absolute.
-    relative: f32,
-    absolute: f32,
+    shrink: f32,
+    drop: f32,
     slot: exact.Slot,
 };
 
@@ -108,44 +111,41 @@ fn Search(comptime Kernel: type) type {
         }
 
         fn init(
+            search: *Self,
             world: *const world_file.World,
             grid: *const Grid,
             bundle: *packet.Bundle(Kernel),
             counts: *TestCounts,
-        ) ?Self {
+        ) bool {
             const scale = length1(grid.corner) + last * (length1(grid.right) + length1(grid.down));
             const roundings = grid.deviation_roundings;
             const unit = edges_file.unit_roundoff;
-            var search: Self = .{
-                .world = world,
-                .tree = world.tree.get(width),
-                .grid = grid,
-                .bundle = bundle,
-                .counts = counts,
-                .frustum = frustumOf(grid, world.pad) orelse return null,
-                // A direction off by d moves an edge function by 2 R L d, 1/t by L^2 / |det| d.
-                .edge_scale = unit * (edges_file.edge_roundings * scale + 2 * roundings),
-                .inverse_scale = unit *
-                    (edges_file.inverse_absolute_roundings * scale + 2 * roundings),
-                .slot = undefined,
-                .lower = undefined,
-                .upper = undefined,
-                .block_lower = @splat(0),
-                .tile_lower = 0,
-            };
+            search.world = world;
+            search.tree = world.tree.get(width);
+            search.grid = grid;
+            search.bundle = bundle;
+            search.counts = counts;
+            search.frustum = frustumOf(grid, world.pad) orelse return false;
+            // A direction off by d moves an edge function by 2 R L d, 1/t by L^2 / |det| d.
+            search.edge_scale = unit * (edges_file.edge_roundings * scale + 2 * roundings);
+            search.inverse_scale = unit *
+                (edges_file.inverse_absolute_roundings * scale + 2 * roundings);
+            search.block_lower = @splat(0);
+            search.tile_lower = 0;
             search.clear();
-            return search;
+            return true;
         }
 
         /// No hit yet anywhere; a pixel without a ray has one at no distance.
         fn clear(search: *Self) void {
-            search.slot = @splat(exact.no_slot);
+            const none: Rays.I32 = .splat(exact.no_slot);
             const zero: F32 = .zero();
             const endless: F32 = .splat(std.math.inf(f32));
             for (&search.bundle.groups, 0..) |*group, index| {
                 const bound: F32 = .select(group.active, zero, endless);
                 bound.storeAligned(@alignCast(search.lower[index * lanes ..][0..lanes]));
                 bound.storeAligned(@alignCast(search.upper[index * lanes ..][0..lanes]));
+                none.storeAligned(@alignCast(search.slot[index * lanes ..][0..lanes]));
             }
         }
 
@@ -210,19 +210,26 @@ fn Search(comptime Kernel: type) type {
             var right: [4]Boxes.F32 = undefined;
             var down: [4]Boxes.F32 = undefined;
             var most: [4]Boxes.F32 = undefined;
+            const slack = edges.slack.mul(.splat(search.edge_scale));
+            const absolute = edges.inverse_absolute.mul(.splat(search.inverse_scale));
+            const one: Boxes.F32 = .splat(1);
+            const growth = one.add(edges.inverse_relative);
             inline for (vectors, 0..) |vector, index| {
                 base[index] = edges_file.dot(Boxes, vector, .splat(grid.corner));
                 right[index] = edges_file.dot(Boxes, vector, .splat(grid.right));
                 down[index] = edges_file.dot(Boxes, vector, .splat(grid.down));
+                if (index < 3) {
+                    base[index] = base[index].add(slack);
+                } else {
+                    base[index] = base[index].mulAdd(growth, absolute);
+                    right[index] = right[index].mul(growth);
+                    down[index] = down[index].mul(growth);
+                }
                 const reach = right[index].maxFast(zero).add(down[index].maxFast(zero));
                 most[index] = reach.mulAdd(.splat(last), base[index]);
             }
-            const slack = edges.slack.mul(.splat(search.edge_scale));
-            const relative = edges.inverse_relative;
-            const absolute = edges.inverse_absolute.mul(.splat(search.inverse_scale));
-            const nearest = most[3].mulAdd(relative, most[3].add(absolute));
-            const seen = most[0].minFast(most[1]).minFast(most[2]).ge(slack.neg())
-                .bitAnd(nearest.gt(.splat(search.tile_lower)));
+            const seen = most[0].minFast(most[1]).minFast(most[2]).ge(zero)
+                .bitAnd(most[3].gt(.splat(search.tile_lower)));
             const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
             const there = primitive.gt(.splat(ray_file.no_primitive));
             const open = there.andNot(edges.decisive);
@@ -237,9 +244,9 @@ fn Search(comptime Kernel: type) type {
                 right[index].store(&table.right[index]);
                 down[index].store(&table.down[index]);
             }
-            slack.store(&table.slack);
-            relative.store(&table.relative);
-            absolute.store(&table.absolute);
+            slack.add(slack).store(&table.slack);
+            one.sub(edges.inverse_relative).div(growth).store(&table.shrink);
+            absolute.add(absolute).store(&table.drop);
             while (rest != 0) : (rest &= rest - 1) {
                 search.cover(&table.at(@ctz(rest), first));
             }
@@ -262,8 +269,8 @@ fn Search(comptime Kernel: type) type {
             for (base[0..3], right[0..3], down[0..3]) |b, r, d| {
                 const most = r.max(zero).add(d.max(zero)).mulAdd(.splat(last), b);
                 const least = r.min(zero).add(d.min(zero)).mulAdd(.splat(last), b);
-                negative = negative.bitOr(most.lt(slack.neg()));
-                positive = positive.bitOr(least.gt(slack));
+                negative = negative.bitOr(most.lt(zero));
+                positive = positive.bitOr(least.gt(slack.add(slack)));
             }
             return negative.bitAnd(positive).bitNot();
         }
@@ -274,8 +281,8 @@ fn Search(comptime Kernel: type) type {
             right: [4][width]f32,
             down: [4][width]f32,
             slack: [width]f32,
-            relative: [width]f32,
-            absolute: [width]f32,
+            shrink: [width]f32,
+            drop: [width]f32,
 
             inline fn at(table: *const Table, lane: u6, first: exact.Slot) Coverage {
                 var coverage: Coverage = .{
@@ -283,8 +290,8 @@ fn Search(comptime Kernel: type) type {
                     .right = undefined,
                     .down = undefined,
                     .slack = table.slack[lane],
-                    .relative = table.relative[lane],
-                    .absolute = table.absolute[lane],
+                    .shrink = table.shrink[lane],
+                    .drop = table.drop[lane],
                     .slot = first + @as(exact.Slot, lane),
                 };
                 inline for (0..4) |index| {
@@ -310,9 +317,6 @@ fn Search(comptime Kernel: type) type {
                 const most = b + block_last * ((if (r > 0) r else 0) + (if (d > 0) d else 0));
                 to.* = .splat(most);
             }
-            const slack: F32 = .splat(-coverage.slack);
-            const relative: F32 = .splat(coverage.relative);
-            const absolute: F32 = .splat(coverage.absolute);
             var candidates: u32 = 0;
             inline for (0..block_count / lanes) |part| {
                 const x: F32 = .fromArray(block_x[part * lanes ..][0..lanes].*);
@@ -321,12 +325,11 @@ fn Search(comptime Kernel: type) type {
                 inline for (&value, start, coverage.right, coverage.down) |*to, from, r, d| {
                     to.* = x.mulAdd(.splat(r), y.mulAdd(.splat(d), from));
                 }
-                const inside = value[0].minFast(value[1]).minFast(value[2]).ge(slack);
-                const nearest = value[3].mulAdd(relative, value[3].add(absolute));
+                const inside = value[0].minFast(value[1]).minFast(value[2]).ge(.zero());
                 const known: F32 = .loadAligned(@alignCast(
                     search.block_lower[part * lanes ..][0..lanes],
                 ));
-                const bits = inside.bitAnd(nearest.gt(known)).bits();
+                const bits = inside.bitAnd(value[3].gt(known)).bits();
                 candidates |= bits << @intCast(part * lanes);
             }
             while (candidates != 0) : (candidates &= candidates - 1) {
@@ -349,9 +352,6 @@ fn Search(comptime Kernel: type) type {
                 value[index] = x.mulAdd(.splat(r), start);
                 step[index] = .splat(d * Kernel.group_height);
             }
-            const slack: F32 = .splat(coverage.slack);
-            const relative: F32 = .splat(coverage.relative);
-            const absolute: F32 = .splat(coverage.absolute);
             var changed = false;
             inline for (0..Kernel.block_groups) |row| {
                 if (row > 0) inline for (&value, step) |*to, by| {
@@ -359,22 +359,21 @@ fn Search(comptime Kernel: type) type {
                 };
                 const group = block * Kernel.block_groups + row;
                 const lower = search.bounds("lower", group);
-                const margin = value[3].mulAdd(relative, absolute);
                 const least = value[0].minFast(value[1]).minFast(value[2]);
                 const known: F32 = .loadAligned(lower);
-                const possible = least.ge(slack.neg()).bitAnd(value[3].add(margin).gt(known));
+                const possible = least.ge(.zero()).bitAnd(value[3].gt(known));
                 if (possible.any()) {
                     const upper = search.bounds("upper", group);
-                    const certain = least.gt(slack)
-                        .bitAnd(value[3].sub(margin).gt(.loadAligned(upper)));
                     const slots = search.bounds("slot", group);
-                    F32.select(certain, value[3].sub(margin), known).storeAligned(lower);
-                    F32.select(certain, value[3].add(margin), .loadAligned(upper))
-                        .storeAligned(upper);
+                    const surely = value[3].mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
+                    const certain = least.gt(.splat(coverage.slack))
+                        .bitAnd(surely.gt(.loadAligned(upper)));
+                    F32.select(certain, surely, known).storeAligned(lower);
+                    F32.select(certain, value[3], .loadAligned(upper)).storeAligned(upper);
                     Rays.I32.select(certain, .splat(coverage.slot), .loadAligned(slots))
                         .storeAligned(slots);
-                    const doubtful = possible.andNot(certain).bits();
-                    if (doubtful != 0) search.decide(coverage.slot, group, doubtful);
+                    const doubtful = possible.andNot(certain);
+                    if (doubtful.any()) search.decide(coverage.slot, group, doubtful.bits());
                     changed = true;
                 }
             }
@@ -450,65 +449,13 @@ fn Search(comptime Kernel: type) type {
                 for (coverage.base[0..3], coverage.right[0..3], coverage.down[0..3]) |b, r, d| {
                     const value = first_x.add(x)
                         .mulAdd(.splat(r), first_y.add(y).mulAdd(.splat(d), .splat(b)));
-                    negative = negative.bitOr(value.lt(slack.neg()));
+                    negative = negative.bitOr(value.lt(.zero()));
                     positive = positive.bitOr(value.gt(slack));
                 }
                 const doubtful = ray.active.andNot(negative.bitAnd(positive)).bits();
                 if (doubtful != 0) search.decide(coverage.slot, group, doubtful);
             }
             for (0..block_count) |block| search.boundBlock(@intCast(block));
-        }
-
-        /// Leaves the exact hits in the bundle.
-        fn finish(search: *Self, shares: ?*[Kernel.group_count][2]F32) void {
-            for (&search.bundle.groups, 0..) |*group, index| {
-                const slots = search.bounds("slot", index).*;
-                const found = Rays.I32.fromArray(slots).gt(.splat(exact.no_slot));
-                if (found.none()) continue;
-                var corners: [3]Rays.Vec3 = undefined;
-                var primitive: Rays.I32 = undefined;
-                search.gather(&slots, &corners, &primitive);
-                const hit = triangle.intersect(Rays, corners, group.line, search.world.pad);
-                assert(found.andNot(hit.mask).none());
-                if (shares) |all| all[index] = hit.shares();
-                group.nearest = .{
-                    .t = .select(found, hit.t, group.nearest.t),
-                    .primitive = .select(found, primitive, group.nearest.primitive),
-                };
-            }
-        }
-
-        /// Corners and numbers of the triangles in slots; of slot 0 where there is none.
-        inline fn gather(
-            search: *const Self,
-            slots: *const [lanes]exact.Slot,
-            corners: *[3]Rays.Vec3,
-            primitive: *Rays.I32,
-        ) void {
-            const same = Rays.I32.fromArray(slots.*).eq(.splat(slots[0]));
-            if (same.all()) {
-                inline for (corners, 0..) |*corner, index| {
-                    corner.* = .splat(exact.cornerAt(width, search.tree, slots[0], index));
-                }
-                primitive.* = .splat(exact.primitiveAt(width, search.tree, slots[0]));
-                return;
-            }
-            var components: [3][3][lanes]f32 = undefined;
-            var numbers: [lanes]i32 = undefined;
-            for (slots, 0..) |slot, lane| {
-                const there = if (slot == exact.no_slot) 0 else slot;
-                inline for (&components, 0..) |*corner, index| {
-                    const position = exact.cornerAt(width, search.tree, there, index);
-                    inline for (corner, position) |*component, value| component[lane] = value;
-                }
-                numbers[lane] = exact.primitiveAt(width, search.tree, there);
-            }
-            inline for (corners, components) |*corner, component| corner.* = .{
-                .x = .fromArray(component[0]),
-                .y = .fromArray(component[1]),
-                .z = .fromArray(component[2]),
-            };
-            primitive.* = .fromArray(numbers);
         }
     };
 }

@@ -241,8 +241,7 @@ fn Search(comptime Kernel: type) type {
         fn place(search: *Self, members: *Members) Members {
             search.choosePlane(members);
             const projection = &search.projection;
-            var rest: Members = @splat(0);
-            var fitting: Members = @splat(0);
+            var unfit: Mask = .splat(false);
             var steepest: F32 = .zero();
             for (&search.bundle.groups, 0..) |*group, index| {
                 const member = groupOf(members, index);
@@ -256,8 +255,7 @@ fn Search(comptime Kernel: type) type {
                 var fits = member;
                 if (projection.slope == null) fits = fits.bitAnd(on_plane.depth.gt(.zero()))
                     .bitAnd(steep.le(.splat(slope_limit)));
-                setGroup(&fitting, index, fits.bits());
-                setGroup(&rest, index, member.andNot(fits).bits());
+                unfit = unfit.bitOr(member.andNot(fits));
                 steepest = steepest.maxFast(.select(fits, steep, .zero()));
                 const near = if (projection.slope == null)
                     F32.splat(1).div(on_plane.depth)
@@ -268,7 +266,12 @@ fn Search(comptime Kernel: type) type {
                 F32.select(fits, near, .splat(inf))
                     .storeAligned(@alignCast(search.nearness[first..][0..lanes]));
             }
-            members.* = fitting;
+            var rest: Members = @splat(0);
+            if (unfit.any()) {
+                rest = members.*;
+                members.* = search.left(&rest);
+                for (&rest, members) |*one, fitting| one.* &= ~fitting;
+            }
             search.slope_max = if (projection.slope) |slope|
                 @max(@abs(slope[0]), @abs(slope[1]))
             else
@@ -296,9 +299,12 @@ fn Search(comptime Kernel: type) type {
             const directional = search.light.kind == .directional;
             var sum: Rays.Vec3 = .splat(.{ 0, 0, 0 });
             var some: ?[3]f32 = null;
-            for (&search.bundle.groups, 0..) |*group, index| {
+            // One group of a block is enough to choose by.
+            for (members, 0..) |set, at| {
+                if (set == 0) continue;
+                const index = at * Kernel.block_groups + @ctz(set) / lanes;
+                const group = &search.bundle.groups[index];
                 const member = groupOf(members, index);
-                if (member.none()) continue;
                 const vector = if (directional) group.line.origin else group.line.direction;
                 if (some == null) some = vector.lane(@ctz(member.bits()));
                 sum = sum.add(.select(member, vector, .splat(.{ 0, 0, 0 })));
@@ -572,34 +578,34 @@ fn Search(comptime Kernel: type) type {
             const basis = &search.basis;
             const bounds = &search.bounds;
             const B = Boxes.F32;
-            var seen = print.slack.eq(print.slack);
+            const growth = B.splat(1).add(print.relative);
+            // Upper bounds from here on.
+            var linear = print.edge ++ .{print.nearness};
+            inline for (linear[0..3]) |*form| form.one = form.one.add(print.slack);
+            linear[3] = .{
+                .u = print.nearness.u.mul(growth),
+                .v = print.nearness.v.mul(growth),
+                .one = print.nearness.one.mulAdd(growth, print.absolute),
+            };
             var along_u: [4]B = undefined;
             var along_v: [4]B = undefined;
-            var one: [4]B = undefined;
-            const linear = print.edge ++ .{print.nearness};
+            var most: [4]B = undefined;
             inline for (linear, 0..) |form, index| {
                 along_u[index] = form.u.mulAdd(.splat(basis.b00), form.v.mul(.splat(basis.b10)));
                 along_v[index] = form.u.mulAdd(.splat(basis.b01), form.v.mul(.splat(basis.b11)));
-                one[index] = form.one;
-                const most = maxOver(along_u[index], bounds.u)
+                most[index] = maxOver(along_u[index], bounds.u)
                     .add(maxOver(along_v[index], bounds.v)).add(form.one);
-                if (index < 3) {
-                    seen = seen.bitAnd(most.ge(print.slack.neg()));
-                } else {
-                    const farthest = if (search.projection.slope == null)
-                        1 / bounds.depth
-                    else
-                        -bounds.depth;
-                    const nearest = most.mulAdd(print.relative, most.add(print.absolute));
-                    seen = seen.bitAnd(nearest.gt(.splat(farthest)));
-                }
             }
+            const directional = search.projection.slope != null;
+            const farthest = if (directional) -bounds.depth else 1 / bounds.depth;
+            const seen = most[0].minFast(most[1]).minFast(most[2]).ge(.zero())
+                .bitAnd(most[3].gt(.splat(farthest)));
             const primitive: Boxes.I32 = .load(@ptrCast(&block_.primitive));
             const there = primitive.gt(.splat(ray_file.no_primitive));
             const open = there.andNot(print.decisive);
             var undecided: u32 = 0;
             if (open.any()) undecided = open
-                .bitAnd(search.mayTouch(&along_u, &along_v, &one, print.slack)).bits();
+                .bitAnd(search.mayTouch(&along_u, &along_v, &linear, print.slack)).bits();
             var rest = there.bitAnd(print.decisive).bitAnd(seen).bits();
             const first: exact.Slot = @intCast(block_index * width);
             if (rest | undecided == 0) return;
@@ -607,15 +613,15 @@ fn Search(comptime Kernel: type) type {
             inline for (0..4) |index| {
                 linear[index].u.store(&table.u[index]);
                 linear[index].v.store(&table.v[index]);
-                one[index].store(&table.one[index]);
+                linear[index].one.store(&table.one[index]);
             }
             inline for (0..3) |index| {
                 along_u[index].store(&table.along_u[index]);
                 along_v[index].store(&table.along_v[index]);
             }
-            print.slack.store(&table.slack);
-            print.relative.store(&table.relative);
-            print.absolute.store(&table.absolute);
+            print.slack.add(print.slack).store(&table.slack);
+            B.splat(1).sub(print.relative).div(growth).store(&table.shrink);
+            print.absolute.add(print.absolute).store(&table.drop);
             while (rest != 0) : (rest &= rest - 1) {
                 const lane = @ctz(rest);
                 search.cover(&table.at(lane, first, block_.primitive[lane]));
@@ -632,17 +638,17 @@ fn Search(comptime Kernel: type) type {
             search: *const Self,
             along_u: *const [4]Boxes.F32,
             along_v: *const [4]Boxes.F32,
-            one: *const [4]Boxes.F32,
+            linear: *const [4]footprint_file.Linear(Boxes),
             slack: Boxes.F32,
         ) Boxes.Mask {
             const bounds = &search.bounds;
             var negative: Boxes.Mask = .splat(false);
             var positive: Boxes.Mask = .splat(false);
-            for (along_u[0..3], along_v[0..3], one[0..3]) |u, v, c| {
-                const most = maxOver(u, bounds.u).add(maxOver(v, bounds.v)).add(c);
-                const least = maxOver(u.neg(), bounds.u).add(maxOver(v.neg(), bounds.v)).sub(c);
-                negative = negative.bitOr(most.lt(slack.neg()));
-                positive = positive.bitOr(least.lt(slack.neg()));
+            for (along_u[0..3], along_v[0..3], linear[0..3]) |u, v, form| {
+                const most = maxOver(u, bounds.u).add(maxOver(v, bounds.v)).add(form.one);
+                const less = maxOver(u.neg(), bounds.u).add(maxOver(v.neg(), bounds.v));
+                negative = negative.bitOr(most.lt(.zero()));
+                positive = positive.bitOr(form.one.sub(less).gt(slack.add(slack)));
             }
             return negative.bitAnd(positive).bitNot();
         }
@@ -655,8 +661,8 @@ fn Search(comptime Kernel: type) type {
             along_u: [3][width]f32,
             along_v: [3][width]f32,
             slack: [width]f32,
-            relative: [width]f32,
-            absolute: [width]f32,
+            shrink: [width]f32,
+            drop: [width]f32,
 
             inline fn at(
                 table: *const Table,
@@ -671,8 +677,8 @@ fn Search(comptime Kernel: type) type {
                     .along_u = undefined,
                     .along_v = undefined,
                     .slack = table.slack[lane],
-                    .relative = table.relative[lane],
-                    .absolute = table.absolute[lane],
+                    .shrink = table.shrink[lane],
+                    .drop = table.drop[lane],
                     .slot = first + @as(exact.Slot, lane),
                     .primitive = @bitCast(primitive),
                 };
@@ -700,7 +706,8 @@ fn Search(comptime Kernel: type) type {
             }
         }
 
-        /// One triangle's edge functions and nearness.
+        /// One triangle's edge functions and nearness: upper bounds, and how far below them lower
+        /// ones are, by as much for edge functions, by a factor and then as much for nearness.
         const Coverage = struct {
             u: [4]f32,
             v: [4]f32,
@@ -709,8 +716,8 @@ fn Search(comptime Kernel: type) type {
             along_u: [3]f32,
             along_v: [3]f32,
             slack: f32,
-            relative: f32,
-            absolute: f32,
+            shrink: f32,
+            drop: f32,
             slot: exact.Slot,
             primitive: i32,
         };
@@ -743,14 +750,13 @@ fn Search(comptime Kernel: type) type {
                     )));
                     least = least.minFast(most);
                 }
-                blocks |= least.ge(.splat(-coverage.slack)).bits() << first;
+                blocks |= least.ge(.zero()).bits() << first;
             }
             return blocks;
         }
 
         /// Tests a triangle against the rays of a block.
         inline fn coverBlock(search: *Self, coverage: *const Coverage, index: u32) void {
-            const slack: F32 = .splat(coverage.slack);
             var any_met = false;
             inline for (0..Kernel.block_groups) |row| {
                 const group = index * Kernel.block_groups + row;
@@ -762,14 +768,14 @@ fn Search(comptime Kernel: type) type {
                     to.* = u.mulAdd(.splat(cu), v.mulAdd(.splat(cv), .splat(c1)));
                 }
                 const near: F32 = .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
-                const margin = value[3].mulAdd(.splat(coverage.relative), .splat(coverage.absolute));
                 const least = value[0].minFast(value[1]).minFast(value[2]);
-                var possible = least.ge(slack.neg()).bitAnd(value[3].add(margin).gt(near));
+                var possible = least.ge(.zero()).bitAnd(value[3].gt(near));
                 if (possible.any()) {
                     const own = search.bundle.groups[group].skip.eq(.splat(coverage.primitive));
                     possible = possible.andNot(own);
-                    const certain = possible.bitAnd(least.gt(slack))
-                        .bitAnd(value[3].sub(margin).gt(near));
+                    const surely = value[3].mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
+                    const certain = possible.bitAnd(least.gt(.splat(coverage.slack)))
+                        .bitAnd(surely.gt(near));
                     any_met = search.meet(coverage.slot, group, possible, certain) or any_met;
                 }
             }
@@ -785,8 +791,9 @@ fn Search(comptime Kernel: type) type {
             certain: Mask,
         ) bool {
             var met = certain;
-            const doubtful = possible.andNot(certain).bits();
-            if (doubtful != 0) met = met.bitOr(.fromBits(search.decide(slot, group, doubtful)));
+            const doubtful = possible.andNot(certain);
+            if (doubtful.any())
+                met = met.bitOr(.fromBits(search.decide(slot, group, doubtful.bits())));
             if (met.none()) return false;
             const first = group * lanes;
             const near: F32 = .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
@@ -850,7 +857,7 @@ fn Search(comptime Kernel: type) type {
                 var positive: Mask = .splat(false);
                 for (coverage.u[0..3], coverage.v[0..3], coverage.one[0..3]) |cu, cv, c1| {
                     const value = u.mulAdd(.splat(cu), v.mulAdd(.splat(cv), .splat(c1)));
-                    negative = negative.bitOr(value.lt(slack.neg()));
+                    negative = negative.bitOr(value.lt(.zero()));
                     positive = positive.bitOr(value.gt(slack));
                 }
                 const own = search.bundle.groups[group].skip.eq(.splat(coverage.primitive));

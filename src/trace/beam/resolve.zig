@@ -1,0 +1,263 @@
+//! What a beam of primary rays has found, exactly: t and barycentric weights of every hit.
+//!
+//! In: a triangle's slot for each ray. Out: hits in the bundle, by the expressions of triangle.zig,
+//! bit for bit. Rays of a beam mostly have the same longest axis and the same signs, and neighbours
+//! hit the same triangle: then what depends on the triangle and the common origin alone is computed
+//! once, and what is left for each ray are its slopes, three edge functions and one division.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const ray_file = @import("../ray.zig");
+const packet = @import("../packet.zig");
+const box = @import("../box.zig");
+const triangle = @import("../triangle.zig");
+const kernel_file = @import("../kernel.zig");
+const edges_file = @import("edges.zig");
+const exact = @import("exact.zig");
+const Grid = @import("primary.zig").Grid;
+const assert = std.debug.assert;
+
+/// Puts the hits of triangles in `slots` (`exact.Slot`, by group and lane) into the bundle, and
+/// weights of the second and third corner into `shares`, if given.
+pub fn resolve(
+    comptime Kernel: type,
+    world: *const world_file.World,
+    grid: *const Grid,
+    slots: *align(64) const [kernel_file.beam_side * kernel_file.beam_side]exact.Slot,
+    bundle: *packet.Bundle(Kernel),
+    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
+) void {
+    const course = Course.of(grid);
+    switch (course.axis orelse 3) {
+        inline 0...2 => |axis| {
+            const tree = world.tree.get(Kernel.width);
+            Together(Kernel, axis).run(world, tree, &course, grid, slots, bundle, shares);
+        },
+        else => apart(Kernel, world, slots, bundle, shares),
+    }
+}
+
+/// What the rays of a beam have in common.
+const Course = struct {
+    /// The longest axis of all, or null; then signs mean nothing.
+    axis: ?u2,
+    /// By axis, whether all directions point down it.
+    negative: [3]bool,
+
+    /// Directions are linear over the pixels, so that the corners tell.
+    fn of(grid: *const Grid) Course {
+        const last: f32 = kernel_file.beam_side - 1;
+        var course: Course = .{ .axis = null, .negative = @splat(false) };
+        const margin = 2 * edges_file.unit_roundoff * grid.deviation_roundings + 1e-20;
+        for (0..4) |index| {
+            var direction: [3]f32 = undefined;
+            var longest: u2 = 0;
+            for (&direction, grid.corner, grid.right, grid.down, 0..) |*to, d, right, down, axis| {
+                to.* = d + (if (index & 1 == 0) 0 else last * right) +
+                    (if (index & 2 == 0) 0 else last * down);
+                if (@abs(to.*) > @abs(direction[longest])) longest = @intCast(axis);
+            }
+            if (index > 0 and course.axis != longest) return .{ .axis = null, .negative = undefined };
+            course.axis = longest;
+            for (direction, &course.negative, 0..) |component, *negative, axis| {
+                const length = @abs(component);
+                const shorter = axis == longest or length + margin < @abs(direction[longest]);
+                const same = index == 0 or negative.* == (component < 0);
+                if (!shorter or !same or !(length > margin))
+                    return .{ .axis = null, .negative = undefined };
+                negative.* = component < 0;
+            }
+        }
+        return course;
+    }
+};
+
+/// Every group with its own longest axes and signs.
+fn apart(
+    comptime Kernel: type,
+    world: *const world_file.World,
+    slots: *align(64) const [kernel_file.beam_side * kernel_file.beam_side]exact.Slot,
+    bundle: *packet.Bundle(Kernel),
+    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
+) void {
+    const Rays = Kernel.Rays;
+    for (&bundle.groups, 0..) |*group, index| {
+        const own = slots[index * Kernel.ray_count ..][0..Kernel.ray_count];
+        const found = Rays.I32.load(own).gt(.splat(exact.no_slot));
+        if (found.none()) continue;
+        const tree = world.tree.get(Kernel.width);
+        const gathered = exact.gather(Kernel, tree, own);
+        const hit = triangle.intersect(Rays, gathered.corners, group.line, world.pad);
+        assert(found.andNot(hit.mask).none());
+        if (shares) |all| all[index] = hit.shares();
+        group.nearest = .{
+            .t = .select(found, hit.t, group.nearest.t),
+            .primitive = .select(found, gathered.primitive, group.nearest.primitive),
+        };
+    }
+}
+
+/// All groups alike.
+fn Together(comptime Kernel: type, comptime axis: u2) type {
+    const Rays = Kernel.Rays;
+    const F32 = Rays.F32;
+    const Vec3 = Rays.Vec3;
+    return struct {
+        /// A triangle seen from the rays' origin, in lanes or the same in all of them.
+        fn Placed(comptime Value: type) type {
+            return struct {
+                /// Turned corners from the origin.
+                offsets: [3]Value,
+                /// Near and far corner of its grown box from there.
+                near: Value,
+                far: Value,
+            };
+        }
+
+        fn run(
+            world: *const world_file.World,
+            tree: *const world_file.Tree(Kernel.width),
+            course: *const Course,
+            grid: *const Grid,
+            slots: *align(64) const [kernel_file.beam_side * kernel_file.beam_side]exact.Slot,
+            bundle: *packet.Bundle(Kernel),
+            shares: ?*[Kernel.group_count][2]F32,
+        ) void {
+            const origin = turned(grid.origin);
+            const down = turned(course.negative);
+            var placed: Placed([3]f32) = undefined;
+            var placed_slot: exact.Slot = exact.no_slot;
+            var placed_primitive: i32 = ray_file.no_primitive;
+            for (&bundle.groups, 0..) |*group, index| {
+                const own = slots[index * Kernel.ray_count ..][0..Kernel.ray_count];
+                const lanes: Rays.I32 = .load(own);
+                if (lanes.eq(.splat(own[0])).all()) {
+                    if (own[0] == exact.no_slot) continue;
+                    if (own[0] != placed_slot) {
+                        placed_slot = own[0];
+                        placed = placeOne(tree, world.pad, origin, down, placed_slot);
+                        placed_primitive = exact.primitiveAt(Kernel.width, tree, placed_slot);
+                    }
+                    const hit = intersect(group, &.{
+                        .offsets = .{
+                            .splat(placed.offsets[0]),
+                            .splat(placed.offsets[1]),
+                            .splat(placed.offsets[2]),
+                        },
+                        .near = .splat(placed.near),
+                        .far = .splat(placed.far),
+                    });
+                    if (shares) |all| all[index] = hit.shares();
+                    group.nearest = .{ .t = hit.t, .primitive = .splat(placed_primitive) };
+                    continue;
+                }
+                const found = lanes.gt(.splat(exact.no_slot));
+                const gathered = exact.gather(Kernel, tree, own);
+                const each = placeEach(world.pad, origin, down, gathered.corners);
+                const hit = intersect(group, &each);
+                assert(found.andNot(hit.mask).none());
+                if (shares) |all| all[index] = hit.shares();
+                group.nearest = .{
+                    .t = .select(found, hit.t, group.nearest.t),
+                    .primitive = .select(found, gathered.primitive, group.nearest.primitive),
+                };
+            }
+        }
+
+        fn turned(values: anytype) @TypeOf(values) {
+            return .{
+                values[ray_file.turnedIndex(axis, 0)],
+                values[ray_file.turnedIndex(axis, 1)],
+                values[axis],
+            };
+        }
+
+        /// One triangle. Minima and maxima are those of `triangle.locate`.
+        fn placeOne(
+            tree: *const world_file.Tree(Kernel.width),
+            pad: f32,
+            origin: [3]f32,
+            down: [3]bool,
+            slot: exact.Slot,
+        ) Placed([3]f32) {
+            var corners: [3][3]f32 = undefined;
+            for (&corners, 0..) |*corner, index| {
+                corner.* = turned(exact.cornerAt(Kernel.width, tree, slot, index));
+            }
+            var placed: Placed([3]f32) = undefined;
+            for (0..3) |component| {
+                const a = corners[0][component];
+                const b = corners[1][component];
+                const c = corners[2][component];
+                const low = if (b < a) b else a;
+                const high = if (b > a) b else a;
+                const lower = (if (c < low) c else low) - pad;
+                const upper = (if (c > high) c else high) + pad;
+                const from = origin[component];
+                placed.near[component] = (if (down[component]) upper else lower) - from;
+                placed.far[component] = (if (down[component]) lower else upper) - from;
+                for (&placed.offsets, corners) |*offset, corner| {
+                    offset[component] = corner[component] - from;
+                }
+            }
+            return placed;
+        }
+
+        /// A triangle in each lane.
+        inline fn placeEach(
+            pad: f32,
+            origin: [3]f32,
+            down: [3]bool,
+            corners: [3]Vec3,
+        ) Placed(Vec3) {
+            const from: Vec3 = .splat(origin);
+            const grow: Vec3 = .splat(@splat(pad));
+            const a = turn(corners[0]);
+            const b = turn(corners[1]);
+            const c = turn(corners[2]);
+            const lower = c.min(b.min(a)).sub(grow).sub(from);
+            const upper = c.max(b.max(a)).add(grow).sub(from);
+            return .{
+                .offsets = .{ a.sub(from), b.sub(from), c.sub(from) },
+                .near = .{
+                    .x = if (down[0]) upper.x else lower.x,
+                    .y = if (down[1]) upper.y else lower.y,
+                    .z = if (down[2]) upper.z else lower.z,
+                },
+                .far = .{
+                    .x = if (down[0]) lower.x else upper.x,
+                    .y = if (down[1]) lower.y else upper.y,
+                    .z = if (down[2]) lower.z else upper.z,
+                },
+            };
+        }
+
+        inline fn turn(vector: Vec3) Vec3 {
+            const components = turned([3]F32{ vector.x, vector.y, vector.z });
+            return .{ .x = components[0], .y = components[1], .z = components[2] };
+        }
+
+        inline fn intersect(
+            group: *const ray_file.Ray(Rays),
+            placed: *const Placed(Vec3),
+        ) triangle.WeightedIntersection(Rays) {
+            const direction = turn(group.line.direction);
+            const one: F32 = .splat(1);
+            const inverse: Vec3 = .{
+                .x = one.div(direction.x),
+                .y = one.div(direction.y),
+                .z = one.div(direction.z),
+            };
+            const seen = triangle.projectOffsets(Rays, placed.offsets, .{
+                .x = direction.x.div(direction.z),
+                .y = direction.y.div(direction.z),
+                .z = inverse.z,
+            });
+            var weights = triangle.weigh(Rays, seen);
+            const inside = triangle.settle(Rays, seen, &weights, group.active);
+            const range = box.slabOffsets(Rays, placed.near, placed.far, inverse);
+            const hit = triangle.locateWithin(Rays, seen, weights, range);
+            return .{ .mask = inside.bitAnd(hit.mask), .t = hit.t, .weights = weights };
+        }
+    };
+}
