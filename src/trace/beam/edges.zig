@@ -21,7 +21,7 @@
 //! u L^2 / |det|: 12 |D|.
 
 const std = @import("std");
-const assert = std.debug.assert;
+const world_file = @import("../../world.zig");
 
 /// Half a unit in the last place of 1.
 pub const unit_roundoff: f32 = 0x1p-24;
@@ -39,7 +39,14 @@ pub const relative_error_max = 0.125;
 /// Outside of this range of L^2 and R, in metres, products may leave the range of floats.
 pub const length_squared_min = 0x1p-80;
 /// See `length_squared_min`.
-pub const reach_max = 1e11;
+const reach_limit = 1e11;
+
+/// The largest R for which bounds hold: boxes are grown for rays of no more than a certain length
+/// (`World.pad`), so that the exact test accepts whatever is surely inside the edges.
+pub fn reachMax(pad: f32) f32 {
+    const covered = pad / world_file.pad_relative;
+    return if (covered < reach_limit) covered else reach_limit;
+}
 
 /// Triangles of a block in lanes, turned so that edge functions are positive within.
 pub fn Edges(comptime Lanes: type) type {
@@ -59,8 +66,12 @@ pub fn Edges(comptime Lanes: type) type {
         /// Lanes whose bounds hold and are worth anything; others are up to the exact test.
         decisive: Lanes.Mask,
 
-        /// Sets up the triangles of a block, or of one lane of it in all lanes.
-        pub inline fn init(corners: [3]Vec3, origin: Vec3) @This() {
+        /// The largest distance of a corner.
+        reach: F32,
+
+        /// Sets up the triangles of a block. Those with a corner farther away than `reach_max` are
+        /// not decisive.
+        pub inline fn init(corners: [3]Vec3, origin: Vec3, reach_max: f32) @This() {
             const a = corners[0].sub(origin);
             const b = corners[1].sub(origin);
             const c = corners[2].sub(origin);
@@ -87,6 +98,7 @@ pub fn Edges(comptime Lanes: type) type {
                     cross(Lanes, b.add(a), edges[2]).scale(flip),
                 },
                 .inverse = plane.scale(det_inv),
+                .reach = reach,
                 .slack = reach.mul(reach.mulAdd(second_order, length)),
                 .inverse_relative = relative,
                 .inverse_absolute = steepness,

@@ -61,6 +61,37 @@ pub fn hitAt(
     return if (hit.mask.lane(0)) hit.t.lane(0) else null;
 }
 
+/// Whether one ray passes within the edges of the triangle in a slot, which is all that is left to
+/// ask where the depth is certain.
+pub fn insideAt(
+    comptime Kernel: type,
+    tree: *const world_file.Tree(Kernel.width),
+    group: *const ray_file.Ray(Kernel.Rays),
+    lane: usize,
+    slot: Slot,
+) bool {
+    const Single = ray_file.Single;
+    const direction = group.line.direction.lane(lane);
+    const origin = group.line.origin.lane(lane);
+    const along: ray_file.LongAxis(Single) = .of(.splat(direction));
+    const axis = along.uniform(.splat(true)).?;
+    const a = ray_file.turnedIndex(axis, 0);
+    const b = ray_file.turnedIndex(axis, 1);
+    const shear: Single.Vec3 = .splat(.{
+        direction[a] / direction[axis], direction[b] / direction[axis], 1,
+    });
+    var offsets: [3]Single.Vec3 = undefined;
+    for (&offsets, 0..) |*offset, index| {
+        const corner = cornerAt(Kernel.width, tree, slot, index);
+        offset.* = .splat(.{ corner[a] - origin[a], corner[b] - origin[b], corner[axis] - origin[axis] });
+    }
+    const seen = triangle.projectOffsets(Single, offsets, shear);
+    var weights = triangle.weigh(Single, seen);
+    const agreeing = weights.agree();
+    if (!agreeing.lane(0)) return false;
+    return triangle.settle(Single, seen, &weights, agreeing).lane(0);
+}
+
 /// Corners and number of the triangle of each lane.
 pub fn Gathered(comptime Lanes: type) type {
     return struct { corners: [3]Lanes.Vec3, primitive: Lanes.I32 };

@@ -96,25 +96,29 @@ pub fn Footprint(comptime Lanes: type) type {
         relative: F32,
         absolute: F32,
         decisive: Lanes.Mask,
+        /// Bounds R of the rounding of u and v.
+        reach: F32,
 
         /// Sets up triangles; slopes (or the rays' own) are at most `slope_max` along each axis.
         pub inline fn init(
             corners: [3]Vec3,
             projection: *const Projection,
             slope_max: f32,
+            reach_max: f32,
         ) @This() {
             return if (projection.slope == null)
-                pointLight(corners, projection, slope_max)
+                pointLight(corners, projection, slope_max, reach_max)
             else
-                directional(corners, projection, slope_max);
+                directional(corners, projection, slope_max, reach_max);
         }
 
         inline fn pointLight(
             corners: [3]Vec3,
             projection: *const Projection,
             slope_max: f32,
+            reach_max: f32,
         ) @This() {
-            const edges: edges_file.Edges(Lanes) = .init(corners, .splat(projection.origin));
+            const edges: edges_file.Edges(Lanes) = .init(corners, .splat(projection.origin), reach_max);
             const sign: F32 = .splat(projection.sign);
             const unit = edges_file.unit_roundoff * (1 + 2 * slope_max);
             const axis = projection.axis;
@@ -130,6 +134,7 @@ pub fn Footprint(comptime Lanes: type) type {
                 .absolute = edges.inverse_absolute
                     .mul(.splat(edges_file.inverse_absolute_roundings * unit)),
                 .decisive = edges.decisive,
+                .reach = edges.reach,
             };
         }
 
@@ -140,6 +145,7 @@ pub fn Footprint(comptime Lanes: type) type {
             corners: [3]Vec3,
             projection: *const Projection,
             slope_max: f32,
+            reach_max: f32,
         ) @This() {
             const axis = projection.axis;
             const origin: Vec3 = turn(Lanes, axis, .splat(projection.origin));
@@ -186,9 +192,10 @@ pub fn Footprint(comptime Lanes: type) type {
                     .mul(.splat(edges_file.edge_roundings * unit)),
                 .relative = .zero(),
                 .absolute = relative,
+                .reach = reach,
                 .decisive = relative.lt(reach.mul(.splat(edges_file.relative_error_max)))
                     .bitAnd(length_squared.gt(.splat(edges_file.length_squared_min)))
-                    .bitAnd(reach.lt(.splat(edges_file.reach_max))),
+                    .bitAnd(reach.lt(.splat(reach_max))),
             };
         }
     };

@@ -25,6 +25,8 @@ const block_side = kernel_file.block_side;
 const block_count = (side / block_side) * (side / block_side);
 const block_pixels = block_side * block_side;
 const pixel_count = side * side;
+/// With no more blocks than this, triangles are not tested against each of them first.
+const few_blocks = 2;
 const last: f32 = side - 1;
 const block_last: f32 = block_side - 1;
 
@@ -69,7 +71,46 @@ const Coverage = struct {
     slack: f32,
     shrink: f32,
     drop: f32,
+    /// Columns and rows that it may be seen in.
+    first_x: u32,
+    first_y: u32,
+    last_x: u32,
+    last_y: u32,
     slot: exact.Slot,
+
+    /// The blocks of these columns and rows, a bit each.
+    inline fn blocks(coverage: *const Coverage) u32 {
+        const across = side / block_side;
+        const columns = (@as(u32, 2) << @intCast(coverage.last_x / block_side)) -
+            (@as(u32, 1) << @intCast(coverage.first_x / block_side));
+        const first_bit = coverage.first_y / block_side * across;
+        const rows = (@as(u32, 1) << @intCast((coverage.last_y / block_side + 1) * across)) -
+            (@as(u32, 1) << @intCast(first_bit));
+        return columns * 0x1111 & rows;
+    }
+};
+
+/// The inverse of a grid: for c = t (corner + x right + y down), depth . c = t, column . c = t x,
+/// row . c = t y.
+const Dual = struct {
+    column: [3]f32,
+    row: [3]f32,
+    depth: [3]f32,
+    /// |column| + |row| + 16 |depth|: x or y of a point is off by 4 u of it, times |c| / t.
+    gain: f32,
+
+    fn of(grid: *const Grid) Dual {
+        const facing = vec3.cross(grid.right, grid.down);
+        const scale = 1 / vec3.dot(facing, grid.corner);
+        var dual: Dual = .{
+            .column = vec3.scale(vec3.cross(grid.down, grid.corner), scale),
+            .row = vec3.scale(vec3.cross(grid.corner, grid.right), scale),
+            .depth = vec3.scale(facing, scale),
+            .gain = undefined,
+        };
+        dual.gain = length1(dual.column) + length1(dual.row) + side * length1(dual.depth);
+        return dual;
+    }
 };
 
 fn Search(comptime Kernel: type) type {
@@ -87,6 +128,10 @@ fn Search(comptime Kernel: type) type {
         /// Longest direction times roundings, for edge functions and for 1/t.
         edge_scale: f32,
         inverse_scale: f32,
+        /// See `edges.reachMax`.
+        reach_max: f32,
+        /// From a point relative to the origin to column and row times t, and t; see `Dual`.
+        dual: Dual,
         /// By pixel, in the order of groups and lanes: what is hit, and bounds of 1/t there.
         slot: [pixel_count]exact.Slot align(64),
         lower: [pixel_count]f32 align(64),
@@ -130,6 +175,8 @@ fn Search(comptime Kernel: type) type {
             search.edge_scale = unit * (edges_file.edge_roundings * scale + 2 * roundings);
             search.inverse_scale = unit *
                 (edges_file.inverse_absolute_roundings * scale + 2 * roundings);
+            search.reach_max = edges_file.reachMax(world.pad);
+            search.dual = .of(grid);
             search.block_lower = @splat(0);
             search.tile_lower = 0;
             search.clear();
@@ -203,7 +250,8 @@ fn Search(comptime Kernel: type) type {
                 .z = .load(&components[2]),
             };
             const grid = search.grid;
-            const edges: edges_file.Edges(Boxes) = .init(corners, .splat(grid.origin));
+            const edges: edges_file.Edges(Boxes) =
+                .init(corners, .splat(grid.origin), search.reach_max);
             const vectors = edges.normal ++ .{edges.inverse};
             const zero: Boxes.F32 = .zero();
             var base: [4]Boxes.F32 = undefined;
@@ -238,7 +286,14 @@ fn Search(comptime Kernel: type) type {
             var rest = there.bitAnd(edges.decisive).bitAnd(seen).bits();
             const first: exact.Slot = @intCast(block_index * width);
             if (rest | undecided == 0) return;
+            const window = search.windowOf(corners, edges.reach);
+            rest &= window.holds_pixels.bits();
+            if (rest | undecided == 0) return;
             var table: Table = undefined;
+            window.first_x.store(&table.first_x);
+            window.first_y.store(&table.first_y);
+            window.last_x.store(&table.last_x);
+            window.last_y.store(&table.last_y);
             inline for (0..4) |index| {
                 base[index].store(&table.base[index]);
                 right[index].store(&table.right[index]);
@@ -253,6 +308,67 @@ fn Search(comptime Kernel: type) type {
             while (undecided != 0) : (undecided &= undecided - 1) {
                 search.coverUndecided(&table.at(@ctz(undecided), first));
             }
+        }
+
+        /// Columns and rows of pixels that triangles may be seen in.
+        const Window = struct {
+            first_x: Boxes.I32,
+            first_y: Boxes.I32,
+            last_x: Boxes.I32,
+            last_y: Boxes.I32,
+            holds_pixels: Boxes.Mask,
+        };
+
+        /// Where triangles in lanes may be seen, by their corners; everywhere if some corner is not
+        /// in front of the origin. A corner's place is off by less than 8 u G |c| / t for G as in
+        /// `Dual`, the exact test's displacement of corners included.
+        inline fn windowOf(search: *const Self, corners: [3]Boxes.Vec3, reach: Boxes.F32) Window {
+            const B = Boxes.F32;
+            const dual = &search.dual;
+            const from: Boxes.Vec3 = .splat(search.grid.origin);
+            var low_x: B = .splat(std.math.inf(f32));
+            var low_y = low_x;
+            var high_x: B = .splat(-std.math.inf(f32));
+            var high_y = high_x;
+            var least_t = low_x;
+            var greatest_inverse: B = .zero();
+            inline for (corners) |corner| {
+                const offset = corner.sub(from);
+                const t = edges_file.dot(Boxes, offset, .splat(dual.depth));
+                const inverse = B.splat(1).div(t);
+                const x = edges_file.dot(Boxes, offset, .splat(dual.column)).mul(inverse);
+                const y = edges_file.dot(Boxes, offset, .splat(dual.row)).mul(inverse);
+                low_x = low_x.minFast(x);
+                low_y = low_y.minFast(y);
+                high_x = high_x.maxFast(x);
+                high_y = high_y.maxFast(y);
+                least_t = least_t.minFast(t);
+                greatest_inverse = greatest_inverse.maxFast(inverse.abs());
+            }
+            const margin = reach.mul(greatest_inverse)
+                .mul(.splat(16 * edges_file.unit_roundoff * dual.gain));
+            // Also where |t| is so small that rounding may have turned its sign.
+            const bounded = least_t.gt(.zero()).bitAnd(margin.lt(.splat(side)));
+            const zero: B = .zero();
+            // Just below 1, so that a whole number stays what it is.
+            const up: B = .splat(1 - 0x1p-10);
+            const first_x = low_x.sub(margin).add(up).maxFast(zero).minFast(.splat(side)).toI32();
+            const first_y = low_y.sub(margin).add(up).maxFast(zero).minFast(.splat(side)).toI32();
+            const past_x = high_x.add(margin).add(.splat(1)).maxFast(zero).minFast(.splat(side));
+            const past_y = high_y.add(margin).add(.splat(1)).maxFast(zero).minFast(.splat(side));
+            const one: Boxes.I32 = .splat(1);
+            const all: Boxes.I32 = .splat(side - 1);
+            const window: Window = .{
+                .first_x = .select(bounded, first_x, .zero()),
+                .first_y = .select(bounded, first_y, .zero()),
+                .last_x = .select(bounded, past_x.toI32().sub(one), all),
+                .last_y = .select(bounded, past_y.toI32().sub(one), all),
+                .holds_pixels = undefined,
+            };
+            var result = window;
+            result.holds_pixels = window.first_x.gt(window.last_x)
+                .bitOr(window.first_y.gt(window.last_y)).bitNot();
+            return result;
         }
 
         /// Lanes of triangles whose orientation is not known that the beam may touch: unless some
@@ -283,6 +399,10 @@ fn Search(comptime Kernel: type) type {
             slack: [width]f32,
             shrink: [width]f32,
             drop: [width]f32,
+            first_x: [width]i32,
+            first_y: [width]i32,
+            last_x: [width]i32,
+            last_y: [width]i32,
 
             inline fn at(table: *const Table, lane: u6, first: exact.Slot) Coverage {
                 var coverage: Coverage = .{
@@ -292,6 +412,10 @@ fn Search(comptime Kernel: type) type {
                     .slack = table.slack[lane],
                     .shrink = table.shrink[lane],
                     .drop = table.drop[lane],
+                    .first_x = @intCast(table.first_x[lane]),
+                    .first_y = @intCast(table.first_y[lane]),
+                    .last_x = @intCast(table.last_x[lane]),
+                    .last_y = @intCast(table.last_y[lane]),
                     .slot = first + @as(exact.Slot, lane),
                 };
                 inline for (0..4) |index| {
@@ -312,12 +436,21 @@ fn Search(comptime Kernel: type) type {
 
         /// Steps a triangle over the blocks of pixels and goes on with those it may be seen in.
         inline fn cover(search: *Self, coverage: *const Coverage) void {
+            var candidates = coverage.blocks();
+            if (@popCount(candidates) > few_blocks) candidates &= search.blocksOf(coverage);
+            while (candidates != 0) : (candidates &= candidates - 1) {
+                search.coverBlock(coverage, @ctz(candidates));
+            }
+        }
+
+        /// The blocks that a triangle may be seen in.
+        inline fn blocksOf(search: *Self, coverage: *const Coverage) u32 {
             var start: [4]F32 = undefined;
             inline for (&start, coverage.base, coverage.right, coverage.down) |*to, b, r, d| {
                 const most = b + block_last * ((if (r > 0) r else 0) + (if (d > 0) d else 0));
                 to.* = .splat(most);
             }
-            var candidates: u32 = 0;
+            var blocks: u32 = 0;
             inline for (0..block_count / lanes) |part| {
                 const x: F32 = .fromArray(block_x[part * lanes ..][0..lanes].*);
                 const y: F32 = .fromArray(block_y[part * lanes ..][0..lanes].*);
@@ -330,33 +463,34 @@ fn Search(comptime Kernel: type) type {
                     search.block_lower[part * lanes ..][0..lanes],
                 ));
                 const bits = inside.bitAnd(value[3].gt(known)).bits();
-                candidates |= bits << @intCast(part * lanes);
+                blocks |= bits << @intCast(part * lanes);
             }
-            while (candidates != 0) : (candidates &= candidates - 1) {
-                search.coverBlock(coverage, @ctz(candidates));
-            }
+            return blocks;
         }
 
         /// Steps a triangle over the pixels of a block.
         inline fn coverBlock(search: *Self, coverage: *const Coverage, block: u32) void {
             const x: F32 = .fromArray(lanePlaces(false));
             const y: F32 = .fromArray(lanePlaces(true));
+            const top = block / (side / block_side) * block_side;
+            const row_first = (@max(coverage.first_y, top) - top) / Kernel.group_height;
+            const row_last = (@min(coverage.last_y, top + block_side - 1) - top) /
+                Kernel.group_height;
+            const first: f32 = @floatFromInt(row_first * Kernel.group_height);
             var value: [4]F32 = undefined;
             var step: [4]F32 = undefined;
             inline for (0..4) |index| {
                 const r = coverage.right[index];
                 const d = coverage.down[index];
-                const base = coverage.base[index] + block_x[block] * r + block_y[block] * d;
+                const base = coverage.base[index] + block_x[block] * r + (block_y[block] + first) * d;
                 var start: F32 = .splat(base);
                 if (Kernel.group_height > 1) start = y.mulAdd(.splat(d), start);
                 value[index] = x.mulAdd(.splat(r), start);
                 step[index] = .splat(d * Kernel.group_height);
             }
             var changed = false;
-            inline for (0..Kernel.block_groups) |row| {
-                if (row > 0) inline for (&value, step) |*to, by| {
-                    to.* = to.add(by);
-                };
+            var row = row_first;
+            while (true) {
                 const group = block * Kernel.block_groups + row;
                 const lower = search.bounds("lower", group);
                 const least = value[0].minFast(value[1]).minFast(value[2]);
@@ -373,9 +507,14 @@ fn Search(comptime Kernel: type) type {
                     Rays.I32.select(certain, .splat(coverage.slot), .loadAligned(slots))
                         .storeAligned(slots);
                     const doubtful = possible.andNot(certain);
-                    if (doubtful.any()) search.decide(coverage.slot, group, doubtful.bits());
+                    if (doubtful.any()) {
+                        search.decideNear(coverage.slot, group, doubtful, surely, value[3]);
+                    }
                     changed = true;
                 }
+                if (row == row_last) break;
+                row += 1;
+                inline for (&value, step) |*to, by| to.* = to.add(by);
             }
             if (changed) search.boundBlock(block);
         }
@@ -405,6 +544,33 @@ fn Search(comptime Kernel: type) type {
                 least = least.minFast(.loadAligned(search.bounds("lower", first + row)));
             }
             search.block_lower[block] = least.reduceMin();
+        }
+
+        /// Decides for rays that a triangle comes near to, with bounds of 1/t there: by its edges
+        /// alone where they tell it from what has been found before.
+        fn decideNear(
+            search: *Self,
+            slot: exact.Slot,
+            group: usize,
+            doubtful: Rays.Mask,
+            lower: F32,
+            upper: F32,
+        ) void {
+            @branchHint(.unlikely);
+            const known: F32 = .loadAligned(search.bounds("upper", group));
+            const nearer = doubtful.bitAnd(lower.gt(known));
+            const unclear = doubtful.andNot(nearer).bits();
+            var rest = nearer.bits();
+            while (rest != 0) : (rest &= rest - 1) {
+                const lane = @ctz(rest);
+                const ray = &search.bundle.groups[group];
+                if (!exact.insideAt(Kernel, search.tree, ray, lane, slot)) continue;
+                const pixel = group * lanes + lane;
+                search.slot[pixel] = slot;
+                search.lower[pixel] = lower.lane(lane);
+                search.upper[pixel] = upper.lane(lane);
+            }
+            if (unclear != 0) search.decide(slot, group, unclear);
         }
 
         /// Asks the exact test about single rays.

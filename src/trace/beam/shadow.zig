@@ -574,7 +574,12 @@ fn Search(comptime Kernel: type) type {
                 .z = .load(&components[2]),
             };
             const print: footprint_file.Footprint(Boxes) =
-                .init(corners, &search.projection, search.slope_max);
+                .init(
+                    corners,
+                    &search.projection,
+                    search.slope_max,
+                    edges_file.reachMax(search.world.pad),
+                );
             const basis = &search.basis;
             const bounds = &search.bounds;
             const B = Boxes.F32;
@@ -609,7 +614,16 @@ fn Search(comptime Kernel: type) type {
             var rest = there.bitAnd(print.decisive).bitAnd(seen).bits();
             const first: exact.Slot = @intCast(block_index * width);
             if (rest | undecided == 0) return;
+            const window = search.windowOf(corners, print.reach);
+            rest &= window.u[1].ge(.splat(bounds.u[0])).bitAnd(window.u[0].le(.splat(bounds.u[1])))
+                .bitAnd(window.v[1].ge(.splat(bounds.v[0])))
+                .bitAnd(window.v[0].le(.splat(bounds.v[1]))).bits();
+            if (rest | undecided == 0) return;
             var table: Table = undefined;
+            inline for (0..2) |end| {
+                window.u[end].store(&table.window_u[end]);
+                window.v[end].store(&table.window_v[end]);
+            }
             inline for (0..4) |index| {
                 linear[index].u.store(&table.u[index]);
                 linear[index].v.store(&table.v[index]);
@@ -630,6 +644,48 @@ fn Search(comptime Kernel: type) type {
                 const lane = @ctz(undecided);
                 search.coverUndecided(&table.at(lane, first, block_.primitive[lane]));
             }
+        }
+
+        /// Bounds of triangles in the axes of the parallelogram.
+        const Window = struct { u: [2]Boxes.F32, v: [2]Boxes.F32 };
+
+        /// Bounds of triangles by their corners; none if a corner is not in front of a point light.
+        /// A corner's u or v is off by less than 6 u |c| / depth, the exact test's displacement of
+        /// corners by as much again.
+        inline fn windowOf(search: *const Self, corners: [3]Boxes.Vec3, reach: Boxes.F32) Window {
+            const B = Boxes.F32;
+            const projection = &search.projection;
+            const basis = &search.basis;
+            const from: Boxes.Vec3 = .splat(projection.origin);
+            const endless: B = .splat(inf);
+            var window: Window = .{
+                .u = .{ endless, endless.neg() },
+                .v = .{ endless, endless.neg() },
+            };
+            var least_depth = endless;
+            inline for (corners) |corner| {
+                const on_plane = footprint_file.project(Boxes, projection, corner.sub(from));
+                const u = on_plane.u.mulAdd(.splat(basis.i00), on_plane.v.mul(.splat(basis.i01)));
+                const v = on_plane.u.mulAdd(.splat(basis.i10), on_plane.v.mul(.splat(basis.i11)));
+                window.u = .{ window.u[0].minFast(u), window.u[1].maxFast(u) };
+                window.v = .{ window.v[0].minFast(v), window.v[1].maxFast(v) };
+                least_depth = least_depth.minFast(on_plane.depth);
+            }
+            const unit: B = .splat(16 * edges_file.unit_roundoff * basis.norm());
+            const flat = projection.slope != null;
+            const margin = if (flat) reach.mul(unit) else reach.div(least_depth).mul(unit);
+            var bounded = margin.lt(.splat(if (flat) inf else 1));
+            if (!flat) bounded = bounded.bitAnd(least_depth.gt(.zero()));
+            return .{
+                .u = .{
+                    .select(bounded, window.u[0].sub(margin), endless.neg()),
+                    .select(bounded, window.u[1].add(margin), endless),
+                },
+                .v = .{
+                    .select(bounded, window.v[0].sub(margin), endless.neg()),
+                    .select(bounded, window.v[1].add(margin), endless),
+                },
+            };
         }
 
         /// Lanes of triangles whose orientation is not known that the beam may touch: unless some
@@ -663,6 +719,8 @@ fn Search(comptime Kernel: type) type {
             slack: [width]f32,
             shrink: [width]f32,
             drop: [width]f32,
+            window_u: [2][width]f32,
+            window_v: [2][width]f32,
 
             inline fn at(
                 table: *const Table,
@@ -679,6 +737,8 @@ fn Search(comptime Kernel: type) type {
                     .slack = table.slack[lane],
                     .shrink = table.shrink[lane],
                     .drop = table.drop[lane],
+                    .window_u = .{ table.window_u[0][lane], table.window_u[1][lane] },
+                    .window_v = .{ table.window_v[0][lane], table.window_v[1][lane] },
                     .slot = first + @as(exact.Slot, lane),
                     .primitive = @bitCast(primitive),
                 };
@@ -718,6 +778,9 @@ fn Search(comptime Kernel: type) type {
             slack: f32,
             shrink: f32,
             drop: f32,
+            /// Bounds in the axes of the parallelogram.
+            window_u: [2]f32,
+            window_v: [2]f32,
             slot: exact.Slot,
             primitive: i32,
         };
@@ -750,9 +813,20 @@ fn Search(comptime Kernel: type) type {
                     )));
                     least = least.minFast(most);
                 }
-                blocks |= least.ge(.zero()).bits() << first;
+                const window_u = coverage.window_u;
+                const window_v = coverage.window_v;
+                const met = least.ge(.zero())
+                    .bitAnd(boundsOf(&search.block_u[0], first).le(.splat(window_u[1])))
+                    .bitAnd(boundsOf(&search.block_u[1], first).ge(.splat(window_u[0])))
+                    .bitAnd(boundsOf(&search.block_v[0], first).le(.splat(window_v[1])))
+                    .bitAnd(boundsOf(&search.block_v[1], first).ge(.splat(window_v[0])));
+                blocks |= met.bits() << first;
             }
             return blocks;
+        }
+
+        inline fn boundsOf(bounds: *align(64) const [block_count]f32, comptime first: usize) F32 {
+            return .loadAligned(@alignCast(bounds[first..][0..lanes]));
         }
 
         /// Tests a triangle against the rays of a block.
@@ -774,26 +848,31 @@ fn Search(comptime Kernel: type) type {
                     const own = search.bundle.groups[group].skip.eq(.splat(coverage.primitive));
                     possible = possible.andNot(own);
                     const surely = value[3].mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
-                    const certain = possible.bitAnd(least.gt(.splat(coverage.slack)))
-                        .bitAnd(surely.gt(near));
-                    any_met = search.meet(coverage.slot, group, possible, certain) or any_met;
+                    const before = possible.bitAnd(surely.gt(near));
+                    const certain = before.bitAnd(least.gt(.splat(coverage.slack)));
+                    const doubtful = possible.andNot(certain);
+                    any_met = search.meet(coverage.slot, group, certain, doubtful, before) or
+                        any_met;
                 }
             }
             if (any_met) search.checkBlock(index);
         }
 
-        /// Takes rays out that have met a triangle. Returns whether there were any.
+        /// Takes rays out that have met a triangle; `before` tells of those in doubt before which
+        /// the triangle stands, if they pass within its edges. Returns whether there were any.
         inline fn meet(
             search: *Self,
             slot: exact.Slot,
             group: usize,
-            possible: Mask,
             certain: Mask,
+            doubtful: Mask,
+            before: Mask,
         ) bool {
             var met = certain;
-            const doubtful = possible.andNot(certain);
-            if (doubtful.any())
-                met = met.bitOr(.fromBits(search.decide(slot, group, doubtful.bits())));
+            if (doubtful.any()) {
+                const bits = search.decide(slot, group, doubtful.bits(), before.bits());
+                met = met.bitOr(.fromBits(bits));
+            }
             if (met.none()) return false;
             const first = group * lanes;
             const near: F32 = .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
@@ -819,13 +898,24 @@ fn Search(comptime Kernel: type) type {
         }
 
         /// Asks the exact test about single rays. Returns those that meet the triangle.
-        fn decide(search: *Self, slot: exact.Slot, group: usize, doubtful: u32) u32 {
+        fn decide(
+            search: *Self,
+            slot: exact.Slot,
+            group: usize,
+            doubtful: u32,
+            before: u32,
+        ) u32 {
             @branchHint(.unlikely);
             var met: u32 = 0;
             var rest = doubtful;
             while (rest != 0) : (rest &= rest - 1) {
                 const lane = @ctz(rest);
                 const ray = &search.bundle.groups[group];
+                if (before >> @intCast(lane) & 1 != 0) {
+                    const inside = exact.insideAt(Kernel, search.tree, ray, lane, slot);
+                    met |= @as(u32, @intFromBool(inside)) << @intCast(lane);
+                    continue;
+                }
                 const t = exact.hitAt(
                     Kernel,
                     search.tree,
@@ -864,7 +954,7 @@ fn Search(comptime Kernel: type) type {
                 const possible = near.lt(.splat(inf)).andNot(own)
                     .andNot(negative.bitAnd(positive));
                 if (possible.none()) continue;
-                if (search.meet(coverage.slot, group, possible, .splat(false))) {
+                if (search.meet(coverage.slot, group, .splat(false), possible, .splat(false))) {
                     search.checkBlock(@intCast(block));
                 }
             }
