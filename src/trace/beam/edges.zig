@@ -11,14 +11,21 @@
 //! more than its own bounds, the exact test (`triangle.zig`) must come to the same answer; anything
 //! nearer is in doubt and asks the exact test itself.
 //!
-//! The bounds, with u = 2^-24, R the largest distance of a corner, L the longest edge, N the normal
-//! and det = a . N. Of an edge function, in units of u R L |D|: 8 from rounding b, c and their sum,
-//! 2 from the edge, 5 from the cross product, 6 from the dot product, 16 from its evaluation
-//! on a grid; and for the exact test, whose corners move by up to 4 sqrt(2) u R across the ray
-//! and whose plane is stretched by up to sqrt(3): 80. With a quarter more for what is of second
-//! order and for the square roots below: 150. Of 1/t, relative to itself and in units of
-//! u R L^2 / |det|: 9 from det, 96 and 6 from the exact test's t; and absolutely, in units of
-//! u L^2 / |det|: 12 |D|.
+//! The bounds, with u = 2^-24, R the largest distance of a corner, L the longest edge, D the
+//! direction, T by how much directions of a beam differ, N the normal, S the sum of the absolute
+//! products that its components are differences of, det = a . N.
+//!
+//! Of an edge function, in units of u R L |D|: 8 from rounding b, c and their sum, 2 from the edge,
+//! 5 from the cross product, 6 from the dot product; 48 T / |D| from stepping over a grid. The exact
+//! test moves corners by up to 4 sqrt(2) u R across the ray, on a plane that is stretched by up to
+//! sqrt(3): 40 if that cannot turn the triangle over, for which |det| > 64 u R^2 L is enough.
+//!
+//! Of 1/t: det is off by 8 u R S, N . D by 7 u S |D|. The exact test's t is that of a point of the
+//! triangle's plane off the ray by as much as corners are moved, and weighed with edge functions
+//! that are off by 2 u L^2 of their area (at least |det| / R): relative to 1/t that is
+//! 9 (1 + L^3 / |det|) u R S / |det| and 16 u; corners' depths and their sum are off by 6 sqrt(3)
+//! u R / |D|, and |D| t is at least |det| / S: 11 u R S / |det|. A quarter is added to all of it for what is of second
+//! order.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -26,15 +33,21 @@ const world_file = @import("../../world.zig");
 /// Half a unit in the last place of 1.
 pub const unit_roundoff: f32 = 0x1p-24;
 
-/// Bounds of an edge function by `slack`, of 1/t relative to itself and by itself; see above.
-pub const edge_roundings = 150.0;
-pub const inverse_relative_roundings = 128.0;
+/// Bounds in the units above.
+pub const edge_roundings = 76.0;
+/// Of an edge function stepped over directions that differ by T.
+pub const step_roundings = 60.0;
 /// Twice what is derived above: the relative part is taken of the rounded value.
-pub const inverse_absolute_roundings = 24.0;
+pub const inverse_roundings = 18.0;
+const inverse_relative_roundings = 36.0;
+const weight_roundings = 11.0;
 
 /// 1/t whose relative error may reach this is left to the exact test. It also makes sure that the
-/// sign of det is right: 8.5 u R L^2 bounds its error.
+/// sign of det is right.
 pub const relative_error_max = 0.125;
+
+/// See above: |det| over u R^2 L that keeps a triangle from being turned over by rounding.
+pub const turning_roundings = 64.0;
 
 /// Outside of this range of L^2 and R, in metres, products may leave the range of floats.
 pub const length_squared_min = 0x1p-80;
@@ -85,12 +98,13 @@ pub fn Edges(comptime Lanes: type) type {
             const det_inv = F32.splat(1).div(det);
             const flip: F32 = .select(det.lt(.zero()), .splat(-1), .splat(1));
             const length_squared = longestSquared(Lanes, edges);
-            const reach = longestSquared(Lanes, .{ a, b, c }).sqrt();
             const length = length_squared.sqrt();
-            const steepness = length_squared.mul(det_inv.abs());
-            const relative = steepness.mul(reach)
-                .mul(.splat(inverse_relative_roundings * unit_roundoff));
-            const second_order: F32 = .splat(2 * unit_roundoff);
+            const reach = longestSquared(Lanes, .{ a, b, c }).sqrt();
+            const unit: F32 = .splat(unit_roundoff);
+            const steepness = absoluteCross(Lanes, edges[1], edges[2]).mul(det_inv.abs());
+            const thinness = length_squared.mul(length).mul(det_inv.abs());
+            const relative = weighed(Lanes, steepness.mul(reach), thinness);
+            const turns_over = reach.mul(reach).mul(length).mul(unit).mul(.splat(turning_roundings));
             return .{
                 .normal = .{
                     cross(Lanes, c.add(b), edges[0]).scale(flip),
@@ -99,15 +113,36 @@ pub fn Edges(comptime Lanes: type) type {
                 },
                 .inverse = plane.scale(det_inv),
                 .reach = reach,
-                .slack = reach.mul(reach.mulAdd(second_order, length)),
+                .slack = reach.mul(reach.mulAdd(unit.add(unit), length)),
                 .inverse_relative = relative,
                 .inverse_absolute = steepness,
                 .decisive = relative.lt(.splat(relative_error_max))
+                    .bitAnd(det.abs().gt(turns_over))
                     .bitAnd(length_squared.gt(.splat(length_squared_min)))
                     .bitAnd(reach.lt(.splat(reach_max))),
             };
         }
     };
+}
+
+/// Bound of the relative error of 1/t: `steepness` is R S / |det|, `thinness` L^3 / |det|.
+pub inline fn weighed(
+    comptime Lanes: type,
+    steepness: Lanes.F32,
+    thinness: Lanes.F32,
+) Lanes.F32 {
+    const constant: Lanes.F32 = .splat(inverse_relative_roundings * unit_roundoff);
+    const share = thinness.mulAdd(.splat(weight_roundings * unit_roundoff), constant);
+    return steepness.mulAdd(share, constant);
+}
+
+/// The sum over components of a x b of the absolute products.
+pub inline fn absoluteCross(comptime Lanes: type, a: Lanes.Vec3, b: Lanes.Vec3) Lanes.F32 {
+    const p = a.abs();
+    const q = b.abs();
+    const x = p.y.mulAdd(q.z, p.z.mul(q.y));
+    const y = p.z.mulAdd(q.x, p.x.mulAdd(q.z, x));
+    return p.x.mulAdd(q.y, p.y.mulAdd(q.x, y));
 }
 
 /// a . b, fused where the target can: for culling only.

@@ -162,7 +162,8 @@ fn Search(comptime Kernel: type) type {
             bundle: *packet.Bundle(Kernel),
             counts: *TestCounts,
         ) bool {
-            const scale = length1(grid.corner) + last * (length1(grid.right) + length1(grid.down));
+            const spread = last * (length1(grid.right) + length1(grid.down));
+            const longest = @sqrt(vec3.dot(grid.corner, grid.corner)) + spread;
             const roundings = grid.deviation_roundings;
             const unit = edges_file.unit_roundoff;
             search.world = world;
@@ -172,9 +173,10 @@ fn Search(comptime Kernel: type) type {
             search.counts = counts;
             search.frustum = frustumOf(grid, world.pad) orelse return false;
             // A direction off by d moves an edge function by 2 R L d, 1/t by L^2 / |det| d.
-            search.edge_scale = unit * (edges_file.edge_roundings * scale + 2 * roundings);
+            search.edge_scale = unit * (edges_file.edge_roundings * longest +
+                edges_file.step_roundings * spread + 2 * roundings);
             search.inverse_scale = unit *
-                (edges_file.inverse_absolute_roundings * scale + 2 * roundings);
+                (edges_file.inverse_roundings * longest + 2 * roundings);
             search.reach_max = edges_file.reachMax(world.pad);
             search.dual = .of(grid);
             search.block_lower = @splat(0);

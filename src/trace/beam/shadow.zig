@@ -258,7 +258,7 @@ fn Search(comptime Kernel: type) type {
                 unfit = unfit.bitOr(member.andNot(fits));
                 steepest = steepest.maxFast(.select(fits, steep, .zero()));
                 const near = if (projection.slope == null)
-                    F32.splat(1).div(on_plane.depth)
+                    F32.splat(1).div(on_plane.depth.mul(group.nearest.t))
                 else
                     on_plane.depth.neg();
                 on_plane.u.storeAligned(@alignCast(search.u[first..][0..lanes]));
@@ -286,7 +286,7 @@ fn Search(comptime Kernel: type) type {
             group: *const ray_file.Ray(Rays),
         ) footprint_file.Place(Rays) {
             const projection = &search.projection;
-            // A point light's rays reach their points at t = 1; a directional one's start there.
+            // A point light's rays are given by where t is 1; a directional one's start there.
             const point = if (projection.slope == null)
                 group.line.direction
             else
