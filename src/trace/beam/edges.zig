@@ -79,8 +79,9 @@ pub fn Edges(comptime Lanes: type) type {
         /// Lanes whose bounds hold and are worth anything; others are up to the exact test.
         decisive: Lanes.Mask,
 
-        /// The largest distance of a corner.
+        /// The largest distance of a corner, and the length of the longest edge.
         reach: F32,
+        length: F32,
 
         /// Sets up the triangles of a block. Those with a corner farther away than `reach_max` are
         /// not decisive.
@@ -113,6 +114,7 @@ pub fn Edges(comptime Lanes: type) type {
                 },
                 .inverse = plane.scale(det_inv),
                 .reach = reach,
+                .length = length,
                 .slack = reach.mul(reach.mulAdd(unit.add(unit), length)),
                 .inverse_relative = relative,
                 .inverse_absolute = steepness,

@@ -98,6 +98,8 @@ pub fn Footprint(comptime Lanes: type) type {
         decisive: Lanes.Mask,
         /// Bounds R of the rounding of u and v.
         reach: F32,
+        /// The longest edge.
+        length: F32,
 
         /// Sets up triangles; slopes (or the rays' own) are at most `slope_max` along each axis.
         pub inline fn init(
@@ -135,6 +137,7 @@ pub fn Footprint(comptime Lanes: type) type {
                     .mul(.splat(edges_file.inverse_roundings * unit)),
                 .decisive = edges.decisive,
                 .reach = edges.reach,
+                .length = edges.length,
             };
         }
 
@@ -199,6 +202,7 @@ pub fn Footprint(comptime Lanes: type) type {
                 .relative = .zero(),
                 .absolute = absolute,
                 .reach = reach,
+                .length = length,
                 .decisive = absolute.lt(reach.mul(.splat(edges_file.relative_error_max)))
                     .bitAnd(area.abs().gt(reach.mul(length)
                         .mul(.splat(edges_file.turning_roundings * unit))))

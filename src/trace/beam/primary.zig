@@ -288,9 +288,14 @@ fn Search(comptime Kernel: type) type {
             var rest = there.bitAnd(edges.decisive).bitAnd(seen).bits();
             const first: exact.Slot = @intCast(block_index * width);
             if (rest | undecided == 0) return;
-            const window = search.windowOf(corners, edges.reach);
-            rest &= window.holds_pixels.bits();
-            if (rest | undecided == 0) return;
+            var window = Window.everywhere;
+            // Bounds tell more than edges of small triangles only.
+            const small = edges.length.mul(.splat(search.dual.gain)).lt(edges.reach.mul(.splat(side)));
+            if (small.any()) {
+                window = search.windowOf(corners, edges.reach);
+                rest &= window.holds_pixels.bits();
+                if (rest | undecided == 0) return;
+            }
             var table: Table = undefined;
             window.first_x.store(&table.first_x);
             window.first_y.store(&table.first_y);
@@ -319,6 +324,14 @@ fn Search(comptime Kernel: type) type {
             last_x: Boxes.I32,
             last_y: Boxes.I32,
             holds_pixels: Boxes.Mask,
+
+            const everywhere: Window = .{
+                .first_x = .splat(0),
+                .first_y = .splat(0),
+                .last_x = .splat(side - 1),
+                .last_y = .splat(side - 1),
+                .holds_pixels = .splat(true),
+            };
         };
 
         /// Where triangles in lanes may be seen, by their corners; everywhere if some corner is not

@@ -71,6 +71,11 @@ const Bounds = struct {
     v: [2]f32 = .{ std.math.inf(f32), -std.math.inf(f32) },
     depth: f32 = -std.math.inf(f32),
 
+    /// The longer side.
+    fn extent(bounds: Bounds) f32 {
+        return @max(bounds.u[1] - bounds.u[0], bounds.v[1] - bounds.v[0]);
+    }
+
     fn area(bounds: Bounds) f32 {
         return (bounds.u[1] - bounds.u[0]) * (bounds.v[1] - bounds.v[0]);
     }
@@ -614,11 +619,17 @@ fn Search(comptime Kernel: type) type {
             var rest = there.bitAnd(print.decisive).bitAnd(seen).bits();
             const first: exact.Slot = @intCast(block_index * width);
             if (rest | undecided == 0) return;
-            const window = search.windowOf(corners, print.reach);
-            rest &= window.u[1].ge(.splat(bounds.u[0])).bitAnd(window.u[0].le(.splat(bounds.u[1])))
-                .bitAnd(window.v[1].ge(.splat(bounds.v[0])))
-                .bitAnd(window.v[0].le(.splat(bounds.v[1]))).bits();
-            if (rest | undecided == 0) return;
+            var window = Window.everywhere;
+            // Bounds tell more than edges of small triangles only.
+            const extent = search.bounds.extent() * (if (directional) 1 else search.bounds.depth);
+            if (print.length.lt(.splat(extent)).any()) {
+                window = search.windowOf(corners, print.reach);
+                rest &= window.u[1].ge(.splat(bounds.u[0]))
+                    .bitAnd(window.u[0].le(.splat(bounds.u[1])))
+                    .bitAnd(window.v[1].ge(.splat(bounds.v[0])))
+                    .bitAnd(window.v[0].le(.splat(bounds.v[1]))).bits();
+                if (rest | undecided == 0) return;
+            }
             var table: Table = undefined;
             inline for (0..2) |end| {
                 window.u[end].store(&table.window_u[end]);
@@ -647,7 +658,15 @@ fn Search(comptime Kernel: type) type {
         }
 
         /// Bounds of triangles in the axes of the parallelogram.
-        const Window = struct { u: [2]Boxes.F32, v: [2]Boxes.F32 };
+        const Window = struct {
+            u: [2]Boxes.F32,
+            v: [2]Boxes.F32,
+
+            const everywhere: Window = .{
+                .u = .{ .splat(-inf), .splat(inf) },
+                .v = .{ .splat(-inf), .splat(inf) },
+            };
+        };
 
         /// Bounds of triangles by their corners; none if a corner is not in front of a point light.
         /// A corner's u or v is off by less than 6 u |c| / depth, the exact test's displacement of
