@@ -109,6 +109,7 @@ noinline fn placeAll(
     const lights_are_default = lights.len == 0;
     if (lights_are_default) lights = try light.placeRig(arena, &seen.camera);
 
+    const pads = pad.choose(surface.bounds, &seen.camera, lights);
     var has_transparency = false;
     var has_holes = false;
     for (from.instances) |instance| {
@@ -137,7 +138,9 @@ noinline fn placeAll(
         .height = seen.height,
         .camera_is_default = seen.camera_is_default,
         .lights_are_default = lights_are_default,
-        .pad = pad.rayPad(surface.bounds, &seen.camera, lights),
+        .pad = pads.triangle,
+        .node_margin = pads.node_margin,
+        .fused_reach = pads.fused_reach,
         .degenerate_count = surface.dropped_count,
         .has_transparency = has_transparency,
         .has_holes = has_holes,
@@ -156,6 +159,7 @@ pub noinline fn buildTree(
         .positions = result.positions,
         .triangles = result.triangles,
         .pad = result.pad,
+        .node_margin = result.node_margin,
         .thread_count = settings.thread_count,
     };
     const facts = &result.tree_statistics;

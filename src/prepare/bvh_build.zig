@@ -89,6 +89,8 @@ pub const Input = struct {
     triangles: []const world.Triangle,
     /// `World.pad`.
     pad: f32,
+    /// `World.node_margin`.
+    node_margin: f32,
     thread_count: usize,
 };
 

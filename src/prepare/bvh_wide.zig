@@ -382,7 +382,7 @@ fn Collapse(comptime width: u32) type {
                             stack_count += 1;
                         }
                         if (!writing) continue;
-                        setChild(&work.nodes[visit.index], slot, binary, target, blocks);
+                        collapse.setChild(&work.nodes[visit.index], slot, binary, target, blocks);
                     }
                     std.mem.reverse(Visit, stack[bottom..stack_count]);
                 }
@@ -437,15 +437,17 @@ fn Collapse(comptime width: u32) type {
         }
 
         fn setChild(
+            collapse: *const Self,
             node: *Node,
             slot: usize,
             binary: *const bvh_build.Node,
             target: u32,
             block_count: u32,
         ) void {
+            const margin = collapse.input.node_margin;
             for (0..3) |axis| {
-                node.bounds[0][axis][slot] = binary.lower[axis];
-                node.bounds[1][axis][slot] = -binary.upper_negated[axis];
+                node.bounds[0][axis][slot] = binary.lower[axis] - margin;
+                node.bounds[1][axis][slot] = margin - binary.upper_negated[axis];
             }
             node.child[slot] = target;
             node.block_count[slot] = block_count;

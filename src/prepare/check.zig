@@ -13,14 +13,15 @@ const Vec3 = math.Vec3;
 const World = world.World;
 
 /// Asserts that every triangle lies in one lane of one block below one leaf, within all boxes above
-/// it; that padding lanes are empty; that every node and block is reached once; and that the tree
-/// is no deeper than it says.
+/// it, which are no larger than they have to be; that padding lanes are empty; that every node and
+/// block is reached once; and that the tree is no deeper than it says.
 pub fn check(gpa: Allocator, checked: *const World) error{OutOfMemory}!void {
     const vertex_count = checked.positions.len;
     assert(checked.normals.len == vertex_count);
     assert(checked.colors.len == 0 or checked.colors.len == vertex_count);
     assert(checked.width > 0 and checked.height > 0);
-    assert(checked.pad > 0);
+    assert(checked.pad > 0 and checked.node_margin >= 0 and checked.fused_reach >= 0);
+    assert(checked.node_margin >= checked.fused_reach * world.node_margin_relative * 0.999);
     for (checked.triangles) |triangle| {
         assert(triangle.material < checked.materials.len);
         for (triangle.corner) |vertex| assert(vertex < vertex_count);
@@ -58,7 +59,7 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
                 checkLeaf(checked, tree.blocks[child..][0..leaf_blocks], box, seen);
             }
         }
-        // Boxes are unions, no larger.
+        // Boxes are unions, no larger: growing keeps their order.
         if (visit.box) |box| assert(box.contains(joined) and joined.contains(box));
     }
     for (seen) |is_seen| assert(is_seen);
@@ -90,5 +91,6 @@ fn checkLeaf(checked: *const World, blocks: anytype, box: Box3, seen: []bool) vo
         }
     }
     assert(!joined.isEmpty());
-    assert(box.contains(joined) and joined.contains(box));
+    const grown = joined.grow(checked.node_margin);
+    assert(box.contains(grown) and grown.contains(box));
 }
