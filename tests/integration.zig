@@ -12,6 +12,7 @@ test {
     _ = @import("malformed.zig");
     _ = @import("output.zig");
     _ = @import("samples.zig");
+    _ = @import("beams.zig");
     _ = @import("soup.zig");
     _ = @import("variants.zig");
 }

@@ -16,7 +16,7 @@ const gpa = std.testing.allocator;
 const inf = std.math.inf(f32);
 
 /// What a ray is asked, and its bounds.
-const Query = struct {
+pub const Query = struct {
     origin: [3]f32,
     direction: [3]f32,
     after: Hit = .{ .t = 0, .primitive = std.math.maxInt(i32) },
@@ -34,10 +34,11 @@ const Query = struct {
     }
 };
 
-const Hit = struct { t: f32, primitive: i32 };
+/// What it should find.
+pub const Hit = struct { t: f32, primitive: i32 };
 
 /// Every triangle in turn.
-fn bruteForce(world: *const World, query: Query) Hit {
+pub fn bruteForce(world: *const World, query: Query) Hit {
     const triangle = raylane.trace.triangle;
     var ray = query.ray();
     for (world.triangles, 0..) |corners, number| {
@@ -57,7 +58,8 @@ fn bruteForce(world: *const World, query: Query) Hit {
     return .{ .t = ray.nearest.t.lane(0), .primitive = ray.nearest.primitive.lane(0) };
 }
 
-fn expectHit(expected: Hit, t: f32, primitive: i32) !void {
+/// Fails unless the same triangle was found, at the same t to the bit.
+pub fn expectHit(expected: Hit, t: f32, primitive: i32) !void {
     const missed = primitive == ray_file.no_primitive;
     const same_t = @as(u32, @bitCast(expected.t)) == @as(u32, @bitCast(t));
     if (expected.primitive == primitive and (missed or same_t)) return;
@@ -168,12 +170,14 @@ fn inLanes(comptime Rays: type, v: [3][Rays.count]f32) Rays.Vec3 {
     return .{ .x = .fromArray(v[0]), .y = .fromArray(v[1]), .z = .fromArray(v[2]) };
 }
 
-const Corners = std.ArrayList([3]f32);
+/// Corners, three a triangle.
+pub const Corners = std.ArrayList([3]f32);
 
 /// Kinds of triangles that break careless code.
-const Soup = enum { uniform, tiny_and_huge, coplanar, slivers, stacked, far_away, grid };
+pub const Soup = enum { uniform, tiny_and_huge, coplanar, slivers, stacked, far_away, grid };
 
-fn addTriangles(soup: Soup, corners: *Corners, random: std.Random, count: usize) !void {
+/// Appends three corners for each triangle.
+pub fn addTriangles(soup: Soup, corners: *Corners, random: std.Random, count: usize) !void {
     for (0..count) |index| {
         for (0..3) |_| {
             var p: [3]f32 = undefined;
@@ -240,16 +244,7 @@ fn expectSoup(soup: Soup, triangle_count: usize, query_count: usize) !void {
     var corners: Corners = .empty;
     defer corners.deinit(gpa);
     try addTriangles(soup, &corners, random.random(), triangle_count);
-    var builder: fixture.Builder = try .init();
-    const triangles = try gpa.alloc([3]u32, triangle_count);
-    defer gpa.free(triangles);
-    for (triangles, 0..) |*triangle, index| {
-        const first: u32 = @intCast(3 * index);
-        triangle.* = .{ first, first + 1, first + 2 };
-    }
-    try builder.addMesh(fixture.matte(.{ 1, 1, 1 }), corners.items, null, triangles);
-    try builder.addCamera(.{ 0, 0, 7 }, 1);
-    var scene = builder.finish();
+    var scene = try makeScene(corners.items);
     defer scene.deinit();
 
     const mode = raylane.simd.setFlushToZero();
@@ -277,7 +272,22 @@ fn expectSoup(soup: Soup, triangle_count: usize, query_count: usize) !void {
     }
 }
 
-fn isCompiled(comptime lanes: u8) bool {
+/// A scene of triangles that share no corner, with a camera.
+pub fn makeScene(corners: []const [3]f32) !raylane.scene.Scene {
+    var builder: fixture.Builder = try .init();
+    const triangles = try gpa.alloc([3]u32, corners.len / 3);
+    defer gpa.free(triangles);
+    for (triangles, 0..) |*triangle, index| {
+        const first: u32 = @intCast(3 * index);
+        triangle.* = .{ first, first + 1, first + 2 };
+    }
+    try builder.addMesh(fixture.matte(.{ 1, 1, 1 }), corners, null, triangles);
+    try builder.addCamera(.{ 0, 0, 7 }, 1);
+    return builder.finish();
+}
+
+/// Whether there is a variant of this width.
+pub fn isCompiled(comptime lanes: u8) bool {
     for (raylane.variant.compiled) |variant| {
         if (variant.lanes == lanes) return true;
     }

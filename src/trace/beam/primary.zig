@@ -294,6 +294,7 @@ fn Search(comptime Kernel: type) type {
             if (small.any()) {
                 window = search.windowOf(corners, edges.reach);
                 rest &= window.holds_pixels.bits();
+                undecided &= window.holds_pixels.bits();
                 if (rest | undecided == 0) return;
             }
             var table: Table = undefined;
