@@ -180,5 +180,6 @@ test {
     _ = Tiles;
     _ = @import("trace/camera.zig");
     _ = @import("trace/exponential.zig");
+    _ = @import("trace/offset.zig");
     _ = @import("trace/shade.zig");
 }

@@ -234,10 +234,9 @@ pub const World = struct {
     camera_is_default: bool,
     /// The file has no light that shines: the lights are three fixed to the camera.
     lights_are_default: bool,
-    /// By how much triangle boxes are grown, and origins of secondary rays are moved off their
-    /// surface: a bound for the rounding of the triangle test, in metres. It is
-    /// `pad_relative` times the largest distance that a ray can span, and a little for the rounding
-    /// of the coordinates themselves.
+    /// By how much triangle boxes are grown: a bound for the rounding of the triangle test, in
+    /// metres. It is `pad_relative` times the largest distance that a ray can span, and a little
+    /// for the rounding of the coordinates themselves.
     pad: f32,
     /// By how much boxes of nodes and leaves are grown beyond the union of the triangle boxes below
     /// them, in metres: `node_margin_relative` times `fused_reach`.

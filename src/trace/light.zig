@@ -18,6 +18,8 @@ pub fn Arrival(comptime Lanes: type) type {
         to_light: Lanes.Vec3,
         /// On a plane across `to_light`, in lux; linear RGB.
         irradiance: Lanes.Vec3,
+        /// To the light in metres, 0 if its rays are parallel.
+        distance: Lanes.F32,
     };
 }
 
@@ -32,10 +34,12 @@ pub fn arrive(
     if (light.kind == .directional) return .{
         .to_light = Lanes.Vec3.splat(light.direction).neg(),
         .irradiance = .splat(light.intensity),
+        .distance = .zero(),
     };
     const way = Lanes.Vec3.splat(light.position).sub(surface.position);
     const distance_squared = way.dot(way).max(.splat(1e-20));
-    const to_light = way.scale(one.div(distance_squared.sqrt()));
+    const distance = distance_squared.sqrt();
+    const to_light = way.scale(one.div(distance));
     const reach = distance_squared.mul(.splat(light.range_inv_squared));
     const window = one.sub(reach.mul(reach)).max(.zero());
     const cosine = Lanes.Vec3.splat(light.direction).dot(to_light).neg();
@@ -45,20 +49,19 @@ pub fn arrive(
     return .{
         .to_light = to_light,
         .irradiance = Lanes.Vec3.splat(light.intensity).scale(factor),
+        .distance = distance,
     };
 }
 
-/// The shadow rays of surfaces. They end (or start) off the surface by `pad` along its normal,
-/// which bounds what rounding can do (world.zig), and never hit the surface's own triangle.
+/// The shadow rays of points off surfaces (`Surface.off`), which never hit the triangle whose
+/// surface it is.
 pub fn shadowRay(
     comptime Lanes: type,
     light: *const Light,
-    surface: *const Surface(Lanes),
+    point: Lanes.Vec3,
     primitive: Lanes.I32,
-    pad: f32,
     active: Lanes.Mask,
 ) ray_file.Ray(Lanes) {
-    const point = surface.position.add(surface.normal_geometric.scale(.splat(pad)));
     const directional = light.kind == .directional;
     const source: Lanes.Vec3 = .splat(light.position);
     return .{

@@ -164,6 +164,7 @@ fn testSurface(view: [3]f32) Surface(Single) {
         .back = .splat(false),
         .culled = .splat(false),
         .coverage = .splat(1),
+        .roundings = .zero(),
         .material = .{
             .base_color = .splat(.{ 1, 1, 1 }),
             .emissive = .splat(.{ 0, 0, 0 }),

@@ -1,13 +1,15 @@
 //! From a hit back to the surface: position, normals and material in lanes.
 //!
 //! In: rays with their nearest primitive. Out: what shading needs. The barycentric weights come
-//! from the very edge functions that decided the hit; the position is their mix of the corners,
-//! which lies on the triangle within a few units in the last place whatever the ray's length
-//! (pbrt, 4th edition, section 6.8.4).
+//! from the very edge functions that decided the hit; the position is a corner plus their mix of
+//! the edges, which lies on the triangle whatever the ray's length (pbrt, 4th edition, section
+//! 6.8.4), and rounds but once at the magnitude of coordinates: a scene far from the origin keeps
+//! its corners clean.
 
 const std = @import("std");
 const world_file = @import("../world.zig");
 const ray_file = @import("ray.zig");
+const offset = @import("offset.zig");
 const triangle = @import("triangle.zig");
 const assert = std.debug.assert;
 const World = world_file.World;
@@ -48,7 +50,22 @@ pub fn Surface(comptime Lanes: type) type {
         culled: Lanes.Mask,
         /// How much of the light is stopped here, 0..1: 0 in holes, alpha where it blends.
         coverage: Lanes.F32,
+        /// How far off rays have to start, see `offset.roundings`.
+        roundings: Lanes.F32,
         material: Material(Lanes),
+
+        /// The position off the surface by what rounding may do, on the side that `away`, the
+        /// geometric normal or its opposite, points to; for a ray that starts there, or that
+        /// comes from `other_distance` away.
+        pub fn off(
+            surface: *const @This(),
+            away: Lanes.Vec3,
+            other_distance: Lanes.F32,
+            pad: f32,
+        ) Lanes.Vec3 {
+            const length = offset.length(Lanes, surface.roundings, other_distance, pad);
+            return surface.position.add(away.scale(length));
+        }
     };
 }
 
@@ -108,7 +125,10 @@ pub fn resolve(
         vec3(Lanes, gathered.position[2]),
     };
     const share = shares(Lanes, weigh(Lanes, corners, ray));
-    const face = unit(Lanes, corners[1].sub(corners[0]).cross(corners[2].sub(corners[0])));
+    const edges = [2]Lanes.Vec3{ corners[1].sub(corners[0]), corners[2].sub(corners[0]) };
+    const position = corners[0].add(edges[0].scale(share[1]).add(edges[1].scale(share[2])));
+    const plane = edges[0].cross(edges[1]);
+    const face = unit(Lanes, plane);
     const back = face.dot(ray.line.direction).gt(.zero());
     const normal_geometric: Lanes.Vec3 = .select(back, face.neg(), face);
     const smooth = mix(Lanes, share, .{
@@ -117,20 +137,22 @@ pub fn resolve(
         vec3(Lanes, gathered.normal[2]),
     });
     const direction_length = ray.line.direction.length();
+    const distance = ray.nearest.t.mul(direction_length);
     const view = ray.line.direction.neg().scale(F32.splat(1).div(direction_length));
     const color = vertexColor(Lanes, world, &gathered, share);
     const material = loadMaterial(Lanes, world.materials, &gathered.material, color.rgb);
     const sides = loadSides(Lanes, world.materials, &gathered.material, color.alpha);
     return .{
         .hit = hit,
-        .position = mix(Lanes, share, corners),
+        .position = position,
         .normal_geometric = normal_geometric,
         .normal = shadingNormal(Lanes, smooth, normal_geometric),
         .view = view,
-        .distance = ray.nearest.t.mul(direction_length),
+        .distance = distance,
         .back = back,
         .culled = back.andNot(sides.shows_back).andNot(material.volume),
         .coverage = sides.coverage,
+        .roundings = offset.roundings(Lanes, corners, position, face, plane, distance),
         .material = material,
     };
 }

@@ -340,14 +340,9 @@ pub fn Whitted(comptime Kernel: type) type {
                 const arrives = lit.bitAnd(worth.x.gt(zero).bitOr(worth.y.gt(zero))
                     .bitOr(worth.z.gt(zero)));
                 const primitive = pending.bundle.groups[group].nearest.primitive;
-                ray.* = light_file.shadowRay(
-                    Rays,
-                    light,
-                    &point.surface,
-                    primitive,
-                    tracer.world.pad,
-                    arrives,
-                );
+                const away = point.surface.normal_geometric;
+                const end = point.surface.off(away, arrival.distance, tracer.world.pad);
+                ray.* = light_file.shadowRay(Rays, light, end, primitive, arrives);
                 tracer.rays.shadow += arrives.popCount();
                 any_lit = any_lit or arrives.any();
             }
@@ -547,7 +542,7 @@ pub fn Whitted(comptime Kernel: type) type {
             direction: Vec3,
             from: ray_file.Hit(Rays),
         ) void {
-            const origin = point.surface.position.add(away.scale(.splat(tracer.world.pad)));
+            const origin = point.surface.off(away, .zero(), tracer.world.pad);
             const active = ray.active;
             ray.* = .{
                 .line = .init(origin, direction),
