@@ -46,16 +46,21 @@ const cell_least: f32 = 0x1p-13;
 const cell_first = bits(cell_least) >> cell_shift;
 const cell_count = (bits(1) >> cell_shift) - cell_first;
 
-/// Code of the least float of each cell.
-const cells: [cell_count]u8 = table: {
+/// The code of the least float of each cell in the upper half. In the lower half what is missing to
+/// a carry where the code changes within the cell, else 0: adding the lower bits of a float then
+/// counts the code up from its threshold on.
+const cells: [cell_count]u32 = table: {
     @setEvalBranchQuota(200_000);
-    var table: [cell_count]u8 = undefined;
+    var table: [cell_count]u32 = undefined;
     var code: usize = 0;
     for (&table, 0..) |*cell, index| {
-        const low: f32 = @bitCast(@as(u32, cell_first + index) << cell_shift);
-        const high: f32 = @bitCast(@as(u32, cell_first + index + 1) << cell_shift);
-        while (thresholds[code + 1] <= low) code += 1;
-        cell.* = code;
+        const low = cell_first + index << cell_shift;
+        const high: f32 = @bitCast(@as(u32, low + (1 << cell_shift)));
+        while (thresholds[code + 1] <= @as(f32, @bitCast(@as(u32, low)))) code += 1;
+        cell.* = code << cell_shift;
+        if (thresholds[code + 1] < high) {
+            cell.* += (1 << cell_shift) - (bits(thresholds[code + 1]) - low);
+        }
         assert(code == 255 or thresholds[code + 2] >= high);
     }
     break :table table;
@@ -65,14 +70,29 @@ fn bits(value: f32) u32 {
     return @bitCast(value);
 }
 
+/// The sRGB codes nearest to linear values; below 0 counts as 0, above 1 as 1. Asserts that the
+/// values are numbers.
+pub inline fn encodeLanes(comptime count: usize, values: @Vector(count, f32)) [count]u8 {
+    const Words = @Vector(count, u32);
+    const least: @Vector(count, f32) = @splat(cell_least);
+    const largest: @Vector(count, f32) = @splat(std.math.nextAfter(f32, 1, 0));
+    const raised = @select(f32, values > least, values, least);
+    const within: Words = @bitCast(@select(f32, raised < largest, raised, largest));
+    const places: [count]u32 =
+        (within >> @as(Words, @splat(cell_shift))) - @as(Words, @splat(cell_first));
+    const lower: [count]u32 = within & @as(Words, @splat((1 << cell_shift) - 1));
+    var codes: [count]u8 = undefined;
+    inline for (&codes, places, lower, 0..) |*code, place, rest, lane| {
+        assert(!std.math.isNan(@as([count]f32, values)[lane]));
+        code.* = @intCast((cells[place] + rest) >> cell_shift);
+    }
+    return codes;
+}
+
 /// The sRGB code nearest to a linear value; below 0 counts as 0, above 1 as 1. Asserts that the
 /// value is a number.
 pub inline fn encode(value: f32) u8 {
-    assert(!std.math.isNan(value));
-    if (value < cell_least) return 0;
-    if (value >= 1) return 255;
-    const code = cells[(bits(value) >> cell_shift) - cell_first];
-    return code + @intFromBool(value >= thresholds[@as(usize, code) + 1]);
+    return encodeLanes(1, .{value})[0];
 }
 
 /// The standard's own formula in f64, not rounded: 0..255.
@@ -119,6 +139,17 @@ test "nearest everywhere, and never falling" {
         previous = code;
     }
     try std.testing.expectEqual(255, previous);
+}
+
+test encodeLanes {
+    const values = [4]f32{ -1, 0.25, 0.5, std.math.inf(f32) };
+    try std.testing.expectEqual([4]u8{ 0, 137, 188, 255 }, encodeLanes(4, values));
+    for (thresholds[1..256], 1..) |at, code| {
+        const below = std.math.nextAfter(f32, at, 0);
+        const expected: u8 = @intCast(code);
+        const codes = encodeLanes(4, .{ below, at, at, below });
+        try std.testing.expectEqual([4]u8{ expected - 1, expected, expected, expected - 1 }, codes);
+    }
 }
 
 test "every code survives decoding and encoding" {
