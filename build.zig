@@ -101,7 +101,7 @@ fn addVendor(b: *std.Build) struct { step: *std.Build.Step, headers: std.Build.L
     fetch.has_side_effects = true;
     const copies = b.addWriteFiles();
     copies.step.dependOn(&fetch.step);
-    for ([_][]const u8{ "cgltf.h", "stb_image.h", "stb_image_write.h" }) |name| {
+    for ([_][]const u8{ "cgltf.h", "stb_image.h" }) |name| {
         _ = copies.addCopyFile(b.path(b.pathJoin(&.{ "vendor/include", name })), name);
     }
     return .{ .step = &fetch.step, .headers = copies.getDirectory() };

@@ -80,7 +80,6 @@ pub fn init(
         .file = b.path("src/simd/intrinsics.c"),
         .flags = own_c_flags,
     });
-    package.addThirdParty(package.raylane, "src/output/stb_image_write.c");
     return package;
 }
 

@@ -272,6 +272,7 @@ const Job = struct {
                 .auto => .auto,
             },
             .transparent = job.options.background == .transparent,
+            .thread_count = job.threadCount(),
         }, target, job.diagnostic) catch |err| return switch (err) {
             error.OutOfMemory => error.OutOfMemory,
             error.InputOutput => error.OutputFailed,

@@ -1,13 +1,13 @@
 //! Stage 4: `Image` -> file.
 //!
 //! In: a finished frame. Out: a PNG, PPM or PFM, either the whole file in its place or nothing at
-//! all. The only stage that sees stb_image_write. Bytes depend on the frame and the settings
-//! alone.
+//! all. Encoded by all threads; the bytes depend on the frame and the settings alone.
 
 const std = @import("std");
 const Allocator = std.mem.Allocator;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Image = @import("image.zig").Image;
+const parallel = @import("parallel.zig");
 const pfm = @import("output/pfm.zig");
 const png = @import("output/png.zig");
 const ppm = @import("output/ppm.zig");
@@ -34,6 +34,8 @@ pub const Settings = struct {
     exposure: Exposure = .{ .ev = 0 },
     /// Keep alpha, where the format has it; otherwise the picture is over black.
     transparent: bool = false,
+    /// 1..`parallel.thread_count_max`. The bytes do not depend on it.
+    thread_count: usize = 1,
 };
 
 /// The diagnostic says why.
@@ -48,36 +50,61 @@ pub fn write(
     diagnostic: *Diagnostic,
 ) Error!void {
     defer target.abandon();
-    if (settings.format == .pfm) {
-        const file = try pfm.encode(gpa, image);
-        defer gpa.free(file);
-        return target.finish(&.{file}, diagnostic);
-    }
-    const scale = switch (settings.exposure) {
-        .ev => |ev| tonemap.scaleOf(ev),
-        .auto => try tonemap.autoScale(gpa, image),
-    };
+    assert(settings.thread_count >= 1 and settings.thread_count <= parallel.thread_count_max);
     const has_alpha = settings.transparent and settings.format == .png;
-    const channel_count: u8 = if (has_alpha) 4 else 3;
-    const pixels = try gpa.alloc(u8, std.math.mul(usize, image.pixels.len, channel_count) catch
-        return error.OutOfMemory);
-    defer gpa.free(pixels);
-    if (has_alpha) {
-        tonemap.encodeRgba(image.pixels, scale, std.mem.bytesAsSlice([4]u8, pixels));
-    } else {
-        tonemap.encodeRgb(image.pixels, scale, std.mem.bytesAsSlice([3]u8, pixels));
-    }
+    const rows: tonemap.Rows = .{
+        .image = image,
+        .scale = if (settings.format == .pfm) 1 else switch (settings.exposure) {
+            .ev => |ev| tonemap.scaleOf(ev),
+            .auto => try tonemap.autoScale(gpa, image),
+        },
+        .channel_count = if (has_alpha) 4 else 3,
+    };
+    return switch (settings.format) {
+        .png => encode(png.Encoder, gpa, rows, settings, target, diagnostic),
+        .ppm => encode(ppm.Encoder, gpa, rows, settings, target, diagnostic),
+        .pfm => encode(pfm.Encoder, gpa, rows, settings, target, diagnostic),
+    };
+}
 
-    if (settings.format == .ppm) {
-        const header: ppm.Header = .init(image.width, image.height);
-        return target.finish(&.{ header.text(), pixels }, diagnostic);
-    }
-    var file = try png.encode(image.width, image.height, channel_count, pixels);
-    defer file.deinit();
-    return target.finish(&.{file.bytes}, diagnostic);
+/// Encodes by all threads, then writes.
+fn encode(
+    comptime Encoder: type,
+    gpa: Allocator,
+    rows: tonemap.Rows,
+    settings: Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    var encoder: Encoder = try .init(gpa, rows, settings.thread_count);
+    defer encoder.deinit(gpa);
+    var work: Work(Encoder) = .{ .encoder = &encoder };
+    const thread_count = @min(settings.thread_count, encoder.threadCount());
+    parallel.run(thread_count, &work, Work(Encoder).run);
+    return target.finish(encoder.finish(), diagnostic);
+}
+
+/// Stretches of a file, each to one thread.
+fn Work(comptime Encoder: type) type {
+    return struct {
+        encoder: *Encoder,
+        next: std.atomic.Value(u32) = .init(0),
+
+        fn run(work: *@This(), thread_index: usize) void {
+            while (true) {
+                const index = work.next.fetchAdd(1, .monotonic);
+                if (index >= work.encoder.stretch_count) return;
+                work.encoder.encodeStretch(index, thread_index);
+            }
+        }
+    };
 }
 
 test {
+    _ = @import("output/checksum.zig");
+    _ = @import("output/deflate.zig");
+    _ = @import("output/filter.zig");
+    _ = @import("output/huffman.zig");
     _ = pfm;
     _ = png;
     _ = ppm;

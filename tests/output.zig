@@ -46,6 +46,13 @@ const Decoded = struct {
 
 /// Writes the image as a PNG and decodes it.
 fn roundTrip(image: *const Image, settings: raylane.output.Settings) !Decoded {
+    const file = try written(image, settings);
+    defer testing.allocator.free(file);
+    return .init(file);
+}
+
+/// The file that the image becomes; the caller frees it.
+fn written(image: *const Image, settings: raylane.output.Settings) ![]u8 {
     const gpa = testing.allocator;
     const io = testing.io;
     var folder = testing.tmpDir(.{});
@@ -58,9 +65,7 @@ fn roundTrip(image: *const Image, settings: raylane.output.Settings) !Decoded {
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
     var target: raylane.output.Target = try .openFile(io, path, &diagnostic);
     try raylane.output.write(gpa, image, settings, &target, &diagnostic);
-    const file = try folder.dir.readFileAlloc(io, "a.png", gpa, .unlimited);
-    defer gpa.free(file);
-    return .init(file);
+    return folder.dir.readFileAlloc(io, "a.png", gpa, .unlimited);
 }
 
 /// A picture with noise, flat parts and gradients, the latter two of which compress.
@@ -80,7 +85,10 @@ fn testImage(gpa: std.mem.Allocator, width: u32, height: u32) !Image {
 }
 
 test "an opaque PNG holds the encoded colours" {
-    for ([_][2]u32{ .{ 1, 1 }, .{ 1, 300 }, .{ 300, 1 }, .{ 65, 33 }, .{ 257, 191 } }) |size| {
+    const sizes = [_][2]u32{
+        .{ 1, 1 }, .{ 1, 300 }, .{ 300, 1 }, .{ 65, 33 }, .{ 257, 191 }, .{ 30_000, 3 },
+    };
+    for (sizes) |size| {
         var image = try testImage(testing.allocator, size[0], size[1]);
         defer image.deinit(testing.allocator);
         var decoded = try roundTrip(&image, .{ .exposure = .{ .ev = 1 } });
@@ -93,6 +101,20 @@ test "an opaque PNG holds the encoded colours" {
                 const expected = srgb.encode(pixel[channel] * 2);
                 try testing.expectEqual(expected, decoded.pixels[index * 3 + channel]);
             }
+        }
+    }
+}
+
+test "the bytes do not depend on the number of threads" {
+    var image = try testImage(testing.allocator, 500, 400);
+    defer image.deinit(testing.allocator);
+    for (std.enums.values(raylane.output.Format)) |format| {
+        const alone = try written(&image, .{ .format = format });
+        defer testing.allocator.free(alone);
+        for ([_]usize{ 2, 7, 256 }) |thread_count| {
+            const file = try written(&image, .{ .format = format, .thread_count = thread_count });
+            defer testing.allocator.free(file);
+            try testing.expectEqualSlices(u8, alone, file);
         }
     }
 }

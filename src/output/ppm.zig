@@ -1,34 +1,72 @@
 //! Netpbm's binary PPM: RGB of 8 bits, sRGB, rows from the top, no alpha.
 //!
-//! In: the size. Out: the header; the bytes of the rows follow it as they are.
+//! In: rows of sRGB bytes. Out: the parts of the file, its rows written by any number of threads.
 
 const std = @import("std");
+const Allocator = std.mem.Allocator;
+const Image = @import("../image.zig").Image;
+const Rows = @import("tonemap.zig").Rows;
 const assert = std.debug.assert;
 
-/// A PPM's header.
-pub const Header = struct {
-    buffer: [32]u8,
-    length: usize,
+/// A file in the making; see the one of `png.zig`. A stretch is a row.
+pub const Encoder = struct {
+    rows: Rows,
+    stretch_count: usize,
+    bytes: []u8,
+    header_buffer: [32]u8,
+    parts: [2][]const u8,
 
-    /// For a picture of this size.
-    pub fn init(width: u32, height: u32) Header {
-        var header: Header = .{ .buffer = undefined, .length = 0 };
-        var writer: std.Io.Writer = .fixed(&header.buffer);
-        writer.print("P6\n{d} {d}\n255\n", .{ width, height }) catch unreachable;
-        header.length = writer.end;
-        return header;
+    /// Takes the memory. Asserts that there is no alpha.
+    pub fn init(gpa: Allocator, rows: Rows, thread_count: usize) error{OutOfMemory}!Encoder {
+        assert(thread_count >= 1 and rows.channel_count == 3);
+        const byte_count = std.math.mul(usize, rows.byteCount(), rows.image.height) catch
+            return error.OutOfMemory;
+        return .{
+            .rows = rows,
+            .stretch_count = rows.image.height,
+            .bytes = try gpa.alloc(u8, byte_count),
+            .header_buffer = undefined,
+            .parts = undefined,
+        };
     }
 
-    /// Its bytes.
-    pub fn text(header: *const Header) []const u8 {
-        return header.buffer[0..header.length];
+    /// Frees everything.
+    pub fn deinit(encoder: *Encoder, gpa: Allocator) void {
+        gpa.free(encoder.bytes);
+        encoder.* = undefined;
+    }
+
+    /// Threads at most that are of use.
+    pub fn threadCount(encoder: *const Encoder) usize {
+        return encoder.stretch_count;
+    }
+
+    /// Encodes one row.
+    pub fn encodeStretch(encoder: *Encoder, stretch_index: usize, thread_index: usize) void {
+        _ = thread_index;
+        const row_bytes = encoder.rows.byteCount();
+        const bytes = encoder.bytes[stretch_index * row_bytes ..][0..row_bytes];
+        encoder.rows.encode(@intCast(stretch_index), bytes);
+    }
+
+    /// The parts of the file, when all rows are done. They are the encoder's.
+    pub fn finish(encoder: *Encoder) []const []const u8 {
+        const header = headerOf(&encoder.header_buffer, encoder.rows.image);
+        encoder.parts = .{ header, encoder.bytes };
+        return &encoder.parts;
     }
 };
 
-test Header {
+fn headerOf(buffer: *[32]u8, image: *const Image) []const u8 {
+    return std.mem.print(buffer, "P6\n{d} {d}\n255\n", .{ image.width, image.height }) catch
+        unreachable; // Two numbers of 10 digits and 9 bytes more.
+}
+
+test headerOf {
     const largest = std.math.maxInt(u32);
-    const header: Header = .init(largest, 1);
-    try std.testing.expectEqualStrings("P6\n4294967295 1\n255\n", header.text());
-    const header_full: Header = .init(largest, largest);
-    try std.testing.expect(header_full.text().len <= header_full.buffer.len);
+    var buffer: [32]u8 = undefined;
+    const image: Image = .{ .width = largest, .height = 1, .pixels = &.{} };
+    try std.testing.expectEqualStrings("P6\n4294967295 1\n255\n", headerOf(&buffer, &image));
+    const image_full: Image = .{ .width = largest, .height = largest, .pixels = &.{} };
+    try std.testing.expect(headerOf(&buffer, &image_full).len <= buffer.len);
 }

@@ -65,26 +65,55 @@ fn luminanceBits(pixel: [4]f32) u32 {
     return if (luminance > 0) @bitCast(luminance) else 0;
 }
 
+/// The frame as rows of bytes.
+pub const Rows = struct {
+    image: *const Image,
+    /// Exposure.
+    scale: f32,
+    /// 3: over black; 4: with alpha, not premultiplied.
+    channel_count: u8,
+
+    /// Bytes of a row.
+    pub fn byteCount(rows: Rows) usize {
+        assert(rows.channel_count == 3 or rows.channel_count == 4);
+        return @as(usize, rows.image.width) * rows.channel_count;
+    }
+
+    /// Encodes row y. Asserts that `bytes` has the length of one.
+    pub fn encode(rows: Rows, y: u32, bytes: []u8) void {
+        assert(y < rows.image.height and bytes.len == rows.byteCount());
+        const row = rows.image.pixels[@as(usize, y) * rows.image.width ..][0..rows.image.width];
+        if (rows.channel_count == 4) {
+            encodeRgba(row, rows.scale, std.mem.bytesAsSlice([4]u8, bytes));
+        } else {
+            encodeRgb(row, rows.scale, std.mem.bytesAsSlice([3]u8, bytes));
+        }
+    }
+};
+
+const Pixel = @Vector(4, f32);
+
 /// One row over black. Asserts that both rows have the same length.
-pub fn encodeRgb(row: []const [4]f32, scale: f32, bytes: [][3]u8) void {
+fn encodeRgb(row: []const [4]f32, scale: f32, bytes: [][3]u8) void {
     assert(row.len == bytes.len);
     for (row, bytes) |pixel, *out| {
-        inline for (0..3) |channel| out[channel] = math.srgb.encode(pixel[channel] * scale);
+        out.* = math.srgb.encodeLanes(4, pixel * @as(Pixel, @splat(scale)))[0..3].*;
     }
 }
 
 /// One row with alpha: colours are divided by it before they are encoded, alpha itself is linear.
 /// Asserts that both rows have the same length.
-pub fn encodeRgba(row: []const [4]f32, scale: f32, bytes: [][4]u8) void {
+fn encodeRgba(row: []const [4]f32, scale: f32, bytes: [][4]u8) void {
     assert(row.len == bytes.len);
     for (row, bytes) |pixel, *out| {
-        const alpha = pixel[3];
-        out[3] = alphaCode(alpha);
-        if (out[3] == 0) {
+        const alpha = alphaCode(pixel[3]);
+        if (alpha == 0) {
             out.* = @splat(0);
-        } else inline for (0..3) |channel| {
-            out[channel] = math.srgb.encode(pixel[channel] / alpha * scale);
+            continue;
         }
+        const color = pixel / @as(Pixel, @splat(pixel[3]));
+        out.* = math.srgb.encodeLanes(4, color * @as(Pixel, @splat(scale)));
+        out[3] = alpha;
     }
 }
 
