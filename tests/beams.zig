@@ -1,7 +1,7 @@
 //! Beams against brute force: their filter must never decide otherwise than the exact test.
 //!
-//! Tiles of primary rays that look at nasty triangles, from far, from near, within their planes; and
-//! shadow rays from what they see to a point light and along a directional one. Every hit is
+//! Tiles of primary rays that look at nasty triangles, from far, from near, within their planes;
+//! and shadow rays from what they see to a point light and along a directional one. Every hit is
 //! compared, to the bit.
 
 const std = @import("std");

@@ -211,7 +211,8 @@ pub fn Workload(comptime Kernel: type) type {
                 const down: Vec3x = .splat(setup.down);
                 for (&worker.rays.groups, 0..) |*ray, index| {
                     const places = &place_table[index];
-                    const spread = across.scale(.load(&places[0])).add(down.scale(.load(&places[1])));
+                    const spread = across.scale(.load(&places[0]))
+                        .add(down.scale(.load(&places[1])));
                     ray.line.direction = Vec3x.splat(first).add(spread);
                     ray.nearest = .before(.splat(std.math.inf(f32)));
                     ray.active = .splat(true);
@@ -253,7 +254,12 @@ pub fn Workload(comptime Kernel: type) type {
                 return any.any();
             }
 
-            inline fn shadeGroup(worker: *Worker, group: usize, weight: f32, last: bool) Lanes.Mask {
+            inline fn shadeGroup(
+                worker: *Worker,
+                group: usize,
+                weight: f32,
+                last: bool,
+            ) Lanes.Mask {
                 const setup = worker.shared.setup;
                 const ray = &worker.rays.groups[group];
                 const shadow = &worker.shadows.groups[group];
@@ -328,7 +334,8 @@ pub fn Workload(comptime Kernel: type) type {
                     inline for (0..Lanes.count / span) |part| {
                         const place = Batch.places[group * Lanes.count + part * span];
                         const first = @as(usize, y + place[1]) * size + x + place[0];
-                        worker.shared.pixels[first..][0..span].* = colors[part * span ..][0..span].*;
+                        const pixels = worker.shared.pixels[first..][0..span];
+                        pixels.* = colors[part * span ..][0..span].*;
                     }
                 }
             }

@@ -1,8 +1,8 @@
 //! The variant's way to trace a bundle: in company, or every ray by itself.
 //!
-//! In: a bundle, and what its rays have in common. Out: hits in the bundle. The thesis's 2x2 packets
-//! always stay together; the large bundles are beams where they can be, and scatter into single rays
-//! where the rays are known to go different ways.
+//! In: a bundle, and what its rays have in common. Out: hits in the bundle. The thesis's 2x2
+//! packets always stay together; the large bundles are beams where they can be, and scatter into
+//! single rays where the rays are known to go different ways.
 
 const world_file = @import("../world.zig");
 const TestCounts = @import("../statistics.zig").TestCounts;

@@ -1,31 +1,31 @@
 //! Triangles as a beam sees them from the point that its rays share: three edge functions and 1/t,
 //! all linear in a ray's direction, each with a bound on what rounding may have done to it.
 //!
-//! In: a block of triangles, the rays' origin. Out: per triangle the vectors whose dot products with
-//! a direction D are the edge functions and 1/t (Davidovic et al., "3D Rasterization: A Bridge
+//! In: a block of triangles, the rays' origin. Out: per triangle the vectors whose dot products
+//! with a direction D are the edge functions and 1/t (Davidovic et al., "3D Rasterization: A Bridge
 //! between Rasterization and Ray Casting", 2012). Edges are taken in Pluecker form,
 //! (c + b) x (c - b) = 2 b x c, with the difference of the corners as they are in the scene: then
 //! the rounding of an edge is in proportion to its length, not to its distance.
 //!
-//! What is decided here is a filter. Where |edge function| exceeds `slack` |D|, or 1/t differs by
-//! more than its own bounds, the exact test (`triangle.zig`) must come to the same answer; anything
-//! nearer is in doubt and asks the exact test itself.
+//! What is decided here is a filter. Where |edge function| exceeds its bound, or two 1/t differ by
+//! more than theirs, the exact test (`triangle.zig`) must come to the same answer; anything nearer
+//! is in doubt and asks the exact test itself.
 //!
 //! The bounds, with u = 2^-24, R the largest distance of a corner, L the longest edge, D the
 //! direction, T by how much directions of a beam differ, N the normal, S the sum of the absolute
 //! products that its components are differences of, det = a . N.
 //!
 //! Of an edge function, in units of u R L |D|: 8 from rounding b, c and their sum, 2 from the edge,
-//! 5 from the cross product, 6 from the dot product; 48 T / |D| from stepping over a grid. The exact
-//! test moves corners by up to 4 sqrt(2) u R across the ray, on a plane that is stretched by up to
-//! sqrt(3): 40 if that cannot turn the triangle over, for which |det| > 64 u R^2 L is enough.
+//! 5 from the cross product, 6 from the dot product; 48 T / |D| from stepping over a grid. The
+//! exact test moves corners by up to 4 sqrt(2) u R across the ray, on a plane that is stretched by
+//! up to sqrt(3): 40 if that cannot turn the triangle over, for which |det| > 64 u R^2 L is enough.
 //!
 //! Of 1/t: det is off by 8 u R S, N . D by 7 u S |D|. The exact test's t is that of a point of the
 //! triangle's plane off the ray by as much as corners are moved, and weighed with edge functions
 //! that are off by 2 u L^2 of their area (at least |det| / R): relative to 1/t that is
 //! 9 (1 + L^3 / |det|) u R S / |det| and 16 u; corners' depths and their sum are off by 6 sqrt(3)
-//! u R / |D|, and |D| t is at least |det| / S: 11 u R S / |det|. A quarter is added to all of it for what is of second
-//! order.
+//! u R / |D|, and |D| t is at least |det| / S: 11 u R S / |det|. A quarter is added to all of it
+//! for what is of second order.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -105,7 +105,8 @@ pub fn Edges(comptime Lanes: type) type {
             const steepness = absoluteCross(Lanes, edges[1], edges[2]).mul(det_inv.abs());
             const thinness = length_squared.mul(length).mul(det_inv.abs());
             const relative = weighed(Lanes, steepness.mul(reach), thinness);
-            const turns_over = reach.mul(reach).mul(length).mul(unit).mul(.splat(turning_roundings));
+            const turns_over = reach.mul(reach).mul(length)
+                .mul(.splat(turning_roundings * unit_roundoff));
             return .{
                 .normal = .{
                     cross(Lanes, c.add(b), edges[0]).scale(flip),

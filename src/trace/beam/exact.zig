@@ -21,7 +21,11 @@ pub inline fn place(comptime width: u32, slot: Slot) struct { block: u32, lane: 
 }
 
 /// Number of the triangle in a slot.
-pub inline fn primitiveAt(comptime width: u32, tree: *const world_file.Tree(width), slot: Slot) i32 {
+pub inline fn primitiveAt(
+    comptime width: u32,
+    tree: *const world_file.Tree(width),
+    slot: Slot,
+) i32 {
     const at = place(width, slot);
     return @bitCast(tree.blocks[at.block].primitive[at.lane]);
 }
@@ -83,7 +87,9 @@ pub fn insideAt(
     var offsets: [3]Single.Vec3 = undefined;
     for (&offsets, 0..) |*offset, index| {
         const corner = cornerAt(Kernel.width, tree, slot, index);
-        offset.* = .splat(.{ corner[a] - origin[a], corner[b] - origin[b], corner[axis] - origin[axis] });
+        offset.* = .splat(.{
+            corner[a] - origin[a], corner[b] - origin[b], corner[axis] - origin[axis],
+        });
     }
     const seen = triangle.projectOffsets(Single, offsets, shear);
     var weights = triangle.weigh(Single, seen);

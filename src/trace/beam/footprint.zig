@@ -1,11 +1,11 @@
 //! Triangles as a light sees them: edge functions and depth, linear on the plane across its rays.
 //!
 //! In: a block of triangles, and how points fall onto that plane (`Projection`). Out: by triangle
-//! three edge functions and a measure of nearness, each a value u + b v + c, with bounds on
-//! their errors in the manner of edges.zig. For a point light (u, v) are slopes, edge functions those
-//! of edges.zig over the slope's axis, nearness is 1/depth; for a directional one (u, v) is where
-//! the light's ray meets an axis plane, nearness is minus the depth. In both a triangle stands before
-//! a point if its nearness is greater than the point's own.
+//! three edge functions and a measure of nearness, each a value a u + b v + c, with bounds on their
+//! errors in the manner of edges.zig. For a point light (u, v) are slopes, edge functions those of
+//! edges.zig over the slope's axis, nearness is 1/depth; for a directional one (u, v) is where the
+//! light's ray meets an axis plane, nearness is minus the depth. In both a triangle stands before a
+//! point if its nearness is greater than the point's own.
 
 const std = @import("std");
 const ray_file = @import("../ray.zig");
@@ -120,7 +120,8 @@ pub fn Footprint(comptime Lanes: type) type {
             slope_max: f32,
             reach_max: f32,
         ) @This() {
-            const edges: edges_file.Edges(Lanes) = .init(corners, .splat(projection.origin), reach_max);
+            const edges: edges_file.Edges(Lanes) =
+                .init(corners, .splat(projection.origin), reach_max);
             const sign: F32 = .splat(projection.sign);
             const unit = edges_file.unit_roundoff * @sqrt(1 + 2 * slope_max * slope_max);
             const axis = projection.axis;

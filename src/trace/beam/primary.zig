@@ -241,6 +241,8 @@ fn Search(comptime Kernel: type) type {
         }
 
         /// Sets up the triangles of a block and goes on with those that the beam may see.
+        ///
+        /// Long: a score of lane values live through it, and stay in registers only here.
         fn meetBlock(search: *Self, block_index: u32) void {
             @setEvalBranchQuota(2000);
             const block = &search.tree.blocks[block_index];
@@ -290,7 +292,8 @@ fn Search(comptime Kernel: type) type {
             if (rest | undecided == 0) return;
             var window = Window.everywhere;
             // Bounds tell more than edges of small triangles only.
-            const small = edges.length.mul(.splat(search.dual.gain)).lt(edges.reach.mul(.splat(side)));
+            const small = edges.length.mul(.splat(search.dual.gain))
+                .lt(edges.reach.mul(.splat(side)));
             if (small.any()) {
                 window = search.windowOf(corners, edges.reach);
                 rest &= window.holds_pixels.bits();
@@ -498,7 +501,8 @@ fn Search(comptime Kernel: type) type {
             inline for (0..4) |index| {
                 const r = coverage.right[index];
                 const d = coverage.down[index];
-                const base = coverage.base[index] + block_x[block] * r + (block_y[block] + first) * d;
+                const base = coverage.base[index] + block_x[block] * r +
+                    (block_y[block] + first) * d;
                 var start: F32 = .splat(base);
                 if (Kernel.group_height > 1) start = y.mulAdd(.splat(d), start);
                 value[index] = x.mulAdd(.splat(r), start);

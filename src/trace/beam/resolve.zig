@@ -57,7 +57,8 @@ const Course = struct {
                     (if (index & 2 == 0) 0 else last * down);
                 if (@abs(to.*) > @abs(direction[longest])) longest = @intCast(axis);
             }
-            if (index > 0 and course.axis != longest) return .{ .axis = null, .negative = undefined };
+            if (index > 0 and course.axis != longest)
+                return .{ .axis = null, .negative = undefined };
             course.axis = longest;
             for (direction, &course.negative, 0..) |component, *negative, axis| {
                 const length = @abs(component);

@@ -352,7 +352,8 @@ fn Search(comptime Kernel: type) type {
             search.basis = .{};
             const corners = comptime cornerPixels();
             for (corners) |pixel| {
-                if (members[pixel / block_pixels] >> @intCast(pixel % block_pixels) & 1 == 0) return;
+                const block = members[pixel / block_pixels];
+                if (block >> @intCast(pixel % block_pixels) & 1 == 0) return;
             }
             const u = [4]f32{
                 search.u[corners[0]], search.u[corners[1]],
@@ -400,8 +401,9 @@ fn Search(comptime Kernel: type) type {
         /// Bounds of blocks and of all.
         fn bound(search: *Self, members: *const Members) void {
             const basis = &search.basis;
-            const margin = 64 * edges_file.unit_roundoff * (1 + 2 * search.slope_max) *
-                basis.norm() * (if (search.projection.slope == null) 1 else search.projection.reach);
+            const unit = 64 * edges_file.unit_roundoff * (1 + 2 * search.slope_max);
+            const length = if (search.projection.slope == null) 1 else search.projection.reach;
+            const margin = unit * basis.norm() * length;
             search.bounds = .{};
             search.live = 0;
             for (0..block_count) |index| {
@@ -412,7 +414,8 @@ fn Search(comptime Kernel: type) type {
                 if (members[index] != 0) {
                     for (0..Kernel.block_groups) |row| {
                         const first = index * block_pixels + row * lanes;
-                        const near: F32 = .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
+                        const near: F32 =
+                            .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
                         const there = near.lt(.splat(inf));
                         const x: F32 = .loadAligned(@alignCast(search.u[first..][0..lanes]));
                         const y: F32 = .loadAligned(@alignCast(search.v[first..][0..lanes]));
@@ -461,8 +464,9 @@ fn Search(comptime Kernel: type) type {
             if (count == 0) return null;
             const share: f32 = @floatFromInt(count);
             if (!(search.bounds.area() > cut_ratio * share * median(areas[0..count]))) return null;
-            const along_u = (search.bounds.u[1] - search.bounds.u[0]) * median(extents[1][0..count]) >
-                (search.bounds.v[1] - search.bounds.v[0]) * median(extents[0][0..count]);
+            const bounds = &search.bounds;
+            const along_u = (bounds.u[1] - bounds.u[0]) * median(extents[1][0..count]) >
+                (bounds.v[1] - bounds.v[0]) * median(extents[0][0..count]);
             const basis = &search.basis;
             const range = if (along_u) search.bounds.u else search.bounds.v;
             const middle: F32 = .splat(0.5 * (range[0] + range[1]));
@@ -568,6 +572,8 @@ fn Search(comptime Kernel: type) type {
         }
 
         /// Sets up the triangles of a block and goes on with those that may stand in the way.
+        ///
+        /// Long: a score of lane values live through it, and stay in registers only here.
         fn meetBlock(search: *Self, block_index: u32) void {
             @setEvalBranchQuota(4000);
             const block_ = &search.tree.blocks[block_index];
