@@ -110,8 +110,9 @@ fn Near(comptime count: usize) type {
                 .none => @as(Bytes, @splat(0)),
                 .sub => near.left,
                 .up => near.above,
-                // Half of the sum, rounded down, without the ninth bit of the sum.
-                .average => (near.left & near.above) +
+                // Half of the sum, rounded down, without the ninth bit of the sum. It cannot wrap;
+                // a checked addition is found to overflow by AArch64 code all the same.
+                .average => (near.left & near.above) +%
                     ((near.left ^ near.above) >> @as(@Vector(count, u3), @splat(1))),
                 .paeth => near.paeth(),
             };
