@@ -74,7 +74,7 @@ fn choose(row: Row, above: Row, pixel_bytes: u8) Filter {
         var lanes: [filters.len]@Vector(lane_count, u16) = @splat(@splat(0));
         while (place < end) : (place += lane_count) {
             const near: Near(lane_count) = .init(row, above, pixel_bytes, place);
-            inline for (&lanes, filters) |*sum, filter| sum.* += near.size(filter);
+            inline for (&lanes, filters) |*sum, filter| sum.* +%= near.size(filter);
         }
         for (&sums, lanes) |*sum, part| sum.* += @reduce(.Add, @as(@Vector(lane_count, u32), part));
     }
@@ -93,6 +93,8 @@ fn Near(comptime count: usize) type {
         above: Bytes,
         above_left: Bytes,
 
+        // Nothing below wraps but where it should. Additions and subtractions are unchecked all the
+        // same: the check of vectors of bytes finds an overflow where there is none on AArch64.
         const Bytes = @Vector(count, u8);
 
         inline fn init(row: Row, row_above: Row, pixel_bytes: u8, place: usize) @This() {
@@ -110,8 +112,7 @@ fn Near(comptime count: usize) type {
                 .none => @as(Bytes, @splat(0)),
                 .sub => near.left,
                 .up => near.above,
-                // Half of the sum, rounded down, without the ninth bit of the sum. It cannot wrap;
-                // a checked addition is found to overflow by AArch64 code all the same.
+                // Half of the sum, rounded down, without the ninth bit of the sum.
                 .average => (near.left & near.above) +%
                     ((near.left ^ near.above) >> @as(@Vector(count, u3), @splat(1))),
                 .paeth => near.paeth(),
@@ -144,7 +145,7 @@ fn Near(comptime count: usize) type {
         }
 
         inline fn distance(a: Bytes, b: Bytes) Bytes {
-            return @max(a, b) - @min(a, b);
+            return @max(a, b) -% @min(a, b);
         }
     };
 }
