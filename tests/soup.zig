@@ -75,22 +75,20 @@ fn expectVariant(
     expected: []const Hit,
 ) !void {
     const Kernel = raylane.trace.kernel.Kernel(variant, false);
-    const tree = world.tree.get(Kernel.width);
     var counts: raylane.statistics.TestCounts = .{};
     for (queries, expected) |query, hit| {
         var ray = query.ray();
         const found = raylane.trace.single.trace(
             Kernel,
             .nearest,
-            tree,
-            world.pad,
+            world,
             &ray,
             &counts,
         );
         try expectHit(hit, ray.nearest.t.lane(0), ray.nearest.primitive.lane(0));
         try std.testing.expectEqual(hit.primitive != ray_file.no_primitive, found);
         var shadow = query.ray();
-        const blocked = raylane.trace.single.trace(Kernel, .any, tree, world.pad, &shadow, &counts);
+        const blocked = raylane.trace.single.trace(Kernel, .any, world, &shadow, &counts);
         try std.testing.expectEqual(found, blocked);
     }
     if (Kernel.ray_count > 1) try expectBundles(Kernel, world, queries, expected);
@@ -367,12 +365,10 @@ test "a closed surface stops every ray that aims at its edges and corners, near 
             var ray = (Query{ .origin = origin, .direction = direction }).ray();
             var counts: raylane.statistics.TestCounts = .{};
             const Kernel = raylane.trace.kernel.Kernel(raylane.variant.compiled[0], false);
-            const tree = world.tree.get(Kernel.width);
             const hit = raylane.trace.single.trace(
                 Kernel,
                 .nearest,
-                tree,
-                world.pad,
+                &world,
                 &ray,
                 &counts,
             );

@@ -37,7 +37,7 @@ pub fn trace(
     const tree = world.tree.get(Kernel.width);
     switch (Kernel.variant.traversal) {
         .single => if (bundle.groups[0].active.lane(0)) {
-            _ = single.trace(Kernel, query, tree, world.pad, &bundle.groups[0], counts);
+            _ = single.trace(Kernel, query, world, &bundle.groups[0], counts);
         },
         .packet2x2 => packet.trace(Kernel, query, tree, world.pad, bundle, counts),
         .packet => switch (company) {
@@ -66,14 +66,13 @@ pub fn traceApart(
     group: anytype,
     counts: *TestCounts,
 ) void {
-    const tree = world.tree.get(Kernel.width);
     var ts = group.nearest.t.toArray();
     var primitives = group.nearest.primitive.toArray();
     var bits = group.active.bits();
     while (bits != 0) : (bits &= bits - 1) {
         const lane = @ctz(bits);
         var ray = group.extract(lane);
-        _ = single.trace(Kernel, query, tree, world.pad, &ray, counts);
+        _ = single.trace(Kernel, query, world, &ray, counts);
         ts[lane] = ray.nearest.t.lane(0);
         primitives[lane] = ray.nearest.primitive.lane(0);
     }

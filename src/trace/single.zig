@@ -2,7 +2,8 @@
 //!
 //! In: a ray by itself. Out: its nearest hit, or whether there is any. SIMD runs across the tree,
 //! so that a ray gains from lanes without company. Which hit wins does not depend on the order of
-//! the visits (ray.zig), nor does culling change it (box.zig).
+//! the visits (ray.zig), nor does culling change it (box.zig; `World.fused_reach` for the rounding
+//! of multiply-adds).
 
 const std = @import("std");
 const world_file = @import("../world.zig");
@@ -14,6 +15,7 @@ const stack_file = @import("stack.zig");
 const assert = std.debug.assert;
 const Entry = stack_file.Entry;
 const Single = ray_file.Single;
+const World = world_file.World;
 
 /// What a ray wants to know.
 pub const Query = enum {
@@ -23,51 +25,61 @@ pub const Query = enum {
     any,
 };
 
-/// The nearest hit so far, and what the tree holds of the ray in the lanes of boxes.
-fn Search(comptime Kernel: type) type {
-    const Boxes = Kernel.Boxes;
-    return struct {
-        slabs: ray_file.Slabs(Boxes),
-        view: ray_file.View(Boxes),
-        /// The ray's longest axis.
-        axis: u2,
-        after: ray_file.Hit(Boxes),
-        skip: Boxes.I32,
-        nearest_t: f32,
-        nearest_primitive: i32,
-        /// Index of the near face in `Node.bounds`, by axis.
-        near_side: [3]u1,
-        pad: f32,
-    };
-}
-
 /// Looks for a hit and keeps it in `ray.nearest`. Returns whether there was one.
 pub fn trace(
     comptime Kernel: type,
     comptime query: Query,
-    tree: *const world_file.Tree(Kernel.width),
-    pad: f32,
+    world: *const World,
     ray: *ray_file.Ray(Single),
     counts: *TestCounts,
 ) bool {
-    var search = begin(Kernel, ray, pad);
+    const origin = ray.line.origin.lane(0);
+    const reach = @max(@abs(origin[0]), @abs(origin[1]), @abs(origin[2]));
+    return if (reach < world.fused_reach)
+        travel(Kernel, query, true, world, ray, counts)
+    else
+        travel(Kernel, query, false, world, ray, counts);
+}
+
+/// Down to the nearest child at once; its siblings wait.
+fn travel(
+    comptime Kernel: type,
+    comptime query: Query,
+    comptime fused: bool,
+    world: *const World,
+    ray: *ray_file.Ray(Single),
+    counts: *TestCounts,
+) bool {
+    const tree = world.tree.get(Kernel.width);
+    var search: Search(Kernel, fused) = .init(ray, world.pad);
     var stack: [Kernel.stack_max]Entry = undefined;
-    stack[0] = .{ .child = 0, .block_count = 0, .near = 0 };
-    var stack_count: usize = 1;
+    var stack_count: usize = 0;
     var found = false;
-    while (stack_count > 0) {
-        stack_count -= 1;
-        const entry = stack[stack_count];
-        if (entry.near > search.nearest_t) continue;
+    var entry: Entry = .{ .child = 0, .block_count = 0, .near = 0 };
+    while (true) {
         if (entry.block_count == 0) {
             assert(stack_count + Kernel.width <= Kernel.stack_max);
             const node = &tree.nodes[entry.child];
-            stack_count = pushChildren(Kernel, &search, node, &stack, stack_count, counts);
+            const range = search.meet(node);
+            if (Kernel.counts_tests) countNode(Kernel, node, counts);
+            const met = range.near.le(range.far).bits();
+            if (met != 0) {
+                const near = range.near;
+                entry = stack_file.descend(Kernel.Boxes, node, met, near, &stack, &stack_count);
+                continue;
+            }
         } else {
-            const blocks = tree.blocks[entry.child..][0..entry.block_count];
-            for (blocks) |*block| found = intersect(Kernel, &search, block, counts) or found;
+            for (tree.blocks[entry.child..][0..entry.block_count]) |*block| {
+                if (Kernel.counts_tests) countBlock(Kernel, block, counts);
+                found = search.intersect(block) or found;
+            }
             if (query == .any and found) break;
         }
+        entry = while (stack_count > 0) {
+            stack_count -= 1;
+            const top = stack[stack_count];
+            if (top.near <= search.nearest_t) break top;
+        } else break;
     }
     ray.nearest = .{
         .t = .splat(search.nearest_t),
@@ -76,119 +88,135 @@ pub fn trace(
     return found;
 }
 
-inline fn begin(comptime Kernel: type, ray: *const ray_file.Ray(Single), pad: f32) Search(Kernel) {
+/// The nearest hit so far, and the ray in the lanes of boxes. With `fused`, nodes are tested by
+/// multiply-adds.
+fn Search(comptime Kernel: type, comptime fused: bool) type {
     const Boxes = Kernel.Boxes;
-    const spread = struct {
-        inline fn vec3(v: Single.Vec3) Boxes.Vec3 {
+    const F32 = Boxes.F32;
+    const Rows = [6][Kernel.width]f32;
+    return struct {
+        /// What a bound has added before it is multiplied, or after with `fused`.
+        shift: Boxes.Vec3,
+        inverse: Boxes.Vec3,
+        /// Rows of `Node.bounds`, lower x y z and upper x y z, that are the near faces and the far.
+        near_row: [3]usize,
+        far_row: [3]usize,
+        view: ray_file.View(Boxes),
+        /// The ray's longest axis.
+        axis: u2,
+        after: ray_file.Hit(Boxes),
+        skip: Boxes.I32,
+        nearest_t: f32,
+        nearest_primitive: i32,
+        pad: f32,
+
+        const Self = @This();
+
+        inline fn init(ray: *const ray_file.Ray(Single), pad: f32) Self {
+            const slabs: ray_file.Slabs(Single) = .init(ray.line);
+            const axis: ray_file.LongAxis(Single) = .of(ray.line.direction);
+            const view: ray_file.View(Single) = .init(ray.line, axis);
+            const inverse = spread(slabs.direction_inv);
+            const origin = spread(slabs.origin);
+            var near_row: [3]usize = undefined;
+            var far_row: [3]usize = undefined;
+            for (&near_row, &far_row, slabs.negative, 0..) |*near, *far, negative, row| {
+                const down = negative.lane(0);
+                near.* = row + @as(usize, if (down) 3 else 0);
+                far.* = row + @as(usize, if (down) 0 else 3);
+            }
+            var negative: [3]Boxes.Mask = undefined;
+            for (&negative, view.negative) |*lanes, mask| lanes.* = .splat(mask.lane(0));
+            return .{
+                .shift = if (fused) origin.mul(inverse).neg() else origin,
+                .inverse = inverse,
+                .near_row = near_row,
+                .far_row = far_row,
+                .view = .{
+                    .origin = spread(view.origin),
+                    .direction_inv = spread(view.direction_inv),
+                    .negative = negative,
+                    .shear = spread(view.shear),
+                },
+                .axis = axis.uniform(.splat(true)).?,
+                .after = .{
+                    .t = .splat(ray.after.t.lane(0)),
+                    .primitive = .splat(ray.after.primitive.lane(0)),
+                },
+                .skip = .splat(ray.skip.lane(0)),
+                .nearest_t = ray.nearest.t.lane(0),
+                .nearest_primitive = ray.nearest.primitive.lane(0),
+                .pad = pad,
+            };
+        }
+
+        inline fn spread(v: Single.Vec3) Boxes.Vec3 {
             return .splat(v.lane(0));
         }
-    };
-    const slabs: ray_file.Slabs(Single) = .init(ray.line);
-    var near_side: [3]u1 = undefined;
-    var negative: [3]Boxes.Mask = undefined;
-    for (0..3) |axis| {
-        const down = slabs.negative[axis].lane(0);
-        near_side[axis] = @intFromBool(down);
-        negative[axis] = .splat(down);
-    }
-    const axis: ray_file.LongAxis(Single) = .of(ray.line.direction);
-    const view: ray_file.View(Single) = .init(ray.line, axis);
-    var view_negative: [3]Boxes.Mask = undefined;
-    for (&view_negative, view.negative) |*spreaded, mask| spreaded.* = .splat(mask.lane(0));
-    return .{
-        .slabs = .{
-            .origin = spread.vec3(slabs.origin),
-            .direction_inv = spread.vec3(slabs.direction_inv),
-            .negative = negative,
-        },
-        .view = .{
-            .origin = spread.vec3(view.origin),
-            .direction_inv = spread.vec3(view.direction_inv),
-            .negative = view_negative,
-            .shear = spread.vec3(view.shear),
-        },
-        .axis = axis.uniform(.splat(true)).?,
-        .after = .{
-            .t = .splat(ray.after.t.lane(0)),
-            .primitive = .splat(ray.after.primitive.lane(0)),
-        },
-        .skip = .splat(ray.skip.lane(0)),
-        .nearest_t = ray.nearest.t.lane(0),
-        .nearest_primitive = ray.nearest.primitive.lane(0),
-        .near_side = near_side,
-        .pad = pad,
-    };
-}
 
-/// Pushes the children that may hold a hit, the nearest on top. Returns the new stack count.
-inline fn pushChildren(
-    comptime Kernel: type,
-    search: *const Search(Kernel),
-    node: *const world_file.Node(Kernel.width),
-    stack: []Entry,
-    stack_count_before: usize,
-    counts: *TestCounts,
-) usize {
-    const Boxes = Kernel.Boxes;
-    const near_side = search.near_side;
-    const near: Boxes.Vec3 = .{
-        .x = .load(&node.bounds[near_side[0]][0]),
-        .y = .load(&node.bounds[near_side[1]][1]),
-        .z = .load(&node.bounds[near_side[2]][2]),
-    };
-    const far: Boxes.Vec3 = .{
-        .x = .load(&node.bounds[1 - near_side[0]][0]),
-        .y = .load(&node.bounds[1 - near_side[1]][1]),
-        .z = .load(&node.bounds[1 - near_side[2]][2]),
-    };
-    const range = box.slab(Boxes, near, far, search.slabs.origin, search.slabs.direction_inv);
-    const hits = box.mayHold(Boxes, range, search.after.t, .splat(search.nearest_t));
-    if (Kernel.counts_tests) {
-        counts.box_issued += Kernel.width;
-        for (node.child) |child| counts.box_useful += @intFromBool(child != world_file.none);
-    }
-    return stack_file.push(Boxes, node, hits.bits(), range.near, stack, stack_count_before);
-}
-
-/// Tests the triangles of a block and keeps the nearest hit. Returns whether there was one.
-inline fn intersect(
-    comptime Kernel: type,
-    search: *Search(Kernel),
-    block: *const world_file.TriangleBlock(Kernel.width),
-    counts: *TestCounts,
-) bool {
-    const Boxes = Kernel.Boxes;
-    const corners = loadCorners(Boxes, block, search.axis);
-    if (Kernel.counts_tests) countBlock(Kernel, block, counts);
-    const seen = triangle.project(Boxes, corners, &search.view);
-    var weights = triangle.weigh(Boxes, seen);
-    const agreeing = weights.agree();
-    if (agreeing.none()) return false;
-    const inside = triangle.settle(Boxes, seen, &weights, agreeing);
-    const hit = triangle.locate(Boxes, seen, weights, corners, &search.view, search.pad);
-    const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
-    const nearest: ray_file.Hit(Boxes) = .{
-        .t = .splat(search.nearest_t),
-        .primitive = .splat(search.nearest_primitive),
-    };
-    const accepted = inside.bitAnd(hit.mask)
-        .bitAnd(search.after.isBefore(hit.t, primitive))
-        .bitAnd(nearest.isAfter(hit.t, primitive))
-        .andNot(primitive.eq(search.skip));
-    var bits = accepted.bits();
-    if (bits == 0) return false;
-    const ts = hit.t.toArray();
-    while (bits != 0) : (bits &= bits - 1) {
-        const lane = @ctz(bits);
-        const number: i32 = @bitCast(block.primitive[lane]);
-        const closer = ts[lane] < search.nearest_t or
-            (ts[lane] == search.nearest_t and number < search.nearest_primitive);
-        if (closer) {
-            search.nearest_t = ts[lane];
-            search.nearest_primitive = number;
+        /// Where the ray is within the children's boxes and its own limits: near <= far where a
+        /// child may hold a hit.
+        inline fn meet(search: *const Self, node: *const world_file.Node(Kernel.width)) Range {
+            const rows: *const Rows = @ptrCast(&node.bounds);
+            var near: [3]F32 = undefined;
+            var far: [3]F32 = undefined;
+            const shifts = [3]F32{ search.shift.x, search.shift.y, search.shift.z };
+            const inverses = [3]F32{ search.inverse.x, search.inverse.y, search.inverse.z };
+            inline for (0..3) |axis| {
+                const shift = shifts[axis];
+                const inverse = inverses[axis];
+                near[axis] = along(.load(&rows[search.near_row[axis]]), shift, inverse);
+                far[axis] = along(.load(&rows[search.far_row[axis]]), shift, inverse);
+            }
+            const limit: F32 = .splat(search.nearest_t);
+            return .{
+                .near = near[0].maxFast(near[1]).maxFast(near[2].maxFast(search.after.t)),
+                .far = far[0].minFast(far[1]).minFast(far[2].minFast(limit)),
+            };
         }
-    }
-    return true;
+
+        const Range = box.Range(Boxes);
+
+        inline fn along(bound: F32, shift: F32, inverse: F32) F32 {
+            return if (fused) bound.mulAdd(inverse, shift) else bound.sub(shift).mul(inverse);
+        }
+
+        /// Tests the triangles of a block and keeps the nearest hit. Returns whether there was one.
+        inline fn intersect(
+            search: *Self,
+            block: *const world_file.TriangleBlock(Kernel.width),
+        ) bool {
+            const corners = loadCorners(Boxes, block, search.axis);
+            const seen = triangle.project(Boxes, corners, &search.view);
+            var weights = triangle.weigh(Boxes, seen);
+            if (weights.mayAgree().none()) return false;
+            const inside = triangle.settle(Boxes, seen, &weights, weights.agree());
+            const hit = triangle.locate(Boxes, seen, weights, corners, &search.view, search.pad);
+            const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
+            const nearest: ray_file.Hit(Boxes) = .{
+                .t = .splat(search.nearest_t),
+                .primitive = .splat(search.nearest_primitive),
+            };
+            const accepted = inside.bitAnd(hit.mask)
+                .bitAnd(search.after.isBefore(hit.t, primitive))
+                .bitAnd(nearest.isAfter(hit.t, primitive))
+                .andNot(primitive.eq(search.skip));
+            var bits = accepted.bits();
+            if (bits == 0) return false;
+            const ts = hit.t.toArray();
+            while (bits != 0) : (bits &= bits - 1) {
+                const lane = @ctz(bits);
+                const number: i32 = @bitCast(block.primitive[lane]);
+                const closer = ts[lane] < search.nearest_t or
+                    (ts[lane] == search.nearest_t and number < search.nearest_primitive);
+                if (closer) {
+                    search.nearest_t = ts[lane];
+                    search.nearest_primitive = number;
+                }
+            }
+            return true;
+        }
+    };
 }
 
 /// The corners of a block's triangles in lanes, turned so that `axis` is z.
@@ -202,6 +230,11 @@ inline fn loadCorners(comptime Boxes: type, block: anytype, axis: u2) [3]Boxes.V
         };
     }
     return corners;
+}
+
+fn countNode(comptime Kernel: type, node: anytype, counts: *TestCounts) void {
+    counts.box_issued += Kernel.width;
+    for (node.child) |child| counts.box_useful += @intFromBool(child != world_file.none);
 }
 
 fn countBlock(comptime Kernel: type, block: anytype, counts: *TestCounts) void {

@@ -28,11 +28,7 @@ pub inline fn push(
     var rest = met;
     while (rest != 0) : (rest &= rest - 1) {
         const child = @ctz(rest);
-        const entry: Entry = .{
-            .child = node.child[child],
-            .block_count = node.block_count[child],
-            .near = nears[child],
-        };
+        const entry = entryOf(node, child, &nears);
         var slot = count;
         while (slot > entry_count and entries[slot - 1].near < entry.near) : (slot -= 1) {
             entries[slot] = entries[slot - 1];
@@ -41,4 +37,37 @@ pub inline fn push(
         count += 1;
     }
     return count;
+}
+
+/// Takes the child with the least `near` of those in `met`, a bit each and at least one, and pushes
+/// the others, nearer ones on top.
+pub inline fn descend(
+    comptime Lanes: type,
+    node: *const world_file.Node(Lanes.count),
+    met: u32,
+    near: Lanes.F32,
+    entries: []Entry,
+    entry_count: *usize,
+) Entry {
+    const nears = near.toArray();
+    const others = met & (met - 1);
+    const one = entryOf(node, @ctz(met), &nears);
+    if (others == 0) return one;
+    const other = entryOf(node, @ctz(others), &nears);
+    if (others & (others - 1) == 0) {
+        const first = one.near <= other.near;
+        entries[entry_count.*] = if (first) other else one;
+        entry_count.* += 1;
+        return if (first) one else other;
+    }
+    entry_count.* = push(Lanes, node, met, near, entries, entry_count.*) - 1;
+    return entries[entry_count.*];
+}
+
+inline fn entryOf(node: anytype, child: usize, nears: anytype) Entry {
+    return .{
+        .child = node.child[child],
+        .block_count = node.block_count[child],
+        .near = nears[child],
+    };
 }

@@ -68,6 +68,14 @@ pub fn Weights(comptime Lanes: type) type {
             return front.bitOr(back);
         }
 
+        /// Set where they agree, and perhaps where one is NaN: quicker, to leave early.
+        pub inline fn mayAgree(weights: @This()) Lanes.Mask {
+            const zero: Lanes.F32 = .zero();
+            const least = weights.a.minFast(weights.b).minFast(weights.c);
+            const greatest = weights.a.maxFast(weights.b).maxFast(weights.c);
+            return least.ge(zero).bitOr(greatest.le(zero));
+        }
+
         /// Their sum, twice the area of the triangle seen.
         pub inline fn sum(weights: @This()) Lanes.F32 {
             return weights.a.add(weights.b).add(weights.c);

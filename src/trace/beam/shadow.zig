@@ -220,13 +220,12 @@ fn Search(comptime Kernel: type) type {
 
         /// Rays of a set, each by itself.
         fn apart(search: *Self, members: *const Members) void {
-            const pad = search.world.pad;
             for (&search.bundle.groups, 0..) |*group, index| {
                 var bits = groupOf(members, index).bits();
                 while (bits != 0) : (bits &= bits - 1) {
                     const lane = @ctz(bits);
                     var ray = group.extract(lane);
-                    if (single.trace(Kernel, .any, search.tree, pad, &ray, search.counts)) {
+                    if (single.trace(Kernel, .any, search.world, &ray, search.counts)) {
                         search.blockRay(index, lane, ray.nearest.primitive.lane(0));
                     }
                 }
