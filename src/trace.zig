@@ -23,6 +23,8 @@ pub const ray = @import("trace/ray.zig");
 pub const triangle = @import("trace/triangle.zig");
 /// One ray through the tree.
 pub const single = @import("trace/single.zig");
+pub const interval = @import("trace/interval.zig");
+pub const walk = @import("trace/walk.zig");
 /// A bundle of rays through the tree.
 pub const packet = @import("trace/packet.zig");
 /// Primary rays as a beam.

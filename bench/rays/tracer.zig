@@ -12,7 +12,7 @@ const ray_file = raylane.trace.ray;
 const triangle = raylane.trace.triangle;
 const Company = query_file.Company;
 const Grid = raylane.trace.Grid;
-const Query = raylane.trace.single.Query;
+const Query = raylane.trace.walk.Query;
 const World = raylane.world.World;
 
 /// Traces batches with one variant.
@@ -67,7 +67,7 @@ pub fn Tracer(comptime Kernel: type) type {
                     group.* = bundle.groups[0];
                 },
                 .single => for (&batch.groups) |*group| {
-                    query_file.traceApart(Kernel, query, world, group, tests);
+                    raylane.trace.single.traceEach(Kernel, query, world, group, tests);
                 },
             }
         }

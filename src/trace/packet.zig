@@ -11,9 +11,9 @@ const TestCounts = @import("../statistics.zig").TestCounts;
 const ray_file = @import("ray.zig");
 const box = @import("box.zig");
 const triangle = @import("triangle.zig");
-const single = @import("single.zig");
+const walk = @import("walk.zig");
 const assert = std.debug.assert;
-const Query = single.Query;
+const Query = walk.Query;
 
 /// Groups of rays that travel together.
 pub fn Bundle(comptime Kernel: type) type {
@@ -21,7 +21,7 @@ pub fn Bundle(comptime Kernel: type) type {
 }
 
 /// How triangles look to a group.
-fn GroupView(comptime Rays: type) type {
+pub fn GroupView(comptime Rays: type) type {
     return struct {
         slabs: ray_file.Slabs(Rays),
         axis: ray_file.LongAxis(Rays),
@@ -77,7 +77,8 @@ pub fn trace(
     }
 }
 
-fn viewOf(comptime Rays: type, group: *const ray_file.Ray(Rays)) GroupView(Rays) {
+/// Views of the active rays of a group.
+pub fn viewOf(comptime Rays: type, group: *const ray_file.Ray(Rays)) GroupView(Rays) {
     if (group.active.none()) return undefined;
     const axis: ray_file.LongAxis(Rays) = .of(group.line.direction);
     return .{
@@ -201,13 +202,13 @@ inline fn intersectBlock(
                 counts.triangle_useful += group.active.popCount();
             }
             const corners = turnedCorners(Kernel.Rays, block, lane, &views[index]);
-            intersect(Kernel, query, group, &views[index].view, corners, primitive, pad);
+            _ = intersect(Kernel, query, group, &views[index].view, corners, primitive, pad);
         }
     }
 }
 
-/// Tests one triangle against one group.
-inline fn intersect(
+/// Tests one triangle against the active rays of one group. Returns whether any took the hit.
+pub inline fn intersect(
     comptime Kernel: type,
     comptime query: Query,
     group: *ray_file.Ray(Kernel.Rays),
@@ -215,12 +216,12 @@ inline fn intersect(
     corners: [3]Kernel.Rays.Vec3,
     primitive_number: i32,
     pad: f32,
-) void {
+) bool {
     const Rays = Kernel.Rays;
     const seen = triangle.project(Rays, corners, view);
     var weights = triangle.weigh(Rays, seen);
+    if (weights.mayAgree().bitAnd(group.active).none()) return false;
     const agreeing = weights.agree().bitAnd(group.active);
-    if (agreeing.none()) return;
     const inside = triangle.settle(Rays, seen, &weights, agreeing);
     const hit = triangle.locate(Rays, seen, weights, corners, view, pad);
     const primitive: Rays.I32 = .splat(primitive_number);
@@ -232,10 +233,11 @@ inline fn intersect(
     const t: Rays.F32 = if (query == .any) .splat(-std.math.inf(f32)) else hit.t;
     group.nearest.t = Rays.F32.select(accepted, t, group.nearest.t);
     group.nearest.primitive = Rays.I32.select(accepted, primitive, group.nearest.primitive);
+    return accepted.any();
 }
 
 /// One triangle for all rays of a group, turned as each ray wants it.
-inline fn turnedCorners(
+pub inline fn turnedCorners(
     comptime Rays: type,
     block: anytype,
     lane: usize,

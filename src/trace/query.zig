@@ -7,7 +7,9 @@
 const world_file = @import("../world.zig");
 const TestCounts = @import("../statistics.zig").TestCounts;
 const ray_file = @import("ray.zig");
+const interval = @import("interval.zig");
 const single = @import("single.zig");
+const walk = @import("walk.zig");
 const packet = @import("packet.zig");
 const primary = @import("beam/primary.zig");
 const shadow = @import("beam/shadow.zig");
@@ -28,7 +30,7 @@ pub const Company = union(enum) {
 /// Looks for hits of all active rays; see `packet.trace` for what is left in the bundle.
 pub fn trace(
     comptime Kernel: type,
-    comptime query: single.Query,
+    comptime query: walk.Query,
     world: *const world_file.World,
     bundle: *packet.Bundle(Kernel),
     company: Company,
@@ -51,30 +53,10 @@ pub fn trace(
                 packet.trace(Kernel, query, tree, world.pad, bundle, counts);
             },
             .coherent => packet.trace(Kernel, query, tree, world.pad, bundle, counts),
-            .scattered => for (&bundle.groups) |*group| {
-                traceApart(Kernel, query, world, group, counts);
+            .scattered => for (0..Kernel.block_count) |block| {
+                const groups = bundle.groups[block * Kernel.block_groups ..][0..Kernel.block_groups];
+                interval.trace(Kernel, query, world, groups, counts);
             },
         },
     }
-}
-
-/// Every active ray of a group by itself.
-pub fn traceApart(
-    comptime Kernel: type,
-    comptime query: single.Query,
-    world: *const world_file.World,
-    group: anytype,
-    counts: *TestCounts,
-) void {
-    var ts = group.nearest.t.toArray();
-    var primitives = group.nearest.primitive.toArray();
-    var bits = group.active.bits();
-    while (bits != 0) : (bits &= bits - 1) {
-        const lane = @ctz(bits);
-        var ray = group.extract(lane);
-        _ = single.trace(Kernel, query, world, &ray, counts);
-        ts[lane] = ray.nearest.t.lane(0);
-        primitives[lane] = ray.nearest.primitive.lane(0);
-    }
-    group.nearest = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };
 }

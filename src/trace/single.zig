@@ -5,25 +5,15 @@
 //! the visits (ray.zig), nor does culling change it (box.zig; `World.fused_reach` for the rounding
 //! of multiply-adds).
 
-const std = @import("std");
 const world_file = @import("../world.zig");
 const TestCounts = @import("../statistics.zig").TestCounts;
 const ray_file = @import("ray.zig");
 const box = @import("box.zig");
 const triangle = @import("triangle.zig");
-const stack_file = @import("stack.zig");
-const assert = std.debug.assert;
-const Entry = stack_file.Entry;
+const walk = @import("walk.zig");
+const Query = walk.Query;
 const Single = ray_file.Single;
 const World = world_file.World;
-
-/// What a ray wants to know.
-pub const Query = enum {
-    /// The first hit in the order of `ray.Hit`.
-    nearest,
-    /// Whether there is a hit; which one is found depends on the tree.
-    any,
-};
 
 /// Looks for a hit and keeps it in `ray.nearest`. Returns whether there was one.
 pub fn trace(
@@ -41,7 +31,27 @@ pub fn trace(
         travel(Kernel, query, false, world, ray, counts);
 }
 
-/// Down to the nearest child at once; its siblings wait.
+/// Every active ray of a group by itself.
+pub fn traceEach(
+    comptime Kernel: type,
+    comptime query: Query,
+    world: *const World,
+    group: anytype,
+    counts: *TestCounts,
+) void {
+    var ts = group.nearest.t.toArray();
+    var primitives = group.nearest.primitive.toArray();
+    var bits = group.active.bits();
+    while (bits != 0) : (bits &= bits - 1) {
+        const lane = @ctz(bits);
+        var ray = group.extract(lane);
+        _ = trace(Kernel, query, world, &ray, counts);
+        ts[lane] = ray.nearest.t.lane(0);
+        primitives[lane] = ray.nearest.primitive.lane(0);
+    }
+    group.nearest = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };
+}
+
 fn travel(
     comptime Kernel: type,
     comptime query: Query,
@@ -50,39 +60,10 @@ fn travel(
     ray: *ray_file.Ray(Single),
     counts: *TestCounts,
 ) bool {
-    const tree = world.tree.get(Kernel.width);
-    var search: Search(Kernel, fused) = .init(ray, world.pad);
-    var stack: [Kernel.stack_max]Entry = undefined;
-    var stack_count: usize = 0;
-    var found = false;
-    var entry: Entry = .{ .child = 0, .block_count = 0, .near = 0 };
-    while (true) {
-        if (entry.block_count == 0) {
-            assert(stack_count + Kernel.width <= Kernel.stack_max);
-            const node = &tree.nodes[entry.child];
-            const range = search.meet(node);
-            if (Kernel.counts_tests) countNode(Kernel, node, counts);
-            const met = range.near.le(range.far).bits();
-            if (met != 0) {
-                const near = range.near;
-                entry = stack_file.descend(Kernel.Boxes, node, met, near, &stack, &stack_count);
-                continue;
-            }
-        } else {
-            for (tree.blocks[entry.child..][0..entry.block_count]) |*block| {
-                if (Kernel.counts_tests) countBlock(Kernel, block, counts);
-                found = search.intersect(block) or found;
-            }
-            if (query == .any and found) break;
-        }
-        entry = while (stack_count > 0) {
-            stack_count -= 1;
-            const top = stack[stack_count];
-            if (top.near <= search.nearest_t) break top;
-        } else break;
-    }
+    var search: Search(Kernel, query, fused) = .init(ray, world.pad);
+    const found = walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts);
     ray.nearest = .{
-        .t = .splat(search.nearest_t),
+        .t = .splat(search.limit),
         .primitive = .splat(search.nearest_primitive),
     };
     return found;
@@ -90,7 +71,7 @@ fn travel(
 
 /// The nearest hit so far, and the ray in the lanes of boxes. With `fused`, nodes are tested by
 /// multiply-adds.
-fn Search(comptime Kernel: type, comptime fused: bool) type {
+fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) type {
     const Boxes = Kernel.Boxes;
     const F32 = Boxes.F32;
     const Rows = [6][Kernel.width]f32;
@@ -106,7 +87,8 @@ fn Search(comptime Kernel: type, comptime fused: bool) type {
         axis: u2,
         after: ray_file.Hit(Boxes),
         skip: Boxes.I32,
-        nearest_t: f32,
+        /// t of the nearest hit so far.
+        limit: f32,
         nearest_primitive: i32,
         pad: f32,
 
@@ -144,7 +126,7 @@ fn Search(comptime Kernel: type, comptime fused: bool) type {
                     .primitive = .splat(ray.after.primitive.lane(0)),
                 },
                 .skip = .splat(ray.skip.lane(0)),
-                .nearest_t = ray.nearest.t.lane(0),
+                .limit = ray.nearest.t.lane(0),
                 .nearest_primitive = ray.nearest.primitive.lane(0),
                 .pad = pad,
             };
@@ -156,7 +138,7 @@ fn Search(comptime Kernel: type, comptime fused: bool) type {
 
         /// Where the ray is within the children's boxes and its own limits: near <= far where a
         /// child may hold a hit.
-        inline fn meet(search: *const Self, node: *const world_file.Node(Kernel.width)) Range {
+        pub inline fn meet(search: *const Self, node: *const world_file.Node(Kernel.width)) Range {
             const rows: *const Rows = @ptrCast(&node.bounds);
             var near: [3]F32 = undefined;
             var far: [3]F32 = undefined;
@@ -168,7 +150,7 @@ fn Search(comptime Kernel: type, comptime fused: bool) type {
                 near[axis] = along(.load(&rows[search.near_row[axis]]), shift, inverse);
                 far[axis] = along(.load(&rows[search.far_row[axis]]), shift, inverse);
             }
-            const limit: F32 = .splat(search.nearest_t);
+            const limit: F32 = .splat(search.limit);
             return .{
                 .near = near[0].maxFast(near[1]).maxFast(near[2].maxFast(search.after.t)),
                 .far = far[0].minFast(far[1]).minFast(far[2].minFast(limit)),
@@ -181,11 +163,17 @@ fn Search(comptime Kernel: type, comptime fused: bool) type {
             return if (fused) bound.mulAdd(inverse, shift) else bound.sub(shift).mul(inverse);
         }
 
+        pub inline fn isDone(_: *const Self, found: bool) bool {
+            return query == .any and found;
+        }
+
         /// Tests the triangles of a block and keeps the nearest hit. Returns whether there was one.
-        inline fn intersect(
+        pub inline fn intersect(
             search: *Self,
             block: *const world_file.TriangleBlock(Kernel.width),
+            counts: *TestCounts,
         ) bool {
+            if (Kernel.counts_tests) walk.countBlock(Kernel, block, counts);
             const corners = loadCorners(Boxes, block, search.axis);
             const seen = triangle.project(Boxes, corners, &search.view);
             var weights = triangle.weigh(Boxes, seen);
@@ -194,7 +182,7 @@ fn Search(comptime Kernel: type, comptime fused: bool) type {
             const hit = triangle.locate(Boxes, seen, weights, corners, &search.view, search.pad);
             const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
             const nearest: ray_file.Hit(Boxes) = .{
-                .t = .splat(search.nearest_t),
+                .t = .splat(search.limit),
                 .primitive = .splat(search.nearest_primitive),
             };
             const accepted = inside.bitAnd(hit.mask)
@@ -207,10 +195,10 @@ fn Search(comptime Kernel: type, comptime fused: bool) type {
             while (bits != 0) : (bits &= bits - 1) {
                 const lane = @ctz(bits);
                 const number: i32 = @bitCast(block.primitive[lane]);
-                const closer = ts[lane] < search.nearest_t or
-                    (ts[lane] == search.nearest_t and number < search.nearest_primitive);
+                const closer = ts[lane] < search.limit or
+                    (ts[lane] == search.limit and number < search.nearest_primitive);
                 if (closer) {
-                    search.nearest_t = ts[lane];
+                    search.limit = ts[lane];
                     search.nearest_primitive = number;
                 }
             }
@@ -230,16 +218,4 @@ inline fn loadCorners(comptime Boxes: type, block: anytype, axis: u2) [3]Boxes.V
         };
     }
     return corners;
-}
-
-fn countNode(comptime Kernel: type, node: anytype, counts: *TestCounts) void {
-    counts.box_issued += Kernel.width;
-    for (node.child) |child| counts.box_useful += @intFromBool(child != world_file.none);
-}
-
-fn countBlock(comptime Kernel: type, block: anytype, counts: *TestCounts) void {
-    counts.triangle_issued += Kernel.width;
-    for (block.primitive) |primitive| {
-        counts.triangle_useful += @intFromBool(primitive != world_file.none);
-    }
 }

@@ -1,0 +1,383 @@
+//! A few rays through the tree as one: intervals that hold them all against boxes, then every ray
+//! against the triangles that are left.
+//!
+//! In: the rays of a block of 4x4 pixels, by whatever way they came there. Out: the nearest hit of
+//! each, or whether there is any. Rays are taken together by octant, since intervals of inverse
+//! directions of both signs say nothing; those that are too far apart go alone.
+//!
+//! Every step of the slab test is monotone in origin, inverse and bound, rounding included. So from
+//! the ends of intervals come bounds of what the test gives for any ray between, and nothing is
+//! culled that the ray by itself would have found (box.zig; `World.fused_reach` for multiply-adds).
+//!
+//! S. Boulos, I. Wald and P. Shirley, "Geometric and Arithmetic Culling Methods for Entire Ray
+//! Packets" (2006), section 3.
+
+const std = @import("std");
+const world_file = @import("../world.zig");
+const TestCounts = @import("../statistics.zig").TestCounts;
+const ray_file = @import("ray.zig");
+const box = @import("box.zig");
+const packet = @import("packet.zig");
+const single = @import("single.zig");
+const triangle = @import("triangle.zig");
+const walk = @import("walk.zig");
+const Query = walk.Query;
+const World = world_file.World;
+
+/// Looks for hits of the active rays and keeps them in `nearest`. With `Query.any` a ray that found
+/// one is out of the search; its `nearest.primitive` tells.
+pub fn trace(
+    comptime Kernel: type,
+    comptime query: Query,
+    world: *const World,
+    groups: *[Kernel.block_groups]ray_file.Ray(Kernel.Rays),
+    counts: *TestCounts,
+) void {
+    const Rays = Kernel.Rays;
+    var active: [Kernel.block_groups]Rays.Mask = undefined;
+    var views: [Kernel.block_groups]packet.GroupView(Rays) = undefined;
+    for (&active, &views, groups) |*mask, *view, *group| {
+        mask.* = group.active;
+        view.* = packet.viewOf(Rays, group);
+    }
+    var rest = active;
+    while (firstOf(Rays, &rest)) |first| {
+        const company: Company(Rays) = .of(world, &groups[first.group], &views[first.group], first.lane);
+        var count: u32 = 0;
+        for (&rest, &views, groups) |*left, *view, *group| {
+            group.active = if (left.none())
+                .splat(false)
+            else
+                left.bitAnd(company.members(group, view));
+            left.* = left.andNot(group.active);
+            count += group.active.popCount();
+        }
+        if (count < rays_min) {
+            for (groups) |*group| single.traceEach(Kernel, query, world, group, counts);
+        } else {
+            together(Kernel, query, world, groups, &views, company.octant, counts);
+        }
+    }
+    for (groups, active) |*group, mask| group.active = mask;
+}
+
+const Place = struct { group: usize, lane: usize };
+
+inline fn firstOf(comptime Rays: type, masks: []const Rays.Mask) ?Place {
+    for (masks, 0..) |mask, group| {
+        const bits = mask.bits();
+        if (bits != 0) return .{ .group = group, .lane = @ctz(bits) };
+    }
+    return null;
+}
+
+/// Who goes with a ray.
+fn Company(comptime Rays: type) type {
+    return struct {
+        origin: Rays.Vec3,
+        direction: Rays.Vec3,
+        origin_apart: Rays.F32,
+        direction_apart: Rays.F32,
+        /// Whether the way is down, by axis.
+        octant: [3]bool,
+
+        inline fn of(
+            world: *const World,
+            group: *const ray_file.Ray(Rays),
+            view: *const packet.GroupView(Rays),
+            lane: usize,
+        ) @This() {
+            const direction = group.line.direction.lane(lane);
+            const length = @max(@abs(direction[0]), @abs(direction[1]), @abs(direction[2]));
+            var octant: [3]bool = undefined;
+            for (&octant, view.slabs.negative) |*down, negative| down.* = negative.lane(lane);
+            return .{
+                .origin = .splat(group.line.origin.lane(lane)),
+                .direction = .splat(direction),
+                .origin_apart = .splat(world.pad * (1.0 / world_file.pad_relative) * tune_origin),
+                .direction_apart = .splat(length * tune_direction),
+                .octant = octant,
+            };
+        }
+
+        inline fn members(
+            company: *const @This(),
+            group: *const ray_file.Ray(Rays),
+            view: *const packet.GroupView(Rays),
+        ) Rays.Mask {
+            const from = group.line.origin.sub(company.origin).abs();
+            const to = group.line.direction.sub(company.direction).abs();
+            var same = from.x.max(from.y).max(from.z).le(company.origin_apart)
+                .bitAnd(to.x.max(to.y).max(to.z).le(company.direction_apart));
+            for (view.slabs.negative, company.octant) |negative, down| {
+                same = if (down) same.bitAnd(negative) else same.andNot(negative);
+            }
+            return same;
+        }
+    };
+}
+
+pub var tune_origin: f32 = 0.05;
+pub var tune_direction: f32 = 0.05;
+pub var rays_min: u32 = 3;
+
+/// Active rays, all of one octant.
+fn together(
+    comptime Kernel: type,
+    comptime query: Query,
+    world: *const World,
+    groups: *[Kernel.block_groups]ray_file.Ray(Kernel.Rays),
+    views: *const [Kernel.block_groups]packet.GroupView(Kernel.Rays),
+    octant: [3]bool,
+    counts: *TestCounts,
+) void {
+    const tree = world.tree.get(Kernel.width);
+    const ends: Ends = .of(Kernel, groups, views);
+    var reach: f32 = 0;
+    for (ends.origin) |range| reach = @max(reach, @abs(range[0]), @abs(range[1]));
+    if (reach < world.fused_reach) {
+        var search: Search(Kernel, query, true) = .init(world, groups, views, octant, &ends);
+        _ = walk.walk(Kernel, tree, &search, counts);
+    } else {
+        var search: Search(Kernel, query, false) = .init(world, groups, views, octant, &ends);
+        _ = walk.walk(Kernel, tree, &search, counts);
+    }
+}
+
+/// The least and the greatest of what rays have.
+const Ends = struct {
+    origin: [3][2]f32,
+    inverse: [3][2]f32,
+    after_t: f32,
+    nearest_t: f32,
+
+    inline fn of(comptime Kernel: type, groups: anytype, views: anytype) Ends {
+        const Rays = Kernel.Rays;
+        const inf: Rays.F32 = .splat(std.math.inf(f32));
+        var least: [7]Rays.F32 = @splat(inf);
+        var greatest: [7]Rays.F32 = @splat(inf.neg());
+        for (groups, views) |*group, *view| {
+            if (group.active.none()) continue;
+            const origin = group.line.origin;
+            const inverse = view.slabs.direction_inv;
+            const values = [6]Rays.F32{
+                origin.x, origin.y, origin.z, inverse.x, inverse.y, inverse.z,
+            };
+            for (values, least[0..6], greatest[0..6]) |value, *low, *high| {
+                low.* = low.minFast(.select(group.active, value, inf));
+                high.* = high.maxFast(.select(group.active, value, inf.neg()));
+            }
+            least[6] = least[6].minFast(.select(group.active, group.after.t, inf));
+            const nearest: Rays.F32 = .select(group.active, group.nearest.t, inf.neg());
+            greatest[6] = greatest[6].maxFast(nearest);
+        }
+        var ends: Ends = undefined;
+        for (0..3) |axis| {
+            ends.origin[axis] = .{ least[axis].reduceMin(), greatest[axis].reduceMax() };
+            ends.inverse[axis] = .{ least[3 + axis].reduceMin(), greatest[3 + axis].reduceMax() };
+        }
+        ends.after_t = least[6].reduceMin();
+        ends.nearest_t = greatest[6].reduceMax();
+        return ends;
+    }
+};
+
+fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) type {
+    const Boxes = Kernel.Boxes;
+    const Rays = Kernel.Rays;
+    const F32 = Boxes.F32;
+    const Rows = [6][Kernel.width]f32;
+    return struct {
+        groups: *[Kernel.block_groups]ray_file.Ray(Rays),
+        views: *const [Kernel.block_groups]packet.GroupView(Rays),
+        /// By axis.
+        slabs: [3]Slab,
+        after_t: F32,
+        /// The greatest t that matters.
+        limit: f32,
+        pad: f32,
+        /// By how much boxes of triangles are grown: more than their own pad and a node's margin.
+        grow: f32,
+
+        const Self = @This();
+        const Range = box.Range(Boxes);
+
+        /// What of the rays the faces across an axis are tested against.
+        const Slab = struct {
+            /// Rows of `Node.bounds`, lower x y z and upper x y z, that are the near faces and the
+            /// far.
+            near_row: usize,
+            far_row: usize,
+            /// See `ray.Slabs.negative`.
+            negative: Boxes.Mask,
+            inverse: [2]F32,
+            /// Of the origins that with which offsets are least or greatest; negated and times
+            /// the inverse with `fused`.
+            near_shift: [if (fused) 2 else 1]F32,
+            far_shift: [if (fused) 2 else 1]F32,
+
+            inline fn init(axis: usize, negative: bool, origin: [2]f32, inverse: [2]f32) Slab {
+                const near_origin: F32 = .splat(origin[if (negative) 0 else 1]);
+                const far_origin: F32 = .splat(origin[if (negative) 1 else 0]);
+                const inverses = [2]F32{ .splat(inverse[0]), .splat(inverse[1]) };
+                return .{
+                    .near_row = axis + @as(usize, if (negative) 3 else 0),
+                    .far_row = axis + @as(usize, if (negative) 0 else 3),
+                    .negative = .splat(negative),
+                    .inverse = inverses,
+                    .near_shift = shiftOf(near_origin, inverses),
+                    .far_shift = shiftOf(far_origin, inverses),
+                };
+            }
+
+            inline fn shiftOf(origin: F32, inverse: [2]F32) [if (fused) 2 else 1]F32 {
+                if (!fused) return .{origin};
+                return .{ origin.mul(inverse[0]).neg(), origin.mul(inverse[1]).neg() };
+            }
+
+            inline fn ts(slab: *const Slab, bound: F32, shift: @FieldType(Slab, "far_shift")) [2]F32 {
+                if (fused) return .{
+                    bound.mulAdd(slab.inverse[0], shift[0]),
+                    bound.mulAdd(slab.inverse[1], shift[1]),
+                };
+                const offset = bound.sub(shift[0]);
+                return .{ offset.mul(slab.inverse[0]), offset.mul(slab.inverse[1]) };
+            }
+
+            /// The least t at which a ray comes through the near face.
+            inline fn near(slab: *const Slab, bound: F32) F32 {
+                const both = slab.ts(bound, slab.near_shift);
+                return both[0].minFast(both[1]);
+            }
+
+            /// The greatest t at which a ray goes out through the far face.
+            inline fn far(slab: *const Slab, bound: F32) F32 {
+                const both = slab.ts(bound, slab.far_shift);
+                return both[0].maxFast(both[1]);
+            }
+        };
+
+        inline fn init(
+            world: *const World,
+            groups: *[Kernel.block_groups]ray_file.Ray(Rays),
+            views: *const [Kernel.block_groups]packet.GroupView(Rays),
+            octant: [3]bool,
+            ends: *const Ends,
+        ) Self {
+            var slabs: [3]Slab = undefined;
+            for (&slabs, octant, ends.origin, ends.inverse, 0..) |*slab, down, from, inverse, axis| {
+                slab.* = .init(axis, down, from, inverse);
+            }
+            return .{
+                .groups = groups,
+                .views = views,
+                .slabs = slabs,
+                .after_t = .splat(ends.after_t),
+                .limit = ends.nearest_t,
+                .pad = world.pad,
+                .grow = world.pad + 2 * world.node_margin,
+            };
+        }
+
+        /// Bounds of where rays are within the children's boxes.
+        pub inline fn meet(search: *const Self, node: *const world_file.Node(Kernel.width)) Range {
+            const rows: *const Rows = @ptrCast(&node.bounds);
+            var near: [3]F32 = undefined;
+            var far: [3]F32 = undefined;
+            inline for (&near, &far, &search.slabs) |*first, *last, *slab| {
+                first.* = slab.near(.load(&rows[slab.near_row]));
+                last.* = slab.far(.load(&rows[slab.far_row]));
+            }
+            return search.within(near, far);
+        }
+
+        inline fn within(search: *const Self, near: [3]F32, far: [3]F32) Range {
+            const limit: F32 = .splat(search.limit);
+            return .{
+                .near = near[0].maxFast(near[1]).maxFast(near[2].maxFast(search.after_t)),
+                .far = far[0].minFast(far[1]).minFast(far[2].minFast(limit)),
+            };
+        }
+
+        pub inline fn isDone(_: *const Self, _: bool) bool {
+            return false; // Nothing is near enough when all rays are done: see `shrink`.
+        }
+
+        /// Tests the triangles of a block whose boxes some ray may enter. Returns whether any ray
+        /// hit one.
+        pub inline fn intersect(
+            search: *Self,
+            block: *const world_file.TriangleBlock(Kernel.width),
+            counts: *TestCounts,
+        ) bool {
+            var met = search.meetBoxes(block);
+            var found = false;
+            while (met != 0) : (met &= met - 1) {
+                const lane = @ctz(met);
+                if (search.intersectOne(block, lane, counts)) found = true;
+            }
+            if (found) search.shrink();
+            return found;
+        }
+
+        inline fn meetBoxes(
+            search: *const Self,
+            block: *const world_file.TriangleBlock(Kernel.width),
+        ) u32 {
+            const grow: F32 = .splat(search.grow);
+            var near: [3]F32 = undefined;
+            var far: [3]F32 = undefined;
+            inline for (&near, &far, &search.slabs, 0..) |*first, *last, *slab, axis| {
+                const a: F32 = .load(&block.corner[0][axis]);
+                const b: F32 = .load(&block.corner[1][axis]);
+                const c: F32 = .load(&block.corner[2][axis]);
+                const lower = a.minFast(b).minFast(c).sub(grow);
+                const upper = a.maxFast(b).maxFast(c).add(grow);
+                first.* = slab.near(.select(slab.negative, upper, lower));
+                last.* = slab.far(.select(slab.negative, lower, upper));
+            }
+            const range = search.within(near, far);
+            const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
+            const there = primitive.gt(.splat(ray_file.no_primitive));
+            return range.near.le(range.far).bitAnd(there).bits();
+        }
+
+        fn intersectOne(
+            search: *Self,
+            block: *const world_file.TriangleBlock(Kernel.width),
+            lane: usize,
+            counts: *TestCounts,
+        ) bool {
+            const primitive: i32 = @bitCast(block.primitive[lane]);
+            var found = false;
+            for (search.groups, search.views) |*group, *view| {
+                if (Kernel.counts_tests) {
+                    counts.triangle_issued += Kernel.ray_count;
+                    counts.triangle_useful += group.active.popCount();
+                }
+                const corners = packet.turnedCorners(Rays, block, lane, view);
+                const hit = packet.intersect(
+                    Kernel,
+                    query,
+                    group,
+                    &view.view,
+                    corners,
+                    primitive,
+                    search.pad,
+                );
+                found = found or hit;
+            }
+            return found;
+        }
+
+        /// No ray looks farther than its hit; one that looked for any has it at t = -inf.
+        fn shrink(search: *Self) void {
+            const none: Rays.F32 = .splat(-std.math.inf(f32));
+            var farthest = none;
+            for (search.groups) |*group| {
+                farthest = farthest.maxFast(.select(group.active, group.nearest.t, none));
+            }
+            search.limit = farthest.reduceMax();
+        }
+    };
+}

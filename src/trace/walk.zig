@@ -1,0 +1,75 @@
+//! The way through the tree: to the nearest child at once, while its siblings wait.
+//!
+//! In: a search, which knows what it looks for (one ray: single.zig; a few as one: interval.zig).
+//! Out: whether it found anything. The hits are the search's own.
+
+const world_file = @import("../world.zig");
+const TestCounts = @import("../statistics.zig").TestCounts;
+const stack_file = @import("stack.zig");
+const std = @import("std");
+const assert = std.debug.assert;
+const Entry = stack_file.Entry;
+
+/// What rays want to know.
+pub const Query = enum {
+    /// The first hit in the order of `ray.Hit`.
+    nearest,
+    /// Whether there is a hit; which one is found depends on the tree.
+    any,
+};
+
+/// Searches the whole tree, or until `search.isDone()`. Of a search it needs
+///
+///     limit: f32          nothing that is farther matters; it may shrink
+///     meet(node)          box.Range in the lanes of children, near <= far where one may matter
+///     intersect(block)    tests a block of triangles, returns whether one was hit
+///     isDone()            asked after every leaf
+pub inline fn walk(
+    comptime Kernel: type,
+    tree: *const world_file.Tree(Kernel.width),
+    search: anytype,
+    counts: *TestCounts,
+) bool {
+    var stack: [Kernel.stack_max]Entry = undefined;
+    var stack_count: usize = 0;
+    var found = false;
+    var entry: Entry = .{ .child = 0, .block_count = 0, .near = 0 };
+    while (true) {
+        if (entry.block_count == 0) {
+            assert(stack_count + Kernel.width <= Kernel.stack_max);
+            const node = &tree.nodes[entry.child];
+            const range = search.meet(node);
+            if (Kernel.counts_tests) countNode(Kernel, node, counts);
+            const met = range.near.le(range.far).bits();
+            if (met != 0) {
+                const near = range.near;
+                entry = stack_file.descend(Kernel.Boxes, node, met, near, &stack, &stack_count);
+                continue;
+            }
+        } else {
+            for (tree.blocks[entry.child..][0..entry.block_count]) |*block| {
+                found = search.intersect(block, counts) or found;
+            }
+            if (search.isDone(found)) break;
+        }
+        entry = while (stack_count > 0) {
+            stack_count -= 1;
+            const top = stack[stack_count];
+            if (top.near <= search.limit) break top;
+        } else break;
+    }
+    return found;
+}
+
+fn countNode(comptime Kernel: type, node: anytype, counts: *TestCounts) void {
+    counts.box_issued += Kernel.width;
+    for (node.child) |child| counts.box_useful += @intFromBool(child != world_file.none);
+}
+
+/// Counts triangle tests of a block, each against as many rays.
+pub fn countBlock(comptime Kernel: type, block: anytype, counts: *TestCounts) void {
+    counts.triangle_issued += Kernel.width;
+    for (block.primitive) |primitive| {
+        counts.triangle_useful += @intFromBool(primitive != world_file.none);
+    }
+}
