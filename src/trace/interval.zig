@@ -117,6 +117,8 @@ fn Company(comptime Rays: type) type {
     };
 }
 
+pub var tune_shadow: bool = false;
+pub var tune_enter: bool = false;
 pub var tune_origin: f32 = 0.05;
 pub var tune_direction: f32 = 0.05;
 pub var rays_min: u32 = 3;
@@ -131,6 +133,7 @@ fn together(
     octant: [3]bool,
     counts: *TestCounts,
 ) void {
+    @setEvalBranchQuota(4000); // For what is inlined here.
     const tree = world.tree.get(Kernel.width);
     const ends: Ends = .of(Kernel, groups, views);
     var reach: f32 = 0;
@@ -190,6 +193,7 @@ fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) ty
     return struct {
         groups: *[Kernel.block_groups]ray_file.Ray(Rays),
         views: *const [Kernel.block_groups]packet.GroupView(Rays),
+        guide: single.Search(Kernel, query, fused),
         /// By axis.
         slabs: [3]Slab,
         after_t: F32,
@@ -264,6 +268,14 @@ fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) ty
             octant: [3]bool,
             ends: *const Ends,
         ) Self {
+            var guide_ray: ray_file.Ray(ray_file.Single) = undefined;
+            for (groups) |*group| {
+                const bits = group.active.bits();
+                if (bits == 0) continue;
+                guide_ray = group.extract(@ctz(bits));
+                break;
+            }
+            const guide: single.Search(Kernel, query, fused) = .init(&guide_ray, world.pad);
             var slabs: [3]Slab = undefined;
             for (&slabs, octant, ends.origin, ends.inverse, 0..) |*slab, down, from, inverse, axis| {
                 slab.* = .init(axis, down, from, inverse);
@@ -271,6 +283,7 @@ fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) ty
             return .{
                 .groups = groups,
                 .views = views,
+                .guide = guide,
                 .slabs = slabs,
                 .after_t = .splat(ends.after_t),
                 .limit = ends.nearest_t,
@@ -288,7 +301,26 @@ fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) ty
                 first.* = slab.near(.load(&rows[slab.near_row]));
                 last.* = slab.far(.load(&rows[slab.far_row]));
             }
-            return search.within(near, far);
+            var range = search.within(near, far);
+            if (!tune_enter) return range;
+            const guided = search.guide.meet(node);
+            var met = range.near.le(range.far).andNot(guided.near.le(guided.far)).bits();
+            if (met == 0) return range;
+            var nears = range.near.toArray();
+            while (met != 0) : (met &= met - 1) {
+                const child = @ctz(met);
+                nears[child] = search.enter(node, child) orelse std.math.inf(f32);
+            }
+            range.near = .fromArray(nears);
+            return range;
+        }
+
+        fn enter(search: *const Self, node: *const world_file.Node(Kernel.width), child: usize) ?f32 {
+            var counts: TestCounts = .{};
+            for (search.groups, search.views) |*group, *view| {
+                if (packet.enter(Kernel, group, &view.slabs, node, child, &counts)) |near| return near;
+            }
+            return null;
         }
 
         inline fn within(search: *const Self, near: [3]F32, far: [3]F32) Range {

@@ -152,7 +152,7 @@ inline fn pushChildren(
 }
 
 /// The least t at which a ray of the group enters a child, or null if none does.
-inline fn enter(
+pub inline fn enter(
     comptime Kernel: type,
     group: *const ray_file.Ray(Kernel.Rays),
     slabs: *const ray_file.Slabs(Kernel.Rays),

@@ -49,6 +49,13 @@ pub fn trace(
                 packet.trace(Kernel, query, tree, world.pad, bundle, counts);
             },
             .light => |light| {
+                if (query == .any and interval.tune_shadow) {
+                    for (0..Kernel.block_count) |block| {
+                        const groups = bundle.groups[block * Kernel.block_groups ..][0..Kernel.block_groups];
+                        interval.trace(Kernel, query, world, groups, counts);
+                    }
+                    return;
+                }
                 if (query == .any) return shadow.trace(Kernel, world, light, bundle, counts);
                 packet.trace(Kernel, query, tree, world.pad, bundle, counts);
             },

@@ -71,7 +71,7 @@ fn travel(
 
 /// The nearest hit so far, and the ray in the lanes of boxes. With `fused`, nodes are tested by
 /// multiply-adds.
-fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) type {
+pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) type {
     const Boxes = Kernel.Boxes;
     const F32 = Boxes.F32;
     const Rows = [6][Kernel.width]f32;
@@ -94,7 +94,7 @@ fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) ty
 
         const Self = @This();
 
-        inline fn init(ray: *const ray_file.Ray(Single), pad: f32) Self {
+        pub inline fn init(ray: *const ray_file.Ray(Single), pad: f32) Self {
             const slabs: ray_file.Slabs(Single) = .init(ray.line);
             const axis: ray_file.LongAxis(Single) = .of(ray.line.direction);
             const view: ray_file.View(Single) = .init(ray.line, axis);
