@@ -309,18 +309,18 @@ fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) ty
             var nears = range.near.toArray();
             while (met != 0) : (met &= met - 1) {
                 const child = @ctz(met);
-                nears[child] = search.enter(node, child) orelse std.math.inf(f32);
+                if (!search.enter(node, child)) nears[child] = std.math.inf(f32);
             }
             range.near = .fromArray(nears);
             return range;
         }
 
-        fn enter(search: *const Self, node: *const world_file.Node(Kernel.width), child: usize) ?f32 {
-            var counts: TestCounts = .{};
+        /// Whether any ray enters a child.
+        fn enter(search: *const Self, node: *const world_file.Node(Kernel.width), child: usize) bool {
             for (search.groups, search.views) |*group, *view| {
-                if (packet.enter(Kernel, group, &view.slabs, node, child, &counts)) |near| return near;
+                if (packet.enter(Kernel, group, &view.slabs, node, child)) |_| return true;
             }
-            return null;
+            return false;
         }
 
         inline fn within(search: *const Self, near: [3]F32, far: [3]F32) Range {

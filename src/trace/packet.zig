@@ -128,7 +128,8 @@ inline fn pushChildren(
         };
         while (entry.group < Kernel.group_count) : (entry.group += 1) {
             const at = entry.group;
-            const near = enter(Kernel, &bundle.groups[at], &views[at].slabs, node, child, counts);
+            countBoxes(Kernel, &bundle.groups[at], counts);
+            const near = enter(Kernel, &bundle.groups[at], &views[at].slabs, node, child);
             entry.near = near orelse continue;
             break;
         } else continue;
@@ -136,7 +137,8 @@ inline fn pushChildren(
             entry.groups = @as(u64, 1) << @intCast(entry.group);
             for (entry.group + 1..Kernel.group_count) |group| {
                 const ray = &bundle.groups[group];
-                const near = enter(Kernel, ray, &views[group].slabs, node, child, counts);
+                countBoxes(Kernel, ray, counts);
+                const near = enter(Kernel, ray, &views[group].slabs, node, child);
                 if (near == null) continue;
                 entry.groups |= @as(u64, 1) << @intCast(group);
             }
@@ -151,14 +153,13 @@ inline fn pushChildren(
     return stack_count;
 }
 
-/// The least t at which a ray of the group enters a child, or null if none does.
+/// The least t at which an active ray of the group enters a child, or null if none does.
 pub inline fn enter(
     comptime Kernel: type,
     group: *const ray_file.Ray(Kernel.Rays),
     slabs: *const ray_file.Slabs(Kernel.Rays),
     node: *const world_file.Node(Kernel.width),
     child: usize,
-    counts: *TestCounts,
 ) ?f32 {
     const Rays = Kernel.Rays;
     const lower: Rays.Vec3 = .splat(.{
@@ -169,14 +170,16 @@ pub inline fn enter(
     });
     const near = triangle.select3(Rays, slabs.negative, upper, lower);
     const far = triangle.select3(Rays, slabs.negative, lower, upper);
-    if (Kernel.counts_tests) {
-        counts.box_issued += Kernel.ray_count;
-        counts.box_useful += group.active.popCount();
-    }
     const range = box.slab(Rays, near, far, slabs.origin, slabs.direction_inv);
     const entered = box.mayHold(Rays, range, group.after.t, group.nearest.t).bitAnd(group.active);
     if (entered.none()) return null;
     return Rays.F32.select(entered, range.near, .splat(std.math.inf(f32))).reduceMin();
+}
+
+fn countBoxes(comptime Kernel: type, group: anytype, counts: *TestCounts) void {
+    if (!Kernel.counts_tests) return;
+    counts.box_issued += Kernel.ray_count;
+    counts.box_useful += group.active.popCount();
 }
 
 /// Tests the triangles of a block against the groups of a set.
