@@ -24,6 +24,7 @@ pub const triangle = @import("trace/triangle.zig");
 /// One ray through the tree.
 pub const single = @import("trace/single.zig");
 pub const interval = @import("trace/interval.zig");
+pub const shadow = @import("trace/beam/shadow.zig");
 pub const walk = @import("trace/walk.zig");
 /// A bundle of rays through the tree.
 pub const packet = @import("trace/packet.zig");

@@ -52,7 +52,7 @@ pub fn trace(
             left.* = left.andNot(group.active);
             count += group.active.popCount();
         }
-        if (count < rays_min) {
+        if (count < rays_min or !company.isWithin(world.fused_reach)) {
             for (groups) |*group| single.traceEach(Kernel, query, world, group, counts);
         } else {
             together(Kernel, query, world, groups, &views, company.octant, counts);
@@ -100,6 +100,13 @@ fn Company(comptime Rays: type) type {
             };
         }
 
+        /// Whether origins of members have coordinates below a limit.
+        fn isWithin(company: *const @This(), reach: f32) bool {
+            const from = company.origin.abs();
+            const largest = from.x.maxFast(from.y).maxFast(from.z).add(company.origin_apart);
+            return largest.extract(0) < reach;
+        }
+
         inline fn members(
             company: *const @This(),
             group: *const ray_file.Ray(Rays),
@@ -136,15 +143,8 @@ fn together(
     @setEvalBranchQuota(4000); // For what is inlined here.
     const tree = world.tree.get(Kernel.width);
     const ends: Ends = .of(Kernel, groups, views);
-    var reach: f32 = 0;
-    for (ends.origin) |range| reach = @max(reach, @abs(range[0]), @abs(range[1]));
-    if (reach < world.fused_reach) {
-        var search: Search(Kernel, query, true) = .init(world, groups, views, octant, &ends);
-        _ = walk.walk(Kernel, tree, &search, counts);
-    } else {
-        var search: Search(Kernel, query, false) = .init(world, groups, views, octant, &ends);
-        _ = walk.walk(Kernel, tree, &search, counts);
-    }
+    var search: Search(Kernel, query) = .init(world, groups, views, octant, &ends);
+    _ = walk.walk(Kernel, tree, &search, counts);
 }
 
 /// The least and the greatest of what rays have.
@@ -185,7 +185,7 @@ const Ends = struct {
     }
 };
 
-fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) type {
+fn Search(comptime Kernel: type, comptime query: Query) type {
     const Boxes = Kernel.Boxes;
     const Rays = Kernel.Rays;
     const F32 = Boxes.F32;
@@ -193,7 +193,7 @@ fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) ty
     return struct {
         groups: *[Kernel.block_groups]ray_file.Ray(Rays),
         views: *const [Kernel.block_groups]packet.GroupView(Rays),
-        guide: single.Search(Kernel, query, fused),
+        guide: single.Search(Kernel, query, true),
         /// By axis.
         slabs: [3]Slab,
         after_t: F32,
@@ -217,8 +217,8 @@ fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) ty
             inverse: [2]F32,
             /// Of the origins that with which offsets are least or greatest; negated and times
             /// the inverse with `fused`.
-            near_shift: [if (fused) 2 else 1]F32,
-            far_shift: [if (fused) 2 else 1]F32,
+            near_shift: [2]F32,
+            far_shift: [2]F32,
 
             inline fn init(axis: usize, negative: bool, origin: [2]f32, inverse: [2]f32) Slab {
                 const near_origin: F32 = .splat(origin[if (negative) 0 else 1]);
@@ -234,18 +234,15 @@ fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) ty
                 };
             }
 
-            inline fn shiftOf(origin: F32, inverse: [2]F32) [if (fused) 2 else 1]F32 {
-                if (!fused) return .{origin};
+            inline fn shiftOf(origin: F32, inverse: [2]F32) [2]F32 {
                 return .{ origin.mul(inverse[0]).neg(), origin.mul(inverse[1]).neg() };
             }
 
-            inline fn ts(slab: *const Slab, bound: F32, shift: @FieldType(Slab, "far_shift")) [2]F32 {
-                if (fused) return .{
+            inline fn ts(slab: *const Slab, bound: F32, shift: [2]F32) [2]F32 {
+                return .{
                     bound.mulAdd(slab.inverse[0], shift[0]),
                     bound.mulAdd(slab.inverse[1], shift[1]),
                 };
-                const offset = bound.sub(shift[0]);
-                return .{ offset.mul(slab.inverse[0]), offset.mul(slab.inverse[1]) };
             }
 
             /// The least t at which a ray comes through the near face.
@@ -275,7 +272,7 @@ fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) ty
                 guide_ray = group.extract(@ctz(bits));
                 break;
             }
-            const guide: single.Search(Kernel, query, fused) = .init(&guide_ray, world.pad);
+            const guide: single.Search(Kernel, query, true) = .init(&guide_ray, world.pad);
             var slabs: [3]Slab = undefined;
             for (&slabs, octant, ends.origin, ends.inverse, 0..) |*slab, down, from, inverse, axis| {
                 slab.* = .init(axis, down, from, inverse);

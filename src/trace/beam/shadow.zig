@@ -13,7 +13,7 @@ const TestCounts = @import("../../statistics.zig").TestCounts;
 const kernel_file = @import("../kernel.zig");
 const ray_file = @import("../ray.zig");
 const packet = @import("../packet.zig");
-const single = @import("../single.zig");
+const interval = @import("../interval.zig");
 const stack = @import("../stack.zig");
 const edges_file = @import("edges.zig");
 const exact = @import("exact.zig");
@@ -33,11 +33,11 @@ const pixel_count = side * side;
 /// A beam is cut where its bounds cover more than this many times what its blocks do.
 const cut_ratio = 2.0;
 /// Cuts of a beam at most, one after the other.
-const cut_depth_max = 4;
+pub var cut_depth_max: u32 = 4;
 /// Blocks of triangles that a beam may meet before its rays go on alone.
-const meeting_max = 160;
+pub var meeting_max: u32 = 160;
 /// Beams of fewer rays are not worth their set-up.
-const beam_rays_min = 8;
+pub var beam_rays_min: u32 = 8;
 /// Slopes at most; rays that go more sideways make a beam of their own.
 const slope_limit = 4.0;
 /// With no more blocks than this, triangles are not tested against each of them first.
@@ -156,7 +156,7 @@ fn Search(comptime Kernel: type) type {
 
         fn run(search: *Self) void {
             // A cut leaves two sets for one; rays that do not fit leave one more, at most 3 times.
-            var waiting: [4 * cut_depth_max + 8]Waiting = undefined;
+            var waiting: [24]Waiting = undefined;
             waiting[0] = .{ .members = search.active(), .depth = 0 };
             var waiting_count: usize = 1;
             while (waiting_count > 0) {
@@ -218,26 +218,20 @@ fn Search(comptime Kernel: type) type {
             return .fromBits(members[group / Kernel.block_groups] >> shift & all);
         }
 
-        /// Rays of a set, each by itself.
+        /// Rays of a set without a beam, block by block.
         fn apart(search: *Self, members: *const Members) void {
-            for (&search.bundle.groups, 0..) |*group, index| {
-                var bits = groupOf(members, index).bits();
-                while (bits != 0) : (bits &= bits - 1) {
-                    const lane = @ctz(bits);
-                    var ray = group.extract(lane);
-                    if (single.trace(Kernel, .any, search.world, &ray, search.counts)) {
-                        search.blockRay(index, lane, ray.nearest.primitive.lane(0));
-                    }
+            const count = Kernel.block_groups;
+            for (members, 0..) |block, index| {
+                if (block == 0) continue;
+                const groups = search.bundle.groups[index * count ..][0..count];
+                var active_before: [count]Mask = undefined;
+                for (&active_before, groups, index * count..) |*mask, *group, at| {
+                    mask.* = group.active;
+                    group.active = groupOf(members, at);
                 }
+                interval.trace(Kernel, .any, search.world, groups, search.counts);
+                for (active_before, groups) |mask, *group| group.active = mask;
             }
-        }
-
-        /// A ray has met a triangle.
-        fn blockRay(search: *Self, group: usize, lane: usize, primitive: i32) void {
-            const ray = &search.bundle.groups[group];
-            var numbers = ray.nearest.primitive.toArray();
-            numbers[lane] = primitive;
-            ray.nearest.primitive = .fromArray(numbers);
         }
 
         /// Puts the rays of a set on the plane of the axis that suits most of them, and takes out
