@@ -40,14 +40,6 @@ pub fn main(init: std.process.Init) u8 {
         error.Usage => return say(init.io, diagnostic.message.text(), 2),
         error.Help => return printHelp(init.io),
     };
-    if (init.environ_map.get("SH")) |_| raylane.trace.interval.tune_shadow = true;
-    if (init.environ_map.get("EN")) |_| raylane.trace.interval.tune_enter = true;
-    if (init.environ_map.get("MM")) |t| raylane.trace.shadow.meeting_max = std.fmt.parseInt(u32, t, 10) catch 0;
-    if (init.environ_map.get("CD")) |t| raylane.trace.shadow.cut_depth_max = std.fmt.parseInt(u32, t, 10) catch 0;
-    if (init.environ_map.get("BR")) |t| raylane.trace.shadow.beam_rays_min = std.fmt.parseInt(u32, t, 10) catch 0;
-    if (init.environ_map.get("TO")) |t| raylane.trace.interval.tune_origin = std.fmt.parseFloat(f32, t) catch 0;
-    if (init.environ_map.get("TD")) |t| raylane.trace.interval.tune_direction = std.fmt.parseFloat(f32, t) catch 0;
-    if (init.environ_map.get("RM")) |t| raylane.trace.interval.rays_min = std.fmt.parseInt(u32, t, 10) catch 0;
     var bench: Bench = .{
         .gpa = init.gpa,
         .arena = arena,

@@ -23,8 +23,7 @@ pub const ray = @import("trace/ray.zig");
 pub const triangle = @import("trace/triangle.zig");
 /// One ray through the tree.
 pub const single = @import("trace/single.zig");
-pub const interval = @import("trace/interval.zig");
-pub const shadow = @import("trace/beam/shadow.zig");
+/// The way through the tree, and what rays want to know.
 pub const walk = @import("trace/walk.zig");
 /// A bundle of rays through the tree.
 pub const packet = @import("trace/packet.zig");

@@ -100,7 +100,6 @@ fn expectBundles(
     queries: []const Query,
     expected: []const Hit,
 ) !void {
-    const tree = world.tree.get(Kernel.width);
     var counts: raylane.statistics.TestCounts = .{};
     const size = Kernel.group_count * Kernel.ray_count;
     var first: usize = 0;
@@ -108,8 +107,8 @@ fn expectBundles(
         const part = queries[first..@min(first + size, queries.len)];
         var bundle = makeBundle(Kernel, part);
         var shadows = bundle;
-        raylane.trace.packet.trace(Kernel, .nearest, tree, world.pad, &bundle, &counts);
-        raylane.trace.packet.trace(Kernel, .any, tree, world.pad, &shadows, &counts);
+        raylane.trace.query.trace(Kernel, .nearest, world, &bundle, .unknown, &counts);
+        raylane.trace.query.trace(Kernel, .any, world, &shadows, .unknown, &counts);
         for (0..part.len) |index| {
             if (!isActive(index)) continue;
             const hit = expected[first + index];
@@ -216,7 +215,16 @@ fn addQueries(soup: Soup, queries: []Query, corners: []const [3]f32, random: std
         if (index >= queries.len / 2) for (&query.origin) |*x| {
             x.* = center + random.floatNorm(f32) * 4;
         };
-        switch (index % 6) {
+        // And every other block's rays go much the same way from much the same place.
+        const led = index % 32 < 16 and index % 16 > 0;
+        if (led) {
+            const leader = queries[index - index % 16];
+            for (0..3) |axis| {
+                query.origin[axis] = leader.origin[axis] + random.floatNorm(f32) * 1e-3;
+                const across = random.floatNorm(f32) * 1e-2;
+                query.direction[axis] = leader.direction[axis] * (1 + across);
+            }
+        } else switch (index % 6) {
             0 => for (0..3) |axis| { // At a corner.
                 query.direction[axis] = target[axis] - query.origin[axis];
             },

@@ -40,14 +40,15 @@ pub fn Tracer(comptime Kernel: type) type {
             tracer.weighHits(batch);
         }
 
-        /// Whether rays from the light hit anything on the way to their ends.
-        pub fn occluded(tracer: *Self, batch: *Batch) void {
-            tracer.trace(.any, batch, .{ .light = &tracer.light });
+        /// Whether rays from the light hit anything on the way to their ends, which are what the
+        /// eye sees or, after a bounce, anywhere.
+        pub fn occluded(tracer: *Self, batch: *Batch, bounced: bool) void {
+            tracer.trace(.any, batch, if (bounced) .unknown else .{ .light = &tracer.light });
         }
 
         /// Nearest hits of rays that have little in common.
         pub fn reflect(tracer: *Self, batch: *Batch) void {
-            tracer.trace(.nearest, batch, .scattered);
+            tracer.trace(.nearest, batch, .unknown);
             tracer.weighHits(batch);
         }
 

@@ -183,7 +183,7 @@ pub fn Workload(comptime Kernel: type) type {
                     const last = depth == worker.shared.settings.depth_max;
                     if (!worker.shade(depth, last)) break;
                     worker.marks.to(if (depth == 0) .shadow else .bounce_shadow);
-                    worker.tracer.occluded(&worker.shadows);
+                    worker.tracer.occluded(&worker.shadows, depth > 0);
                     if (observer) |o| o.sawShadows(&worker.shadows, depth);
                     worker.marks.to(if (depth == 0) .shading else .bounce_shading);
                     worker.addLight();

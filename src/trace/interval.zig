@@ -2,8 +2,9 @@
 //! against the triangles that are left.
 //!
 //! In: the rays of a block of 4x4 pixels, by whatever way they came there. Out: the nearest hit of
-//! each, or whether there is any. Rays are taken together by octant, since intervals of inverse
-//! directions of both signs say nothing; those that are too far apart go alone.
+//! each, or whether there is any. The first ray takes with it those that go much the same way from
+//! much the same place, in the same octant, since intervals of inverse directions of both signs say
+//! nothing; then the next that is left. Who finds little company goes alone.
 //!
 //! Every step of the slab test is monotone in origin, inverse and bound, rounding included. So from
 //! the ends of intervals come bounds of what the test gives for any ray between, and nothing is
@@ -19,10 +20,18 @@ const ray_file = @import("ray.zig");
 const box = @import("box.zig");
 const packet = @import("packet.zig");
 const single = @import("single.zig");
-const triangle = @import("triangle.zig");
 const walk = @import("walk.zig");
 const Query = walk.Query;
 const World = world_file.World;
+
+/// Fewer rays go alone.
+const rays_min = 3;
+/// How far apart the directions of rays are that go together, over their length, and the origins,
+/// over the size of the scene. Both are rough: what they let through costs little more than single
+/// rays, since a child is entered only where a ray is (`Search.meet`).
+const direction_apart_max = 0.06;
+/// See `direction_apart_max`.
+const origin_apart_max = 0.01;
 
 /// Looks for hits of the active rays and keeps them in `nearest`. With `Query.any` a ray that found
 /// one is out of the search; its `nearest.primitive` tells.
@@ -42,13 +51,16 @@ pub fn trace(
     }
     var rest = active;
     while (firstOf(Rays, &rest)) |first| {
-        const company: Company(Rays) = .of(world, &groups[first.group], &views[first.group], first.lane);
+        const leader = &groups[first.group];
+        const company: Company(Rays) = .of(world, leader, &views[first.group], first.lane);
         var count: u32 = 0;
-        for (&rest, &views, groups) |*left, *view, *group| {
-            group.active = if (left.none())
-                .splat(false)
-            else
-                left.bitAnd(company.members(group, view));
+        for (&rest, &views, groups, 0..) |*left, *view, *group, index| {
+            group.active = .splat(false);
+            if (left.none()) continue;
+            group.active = left.bitAnd(company.members(group, view));
+            // Not a member of its own company if its way is no number.
+            const self = @as(u32, @intFromBool(index == first.group)) << @intCast(first.lane);
+            group.active = group.active.bitOr(.fromBits(self));
             left.* = left.andNot(group.active);
             count += group.active.popCount();
         }
@@ -71,7 +83,7 @@ inline fn firstOf(comptime Rays: type, masks: []const Rays.Mask) ?Place {
     return null;
 }
 
-/// Who goes with a ray.
+/// Who goes with a ray, the leader.
 fn Company(comptime Rays: type) type {
     return struct {
         origin: Rays.Vec3,
@@ -94,8 +106,8 @@ fn Company(comptime Rays: type) type {
             return .{
                 .origin = .splat(group.line.origin.lane(lane)),
                 .direction = .splat(direction),
-                .origin_apart = .splat(world.pad * (1.0 / world_file.pad_relative) * tune_origin),
-                .direction_apart = .splat(length * tune_direction),
+                .origin_apart = .splat(world.pad * (origin_apart_max / world_file.pad_relative)),
+                .direction_apart = .splat(length * direction_apart_max),
                 .octant = octant,
             };
         }
@@ -123,12 +135,6 @@ fn Company(comptime Rays: type) type {
         }
     };
 }
-
-pub var tune_shadow: bool = false;
-pub var tune_enter: bool = false;
-pub var tune_origin: f32 = 0.05;
-pub var tune_direction: f32 = 0.05;
-pub var rays_min: u32 = 3;
 
 /// Active rays, all of one octant.
 fn together(
@@ -193,6 +199,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
     return struct {
         groups: *[Kernel.block_groups]ray_file.Ray(Rays),
         views: *const [Kernel.block_groups]packet.GroupView(Rays),
+        /// The first ray by itself: what it enters need not be tested against the others.
         guide: single.Search(Kernel, query, true),
         /// By axis.
         slabs: [3]Slab,
@@ -215,8 +222,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             /// See `ray.Slabs.negative`.
             negative: Boxes.Mask,
             inverse: [2]F32,
-            /// Of the origins that with which offsets are least or greatest; negated and times
-            /// the inverse with `fused`.
+            /// The origin farthest on the way, or least far, negated and times each inverse.
             near_shift: [2]F32,
             far_shift: [2]F32,
 
@@ -289,8 +295,14 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             };
         }
 
-        /// Bounds of where rays are within the children's boxes.
-        pub inline fn meet(search: *const Self, node: *const world_file.Node(Kernel.width)) Range {
+        /// Bounds of where rays are within the children's boxes. Where the intervals meet a child
+        /// that the guide does not enter, the rays decide.
+        pub inline fn meet(
+            search: *const Self,
+            node: *const world_file.Node(Kernel.width),
+            counts: *TestCounts,
+        ) Range {
+            walk.countNode(Kernel, node, counts);
             const rows: *const Rows = @ptrCast(&node.bounds);
             var near: [3]F32 = undefined;
             var far: [3]F32 = undefined;
@@ -299,22 +311,27 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
                 last.* = slab.far(.load(&rows[slab.far_row]));
             }
             var range = search.within(near, far);
-            if (!tune_enter) return range;
-            const guided = search.guide.meet(node);
+            const guided = search.guide.meet(node, counts);
             var met = range.near.le(range.far).andNot(guided.near.le(guided.far)).bits();
             if (met == 0) return range;
             var nears = range.near.toArray();
             while (met != 0) : (met &= met - 1) {
                 const child = @ctz(met);
-                if (!search.enter(node, child)) nears[child] = std.math.inf(f32);
+                if (!search.isEntered(node, child, counts)) nears[child] = std.math.inf(f32);
             }
             range.near = .fromArray(nears);
             return range;
         }
 
         /// Whether any ray enters a child.
-        fn enter(search: *const Self, node: *const world_file.Node(Kernel.width), child: usize) bool {
+        fn isEntered(
+            search: *const Self,
+            node: *const world_file.Node(Kernel.width),
+            child: usize,
+            counts: *TestCounts,
+        ) bool {
             for (search.groups, search.views) |*group, *view| {
+                packet.countBoxes(Kernel, group, counts);
                 if (packet.enter(Kernel, group, &view.slabs, node, child)) |_| return true;
             }
             return false;
@@ -328,6 +345,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             };
         }
 
+        /// See `walk.walk`.
         pub inline fn isDone(_: *const Self, _: bool) bool {
             return false; // Nothing is near enough when all rays are done: see `shrink`.
         }
@@ -349,6 +367,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             return found;
         }
 
+        /// Triangles whose grown boxes the intervals meet, a bit each.
         inline fn meetBoxes(
             search: *const Self,
             block: *const world_file.TriangleBlock(Kernel.width),
@@ -377,24 +396,13 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             lane: usize,
             counts: *TestCounts,
         ) bool {
-            const primitive: i32 = @bitCast(block.primitive[lane]);
             var found = false;
             for (search.groups, search.views) |*group, *view| {
-                if (Kernel.counts_tests) {
-                    counts.triangle_issued += Kernel.ray_count;
-                    counts.triangle_useful += group.active.popCount();
-                }
-                const corners = packet.turnedCorners(Rays, block, lane, view);
-                const hit = packet.intersect(
-                    Kernel,
-                    query,
-                    group,
-                    &view.view,
-                    corners,
-                    primitive,
-                    search.pad,
-                );
-                found = found or hit;
+                if (group.active.none()) continue;
+                found = packet.intersectLane(Kernel, query, group, view, block, .{
+                    .lane = lane,
+                    .pad = search.pad,
+                }, counts) or found;
             }
             return found;
         }

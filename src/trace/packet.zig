@@ -1,9 +1,8 @@
-//! Rays in company through the tree: a box or a triangle against groups of rays in lanes.
+//! A group of rays in lanes through the tree: a box or a triangle against all of them at once.
 //!
-//! In: a bundle of groups (the thesis's 2x2 packet is a bundle of one group). Out: the nearest hit
-//! of every ray, or whether there is any. A child is visited when some ray of some group enters it;
-//! an inner node is handed down with the first group that does (as the ranged traversal of Wald,
-//! Boulos and Shirley 2007, section 3.2), a leaf with the set of all groups that do.
+//! In: a group, such as the thesis's packet of 2x2 pixels. Out: the nearest hit of every ray, or
+//! whether there is any. A child is visited when some ray enters it. Holds also what a bundle is,
+//! and the tests of a group that other traversals share.
 
 const std = @import("std");
 const world_file = @import("../world.zig");
@@ -12,7 +11,6 @@ const ray_file = @import("ray.zig");
 const box = @import("box.zig");
 const triangle = @import("triangle.zig");
 const walk = @import("walk.zig");
-const assert = std.debug.assert;
 const Query = walk.Query;
 
 /// Groups of rays that travel together.
@@ -20,7 +18,7 @@ pub fn Bundle(comptime Kernel: type) type {
     return struct { groups: [Kernel.group_count]ray_file.Ray(Kernel.Rays) };
 }
 
-/// How triangles look to a group.
+/// How boxes and triangles look to a group.
 pub fn GroupView(comptime Rays: type) type {
     return struct {
         slabs: ray_file.Slabs(Rays),
@@ -29,52 +27,6 @@ pub fn GroupView(comptime Rays: type) type {
         uniform: ?u2,
         view: ray_file.View(Rays),
     };
-}
-
-/// A child still to be visited: by all groups from `group` on (nodes), or by those in the set
-/// `groups` (leaves).
-const Entry = struct { child: u32, block_count: u32, near: f32, group: u32, groups: u64 };
-
-/// Looks for hits and keeps them in `nearest` of every group. With `Query.any` a ray that found one
-/// is out of the search; its `nearest.primitive` tells.
-pub fn trace(
-    comptime Kernel: type,
-    comptime query: Query,
-    tree: *const world_file.Tree(Kernel.width),
-    pad: f32,
-    bundle: *Bundle(Kernel),
-    counts: *TestCounts,
-) void {
-    var stack: [Kernel.stack_max]Entry = undefined;
-    const first = firstActive(Kernel, bundle) orelse return;
-    var views: [Kernel.group_count]GroupView(Kernel.Rays) = undefined;
-    for (&views, &bundle.groups) |*view, *group| view.* = viewOf(Kernel.Rays, group);
-    stack[0] = .{ .child = 0, .block_count = 0, .near = 0, .group = first, .groups = 0 };
-    var stack_count: usize = 1;
-    while (stack_count > 0) {
-        stack_count -= 1;
-        const entry = stack[stack_count];
-        if (entry.block_count == 0) {
-            assert(stack_count + Kernel.width <= Kernel.stack_max);
-            const node = &tree.nodes[entry.child];
-            const group = entry.group;
-            stack_count = pushChildren(
-                Kernel,
-                bundle,
-                &views,
-                node,
-                group,
-                &stack,
-                stack_count,
-                counts,
-            );
-        } else {
-            for (tree.blocks[entry.child..][0..entry.block_count]) |*block| {
-                intersectBlock(Kernel, query, bundle, &views, block, entry.groups, pad, counts);
-            }
-            if (query == .any and allFound(Kernel, bundle)) return;
-        }
-    }
 }
 
 /// Views of the active rays of a group.
@@ -89,68 +41,74 @@ pub fn viewOf(comptime Rays: type, group: *const ray_file.Ray(Rays)) GroupView(R
     };
 }
 
-fn firstActive(comptime Kernel: type, bundle: *const Bundle(Kernel)) ?u32 {
-    for (&bundle.groups, 0..) |*group, index| {
-        if (group.active.any()) return @intCast(index);
-    }
-    return null;
-}
-
-fn allFound(comptime Kernel: type, bundle: *const Bundle(Kernel)) bool {
-    for (&bundle.groups) |*group| {
-        const searching = group.nearest.primitive.eq(.splat(ray_file.no_primitive));
-        if (searching.bitAnd(group.active).any()) return false;
-    }
-    return true;
-}
-
-/// Pushes the children that some ray enters, the nearest on top (by the first group that enters).
-/// Returns the new stack count.
-inline fn pushChildren(
+/// Looks for hits of the active rays and keeps them in `nearest`. With `Query.any` a ray that found
+/// one is out of the search; its `nearest.primitive` tells.
+pub fn trace(
     comptime Kernel: type,
-    bundle: *const Bundle(Kernel),
-    views: *const [Kernel.group_count]GroupView(Kernel.Rays),
-    node: *const world_file.Node(Kernel.width),
-    group_first: u32,
-    stack: []Entry,
-    stack_count_before: usize,
+    comptime query: Query,
+    world: *const world_file.World,
+    group: *ray_file.Ray(Kernel.Rays),
     counts: *TestCounts,
-) usize {
-    var stack_count = stack_count_before;
-    for (0..Kernel.width) |child| {
-        if (node.child[child] == world_file.none) continue;
-        var entry: Entry = .{
-            .child = node.child[child],
-            .block_count = node.block_count[child],
-            .near = 0,
-            .group = group_first,
-            .groups = 0,
-        };
-        while (entry.group < Kernel.group_count) : (entry.group += 1) {
-            const at = entry.group;
-            countBoxes(Kernel, &bundle.groups[at], counts);
-            const near = enter(Kernel, &bundle.groups[at], &views[at].slabs, node, child);
-            entry.near = near orelse continue;
-            break;
-        } else continue;
-        if (entry.block_count > 0) {
-            entry.groups = @as(u64, 1) << @intCast(entry.group);
-            for (entry.group + 1..Kernel.group_count) |group| {
-                const ray = &bundle.groups[group];
-                countBoxes(Kernel, ray, counts);
-                const near = enter(Kernel, ray, &views[group].slabs, node, child);
-                if (near == null) continue;
-                entry.groups |= @as(u64, 1) << @intCast(group);
+) void {
+    if (group.active.none()) return;
+    var search: Search(Kernel, query) = .{
+        .group = group,
+        .view = viewOf(Kernel.Rays, group),
+        .pad = world.pad,
+    };
+    _ = walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts);
+}
+
+fn Search(comptime Kernel: type, comptime query: Query) type {
+    const Boxes = Kernel.Boxes;
+    const inf = std.math.inf(f32);
+    return struct {
+        group: *ray_file.Ray(Kernel.Rays),
+        view: GroupView(Kernel.Rays),
+        pad: f32,
+        /// Every ray has its own.
+        limit: f32 = inf,
+
+        const Self = @This();
+
+        /// Where the first ray enters each child.
+        pub inline fn meet(
+            search: *const Self,
+            node: *const world_file.Node(Kernel.width),
+            counts: *TestCounts,
+        ) box.Range(Boxes) {
+            var nears: [Kernel.width]f32 = @splat(inf);
+            for (&nears, node.child, 0..) |*near, child, at| {
+                if (child == world_file.none) continue;
+                countBoxes(Kernel, search.group, counts);
+                near.* = enter(Kernel, search.group, &search.view.slabs, node, at) orelse continue;
             }
+            return .{ .near = .fromArray(nears), .far = .splat(std.math.floatMax(f32)) };
         }
-        var slot = stack_count;
-        while (slot > stack_count_before and stack[slot - 1].near < entry.near) : (slot -= 1) {
-            stack[slot] = stack[slot - 1];
+
+        /// Tests the triangles of a block.
+        pub inline fn intersect(
+            search: *Self,
+            block: *const world_file.TriangleBlock(Kernel.width),
+            counts: *TestCounts,
+        ) bool {
+            var found = false;
+            for (0..Kernel.width) |lane| {
+                if (block.primitive[lane] == world_file.none) break;
+                found = intersectLane(Kernel, query, search.group, &search.view, block, .{
+                    .lane = lane,
+                    .pad = search.pad,
+                }, counts) or found;
+            }
+            return found;
         }
-        stack[slot] = entry;
-        stack_count += 1;
-    }
-    return stack_count;
+
+        pub inline fn isDone(search: *const Self, _: bool) bool {
+            if (query != .any) return false;
+            const none: Kernel.Rays.I32 = .splat(ray_file.no_primitive);
+            return search.group.nearest.primitive.eq(none).bitAnd(search.group.active).none();
+        }
+    };
 }
 
 /// The least t at which an active ray of the group enters a child, or null if none does.
@@ -176,42 +134,37 @@ pub inline fn enter(
     return Rays.F32.select(entered, range.near, .splat(std.math.inf(f32))).reduceMin();
 }
 
-fn countBoxes(comptime Kernel: type, group: anytype, counts: *TestCounts) void {
+/// Counts the test of a box against a group.
+pub fn countBoxes(comptime Kernel: type, group: anytype, counts: *TestCounts) void {
     if (!Kernel.counts_tests) return;
     counts.box_issued += Kernel.ray_count;
     counts.box_useful += group.active.popCount();
 }
 
-/// Tests the triangles of a block against the groups of a set.
-inline fn intersectBlock(
+/// Which triangle of a block, and `World.pad`.
+const At = struct { lane: usize, pad: f32 };
+
+/// Tests one triangle of a block against the active rays of one group. Returns whether any took
+/// the hit.
+pub inline fn intersectLane(
     comptime Kernel: type,
     comptime query: Query,
-    bundle: *Bundle(Kernel),
-    views: *const [Kernel.group_count]GroupView(Kernel.Rays),
+    group: *ray_file.Ray(Kernel.Rays),
+    view: *const GroupView(Kernel.Rays),
     block: *const world_file.TriangleBlock(Kernel.width),
-    groups: u64,
-    pad: f32,
+    at: At,
     counts: *TestCounts,
-) void {
-    for (0..Kernel.width) |lane| {
-        if (block.primitive[lane] == world_file.none) break;
-        const primitive: i32 = @intCast(block.primitive[lane]);
-        var rest = groups;
-        while (rest != 0) : (rest &= rest - 1) {
-            const index = @ctz(rest);
-            const group = &bundle.groups[index];
-            if (Kernel.counts_tests) {
-                counts.triangle_issued += Kernel.ray_count;
-                counts.triangle_useful += group.active.popCount();
-            }
-            const corners = turnedCorners(Kernel.Rays, block, lane, &views[index]);
-            _ = intersect(Kernel, query, group, &views[index].view, corners, primitive, pad);
-        }
+) bool {
+    if (Kernel.counts_tests) {
+        counts.triangle_issued += Kernel.ray_count;
+        counts.triangle_useful += group.active.popCount();
     }
+    const primitive: i32 = @bitCast(block.primitive[at.lane]);
+    const corners = turnedCorners(Kernel.Rays, block, at.lane, view);
+    return intersect(Kernel, query, group, &view.view, corners, primitive, at.pad);
 }
 
-/// Tests one triangle against the active rays of one group. Returns whether any took the hit.
-pub inline fn intersect(
+inline fn intersect(
     comptime Kernel: type,
     comptime query: Query,
     group: *ray_file.Ray(Kernel.Rays),
@@ -240,7 +193,7 @@ pub inline fn intersect(
 }
 
 /// One triangle for all rays of a group, turned as each ray wants it.
-pub inline fn turnedCorners(
+inline fn turnedCorners(
     comptime Rays: type,
     block: anytype,
     lane: usize,

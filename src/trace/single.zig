@@ -94,6 +94,7 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
 
         const Self = @This();
 
+        /// The search of a ray. Asserts, with `fused`, that it starts within `World.fused_reach`.
         pub inline fn init(ray: *const ray_file.Ray(Single), pad: f32) Self {
             const slabs: ray_file.Slabs(Single) = .init(ray.line);
             const axis: ray_file.LongAxis(Single) = .of(ray.line.direction);
@@ -138,7 +139,12 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
 
         /// Where the ray is within the children's boxes and its own limits: near <= far where a
         /// child may hold a hit.
-        pub inline fn meet(search: *const Self, node: *const world_file.Node(Kernel.width)) Range {
+        pub inline fn meet(
+            search: *const Self,
+            node: *const world_file.Node(Kernel.width),
+            counts: *TestCounts,
+        ) Range {
+            walk.countNode(Kernel, node, counts);
             const rows: *const Rows = @ptrCast(&node.bounds);
             var near: [3]F32 = undefined;
             var far: [3]F32 = undefined;
@@ -163,6 +169,7 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
             return if (fused) bound.mulAdd(inverse, shift) else bound.sub(shift).mul(inverse);
         }
 
+        /// See `walk.walk`.
         pub inline fn isDone(_: *const Self, found: bool) bool {
             return query == .any and found;
         }
@@ -173,7 +180,7 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
             block: *const world_file.TriangleBlock(Kernel.width),
             counts: *TestCounts,
         ) bool {
-            if (Kernel.counts_tests) walk.countBlock(Kernel, block, counts);
+            walk.countBlock(Kernel, block, counts);
             const corners = loadCorners(Boxes, block, search.axis);
             const seen = triangle.project(Boxes, corners, &search.view);
             var weights = triangle.weigh(Boxes, seen);

@@ -1,12 +1,12 @@
 //! The way through the tree: to the nearest child at once, while its siblings wait.
 //!
-//! In: a search, which knows what it looks for (one ray: single.zig; a few as one: interval.zig).
-//! Out: whether it found anything. The hits are the search's own.
+//! In: a search, which knows what it looks for (a ray: single.zig; rays in lanes: packet.zig; a few
+//! as one: interval.zig). Out: whether it found anything. The hits are the search's own.
 
+const std = @import("std");
 const world_file = @import("../world.zig");
 const TestCounts = @import("../statistics.zig").TestCounts;
 const stack_file = @import("stack.zig");
-const std = @import("std");
 const assert = std.debug.assert;
 const Entry = stack_file.Entry;
 
@@ -21,9 +21,9 @@ pub const Query = enum {
 /// Searches the whole tree, or until `search.isDone()`. Of a search it needs
 ///
 ///     limit: f32          nothing that is farther matters; it may shrink
-///     meet(node)          box.Range in the lanes of children, near <= far where one may matter
-///     intersect(block)    tests a block of triangles, returns whether one was hit
-///     isDone()            asked after every leaf
+///     meet(node, counts)        box.Range in lanes of children, near <= far where one may matter
+///     intersect(block, counts)  tests a block of triangles, returns whether one was hit
+///     isDone(found)             asked after every leaf
 pub inline fn walk(
     comptime Kernel: type,
     tree: *const world_file.Tree(Kernel.width),
@@ -38,8 +38,7 @@ pub inline fn walk(
         if (entry.block_count == 0) {
             assert(stack_count + Kernel.width <= Kernel.stack_max);
             const node = &tree.nodes[entry.child];
-            const range = search.meet(node);
-            if (Kernel.counts_tests) countNode(Kernel, node, counts);
+            const range = search.meet(node, counts);
             const met = range.near.le(range.far).bits();
             if (met != 0) {
                 const near = range.near;
@@ -61,13 +60,16 @@ pub inline fn walk(
     return found;
 }
 
-fn countNode(comptime Kernel: type, node: anytype, counts: *TestCounts) void {
+/// Counts the test of a ray against the children of a node.
+pub fn countNode(comptime Kernel: type, node: anytype, counts: *TestCounts) void {
+    if (!Kernel.counts_tests) return;
     counts.box_issued += Kernel.width;
     for (node.child) |child| counts.box_useful += @intFromBool(child != world_file.none);
 }
 
-/// Counts triangle tests of a block, each against as many rays.
+/// Counts the test of a ray against the triangles of a block.
 pub fn countBlock(comptime Kernel: type, block: anytype, counts: *TestCounts) void {
+    if (!Kernel.counts_tests) return;
     counts.triangle_issued += Kernel.width;
     for (block.primitive) |primitive| {
         counts.triangle_useful += @intFromBool(primitive != world_file.none);

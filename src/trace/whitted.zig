@@ -212,12 +212,11 @@ pub fn Whitted(comptime Kernel: type) type {
         /// Traces rays, adds what they see, and pushes what has to be traced because of it.
         fn step(tracer: *Self, pending_before: Pending) void {
             var pending = pending_before;
-            const company: query.Company = if (pending.depth > 0)
-                .scattered
-            else if (pending.layer == 0 and tracer.grid != null)
-                .{ .pencil = &tracer.grid.? }
-            else
-                .coherent;
+            const company: query.Company =
+                if (pending.depth == 0 and pending.layer == 0 and tracer.grid != null)
+                    .{ .pencil = &tracer.grid.? }
+                else
+                    .unknown;
             query.trace(Kernel, .nearest, tracer.world, &pending.bundle, company, &tracer.tests);
             var points: [group_count]Point = undefined;
             var any_seen = false;
@@ -348,7 +347,7 @@ pub fn Whitted(comptime Kernel: type) type {
             }
             if (!any_lit) return;
             const company: query.Company =
-                if (pending.depth == 0) .{ .light = light } else .scattered;
+                if (pending.depth == 0) .{ .light = light } else .unknown;
             var passing: [group_count]Vec3 = undefined;
             const active = activeMasks(&bundle);
             if (tracer.world.has_transparency or tracer.world.has_holes) {

@@ -33,11 +33,11 @@ const pixel_count = side * side;
 /// A beam is cut where its bounds cover more than this many times what its blocks do.
 const cut_ratio = 2.0;
 /// Cuts of a beam at most, one after the other.
-pub var cut_depth_max: u32 = 4;
-/// Blocks of triangles that a beam may meet before its rays go on alone.
-pub var meeting_max: u32 = 160;
+const cut_depth_max = 2;
+/// Triangles in the blocks that a beam may meet before its rays go on without it.
+const meeting_max = 400;
 /// Beams of fewer rays are not worth their set-up.
-pub var beam_rays_min: u32 = 8;
+const beam_rays_min = 8;
 /// Slopes at most; rays that go more sideways make a beam of their own.
 const slope_limit = 4.0;
 /// With no more blocks than this, triangles are not tested against each of them first.
@@ -156,7 +156,7 @@ fn Search(comptime Kernel: type) type {
 
         fn run(search: *Self) void {
             // A cut leaves two sets for one; rays that do not fit leave one more, at most 3 times.
-            var waiting: [24]Waiting = undefined;
+            var waiting: [4 * cut_depth_max + 8]Waiting = undefined;
             waiting[0] = .{ .members = search.active(), .depth = 0 };
             var waiting_count: usize = 1;
             while (waiting_count > 0) {
@@ -503,7 +503,7 @@ fn Search(comptime Kernel: type) type {
                     continue;
                 }
                 meeting_count += entry.block_count;
-                if (meeting_count > meeting_max) return search.apart(&search.left(members));
+                if (meeting_count > meeting_max / width) return search.apart(&search.left(members));
                 for (entry.child..entry.child + entry.block_count) |index| {
                     search.meetBlock(@intCast(index));
                 }
