@@ -280,8 +280,8 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             }
             const guide: single.Search(Kernel, query, true) = .init(&guide_ray, world.pad);
             var slabs: [3]Slab = undefined;
-            for (&slabs, octant, ends.origin, ends.inverse, 0..) |*slab, down, from, inverse, axis| {
-                slab.* = .init(axis, down, from, inverse);
+            for (&slabs, octant, ends.origin, ends.inverse, 0..) |*slab, down, from, inv, axis| {
+                slab.* = .init(axis, down, from, inv);
             }
             return .{
                 .groups = groups,
