@@ -77,8 +77,8 @@ pub fn Node(comptime width: comptime_int) type {
 ///     width 4, bytes   0..143  corner[3]: x x x x | y y y y | z z z z each
 ///                    144..159  primitive
 ///
-/// Padding lanes have `primitive = none` and corners of NaN: no test of signs or order is true of
-/// them, so that none is passed.
+/// Padding lanes have `primitive = none` and three corners at the origin, which no ray hits: but
+/// every test of edges is in doubt about them, so that they are left out first.
 pub fn TriangleBlock(comptime width: comptime_int) type {
     return extern struct {
         /// [corner][axis][lane].
@@ -88,7 +88,7 @@ pub fn TriangleBlock(comptime width: comptime_int) type {
 
         /// A block without triangles.
         pub const empty: @This() = .{
-            .corner = @splat(@splat(@splat(std.math.nan(f32)))),
+            .corner = @splat(@splat(@splat(0))),
             .primitive = @splat(none),
         };
 

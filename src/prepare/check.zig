@@ -77,7 +77,7 @@ fn checkLeaf(checked: *const World, blocks: anytype, box: Box3, seen: []bool) vo
             for (&block.corner, 0..) |*corner, corner_index| {
                 const position: Vec3 = .{ corner[0][lane], corner[1][lane], corner[2][lane] };
                 if (primitive == world.none) {
-                    for (position) |coordinate| assert(coordinate != coordinate);
+                    for (position) |coordinate| assert(coordinate == 0);
                     continue;
                 }
                 const vertex = checked.triangles[primitive].corner[corner_index];

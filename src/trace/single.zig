@@ -184,10 +184,12 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
             const corners = loadCorners(Boxes, block, search.axis);
             const seen = triangle.project(Boxes, corners, &search.view);
             var weights = triangle.weigh(Boxes, seen);
-            if (weights.mayAgree().none()) return false;
-            const inside = triangle.settle(Boxes, seen, &weights, weights.agree());
-            const hit = triangle.locate(Boxes, seen, weights, corners, &search.view, search.pad);
             const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
+            const there = primitive.gt(.splat(ray_file.no_primitive));
+            if (weights.mayAgree().bitAnd(there).none()) return false;
+            const agreeing = weights.agree().bitAnd(there);
+            const inside = triangle.settle(Boxes, seen, &weights, agreeing);
+            const hit = triangle.locate(Boxes, seen, weights, corners, &search.view, search.pad);
             const nearest: ray_file.Hit(Boxes) = .{
                 .t = .splat(search.limit),
                 .primitive = .splat(search.nearest_primitive),
