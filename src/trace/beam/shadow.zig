@@ -33,9 +33,12 @@ const pixel_count = side * side;
 /// A beam is cut where its bounds cover more than this many times what its blocks do.
 const cut_ratio = 2.0;
 /// Cuts of a beam at most, one after the other.
-const cut_depth_max = 2;
-/// Triangles in the blocks that a beam may meet before its rays go on without it.
-const meeting_max = 400;
+const cut_depth_max = 1;
+/// Blocks of triangles that a beam may meet before its rays go on without it: so much work as the
+/// rays of a tile would have by themselves, of which a part does not depend on the lanes.
+fn meetingMax(comptime lanes: u32) u32 {
+    return 30 + 240 / lanes;
+}
 /// Beams of fewer rays are not worth their set-up.
 const beam_rays_min = 8;
 /// Slopes at most; rays that go more sideways make a beam of their own.
@@ -503,7 +506,7 @@ fn Search(comptime Kernel: type) type {
                     continue;
                 }
                 meeting_count += entry.block_count;
-                if (meeting_count > meeting_max / width) return search.apart(&search.left(members));
+                if (meeting_count > meetingMax(width)) return search.apart(&search.left(members));
                 for (entry.child..entry.child + entry.block_count) |index| {
                     search.meetBlock(@intCast(index));
                 }
