@@ -13,6 +13,7 @@ const simd = @import("simd.zig");
 const statistics = @import("statistics.zig");
 const world = @import("world.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const bvh_build = @import("prepare/bvh_build.zig");
 const bvh_wide = @import("prepare/bvh_wide.zig");
 const check = @import("prepare/check.zig");
 const flatten = @import("prepare/flatten.zig");
@@ -30,12 +31,16 @@ const World = world.World;
 /// How the user chooses a camera.
 pub const CameraChoice = view.CameraChoice;
 
+/// How much care is taken over the tree: the same picture in any case.
+pub const TreeQuality = bvh_build.Quality;
+
 /// What the user may decide.
 pub const Settings = struct {
     /// Width of the tree's nodes and triangle blocks: 4, 8 or 16.
     lanes: u8,
     /// 1..`parallel.thread_count_max`.
     thread_count: usize,
+    tree_quality: TreeQuality = .default,
     camera: CameraChoice = .default,
     /// Width and height in pixels, at least 1 each.
     resolution: ?[2]u32 = null,
@@ -161,6 +166,7 @@ pub noinline fn buildTree(
         .pad = result.pad,
         .node_margin = result.node_margin,
         .thread_count = settings.thread_count,
+        .quality = settings.tree_quality,
     };
     const facts = &result.tree_statistics;
     result.tree = switch (settings.lanes) {
@@ -503,5 +509,6 @@ test {
     _ = view;
     _ = @import("prepare/framing.zig");
     _ = @import("prepare/bvh_split.zig");
-    _ = @import("prepare/bvh_build.zig");
+    _ = bvh_build;
+    _ = @import("prepare/bvh_cells.zig");
 }

@@ -13,11 +13,14 @@ const math = @import("../math.zig");
 const parallel = @import("../parallel.zig");
 const world = @import("../world.zig");
 const huge_pages = @import("huge_pages.zig");
+const cells_file = @import("bvh_cells.zig");
 const split = @import("bvh_split.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
-const Bins = split.Bins(split.bin_count_large);
+const Bins = split.Bins(split.bin_count_large, 3);
 const Binning = split.Binning(split.bin_count_large);
+const Cells = cells_file.Cells;
+const Item = cells_file.Item;
 const Box = split.Box;
 const Box3 = math.Box3;
 const Side = split.Side;
@@ -26,6 +29,9 @@ const Vec3 = math.Vec3;
 
 /// References a thread takes at a time while large sets are cut.
 const chunk_size = 4096;
+
+/// Sets in fewer cells than these are cut by their references: too few planes lie between them.
+const item_count_min = 16;
 
 /// A node of the binary tree, laid out as a `Box` with its free lanes in use:
 ///
@@ -92,7 +98,11 @@ pub const Input = struct {
     /// `World.node_margin`.
     node_margin: f32,
     thread_count: usize,
+    quality: Quality = .default,
 };
+
+/// How much care is taken over a tree.
+pub const Quality = enum { fast, default, high };
 
 /// Triangles of the sets that one thread cuts on its own: small enough that many threads are busy,
 /// large enough that few sets are cut by all of them.
@@ -135,6 +145,18 @@ pub fn build(
     };
 }
 
+/// What one thread cuts.
+const Task = struct {
+    /// Of the triangles.
+    begin: u32,
+    end: u32,
+    /// The next pair that is free, and all before `end` are.
+    pair: u32,
+    /// Within `task_sets`.
+    sets_begin: u32,
+    sets_end: u32,
+};
+
 /// A set of triangles that is still to be cut.
 const Set = struct {
     node: u32,
@@ -157,13 +179,16 @@ fn Builder(comptime block_size: u32) type {
         references: []align(64) Box,
         nodes: []Node,
         task_size: u32,
-        tasks: std.ArrayList(Set) = .empty,
+        tasks: std.ArrayList(Task) = .empty,
+        /// Of tasks, those of each side by side.
+        task_sets: std.ArrayList(Set) = .empty,
         top_pairs: std.ArrayList(u32) = .empty,
 
         const Self = @This();
 
         fn deinit(builder: *Self, gpa: Allocator) void {
             builder.tasks.deinit(gpa);
+            builder.task_sets.deinit(gpa);
             builder.top_pairs.deinit(gpa);
         }
 
@@ -195,18 +220,155 @@ fn Builder(comptime block_size: u32) type {
             };
         }
 
+        /// Cuts a large set into `sets` by cells of a grid; leaves a small one as it is.
+        fn cutCells(
+            builder: *Self,
+            gpa: Allocator,
+            root: Set,
+            sets: *std.ArrayList(Set),
+        ) error{OutOfMemory}!void {
+            if (root.count() < cells_file.reference_count_min) return sets.append(gpa, root);
+            const thread_count = builder.input.thread_count;
+            var cells: Cells = try .init(gpa, builder.references, root.centers, thread_count);
+            defer cells.deinit(gpa);
+            try builder.cutItems(gpa, root, cells.items, sets);
+            const target = try gpa.alignedAlloc(Box, .@"64", builder.references.len);
+            huge_pages.advise(target);
+            cells.scatter(target, thread_count);
+            gpa.free(builder.references);
+            builder.references = target;
+        }
+
+        /// Cuts a set between cells, down to tasks, or to `sets` where few cells are left that hold
+        /// many. Their references are yet to be moved to where the cells are moved here.
+        fn cutItems(
+            builder: *Self,
+            gpa: Allocator,
+            root: Set,
+            items: []Item,
+            sets: *std.ArrayList(Set),
+        ) error{OutOfMemory}!void {
+            const fast = builder.input.quality == .fast;
+            // A set waits on each level at most.
+            var stack: [world.tree_depth_max]ItemSet = undefined;
+            stack[0] = .{ .set = root, .items = items, .in_task = false };
+            var stack_count: usize = 1;
+            while (stack_count > 0) {
+                const at = stack[stack_count - 1];
+                const set = &at.set;
+                const is_task = set.count() <= builder.task_size;
+                if (is_task and !at.in_task) try builder.beginTask(gpa, set);
+                const is_done = (is_task and !fast) or isTooDeep(set) or
+                    at.items.len <= @as(usize, if (fast) 1 else item_count_min);
+                const chosen = if (is_done) null else chooseItems(set, at.items);
+                const left = chosen orelse {
+                    if (is_task) {
+                        try builder.addTaskSet(gpa, set);
+                    } else {
+                        try sets.append(gpa, at.set);
+                    }
+                    stack_count -= 1;
+                    continue;
+                };
+                const pair = try builder.takePair(gpa, set.begin + left.count, is_task);
+                const children = builder.makeChildren(
+                    set,
+                    pair,
+                    left.count,
+                    left.boxes,
+                    left.centers,
+                );
+                for ([_]usize{ 1, 0 }, stack_count - 1..) |child, to| stack[to] = .{
+                    .set = children[child],
+                    .items = if (child == 0)
+                        at.items[0..left.item_count]
+                    else
+                        at.items[left.item_count..],
+                    .in_task = is_task,
+                };
+                stack_count += 1;
+            }
+        }
+
+        /// A pair for a cut whose left half ends at `left_end`, of the last task if it is in one.
+        fn takePair(
+            builder: *Self,
+            gpa: Allocator,
+            left_end: u32,
+            is_task: bool,
+        ) error{OutOfMemory}!u32 {
+            if (is_task) {
+                const task = &builder.tasks.items[builder.tasks.items.len - 1];
+                task.pair += 1;
+                return task.pair - 1;
+            }
+            // No task has this pair: theirs start one after their first triangle.
+            try builder.top_pairs.append(gpa, left_end);
+            return left_end;
+        }
+
+        fn beginTask(builder: *Self, gpa: Allocator, set: *const Set) error{OutOfMemory}!void {
+            const sets_begin: u32 = @intCast(builder.task_sets.items.len);
+            try builder.tasks.append(gpa, .{
+                .begin = set.begin,
+                .end = set.end,
+                .pair = set.begin + 1,
+                .sets_begin = sets_begin,
+                .sets_end = sets_begin,
+            });
+        }
+
+        /// Adds a set to the last task.
+        fn addTaskSet(builder: *Self, gpa: Allocator, set: *const Set) error{OutOfMemory}!void {
+            try builder.task_sets.append(gpa, set.*);
+            const task = &builder.tasks.items[builder.tasks.items.len - 1];
+            task.sets_end += 1;
+            assert(task.sets_end == builder.task_sets.items.len);
+        }
+
+        const ItemSet = struct { set: Set, items: []Item, in_task: bool };
+
+        const LeftItems = struct { item_count: usize, count: u32, boxes: [2]Box, centers: [2]Box };
+
+        /// Moves the cells that go left to the front; null where nothing separates them.
+        fn chooseItems(set: *const Set, items: []Item) ?LeftItems {
+            const binning: Binning = .init(set.centers);
+            var bins: Bins = undefined;
+            bins.clear(&binning);
+            for (items) |*item| bins.addItem(&binning, item);
+            const chosen = bins.choose(block_size) orelse return null;
+            const side: Side = .init(&binning, &chosen);
+            var left: LeftItems = .{
+                .item_count = 0,
+                .count = chosen.left_count,
+                .boxes = .{ chosen.left_box, chosen.right_box },
+                .centers = @splat(split.box_empty),
+            };
+            for (items) |*item| {
+                const middle = split.middleOf(item.centers);
+                const is_left = side.isLeft(&middle);
+                const centers = &left.centers[@intFromBool(!is_left)];
+                centers.* = split.join(item.centers, centers.*);
+                if (!is_left) continue;
+                std.mem.swap(Item, item, &items[left.item_count]);
+                left.item_count += 1;
+            }
+            return left;
+        }
+
         /// Cuts sets larger than a task, level by level.
         fn cutTop(builder: *Self, gpa: Allocator, root: Set) error{OutOfMemory}!void {
             var level: std.ArrayList(Cut) = .empty;
             defer level.deinit(gpa);
             var next: std.ArrayList(Set) = .empty;
             defer next.deinit(gpa);
-            try next.append(gpa, root);
+            try builder.cutCells(gpa, root, &next);
             while (next.items.len > 0) {
                 level.clearRetainingCapacity();
                 for (next.items) |set| {
                     if (set.count() <= builder.task_size) {
-                        try builder.tasks.append(gpa, set);
+                        try builder.beginTask(gpa, &set);
+                        try builder.addTaskSet(gpa, &set);
                     } else {
                         try level.append(gpa, .{ .set = set, .binning = .init(set.centers) });
                     }
@@ -223,8 +385,11 @@ fn Builder(comptime block_size: u32) type {
                 work.next.store(0, .monotonic);
                 parallel.run(thread_count, &work, LevelWork.exchange);
                 for (work.cuts, 0..) |*cut, index| {
-                    try builder.top_pairs.append(gpa, cut.left_end);
-                    try next.appendSlice(gpa, &work.finish(cut, @intCast(index)));
+                    try next.appendSlice(gpa, &work.finish(
+                        cut,
+                        @intCast(index),
+                        try builder.takePair(gpa, cut.left_end, false),
+                    ));
                 }
             }
         }
@@ -232,11 +397,11 @@ fn Builder(comptime block_size: u32) type {
         /// Cuts the sets that are tasks, the largest first.
         fn runTasks(builder: *Self, stretches: []Tree.Stretch) void {
             const larger = struct {
-                fn larger(_: void, a: Set, b: Set) bool {
-                    return a.count() > b.count();
+                fn larger(_: void, a: Task, b: Task) bool {
+                    return a.end - a.begin > b.end - b.begin;
                 }
             }.larger;
-            std.mem.sort(Set, builder.tasks.items, {}, larger);
+            std.mem.sort(Task, builder.tasks.items, {}, larger);
             var work: TaskWork = .{ .builder = builder, .stretches = stretches };
             const thread_count = @min(builder.input.thread_count, builder.tasks.items.len);
             parallel.run(thread_count, &work, TaskWork.run);
@@ -291,22 +456,30 @@ fn Builder(comptime block_size: u32) type {
                 while (true) {
                     const index = work.next.fetchAdd(1, .monotonic);
                     if (index >= work.stretches.len) return;
-                    work.stretches[index] = work.cut(work.builder.tasks.items[index]);
+                    work.stretches[index] = work.cutTask(&work.builder.tasks.items[index]);
                 }
             }
 
-            /// Cuts a set down to leaves. Returns the pairs made.
-            fn cut(work: *TaskWork, task: Set) Tree.Stretch {
+            /// Cuts the sets of a task down to leaves. Returns its pairs.
+            fn cutTask(work: *TaskWork, task: *const Task) Tree.Stretch {
+                const sets = work.builder.task_sets.items[task.sets_begin..task.sets_end];
+                var pair = task.pair;
+                for (sets) |*set| pair = work.cut(set.*, pair);
+                assert(pair <= task.end);
+                return .{ .begin = task.begin + 1, .end = pair };
+            }
+
+            /// Cuts a set in pairs from `first_pair` on. Returns the next.
+            fn cut(work: *TaskWork, whole: Set, first_pair: u32) u32 {
                 const builder = work.builder;
                 // A set waits on each level at most.
                 var stack: [world.tree_depth_max]Set = undefined;
                 var stack_count: usize = 0;
-                const begin = task.begin + 1;
-                var pair = begin;
-                var set = task;
+                var pair = first_pair;
+                var set = whole;
                 while (true) {
                     if (set.count() <= block_size) {
-                        if (stack_count == 0) break;
+                        if (stack_count == 0) return pair;
                         stack_count -= 1;
                         set = stack[stack_count];
                     } else {
@@ -317,18 +490,23 @@ fn Builder(comptime block_size: u32) type {
                         set = children[0];
                     }
                 }
-                assert(pair <= task.end);
-                return .{ .begin = begin, .end = pair };
             }
         };
 
         /// Cuts one set by one thread.
         fn cutSet(builder: *Self, set: *const Set, pair: u32) [2]Set {
             if (!isTooDeep(set)) {
-                const children = if (set.count() <= split.small_count_max)
-                    builder.cutByCost(set, pair, split.bin_count_small)
-                else
-                    builder.cutByCost(set, pair, split.bin_count_large);
+                const small = set.count() <= split.small_count_max;
+                const children = switch (builder.input.quality) {
+                    .fast => if (small)
+                        builder.cutByCost(set, pair, split.bin_count_small, 1)
+                    else
+                        builder.cutByCost(set, pair, split.bin_count_large, 1),
+                    .default, .high => if (small)
+                        builder.cutByCost(set, pair, split.bin_count_small, 3)
+                    else
+                        builder.cutByCost(set, pair, split.bin_count_large, 3),
+                };
                 if (children) |found| return found;
             }
             const left_count = set.count() / 2;
@@ -345,11 +523,12 @@ fn Builder(comptime block_size: u32) type {
             set: *const Set,
             pair: u32,
             comptime bin_count: comptime_int,
+            comptime axis_count: comptime_int,
         ) ?[2]Set {
             const references = builder.references[set.begin..set.end];
             const binning: split.Binning(bin_count) = .init(set.centers);
-            var bins: split.Bins(bin_count) = undefined;
-            bins.clear();
+            var bins: split.Bins(bin_count, axis_count) = undefined;
+            bins.clear(&binning);
             bins.add(&binning, references);
             const chosen = bins.choose(block_size) orelse return null;
             const side: Side = .init(&binning, &chosen);
@@ -533,7 +712,7 @@ fn LevelWorkOf(comptime Self: type, comptime block_size: u32) type {
                 const chunk = &work.chunks[index];
                 const cut = &work.cuts[chunk.cut];
                 const references = work.builder.references[chunk.begin..chunk.end];
-                work.bins[index].clear();
+                work.bins[index].clear(&cut.binning);
                 work.bins[index].add(&cut.binning, references);
             }
         }
@@ -639,13 +818,11 @@ fn LevelWorkOf(comptime Self: type, comptime block_size: u32) type {
         }
 
         /// The children of a set whose references have been moved.
-        fn finish(work: *LevelWork, cut: *const Cut, cut_index: u32) [2]Set {
+        fn finish(work: *LevelWork, cut: *const Cut, cut_index: u32, pair: u32) [2]Set {
             var sides: Sides = .empty;
             for (work.chunksOf(cut_index)) |*chunk| sides.join(&chunk.sides);
             if (cut.split) |*chosen| sides.boxes = .{ chosen.left_box, chosen.right_box };
-            // No task has this pair: theirs start one after their first triangle.
-            const pair = cut.left_end;
-            const left_count = pair - cut.set.begin;
+            const left_count = cut.left_end - cut.set.begin;
             const builder = work.builder;
             return builder.makeChildren(&cut.set, pair, left_count, sides.boxes, sides.centers);
         }
