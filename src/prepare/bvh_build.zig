@@ -30,6 +30,14 @@ const Vec3 = math.Vec3;
 /// References a thread takes at a time while large sets are cut.
 const chunk_size = 4096;
 
+/// Sets of this many references and less are cut by them, not by their cells: there are more and
+/// better planes, and all of them are in the cache. The quality `fast` does not mind.
+const grid_set_max = 16_384;
+
+/// Leaves of a tree that is to be optimised hold this part of a block, so that triangles can change
+/// blocks.
+const high_leaf_share = 4;
+
 /// Sets in fewer cells than these are cut by their references: too few planes lie between them.
 const item_count_min = 16;
 
@@ -49,7 +57,8 @@ pub const Node = extern struct {
         return @as(*const Box, @ptrCast(node)).*;
     }
 
-    fn of(bounds: Box, count: u32) Node {
+    /// A leaf.
+    pub fn of(bounds: Box, count: u32) Node {
         const lanes: [8]f32 = bounds;
         return .{
             .lower = lanes[0..3].*,
@@ -124,6 +133,7 @@ pub fn build(
         .references = undefined,
         .nodes = undefined,
         .task_size = @intCast(taskSize(count)),
+        .leaf_size = if (input.quality == .high) block_size / high_leaf_share else block_size,
     };
     builder.references = try gpa.alignedAlloc(Box, .@"64", count);
     errdefer gpa.free(builder.references);
@@ -179,6 +189,8 @@ fn Builder(comptime block_size: u32) type {
         references: []align(64) Box,
         nodes: []Node,
         task_size: u32,
+        /// Sets of that many triangles and less are leaves.
+        leaf_size: u32,
         tasks: std.ArrayList(Task) = .empty,
         /// Of tasks, those of each side by side.
         task_sets: std.ArrayList(Set) = .empty,
@@ -258,7 +270,7 @@ fn Builder(comptime block_size: u32) type {
                 const set = &at.set;
                 const is_task = set.count() <= builder.task_size;
                 if (is_task and !at.in_task) try builder.beginTask(gpa, set);
-                const is_done = (is_task and !fast) or isTooDeep(set) or
+                const is_done = (set.count() <= @max(grid_set_max, builder.task_size) and !fast) or isTooDeep(set) or
                     at.items.len <= @as(usize, if (fast) 1 else item_count_min);
                 const chosen = if (is_done) null else chooseItems(set, at.items);
                 const left = chosen orelse {
@@ -440,8 +452,7 @@ fn Builder(comptime block_size: u32) type {
         /// Whether a set must be halved now, for its leaves to stay within `world.tree_depth_max`
         /// however its heuristic cuts would fall.
         fn isTooDeep(set: *const Set) bool {
-            const block_count = (set.count() + block_size - 1) / block_size;
-            return set.depth + std.math.log2_int_ceil(u32, block_count) >= world.tree_depth_max;
+            return set.depth + std.math.log2_int_ceil(u32, set.count()) >= world.tree_depth_max;
         }
 
         const LevelWork = LevelWorkOf(Self, block_size);
@@ -478,7 +489,7 @@ fn Builder(comptime block_size: u32) type {
                 var pair = first_pair;
                 var set = whole;
                 while (true) {
-                    if (set.count() <= block_size) {
+                    if (set.count() <= builder.leaf_size) {
                         if (stack_count == 0) return pair;
                         stack_count -= 1;
                         set = stack[stack_count];
@@ -534,7 +545,7 @@ fn Builder(comptime block_size: u32) type {
             const side: Side = .init(&binning, &chosen);
             // Leaves have no use for the middles of what is in them.
             const largest = @max(chosen.left_count, set.count() - chosen.left_count);
-            const centers = if (largest > block_size)
+            const centers = if (largest > builder.leaf_size)
                 partition(references, &side, chosen.left_count, true)
             else
                 partition(references, &side, chosen.left_count, false);

@@ -99,7 +99,8 @@ pub const Cells = struct {
         thread_count: usize,
     ) error{OutOfMemory}!Cells {
         assert(references.len >= reference_count_min);
-        const bits = @min(std.math.log2_int(usize, references.len / references_per_cell), cell_bits_max);
+        const wanted = std.math.log2_int(usize, references.len / references_per_cell);
+        const bits: u5 = @intCast(@min(wanted, cell_bits_max));
         const cell_count = @as(u32, 1) << bits;
         const chunk_count: u32 = @intCast(@min(references.len / chunk_size_min, chunk_count_max));
         const counts = try gpa.alloc(u32, chunk_count * cell_count);
@@ -237,3 +238,40 @@ const ScatterWork = struct {
         }
     }
 };
+
+test "every reference ends up in its cell's place, in the order it had" {
+    const gpa = std.testing.allocator;
+    const references = try gpa.alloc(Box, reference_count_min + 7);
+    defer gpa.free(references);
+    var random_state: std.Random.DefaultPrng = .init(2);
+    const random = random_state.random();
+    var centers = split.box_empty;
+    for (references, 0..) |*box, index| {
+        const at: [3]f32 = .{ random.float(f32), 9 * random.float(f32), 3 };
+        box.* = split.reference(.{ .lower = at, .upper = at }, @intCast(index));
+        centers = split.join(centers, split.centerBox(box.*));
+    }
+    const target = try gpa.alloc(Box, references.len);
+    defer gpa.free(target);
+    var cells: Cells = try .init(gpa, references, centers, 3);
+    defer cells.deinit(gpa);
+    // The longer axis has the more cells, the one without extent none.
+    try std.testing.expectEqual(6, cells.grid.shifts[1] - cells.grid.shifts[0] + 3);
+    std.mem.reverse(Item, cells.items);
+    cells.scatter(target, 3);
+    var begin: usize = 0;
+    for (cells.items) |item| {
+        var last: ?u32 = null;
+        var box = split.box_empty;
+        for (target[begin..][0..item.count]) |reference| {
+            try std.testing.expectEqual(item.cell, cells.grid.cellOf(reference));
+            const number = split.triangleNumber(reference);
+            if (last) |before| try std.testing.expect(number > before);
+            last = number;
+            box = split.join(box, reference);
+        }
+        try std.testing.expectEqual(split.toBox3(item.box), split.toBox3(box));
+        begin += item.count;
+    }
+    try std.testing.expectEqual(references.len, begin);
+}

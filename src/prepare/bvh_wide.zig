@@ -12,6 +12,7 @@ const math = @import("../math.zig");
 const parallel = @import("../parallel.zig");
 const world = @import("../world.zig");
 const bvh_build = @import("bvh_build.zig");
+const bvh_reinsert = @import("bvh_reinsert.zig");
 const bvh_split = @import("bvh_split.zig");
 const huge_pages = @import("huge_pages.zig");
 const assert = std.debug.assert;
@@ -47,6 +48,9 @@ pub fn build(
     }
     var binary = try bvh_build.build(gpa, input, width);
     defer binary.deinit(gpa);
+    if (input.quality == .high) {
+        try bvh_reinsert.optimize(gpa, &binary, input.thread_count, width);
+    }
     const costs = try gpa.alloc([width]f32, binary.nodes.len);
     defer gpa.free(costs);
     var collapse: Collapse(width) = .init(input, &binary, costs);
