@@ -30,10 +30,6 @@ const Vec3 = math.Vec3;
 /// References a thread takes at a time while large sets are cut.
 const chunk_size = 4096;
 
-/// Sets of this many references and less are cut by them, not by their cells: there are more and
-/// better planes, and all of them are in the cache. The quality `fast` does not mind.
-const grid_set_max = 16_384;
-
 /// Leaves of a tree that is to be optimised hold this part of a block, so that triangles can change
 /// blocks.
 const high_leaf_share = 4;
@@ -116,7 +112,7 @@ pub const Quality = enum { fast, default, high };
 /// Triangles of the sets that one thread cuts on its own: small enough that many threads are busy,
 /// large enough that few sets are cut by all of them.
 pub fn taskSize(triangle_count: usize) usize {
-    return @max(triangle_count / 64, 4096);
+    return @max(triangle_count / 64, 8192);
 }
 
 /// Builds the tree over at least one triangle. `block_size` is how many triangles are tested at
@@ -215,7 +211,7 @@ fn Builder(comptime block_size: u32) type {
             };
             defer gpa.free(work.results);
             const thread_count = @min(builder.input.thread_count, chunk_count);
-            parallel.run(thread_count, &work, ReferenceWork.run);
+            parallel.share(thread_count, &work, ReferenceWork.run);
             var box = split.box_empty;
             var centers = split.box_empty;
             for (work.results) |result| {
@@ -270,7 +266,7 @@ fn Builder(comptime block_size: u32) type {
                 const set = &at.set;
                 const is_task = set.count() <= builder.task_size;
                 if (is_task and !at.in_task) try builder.beginTask(gpa, set);
-                const is_done = (set.count() <= @max(grid_set_max, builder.task_size) and !fast) or isTooDeep(set) or
+                const is_done = (is_task and !fast) or isTooDeep(set) or
                     at.items.len <= @as(usize, if (fast) 1 else item_count_min);
                 const chosen = if (is_done) null else chooseItems(set, at.items);
                 const left = chosen orelse {
@@ -390,12 +386,12 @@ fn Builder(comptime block_size: u32) type {
                 var work = try LevelWork.init(gpa, builder, level.items);
                 defer work.deinit(gpa);
                 const thread_count = @min(builder.input.thread_count, work.chunks.len);
-                parallel.run(thread_count, &work, LevelWork.fillBins);
+                parallel.share(thread_count, &work, LevelWork.fillBins);
                 work.choose();
                 work.next.store(0, .monotonic);
-                parallel.run(thread_count, &work, LevelWork.partitionChunks);
+                parallel.share(thread_count, &work, LevelWork.partitionChunks);
                 work.next.store(0, .monotonic);
-                parallel.run(thread_count, &work, LevelWork.exchange);
+                parallel.share(thread_count, &work, LevelWork.exchange);
                 for (work.cuts, 0..) |*cut, index| {
                     try next.appendSlice(gpa, &work.finish(
                         cut,
@@ -416,7 +412,7 @@ fn Builder(comptime block_size: u32) type {
             std.mem.sort(Task, builder.tasks.items, {}, larger);
             var work: TaskWork = .{ .builder = builder, .stretches = stretches };
             const thread_count = @min(builder.input.thread_count, builder.tasks.items.len);
-            parallel.run(thread_count, &work, TaskWork.run);
+            parallel.share(thread_count, &work, TaskWork.run);
         }
 
         /// Makes the two children of a set in the given pair. Returns them as sets.
@@ -616,9 +612,10 @@ const ReferenceWork = struct {
         assert(thread_index < parallel.thread_count_max);
         const positions = work.input.positions;
         while (true) {
-            const chunk = work.next.fetchAdd(1, .monotonic);
-            if (chunk >= work.results.len) return;
-            const begin = @as(usize, chunk) * chunk_size;
+            const turn = work.next.fetchAdd(1, .monotonic);
+            if (turn >= work.results.len) return;
+            const chunk = parallel.spread(turn, work.results.len, work.input.thread_count);
+            const begin = chunk * chunk_size;
             const end = @min(begin + chunk_size, work.references.len);
             var box = split.box_empty;
             var centers = split.box_empty;

@@ -25,8 +25,8 @@ const references_per_cell = 32;
 const cell_bits_max = 14;
 
 /// Parts of the references that are counted apart.
-const chunk_count_max = 32;
-const chunk_size_min = 4096;
+const chunk_count_max = 64;
+const chunk_size_min = 8192;
 
 /// A cell that holds references.
 pub const Item = struct {
@@ -117,7 +117,7 @@ pub const Cells = struct {
             .items = &.{},
         };
         var work: CountWork = .{ .cells = &cells, .boxes = boxes };
-        parallel.run(used_count, &work, CountWork.run);
+        parallel.share(used_count, &work, CountWork.run);
         try work.collect(gpa);
         return cells;
     }
@@ -150,7 +150,7 @@ pub const Cells = struct {
         }
         assert(next == target.len);
         var work: ScatterWork = .{ .cells = cells, .target = target };
-        parallel.run(@min(thread_count, cells.chunk_count), &work, ScatterWork.run);
+        parallel.share(@min(thread_count, cells.chunk_count), &work, ScatterWork.run);
     }
 };
 

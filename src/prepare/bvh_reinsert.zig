@@ -1,4 +1,4 @@
-//! A binary tree -> one of less expected cost, by taking subtrees out and putting them in elsewhere.
+//! A binary tree -> one of less expected cost: subtrees are taken out and put in elsewhere.
 //!
 //! In: a tree whose leaves may be smaller than blocks. Out: the same triangles in a tree of the
 //! same form. Each pass asks for every node where its subtree would cost the least, by branch and
@@ -181,7 +181,7 @@ fn Optimizer(comptime block_size: u32) type {
             defer gpa.free(moves);
             var work: SearchWork = .{ .optimizer = optimizer, .moves = moves };
             const chunk_count = (moves.len + chunk_size - 1) / chunk_size;
-            parallel.run(@min(thread_count, chunk_count), &work, SearchWork.run);
+            parallel.share(@min(thread_count, chunk_count), &work, SearchWork.run);
             var count: usize = 0;
             for (moves) |move| {
                 if (move.saving <= 0) continue;
@@ -407,7 +407,12 @@ fn Optimizer(comptime block_size: u32) type {
             errdefer gpa.free(nodes);
             const references = try gpa.alignedAlloc(Box, .@"64", tree.references.len);
             errdefer gpa.free(references);
-            var layout: Layout = .{ .optimizer = optimizer, .from = tree.references, .nodes = nodes, .references = references };
+            var layout: Layout = .{
+                .optimizer = optimizer,
+                .from = tree.references,
+                .nodes = nodes,
+                .references = references,
+            };
             defer layout.deinit(gpa);
             try layout.run(gpa);
             const stretches = try layout.stretches.toOwnedSlice(gpa);

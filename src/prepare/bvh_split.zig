@@ -270,7 +270,8 @@ pub fn Bins(comptime bin_count: comptime_int, comptime axis_count: comptime_int)
             inline for (&costs, &bins.boxes, &bins.counts) |*to, *boxes, *counts| {
                 to.* = planeCosts(boxes, counts, block_size);
             }
-            const lowest = if (axis_count == 1) costs[0] else lesser(costs[0], lesser(costs[1], costs[2]));
+            var lowest = costs[0];
+            for (costs[1..]) |row_costs| lowest = lesser(lowest, row_costs);
             const least = leastLane(bin_count, lowest);
             if (least == std.math.inf(f32)) return null;
             for (costs, 0..) |row_costs, row| {

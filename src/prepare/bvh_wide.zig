@@ -94,7 +94,7 @@ fn Collapse(comptime width: u32) type {
         fn weigh(collapse: *Self) void {
             var work: WeighWork = .{ .collapse = collapse };
             const stretch_count = collapse.binary.stretches.len;
-            parallel.run(@min(collapse.input.thread_count, stretch_count), &work, WeighWork.run);
+            parallel.share(@min(collapse.input.thread_count, stretch_count), &work, WeighWork.run);
             const pairs = collapse.binary.top_pairs;
             for (0..pairs.len) |index| collapse.weighPair(pairs[pairs.len - 1 - index]);
             collapse.weighNode(0);
@@ -247,7 +247,7 @@ fn Collapse(comptime width: u32) type {
             try collapse.findParts(gpa, &parts, limit);
             var work: EmitWork = .{ .collapse = collapse, .parts = parts.items, .limit = limit };
             const thread_count = @min(collapse.input.thread_count, parts.items.len);
-            parallel.run(thread_count, &work, EmitWork.count);
+            parallel.share(thread_count, &work, EmitWork.count);
 
             var node_count: u32 = 0;
             var block_count: u32 = 0;
@@ -266,7 +266,7 @@ fn Collapse(comptime width: u32) type {
             huge_pages.advise(work.nodes);
             huge_pages.advise(work.blocks);
             work.next.store(0, .monotonic);
-            parallel.run(thread_count, &work, EmitWork.write);
+            parallel.share(thread_count, &work, EmitWork.write);
             statistics.node_count = node_count;
             statistics.bytes = @as(u64, node_count) * @sizeOf(Node) +
                 @as(u64, block_count) * @sizeOf(Block);
@@ -335,8 +335,10 @@ fn Collapse(comptime width: u32) type {
             }
 
             fn take(work: *EmitWork) ?usize {
-                const index = work.next.fetchAdd(1, .monotonic);
-                return if (index < work.parts.len) index else null;
+                const turn = work.next.fetchAdd(1, .monotonic);
+                if (turn >= work.parts.len) return null;
+                const thread_count = work.collapse.input.thread_count;
+                return parallel.spread(turn, work.parts.len, thread_count);
             }
 
             /// Visits the wide nodes of a part in depth-first order.

@@ -97,9 +97,9 @@ pub fn flatten(
         huge_pages.advise(array);
     }
     const vertex_chunk_count = chunkCount(size.vertex_count);
-    parallel.run(@min(thread_count, @max(vertex_chunk_count, 1)), &work, Work.placeVertices);
+    parallel.share(@min(thread_count, @max(vertex_chunk_count, 1)), &work, Work.placeVertices);
     work.next.store(0, .monotonic);
-    parallel.run(@min(thread_count, @max(work.chunks.len, 1)), &work, Work.placeTriangles);
+    parallel.share(@min(thread_count, @max(work.chunks.len, 1)), &work, Work.placeTriangles);
     return work.finish(diagnostic);
 }
 
