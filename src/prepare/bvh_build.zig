@@ -87,7 +87,7 @@ pub const Tree = struct {
     /// Frees the arrays.
     pub fn deinit(tree: *Tree, gpa: Allocator) void {
         gpa.free(tree.nodes);
-        gpa.free(tree.references);
+        huge_pages.free(gpa, tree.references);
         gpa.free(tree.stretches);
         gpa.free(tree.top_pairs);
         tree.* = undefined;
@@ -131,9 +131,8 @@ pub fn build(
         .task_size = @intCast(taskSize(count)),
         .leaf_size = if (input.quality == .high) block_size / high_leaf_share else block_size,
     };
-    builder.references = try gpa.alignedAlloc(Box, .@"64", count);
-    errdefer gpa.free(builder.references);
-    huge_pages.advise(builder.references);
+    builder.references = try huge_pages.alloc(gpa, Box, count);
+    errdefer huge_pages.free(gpa, builder.references);
     builder.nodes = try gpa.alloc(Node, 2 * @as(usize, count));
     errdefer gpa.free(builder.nodes);
     defer builder.deinit(gpa);
@@ -240,10 +239,9 @@ fn Builder(comptime block_size: u32) type {
             var cells: Cells = try .init(gpa, builder.references, root.centers, thread_count);
             defer cells.deinit(gpa);
             try builder.cutItems(gpa, root, cells.items, sets);
-            const target = try gpa.alignedAlloc(Box, .@"64", builder.references.len);
-            huge_pages.advise(target);
+            const target = try huge_pages.alloc(gpa, Box, builder.references.len);
             cells.scatter(target, thread_count);
-            gpa.free(builder.references);
+            huge_pages.free(gpa, builder.references);
             builder.references = target;
         }
 

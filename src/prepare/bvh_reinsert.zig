@@ -15,6 +15,7 @@ const std = @import("std");
 const parallel = @import("../parallel.zig");
 const world = @import("../world.zig");
 const bvh_build = @import("bvh_build.zig");
+const huge_pages = @import("huge_pages.zig");
 const split = @import("bvh_split.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
@@ -405,8 +406,8 @@ fn Optimizer(comptime block_size: u32) type {
         fn layOut(optimizer: *const Self, gpa: Allocator, tree: *Tree) error{OutOfMemory}!void {
             const nodes = try gpa.alloc(Node, tree.nodes.len);
             errdefer gpa.free(nodes);
-            const references = try gpa.alignedAlloc(Box, .@"64", tree.references.len);
-            errdefer gpa.free(references);
+            const references = try huge_pages.alloc(gpa, Box, tree.references.len);
+            errdefer huge_pages.free(gpa, references);
             var layout: Layout = .{
                 .optimizer = optimizer,
                 .from = tree.references,
@@ -509,7 +510,7 @@ test "a subtree that was put in the wrong place finds the right one" {
     // Two heaps of four blocks; one block of the second is among those of the first.
     const heaps = [_]f32{ 0, 0, 0, 100, 100, 100, 100, 0 };
     const nodes = try gpa.alloc(Node, 2 * heaps.len);
-    const references = try gpa.alignedAlloc(Box, .@"64", heaps.len);
+    const references = try huge_pages.alloc(gpa, Box, heaps.len);
     for (references, heaps, 0..) |*box, x, index| {
         const y: f32 = @floatFromInt(index);
         const lower = [3]f32{ x, y, 0 };

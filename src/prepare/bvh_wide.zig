@@ -261,10 +261,8 @@ fn Collapse(comptime width: u32) type {
                 statistics.sah_cost += part.cost;
             }
             assert(statistics.depth <= world.tree_depth_max);
-            work.nodes = try arena.alignedAlloc(Node, .@"64", node_count);
-            work.blocks = try arena.alignedAlloc(Block, .@"64", block_count);
-            huge_pages.advise(work.nodes);
-            huge_pages.advise(work.blocks);
+            work.nodes = try huge_pages.alloc(arena, Node, node_count);
+            work.blocks = try huge_pages.alloc(arena, Block, block_count);
             work.next.store(0, .monotonic);
             parallel.share(thread_count, &work, EmitWork.write);
             statistics.node_count = node_count;

@@ -86,16 +86,17 @@ pub fn flatten(
 
     var work: Work = .{
         .draws = draws,
-        .positions = try arena.alloc(Vec3, size.vertex_count),
-        .normals = try arena.alloc(Vec3, size.vertex_count),
-        .colors = try arena.alloc([4]f32, if (size.has_colors) size.vertex_count else 0),
-        .triangles = try arena.alloc(world.Triangle, size.triangle_count),
+        .positions = try huge_pages.alloc(arena, Vec3, size.vertex_count),
+        .normals = try huge_pages.alloc(arena, Vec3, size.vertex_count),
+        .colors = try huge_pages.alloc(
+            arena,
+            [4]f32,
+            if (size.has_colors) size.vertex_count else 0,
+        ),
+        .triangles = try huge_pages.alloc(arena, world.Triangle, size.triangle_count),
         .chunks = try gpa.alloc(ChunkResult, chunkCount(size.triangle_count)),
     };
     defer gpa.free(work.chunks);
-    inline for (.{ work.positions, work.normals, work.colors, work.triangles }) |array| {
-        huge_pages.advise(array);
-    }
     const vertex_chunk_count = chunkCount(size.vertex_count);
     parallel.share(@min(thread_count, @max(vertex_chunk_count, 1)), &work, Work.placeVertices);
     work.next.store(0, .monotonic);
