@@ -30,12 +30,16 @@ const Vec3 = math.Vec3;
 /// References a thread takes at a time while large sets are cut.
 const chunk_size = 4096;
 
+/// Triangles of sets that are cut by their references rather than their cells: there are more and
+/// better planes between those, and they all fit in a cache of 256 KiB.
+const task_size_min = 8192;
+
 /// Leaves of a tree that is to be optimised hold this part of a block, so that triangles can change
 /// blocks.
 const high_leaf_share = 4;
 
 /// Sets in fewer cells than these are cut by their references: too few planes lie between them.
-const item_count_min = 16;
+const item_count_min = 8;
 
 /// A node of the binary tree, laid out as a `Box` with its free lanes in use:
 ///
@@ -112,7 +116,7 @@ pub const Quality = enum { fast, default, high };
 /// Triangles of the sets that one thread cuts on its own: small enough that many threads are busy,
 /// large enough that few sets are cut by all of them.
 pub fn taskSize(triangle_count: usize) usize {
-    return @max(triangle_count / 64, 8192);
+    return @max(triangle_count / 64, task_size_min);
 }
 
 /// Builds the tree over at least one triangle. `block_size` is how many triangles are tested at
@@ -264,7 +268,7 @@ fn Builder(comptime block_size: u32) type {
                 const set = &at.set;
                 const is_task = set.count() <= builder.task_size;
                 if (is_task and !at.in_task) try builder.beginTask(gpa, set);
-                const is_done = (is_task and !fast) or isTooDeep(set) or
+                const is_done = (set.count() <= task_size_min and !fast) or isTooDeep(set) or
                     at.items.len <= @as(usize, if (fast) 1 else item_count_min);
                 const chosen = if (is_done) null else chooseItems(set, at.items);
                 const left = chosen orelse {
