@@ -13,7 +13,7 @@ const simd = @import("simd.zig");
 const statistics = @import("statistics.zig");
 const world = @import("world.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
-const bvh_build = @import("prepare/bvh_build.zig");
+const bvh_input = @import("prepare/bvh_input.zig");
 const bvh_wide = @import("prepare/bvh_wide.zig");
 const check = @import("prepare/check.zig");
 const flatten = @import("prepare/flatten.zig");
@@ -32,7 +32,7 @@ const World = world.World;
 pub const CameraChoice = view.CameraChoice;
 
 /// How much care is taken over the tree: the same picture in any case.
-pub const TreeQuality = bvh_build.Quality;
+pub const TreeQuality = bvh_input.Quality;
 
 /// What the user may decide.
 pub const Settings = struct {
@@ -130,6 +130,7 @@ noinline fn placeAll(
         .normals = surface.normals,
         .colors = surface.colors,
         .triangles = surface.triangles,
+        .bounds = surface.bounds,
         .materials = materials,
         .lights = lights,
         .camera = seen.camera,
@@ -163,6 +164,7 @@ pub noinline fn buildTree(
     const input: bvh_wide.Input = .{
         .positions = result.positions,
         .triangles = result.triangles,
+        .bounds = result.bounds,
         .pad = result.pad,
         .node_margin = result.node_margin,
         .thread_count = settings.thread_count,
@@ -582,7 +584,8 @@ test {
     _ = view;
     _ = @import("prepare/framing.zig");
     _ = @import("prepare/bvh_split.zig");
-    _ = bvh_build;
+    _ = bvh_input;
+    _ = @import("prepare/bvh_build.zig");
     _ = @import("prepare/bvh_cells.zig");
     _ = @import("prepare/bvh_reinsert.zig");
 }

@@ -13,6 +13,7 @@ const math = @import("../math.zig");
 const parallel = @import("../parallel.zig");
 const world = @import("../world.zig");
 const huge_pages = @import("huge_pages.zig");
+const bvh_input = @import("bvh_input.zig");
 const cells_file = @import("bvh_cells.zig");
 const split = @import("bvh_split.zig");
 const assert = std.debug.assert;
@@ -20,6 +21,7 @@ const Allocator = std.mem.Allocator;
 const Bins = split.Bins(split.bin_count_large, 3);
 const Binning = split.Binning(split.bin_count_large);
 const Cells = cells_file.Cells;
+const Input = bvh_input.Input;
 const Item = cells_file.Item;
 const Box = split.Box;
 const Box3 = math.Box3;
@@ -98,21 +100,6 @@ pub const Tree = struct {
     }
 };
 
-/// What is to be built on.
-pub const Input = struct {
-    positions: []const Vec3,
-    triangles: []const world.Triangle,
-    /// `World.pad`.
-    pad: f32,
-    /// `World.node_margin`.
-    node_margin: f32,
-    thread_count: usize,
-    quality: Quality = .default,
-};
-
-/// How much care is taken over a tree.
-pub const Quality = enum { fast, default, high };
-
 /// Triangles of the sets that one thread cuts on its own: small enough that many threads are busy,
 /// large enough that few sets are cut by all of them.
 pub fn taskSize(triangle_count: usize) usize {
@@ -141,8 +128,7 @@ pub fn build(
     errdefer gpa.free(builder.nodes);
     defer builder.deinit(gpa);
 
-    const root = try builder.makeReferences(gpa);
-    try builder.cutTop(gpa, root);
+    try builder.cutTop(gpa);
     const stretches = try gpa.alloc(Tree.Stretch, builder.tasks.items.len);
     errdefer gpa.free(stretches);
     builder.runTasks(stretches);
@@ -203,10 +189,30 @@ fn Builder(comptime block_size: u32) type {
             builder.top_pairs.deinit(gpa);
         }
 
-        /// Makes the references and the root.
+        /// The sets to begin with: the whole, or where there is much of it, what a grid cuts it in.
+        /// Fills the references.
+        fn makeSets(
+            builder: *Self,
+            gpa: Allocator,
+            sets: *std.ArrayList(Set),
+        ) error{OutOfMemory}!void {
+            if (builder.references.len < cells_file.reference_count_min) {
+                return sets.append(gpa, try builder.makeReferences(gpa));
+            }
+            var cells: Cells = try .init(gpa, builder.input);
+            defer cells.deinit(gpa);
+            var bounds: [2]Box = @splat(split.box_empty);
+            for (cells.items) |*item| {
+                bounds[0] = split.join(bounds[0], item.box);
+                bounds[1] = split.join(bounds[1], item.centers);
+            }
+            try builder.cutItems(gpa, builder.makeRoot(bounds), cells.items, sets);
+            try cells.scatter(gpa, builder.references);
+        }
+
+        /// Makes the references in the order of the triangles, and the root.
         fn makeReferences(builder: *Self, gpa: Allocator) error{OutOfMemory}!Set {
-            const count: u32 = @intCast(builder.references.len);
-            const chunk_count = (count + chunk_size - 1) / chunk_size;
+            const chunk_count = (builder.references.len + chunk_size - 1) / chunk_size;
             var work: ReferenceWork = .{
                 .input = builder.input,
                 .references = builder.references,
@@ -215,38 +221,18 @@ fn Builder(comptime block_size: u32) type {
             defer gpa.free(work.results);
             const thread_count = @min(builder.input.thread_count, chunk_count);
             parallel.share(thread_count, &work, ReferenceWork.run);
-            var box = split.box_empty;
-            var centers = split.box_empty;
+            var bounds: [2]Box = @splat(split.box_empty);
             for (work.results) |result| {
-                box = split.join(box, result[0]);
-                centers = split.join(centers, result[1]);
+                for (&bounds, result) |*bound, box| bound.* = split.join(bound.*, box);
             }
-            builder.nodes[0] = .of(box, count);
-            return .{
-                .node = 0,
-                .begin = 0,
-                .end = count,
-                .depth = 1,
-                .centers = centers,
-            };
+            return builder.makeRoot(bounds);
         }
 
-        /// Cuts a large set into `sets` by cells of a grid; leaves a small one as it is.
-        fn cutCells(
-            builder: *Self,
-            gpa: Allocator,
-            root: Set,
-            sets: *std.ArrayList(Set),
-        ) error{OutOfMemory}!void {
-            if (root.count() < cells_file.reference_count_min) return sets.append(gpa, root);
-            const thread_count = builder.input.thread_count;
-            var cells: Cells = try .init(gpa, builder.references, root.centers, thread_count);
-            defer cells.deinit(gpa);
-            try builder.cutItems(gpa, root, cells.items, sets);
-            const target = try huge_pages.alloc(gpa, Box, builder.references.len);
-            cells.scatter(target, thread_count);
-            huge_pages.free(gpa, builder.references);
-            builder.references = target;
+        /// The root, of the join of all boxes and that of all `centerBox`es.
+        fn makeRoot(builder: *Self, bounds: [2]Box) Set {
+            const count: u32 = @intCast(builder.references.len);
+            builder.nodes[0] = .of(bounds[0], count);
+            return .{ .node = 0, .begin = 0, .end = count, .depth = 1, .centers = bounds[1] };
         }
 
         /// Cuts a set between cells, down to tasks, or to `sets` where few cells are left that hold
@@ -366,13 +352,13 @@ fn Builder(comptime block_size: u32) type {
             return left;
         }
 
-        /// Cuts sets larger than a task, level by level.
-        fn cutTop(builder: *Self, gpa: Allocator, root: Set) error{OutOfMemory}!void {
+        /// Makes tasks; cuts sets larger than that level by level.
+        fn cutTop(builder: *Self, gpa: Allocator) error{OutOfMemory}!void {
             var level: std.ArrayList(Cut) = .empty;
             defer level.deinit(gpa);
             var next: std.ArrayList(Set) = .empty;
             defer next.deinit(gpa);
-            try builder.cutCells(gpa, root, &next);
+            try builder.makeSets(gpa, &next);
             while (next.items.len > 0) {
                 level.clearRetainingCapacity();
                 for (next.items) |set| {
@@ -612,26 +598,15 @@ const ReferenceWork = struct {
 
     fn run(work: *ReferenceWork, thread_index: usize) void {
         assert(thread_index < parallel.thread_count_max);
-        const positions = work.input.positions;
         while (true) {
-            const turn = work.next.fetchAdd(1, .monotonic);
-            if (turn >= work.results.len) return;
-            const chunk = parallel.spread(turn, work.results.len, work.input.thread_count);
-            const begin = chunk * chunk_size;
+            const chunk = work.next.fetchAdd(1, .monotonic);
+            if (chunk >= work.results.len) return;
+            const begin = @as(usize, chunk) * chunk_size;
             const end = @min(begin + chunk_size, work.references.len);
             var box = split.box_empty;
             var centers = split.box_empty;
-            for (
-                work.references[begin..end],
-                work.input.triangles[begin..end],
-                begin..,
-            ) |*reference, triangle, number| {
-                const grown = Box3.empty
-                    .include(positions[triangle.corner[0]])
-                    .include(positions[triangle.corner[1]])
-                    .include(positions[triangle.corner[2]])
-                    .grow(work.input.pad);
-                reference.* = split.reference(grown, @intCast(number));
+            for (work.references[begin..end], begin..) |*reference, number| {
+                reference.* = work.input.reference(number);
                 box = split.join(box, reference.*);
                 centers = split.join(centers, split.centerBox(reference.*));
             }

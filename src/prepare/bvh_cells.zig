@@ -1,23 +1,28 @@
-//! Many triangles -> a few thousand cells of a grid, in three passes over the references.
+//! Many triangles -> a few thousand cells of a grid.
 //!
-//! In: references and the bounds of their middles. Out: the cells that hold some, each with its
-//! box, then the references in whatever order of the cells the caller comes to, cell by cell. A
-//! tree over the cells takes the place of the first levels of binned cuts, each of which reads and
-//! writes all of memory. Which cell a reference falls in, and its place among those of the same
-//! cell, are functions of the references alone: chunks are cut by their number, not by threads.
+//! In: triangles and their bounds. Out: the cells that hold some, each with its box, then
+//! references in whatever order of the cells the caller comes to, cell by cell. A tree over the
+//! cells takes the place of the first levels of binned cuts, each of which reads and writes all of
+//! memory; here the triangles are read twice and the references written once. Which cell a triangle
+//! falls in, and its place among those of the same cell, are functions of the triangles alone:
+//! chunks are cut by their number, not by threads.
 //! After the grids of T. Ize, I. Wald, S. Parker, "Asynchronous BVH Construction for Ray Tracing
 //! Dynamic Scenes on Parallel Multi-Core Architectures" (2007), with counts in the place of locks.
 
 const std = @import("std");
+const math = @import("../math.zig");
 const parallel = @import("../parallel.zig");
-const huge_pages = @import("huge_pages.zig");
+const world = @import("../world.zig");
+const bvh_input = @import("bvh_input.zig");
 const split = @import("bvh_split.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Box = split.Box;
+const Box3 = math.Box3;
+const Input = bvh_input.Input;
 const Vec4 = @Vector(4, f32);
 
-/// Fewer references are not worth a grid.
+/// Fewer triangles are not worth a grid.
 pub const reference_count_min = 16_384;
 
 /// References to a cell of the whole grid, of which a scene of surfaces fills few.
@@ -42,13 +47,21 @@ pub const Item = struct {
 const Grid = struct {
     offset: Vec4,
     scale: Vec4,
+    /// By axis, the last index.
+    last: Indices,
     /// By axis, how far its index is moved in a cell's number.
     shifts: @Vector(4, u5),
 
+    const Indices = @Vector(4, i32);
+
     /// 2^`bits` cells that are as near to cubes as halving the longest edge makes them.
-    fn init(centers: Box, bits: u5) Grid {
-        const whole: [4]f32 = split.extent(centers);
-        var edges = whole;
+    fn init(bounds: Box3, bits: u5) Grid {
+        var edges: [3]f32 = undefined;
+        // Middles are twice what they are, here as well.
+        for (&edges, bounds.lower, bounds.upper) |*edge, lower, upper| {
+            edge.* = 2 * upper - 2 * lower;
+        }
+        const whole = edges;
         var axis_bits: [4]u5 = @splat(0);
         for (0..bits) |_| {
             var longest: usize = 0;
@@ -59,31 +72,35 @@ const Grid = struct {
             axis_bits[longest] += 1;
         }
         var scale: [4]f32 = @splat(0);
-        for (scale[0..3], whole[0..3], axis_bits[0..3]) |*to, edge, axis_bit| {
-            const cells: f32 = @floatFromInt(@as(u32, 1) << axis_bit);
-            // Just below, so that the last middle lands in the last cell after rounding.
-            if (edge > split.extent_min) to.* = cells * (1 - 0x1p-20) / edge;
+        var last: [4]i32 = @splat(0);
+        for (scale[0..3], last[0..3], whole, axis_bits[0..3]) |*to, *end, edge, axis_bit| {
+            const cells = @as(i32, 1) << axis_bit;
+            end.* = cells - 1;
+            if (edge > split.extent_min) to.* = @as(f32, @floatFromInt(cells)) / edge;
         }
         return .{
-            .offset = split.lowerHalf(centers),
+            .offset = .{ 2 * bounds.lower[0], 2 * bounds.lower[1], 2 * bounds.lower[2], 0 },
             .scale = scale,
+            .last = last,
             .shifts = .{ 0, axis_bits[0], axis_bits[0] + axis_bits[1], 0 },
         };
     }
 
     inline fn cellOf(grid: *const Grid, box: Box) u32 {
-        const at: @Vector(4, i32) = @intFromFloat(
+        const at: Indices = @intFromFloat(
             (split.centerTwice(box) - grid.offset) * grid.scale,
         );
-        const moved = at << grid.shifts;
+        // Rounding may lead out of the bounds, by little.
+        const within = @min(@max(at, @as(Indices, @splat(0))), grid.last);
+        const moved = within << grid.shifts;
         return @intCast(moved[0] + moved[1] + moved[2]);
     }
 };
 
-/// References counted by cell.
+/// Triangles counted by cell.
 pub const Cells = struct {
+    input: *const Input,
     grid: Grid,
-    references: []const Box,
     cell_count: u32,
     chunk_count: u32,
     /// By chunk and cell: how many there are, then where the next goes.
@@ -91,26 +108,22 @@ pub const Cells = struct {
     /// The cells that hold some, in the order of their numbers until the caller moves them.
     items: []Item,
 
-    /// Counts `references`, `centers` being the join of their `centerBox`es.
-    pub fn init(
-        gpa: Allocator,
-        references: []const Box,
-        centers: Box,
-        thread_count: usize,
-    ) error{OutOfMemory}!Cells {
-        assert(references.len >= reference_count_min);
-        const wanted = std.math.log2_int(usize, references.len / references_per_cell);
+    /// Counts the triangles of `input`, at least `reference_count_min`.
+    pub fn init(gpa: Allocator, input: *const Input) error{OutOfMemory}!Cells {
+        const count = input.triangles.len;
+        assert(count >= reference_count_min);
+        const wanted = std.math.log2_int(usize, count / references_per_cell);
         const bits: u5 = @intCast(@min(wanted, cell_bits_max));
         const cell_count = @as(u32, 1) << bits;
-        const chunk_count: u32 = @intCast(@min(references.len / chunk_size_min, chunk_count_max));
+        const chunk_count: u32 = @intCast(@min(count / chunk_size_min, chunk_count_max));
         const counts = try gpa.alloc(u32, chunk_count * cell_count);
         errdefer gpa.free(counts);
-        const used_count = @min(thread_count, chunk_count);
+        const used_count = @min(input.thread_count, chunk_count);
         const boxes = try gpa.alloc([2]Box, used_count * cell_count);
         defer gpa.free(boxes);
         var cells: Cells = .{
-            .grid = .init(centers, bits),
-            .references = references,
+            .input = input,
+            .grid = .init(input.bounds, bits),
             .cell_count = cell_count,
             .chunk_count = chunk_count,
             .counts = counts,
@@ -129,28 +142,35 @@ pub const Cells = struct {
         cells.* = undefined;
     }
 
-    fn chunk(cells: *const Cells, index: usize) []const Box {
-        const count = cells.references.len;
-        const begin = index * count / cells.chunk_count;
-        return cells.references[begin .. (index + 1) * count / cells.chunk_count];
+    /// Where a chunk begins, and the one before it ends.
+    fn chunkBegin(cells: *const Cells, index: usize) usize {
+        return @intCast(@as(u64, index) * cells.input.triangles.len / cells.chunk_count);
     }
 
-    /// Writes the references to `target`, cell by cell in the order of `items`. Asserts that it is
-    /// as long. Spends the counts: once only.
-    pub fn scatter(cells: *Cells, target: []Box, thread_count: usize) void {
-        assert(target.len == cells.references.len);
+    /// Writes the references to `target`, cell by cell in the order of `items`. Asserts that there
+    /// is one place for each. Spends the counts: once only.
+    pub fn scatter(cells: *Cells, gpa: Allocator, target: []Box) error{OutOfMemory}!void {
+        assert(target.len == cells.input.triangles.len);
+        const places = try gpa.alloc(u32, cells.cell_count);
+        defer gpa.free(places);
+        @memset(places, 0);
         var next: u32 = 0;
         for (cells.items) |*item| {
-            for (0..cells.chunk_count) |chunk_index| {
-                const place = &cells.counts[chunk_index * cells.cell_count + item.cell];
-                const count = place.*;
-                place.* = next;
-                next += count;
-            }
+            places[item.cell] = next;
+            next += item.count;
         }
         assert(next == target.len);
+        for (0..cells.chunk_count) |chunk| {
+            const counts = cells.counts[chunk * cells.cell_count ..][0..cells.cell_count];
+            for (counts, places) |*count, *place| {
+                const begin = place.*;
+                place.* += count.*;
+                count.* = begin;
+            }
+        }
         var work: ScatterWork = .{ .cells = cells, .target = target };
-        parallel.share(@min(thread_count, cells.chunk_count), &work, ScatterWork.run);
+        const thread_count = @min(cells.input.thread_count, cells.chunk_count);
+        parallel.share(thread_count, &work, ScatterWork.run);
     }
 };
 
@@ -174,7 +194,8 @@ const CountWork = struct {
             }
             const counts = cells.counts[index * cells.cell_count ..][0..cells.cell_count];
             @memset(counts, 0);
-            for (cells.chunk(index)) |box| {
+            for (cells.chunkBegin(index)..cells.chunkBegin(index + 1)) |number| {
+                const box = cells.input.reference(number);
                 const cell = cells.grid.cellOf(box);
                 counts[cell] += 1;
                 const pair = &boxes[cell];
@@ -230,7 +251,8 @@ const ScatterWork = struct {
             const index = work.next.fetchAdd(1, .monotonic);
             if (index >= cells.chunk_count) return;
             const places = cells.counts[index * cells.cell_count ..][0..cells.cell_count];
-            for (cells.chunk(index)) |box| {
+            for (cells.chunkBegin(index)..cells.chunkBegin(index + 1)) |number| {
+                const box = cells.input.reference(number);
                 const place = &places[cells.grid.cellOf(box)];
                 work.target[place.*] = box;
                 place.* += 1;
@@ -241,24 +263,34 @@ const ScatterWork = struct {
 
 test "every reference ends up in its cell's place, in the order it had" {
     const gpa = std.testing.allocator;
-    const references = try gpa.alloc(Box, reference_count_min + 7);
-    defer gpa.free(references);
+    const positions = try gpa.alloc(math.Vec3, reference_count_min + 7);
+    defer gpa.free(positions);
+    const triangles = try gpa.alloc(world.Triangle, positions.len);
+    defer gpa.free(triangles);
     var random_state: std.Random.DefaultPrng = .init(2);
     const random = random_state.random();
-    var centers = split.box_empty;
-    for (references, 0..) |*box, index| {
-        const at: [3]f32 = .{ random.float(f32), 9 * random.float(f32), 3 };
-        box.* = split.reference(.{ .lower = at, .upper = at }, @intCast(index));
-        centers = split.join(centers, split.centerBox(box.*));
+    var bounds: Box3 = .empty;
+    for (positions, triangles, 0..) |*position, *triangle, index| {
+        position.* = .{ random.float(f32), 9 * random.float(f32), 3 };
+        triangle.* = .{ .corner = @splat(@intCast(index)), .material = 0 };
+        bounds = bounds.include(position.*);
     }
-    const target = try gpa.alloc(Box, references.len);
+    const input: Input = .{
+        .positions = positions,
+        .triangles = triangles,
+        .bounds = bounds,
+        .pad = 0.001,
+        .node_margin = 0,
+        .thread_count = 3,
+    };
+    const target = try gpa.alloc(Box, positions.len);
     defer gpa.free(target);
-    var cells: Cells = try .init(gpa, references, centers, 3);
+    var cells: Cells = try .init(gpa, &input);
     defer cells.deinit(gpa);
-    // The longer axis has the more cells, the one without extent none.
-    try std.testing.expectEqual(6, cells.grid.shifts[1] - cells.grid.shifts[0] + 3);
+    // 512 cells: the longer axis has eight times the cells, the one without extent none.
+    try std.testing.expectEqual(@Vector(4, i32){ 7, 63, 0, 0 }, cells.grid.last);
     std.mem.reverse(Item, cells.items);
-    cells.scatter(target, 3);
+    try cells.scatter(gpa, target);
     var begin: usize = 0;
     for (cells.items) |item| {
         var last: ?u32 = null;
@@ -273,5 +305,5 @@ test "every reference ends up in its cell's place, in the order it had" {
         try std.testing.expectEqual(split.toBox3(item.box), split.toBox3(box));
         begin += item.count;
     }
-    try std.testing.expectEqual(references.len, begin);
+    try std.testing.expectEqual(positions.len, begin);
 }

@@ -11,6 +11,7 @@ const std = @import("std");
 const math = @import("../math.zig");
 const parallel = @import("../parallel.zig");
 const world = @import("../world.zig");
+const bvh_input = @import("bvh_input.zig");
 const bvh_build = @import("bvh_build.zig");
 const bvh_reinsert = @import("bvh_reinsert.zig");
 const bvh_split = @import("bvh_split.zig");
@@ -21,7 +22,7 @@ const Box3 = math.Box3;
 const Vec3 = math.Vec3;
 
 /// What is to be built on.
-pub const Input = bvh_build.Input;
+pub const Input = bvh_input.Input;
 
 /// Cost of testing a ray against the boxes of a node, and against a block of triangles.
 const node_cost: f32 = 1;
