@@ -130,7 +130,7 @@ noinline fn placeAll(
         .normals = surface.normals,
         .colors = surface.colors,
         .triangles = surface.triangles,
-        .bounds = surface.bounds,
+        .middles_twice = surface.middles_twice,
         .materials = materials,
         .lights = lights,
         .camera = seen.camera,
@@ -164,7 +164,7 @@ pub noinline fn buildTree(
     const input: bvh_wide.Input = .{
         .positions = result.positions,
         .triangles = result.triangles,
-        .bounds = result.bounds,
+        .middles_twice = result.middles_twice,
         .pad = result.pad,
         .node_margin = result.node_margin,
         .thread_count = settings.thread_count,

@@ -223,8 +223,8 @@ pub const World = struct {
     /// By vertex, linear RGBA; empty where no mesh has colours.
     colors: []const [4]f32,
     triangles: []const Triangle,
-    /// Box of all triangles, empty without any.
-    bounds: Box3,
+    /// Box of twice the middles of the triangles' boxes, empty without any.
+    middles_twice: Box3,
     materials: []const Material,
     lights: []const Light,
     camera: Camera,

@@ -1,6 +1,6 @@
 //! Many triangles -> a few thousand cells of a grid.
 //!
-//! In: triangles and their bounds. Out: the cells that hold some, each with its box, then
+//! In: triangles and the bounds of their middles. Out: the cells that hold some, each with its box, then
 //! references in whatever order of the cells the caller comes to, cell by cell. A tree over the
 //! cells takes the place of the first levels of binned cuts, each of which reads and writes all of
 //! memory; here the triangles are read twice and the references written once. Which cell a triangle
@@ -55,12 +55,10 @@ const Grid = struct {
     const Indices = @Vector(4, i32);
 
     /// 2^`bits` cells that are as near to cubes as halving the longest edge makes them.
-    fn init(bounds: Box3, bits: u5) Grid {
+    fn init(middles_twice: Box3, bits: u5) Grid {
+        const lower = middles_twice.lower;
         var edges: [3]f32 = undefined;
-        // Middles are twice what they are, here as well.
-        for (&edges, bounds.lower, bounds.upper) |*edge, lower, upper| {
-            edge.* = 2 * upper - 2 * lower;
-        }
+        for (&edges, lower, middles_twice.upper) |*edge, from, to| edge.* = to - from;
         const whole = edges;
         var axis_bits: [4]u5 = @splat(0);
         for (0..bits) |_| {
@@ -79,7 +77,7 @@ const Grid = struct {
             if (edge > split.extent_min) to.* = @as(f32, @floatFromInt(cells)) / edge;
         }
         return .{
-            .offset = .{ 2 * bounds.lower[0], 2 * bounds.lower[1], 2 * bounds.lower[2], 0 },
+            .offset = .{ lower[0], lower[1], lower[2], 0 },
             .scale = scale,
             .last = last,
             .shifts = .{ 0, axis_bits[0], axis_bits[0] + axis_bits[1], 0 },
@@ -123,7 +121,7 @@ pub const Cells = struct {
         defer gpa.free(boxes);
         var cells: Cells = .{
             .input = input,
-            .grid = .init(input.bounds, bits),
+            .grid = .init(input.middles_twice, bits),
             .cell_count = cell_count,
             .chunk_count = chunk_count,
             .counts = counts,
@@ -269,16 +267,16 @@ test "every reference ends up in its cell's place, in the order it had" {
     defer gpa.free(triangles);
     var random_state: std.Random.DefaultPrng = .init(2);
     const random = random_state.random();
-    var bounds: Box3 = .empty;
+    var middles_twice: Box3 = .empty;
     for (positions, triangles, 0..) |*position, *triangle, index| {
         position.* = .{ random.float(f32), 9 * random.float(f32), 3 };
         triangle.* = .{ .corner = @splat(@intCast(index)), .material = 0 };
-        bounds = bounds.include(position.*);
+        middles_twice = middles_twice.include(math.vec3.scale(position.*, 2));
     }
     const input: Input = .{
         .positions = positions,
         .triangles = triangles,
-        .bounds = bounds,
+        .middles_twice = middles_twice,
         .pad = 0.001,
         .node_margin = 0,
         .thread_count = 3,

@@ -21,8 +21,8 @@ pub const Quality = enum {
 pub const Input = struct {
     positions: []const Vec3,
     triangles: []const world.Triangle,
-    /// Box of all triangles.
-    bounds: Box3,
+    /// Box of twice the middles of the triangles' boxes, give or take rounding.
+    middles_twice: Box3,
     /// `World.pad`.
     pad: f32,
     /// `World.node_margin`.
