@@ -1,11 +1,12 @@
 //! Many triangles -> a few thousand cells of a grid.
 //!
-//! In: triangles and the bounds of their middles. Out: the cells that hold some, each with its box, then
-//! references in whatever order of the cells the caller comes to, cell by cell. A tree over the
-//! cells takes the place of the first levels of binned cuts, each of which reads and writes all of
-//! memory; here the triangles are read twice and the references written once. Which cell a triangle
-//! falls in, and its place among those of the same cell, are functions of the triangles alone:
-//! chunks are cut by their number, not by threads.
+//! In: triangles and the bounds of their middles. Out: the cells that hold some, each with its box,
+//! then references in whatever order of the cells the caller comes to, cell by cell. A tree over
+//! the cells takes the place of the first levels of binned cuts, each of which reads and writes all
+//! of memory; here the triangles are read twice and the references written once. Which cell a
+//! triangle falls in, and its place among those of the same cell, are functions of the triangles
+//! alone: chunks are cut by their number, not by threads.
+//!
 //! After the grids of T. Ize, I. Wald, S. Parker, "Asynchronous BVH Construction for Ray Tracing
 //! Dynamic Scenes on Parallel Multi-Core Architectures" (2007), with counts in the place of locks.
 
