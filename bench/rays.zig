@@ -27,6 +27,7 @@ const assert = std.debug.assert;
 
 /// Widths of trees.
 const widths = [_]u8{ 4, 8, 16 };
+const quality_count = std.enums.values(raylane.prepare.TreeQuality).len;
 
 pub fn main(init: std.process.Init) u8 {
     _ = raylane.simd.setFlushToZero();
@@ -96,8 +97,8 @@ const Bench = struct {
     io: Io,
     options: *const Options,
     diagnostic: *Diagnostic,
-    /// The scene with a tree of each width that is needed.
-    worlds: [widths.len]?World = @splat(null),
+    /// The scene with a tree of each quality and width that is needed.
+    worlds: [quality_count][widths.len]?World = @splat(@splat(null)),
     setup: workload.Setup = undefined,
     pixels: []f32 = &.{},
     processor_buffer: [processors.count_max]u32 = undefined,
@@ -107,7 +108,8 @@ const Bench = struct {
     fn run(bench: *Bench) !bool {
         const options = bench.options;
         if (!options.count) bench.processor_list = processors.allowed(&bench.processor_buffer);
-        processors.pin(bench.processor_list, 0);
+        // Threads that build start where the one that starts them may run: anywhere, then.
+        if (options.build_thread_count == 1) processors.pin(bench.processor_list, 0);
         var base = try bench.prepare();
         defer base.deinit();
         var tree_arena: std.heap.ArenaAllocator = .init(bench.gpa);
@@ -116,6 +118,7 @@ const Bench = struct {
         bench.setup = try input.setUp(bench.arena, &base, bench.diagnostic);
         if (options.dump) |path| try dump.write(bench.gpa, bench.io, path, &base, &bench.setup);
 
+        processors.pin(bench.processor_list, 0);
         const runs = if (options.build_only) &.{} else try bench.runAll();
         if (options.image) |path| try bench.writeImage(path);
         try bench.print(&.{
@@ -161,94 +164,133 @@ const Bench = struct {
         return err;
     }
 
-    /// Builds the trees that the chosen variants need, over and over.
+    /// Builds the trees that the chosen variants need, all of them in turns, over and over.
     fn buildAll(bench: *Bench, arena: Allocator, base: *const World) ![]const report_file.Build {
-        var builds: std.ArrayList(report_file.Build) = .empty;
-        for (widths, &bench.worlds) |lanes, *world| {
-            const needed = for (bench.options.chosen()) |variant| {
+        const options = bench.options;
+        var trees: std.ArrayList(TimedTree) = .empty;
+        for (options.chosenQualities()) |quality| for (widths, 0..) |lanes, width_index| {
+            const needed = for (options.chosen()) |variant| {
                 if (compiled[variant].lanes == lanes) break true;
             } else false;
             if (!needed) continue;
+            const world = &bench.worlds[@backingInt(quality)][width_index];
             world.* = base.*;
-            const first_tag = firstTag(builds.items.len);
-            try builds.append(bench.arena, try bench.build(arena, &world.*.?, lanes, first_tag));
-        }
-        return builds.items;
+            try trees.append(bench.arena, .{
+                .world = &world.*.?,
+                .quality = quality,
+                .lanes = lanes,
+                .first_tag = firstTag(trees.items.len),
+            });
+        };
+        for (0..options.repetition_count) |repetition| for (trees.items) |*tree| {
+            try bench.build(arena, tree, repetition);
+        };
+        const builds = try bench.arena.alloc(report_file.Build, trees.items.len);
+        for (builds, trees.items) |*to, *tree| to.* = bench.reportOfTree(tree);
+        return builds;
     }
 
-    fn build(
-        bench: *Bench,
-        arena: Allocator,
+    /// A tree that is built over and over.
+    const TimedTree = struct {
         world: *World,
+        quality: raylane.prepare.TreeQuality,
         lanes: u8,
         first_tag: u32,
-    ) !report_file.Build {
+        /// By repetition.
+        times_ms: [options_file.repetitions_max]f64 = undefined,
+    };
+
+    /// The tree of the last repetition stays.
+    fn build(bench: *Bench, arena: Allocator, tree: *TimedTree, repetition: usize) !void {
         const options = bench.options;
         const settings: raylane.prepare.Settings = .{
-            .lanes = lanes,
+            .lanes = tree.lanes,
             .thread_count = options.build_thread_count,
+            .tree_quality = tree.quality,
         };
-        var times_ms: [options_file.repetitions_max]f64 = undefined;
-        for (times_ms[0..options.repetition_count], 1..) |*time_ms, repetition| {
-            var own_arena: std.heap.ArenaAllocator = .init(bench.gpa);
-            defer own_arena.deinit();
-            const last = repetition == options.repetition_count;
-            const used = if (last) arena else own_arena.allocator();
-            var marks: Marks = .init(if (options.count) .{ .tags = first_tag } else .clock);
-            const start = Io.Clock.awake.now(bench.io);
-            marks.to(.build);
-            try raylane.prepare.buildTree(bench.gpa, used, world, settings);
-            marks.to(.other);
-            time_ms.* = milliseconds(start.untilNow(bench.io, .awake).toNanoseconds());
-        }
-        const spread: Spread = .of(times_ms[0..options.repetition_count]);
-        const facts = &world.tree_statistics;
-        const triangle_count: f64 = @floatFromInt(world.triangles.len);
+        var own_arena: std.heap.ArenaAllocator = .init(bench.gpa);
+        defer own_arena.deinit();
+        const last = repetition + 1 == options.repetition_count;
+        const used = if (last) arena else own_arena.allocator();
+        var marks: Marks = .init(if (options.count) .{ .tags = tree.first_tag } else .clock);
+        const start = Io.Clock.awake.now(bench.io);
+        marks.to(.build);
+        try raylane.prepare.buildTree(bench.gpa, used, tree.world, settings);
+        marks.to(.other);
+        const time_ns = start.untilNow(bench.io, .awake).toNanoseconds();
+        tree.times_ms[repetition] = milliseconds(time_ns);
+    }
+
+    fn reportOfTree(bench: *Bench, tree: *TimedTree) report_file.Build {
+        const options = bench.options;
+        const spread: Spread = .of(tree.times_ms[0..options.repetition_count]);
+        const facts = &tree.world.tree_statistics;
+        const triangle_count: f64 = @floatFromInt(tree.world.triangles.len);
         return .{
-            .lanes = lanes,
-            .first_tag = first_tag,
+            .bvh = tree.quality,
+            .lanes = tree.lanes,
+            .first_tag = tree.first_tag,
             .time_ms = if (options.count) null else spread,
             .mtriangles_per_s = if (options.count) null else triangle_count / spread.min * 1e-3,
             .bytes_per_triangle = @as(f64, @floatFromInt(facts.bytes)) / triangle_count,
             .sah_cost = facts.sah_cost,
             .nodes = facts.node_count,
-            .blocks = switch (world.tree) {
-                inline else => |*tree| tree.blocks.len,
+            .blocks = switch (tree.world.tree) {
+                inline else => |*wide| wide.blocks.len,
             },
         };
     }
 
-    fn worldOf(bench: *const Bench, variant: usize) *const World {
-        const index = std.mem.findScalar(u8, &widths, compiled[variant].lanes).?;
-        return &bench.worlds[index].?;
+    /// What makes a picture.
+    const Candidate = struct { variant: usize, quality: raylane.prepare.TreeQuality };
+
+    fn worldOf(bench: *const Bench, candidate: Candidate) *const World {
+        const index = std.mem.findScalar(u8, &widths, compiled[candidate.variant].lanes).?;
+        return &bench.worlds[@backingInt(candidate.quality)][index].?;
     }
 
-    /// Makes the picture once by each variant to see what comes out, then in turns for the times.
+    fn candidates(bench: *Bench) ![]const Candidate {
+        var all: std.ArrayList(Candidate) = .empty;
+        for (bench.options.chosen()) |variant| {
+            for (bench.options.chosenQualities()) |quality| {
+                try all.append(bench.arena, .{ .variant = variant, .quality = quality });
+            }
+        }
+        return all.items;
+    }
+
+    /// Makes the picture once by each candidate to see what comes out, then in turns for the times.
     fn runAll(bench: *Bench) ![]const report_file.Run {
         const options = bench.options;
         bench.pixels = try bench.arena.alloc(f32, @as(usize, options.size) * options.size);
-        const chosen = options.chosen();
+        const chosen = try bench.candidates();
         const observers = try bench.arena.alloc(Observer, chosen.len);
         for (observers, 0..) |*observer, position| {
             observer.* = .{};
-            _ = bench.runOne(position, observer);
+            _ = bench.runOne(chosen[position], position, observer);
         }
         const times = try bench.arena.alloc([]workload.Times, chosen.len);
         for (times) |*of| of.* = try bench.arena.alloc(workload.Times, options.repetition_count);
         for (0..options.repetition_count) |repetition| {
-            for (times, 0..) |of, position| of[repetition] = bench.runOne(position, null);
+            for (times, 0..) |of, position| {
+                of[repetition] = bench.runOne(chosen[position], position, null);
+            }
         }
         const runs = try bench.arena.alloc(report_file.Run, chosen.len);
         for (runs, observers, times, 0..) |*result, *observer, of, position| {
-            result.* = try bench.reportOf(position, observer, of);
+            result.* = try bench.reportOf(chosen[position], position, observer, of);
         }
         return runs;
     }
 
-    /// `position` is that among the chosen variants. With an observer nothing is marked.
-    fn runOne(bench: *Bench, position: usize, observer: ?*Observer) workload.Times {
+    /// `position` is that among the candidates. With an observer nothing is marked.
+    fn runOne(
+        bench: *Bench,
+        candidate: Candidate,
+        position: usize,
+        observer: ?*Observer,
+    ) workload.Times {
         const options = bench.options;
-        const variant = options.chosen()[position];
         const tag = firstTag(position);
         const settings: workload.Settings = .{
             .depth_max = options.depth,
@@ -256,8 +298,9 @@ const Bench = struct {
             .mode = if (options.count and observer == null) .{ .tags = tag } else .clock,
             .processors = bench.processor_list,
         };
-        const world = bench.worldOf(variant);
-        return run_fns[variant](bench.io, &bench.setup, settings, world, bench.pixels, observer);
+        const world = bench.worldOf(candidate);
+        const run_fn = run_fns[candidate.variant];
+        return run_fn(bench.io, &bench.setup, settings, world, bench.pixels, observer);
     }
 
     fn firstTag(position: usize) u32 {
@@ -266,6 +309,7 @@ const Bench = struct {
 
     fn reportOf(
         bench: *Bench,
+        candidate: Candidate,
         position: usize,
         observer: *Observer,
         times: []const workload.Times,
@@ -278,7 +322,8 @@ const Bench = struct {
         const shadow_count = counts.hits + counts.reflection_hits;
         const ray_count = bench.pixels.len + counts.reflections + shadow_count;
         var result: report_file.Run = .{
-            .name = raylane.variant.names[bench.options.chosen()[position]],
+            .name = raylane.variant.names[candidate.variant],
+            .bvh = candidate.quality,
             .first_tag = firstTag(position),
             .frame_ms = if (counting) null else spread,
             .mrays_per_s = if (counting) null else perMicrosecond(ray_count, spread.min),

@@ -224,6 +224,9 @@ const Job = struct {
         return .{
             .lanes = raylane.variant.compiled[options.variant_index].lanes,
             .thread_count = job.threadCount(),
+            .tree_quality = switch (options.bvh) {
+                inline else => |quality| @field(raylane.prepare.TreeQuality, @tagName(quality)),
+            },
             .camera = switch (options.camera) {
                 .default => .default,
                 .auto => .auto,

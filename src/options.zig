@@ -22,6 +22,9 @@ pub const Format = enum { png, ppm, pfm };
 /// Form of the report.
 pub const Stats = enum { text, json, none };
 
+/// Care taken over the tree of the scene: time to build it against time to trace rays through it.
+pub const Bvh = enum { fast, default, high };
+
 /// Which camera to look through.
 pub const Camera = union(enum) {
     /// The file's own, else automatic.
@@ -79,6 +82,7 @@ pub const Options = struct {
     sample_count: u32 = 1,
     depth: u32 = 6,
     tile_size: u32 = 32,
+    bvh: Bvh = .default,
     camera: Camera = .default,
     /// Index into the variant names given to `parse`.
     variant_index: usize = 0,
@@ -116,6 +120,7 @@ const Id = enum {
     allow_outside,
     ambient,
     background,
+    bvh,
     camera,
     count_tests,
     depth,
@@ -160,6 +165,7 @@ const flags: []const Flag = &.{
     .{ .id = .exposure, .long = "--exposure" },
     .{ .id = .tonemap, .long = "--tonemap" },
     .{ .id = .thesis, .long = "--thesis", .has_value = false },
+    .{ .id = .bvh, .long = "--bvh" },
     .{ .id = .variant, .long = "--variant" },
     .{ .id = .list_variants, .long = "--list-variants", .has_value = false },
     .{ .id = .stats, .long = "--stats" },
@@ -207,6 +213,8 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\  -t, --threads N          1 to 256 (default: as many as CPUs)
     \\      --tile-size N        pixels on the side of a piece of work, 4 to 512 in
     \\                           steps of 4 (default: 32)
+    \\      --bvh QUALITY        fast, default or high: time to build the scene's tree
+    \\                           against time to trace; the image is always the same
     \\      --variant NAME       how rays are traced; the image is always the same
     \\      --list-variants      print the names of the variants, the default first
     \\
@@ -387,6 +395,8 @@ const Parser = struct {
                 options.depth = 3;
                 options.thread_count = null;
             },
+            .bvh => options.bvh = std.meta.stringToEnum(Bvh, value) orelse
+                return parser.bad(flag, value, "fast, default or high"),
             .variant => options.variant_index = try parser.variantOf(value),
             .count_tests => options.count_tests = true,
             .allow_outside => options.allow_outside = true,
@@ -661,6 +671,7 @@ test "numbers keep to their ranges" {
         },
         .{ .flag = "--tonemap", .good = &.{"linear"}, .bad = &.{ "aces", "" } },
         .{ .flag = "--stats", .good = &.{ "text", "json", "none" }, .bad = &.{ "JSON", "" } },
+        .{ .flag = "--bvh", .good = &.{ "fast", "default", "high" }, .bad = &.{ "High", "" } },
         .{ .flag = "--format", .good = &.{ "png", "ppm", "pfm" }, .bad = &.{ "PNG", "jpg", "" } },
         .{ .flag = "--variant", .good = test_names, .bad = &.{ "vector", "", "vector-packet-16" } },
         .{ .flag = "--camera", .good = &.{ "auto", "0", "4294967296", "b c" }, .bad = &.{""} },
@@ -695,6 +706,7 @@ test "values arrive as they were meant" {
     try std.testing.expectEqual(0, denormal);
     const exposure = (try optionsForTest(&.{ "--exposure", "-1.5" })).exposure;
     try std.testing.expectEqual(-1.5, exposure.ev);
+    try std.testing.expectEqual(.high, (try optionsForTest(&.{ "--bvh", "high" })).bvh);
     const variant = try optionsForTest(&.{"--variant=scalar-single-4"});
     try std.testing.expectEqual(1, variant.variant_index);
     try expectUsage("did you mean 'vector-packet-8'?", &.{ "--variant=vector-paket-8", "s" });

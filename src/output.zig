@@ -80,7 +80,7 @@ fn encode(
     defer encoder.deinit(gpa);
     var work: Work(Encoder) = .{ .encoder = &encoder };
     const thread_count = @min(settings.thread_count, encoder.threadCount());
-    parallel.run(thread_count, &work, Work(Encoder).run);
+    parallel.share(thread_count, &work, Work(Encoder).run);
     return target.finish(encoder.finish(), diagnostic);
 }
 

@@ -13,6 +13,7 @@ const simd = @import("simd.zig");
 const statistics = @import("statistics.zig");
 const world = @import("world.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const bvh_input = @import("prepare/bvh_input.zig");
 const bvh_wide = @import("prepare/bvh_wide.zig");
 const check = @import("prepare/check.zig");
 const flatten = @import("prepare/flatten.zig");
@@ -30,12 +31,16 @@ const World = world.World;
 /// How the user chooses a camera.
 pub const CameraChoice = view.CameraChoice;
 
+/// How much care is taken over the tree: the same picture in any case.
+pub const TreeQuality = bvh_input.Quality;
+
 /// What the user may decide.
 pub const Settings = struct {
     /// Width of the tree's nodes and triangle blocks: 4, 8 or 16.
     lanes: u8,
     /// 1..`parallel.thread_count_max`.
     thread_count: usize,
+    tree_quality: TreeQuality = .default,
     camera: CameraChoice = .default,
     /// Width and height in pixels, at least 1 each.
     resolution: ?[2]u32 = null,
@@ -125,6 +130,7 @@ noinline fn placeAll(
         .normals = surface.normals,
         .colors = surface.colors,
         .triangles = surface.triangles,
+        .middles_twice = surface.middles_twice,
         .materials = materials,
         .lights = lights,
         .camera = seen.camera,
@@ -158,9 +164,11 @@ pub noinline fn buildTree(
     const input: bvh_wide.Input = .{
         .positions = result.positions,
         .triangles = result.triangles,
+        .middles_twice = result.middles_twice,
         .pad = result.pad,
         .node_margin = result.node_margin,
         .thread_count = settings.thread_count,
+        .quality = settings.tree_quality,
     };
     const facts = &result.tree_statistics;
     result.tree = switch (settings.lanes) {
@@ -212,36 +220,41 @@ fn testPrepare(from: *const Scene, settings: Settings) !World {
     return prepare(std.testing.allocator, std.testing.io, from, settings, &diagnostic, &times);
 }
 
-/// Prepares and checks in all widths and with several thread counts, which all must agree.
-/// Returns how many triangles are in the tree.
+/// Prepares and checks in all widths and qualities and with several thread counts, which must all
+/// agree. Returns how many triangles are in the tree.
 fn testEverywhere(from: *const Scene) !usize {
-    const gpa = std.testing.allocator;
     var kept: usize = 0;
-    for ([_]u8{ 4, 8, 16 }) |lanes| {
-        var reference = try testPrepare(from, .{ .lanes = lanes, .thread_count = 1 });
-        defer reference.deinit();
-        try check.check(gpa, &reference);
-        kept = reference.triangles.len;
-        for ([_]usize{ 2, 7 }) |thread_count| {
-            var other = try testPrepare(from, .{ .lanes = lanes, .thread_count = thread_count });
-            defer other.deinit();
-            try expectSameBytes(reference.positions, other.positions);
-            try expectSameBytes(reference.triangles, other.triangles);
-            switch (lanes) {
-                inline 4, 8, 16 => |width| {
-                    const a = reference.tree.get(width);
-                    const b = other.tree.get(width);
-                    try expectSameBytes(a.nodes, b.nodes);
-                    try expectSameBytes(a.blocks, b.blocks);
-                },
-                else => unreachable,
-            }
-            try std.testing.expectEqual(reference.tree_statistics, other.tree_statistics);
-            try std.testing.expectEqual(reference.pad, other.pad);
-            try std.testing.expectEqual(reference.camera, other.camera);
-        }
-    }
+    for ([_]u8{ 4, 8, 16 }) |lanes| for (std.enums.values(TreeQuality)) |quality| {
+        kept = try testThreads(from, lanes, quality);
+    };
     return kept;
+}
+
+fn testThreads(from: *const Scene, lanes: u8, quality: TreeQuality) !usize {
+    var settings: Settings = .{ .lanes = lanes, .thread_count = 1, .tree_quality = quality };
+    var reference = try testPrepare(from, settings);
+    defer reference.deinit();
+    try check.check(std.testing.allocator, &reference);
+    for ([_]usize{ 2, 7 }) |thread_count| {
+        settings.thread_count = thread_count;
+        var other = try testPrepare(from, settings);
+        defer other.deinit();
+        try expectSameBytes(reference.positions, other.positions);
+        try expectSameBytes(reference.triangles, other.triangles);
+        switch (lanes) {
+            inline 4, 8, 16 => |width| {
+                const a = reference.tree.get(width);
+                const b = other.tree.get(width);
+                try expectSameBytes(a.nodes, b.nodes);
+                try expectSameBytes(a.blocks, b.blocks);
+            },
+            else => unreachable,
+        }
+        try std.testing.expectEqual(reference.tree_statistics, other.tree_statistics);
+        try std.testing.expectEqual(reference.pad, other.pad);
+        try std.testing.expectEqual(reference.camera, other.camera);
+    }
+    return reference.triangles.len;
 }
 
 fn expectSameBytes(a: anytype, b: @TypeOf(a)) !void {
@@ -292,6 +305,69 @@ test "random soups of all sizes, in all widths, by any number of threads" {
         var from = try TestScene.soup(gpa, corners);
         defer from.deinit();
         try std.testing.expectEqual(count, try testEverywhere(&from));
+    }
+}
+
+test "a grid cuts large soups, even ones and heaps in a void" {
+    const gpa = std.testing.allocator;
+    const count = 20_000;
+    const corners = try gpa.alloc([3]math.Vec3, count);
+    defer gpa.free(corners);
+    const Kind = enum { even, heap, coincident, flat_line };
+    var random_state: std.Random.DefaultPrng = .init(5);
+    const random = random_state.random();
+    for (std.enums.values(Kind)) |kind| {
+        for (corners, 0..) |*triangle, index| {
+            // All but a few within a cell that is one of thousands.
+            const reach: f32 = if (kind == .heap and index % 1000 > 0) 1e-4 else 1;
+            var at: math.Vec3 = undefined;
+            for (&at) |*coordinate| coordinate.* = random.float(f32) * reach;
+            if (kind == .coincident) at = .{ 1, 2, 3 };
+            if (kind == .flat_line) at = .{ at[0], 0, 0 };
+            const size = 0.01 * reach;
+            triangle.* = .{ at, .{ at[0] + size, at[1], at[2] }, .{ at[0], at[1] + size, at[2] } };
+        }
+        var from = try TestScene.soup(gpa, corners);
+        defer from.deinit();
+        for ([_]TreeQuality{ .fast, .default }) |quality| {
+            try std.testing.expectEqual(count, try testThreads(&from, 8, quality));
+        }
+    }
+}
+
+test "more care, less cost" {
+    const gpa = std.testing.allocator;
+    const corners = try gpa.alloc([3]math.Vec3, 5000);
+    defer gpa.free(corners);
+    var random_state: std.Random.DefaultPrng = .init(23);
+    const random = random_state.random();
+    // Of all sizes: what cuts by the middle do worst at.
+    for (corners) |*triangle| {
+        const size = std.math.pow(f32, 10, -3 * random.float(f32));
+        var at: math.Vec3 = undefined;
+        for (&at) |*coordinate| coordinate.* = random.float(f32) * 3;
+        for (triangle) |*corner| {
+            for (corner, at) |*coordinate, middle| {
+                coordinate.* = middle + size * random.floatNorm(f32);
+            }
+        }
+    }
+    var from = try TestScene.soup(gpa, corners);
+    defer from.deinit();
+    for ([_]u8{ 4, 16 }) |lanes| {
+        var costs: std.enums.EnumArray(TreeQuality, f64) = .initFill(0);
+        for (std.enums.values(TreeQuality)) |quality| {
+            const settings: Settings = .{
+                .lanes = lanes,
+                .thread_count = 1,
+                .tree_quality = quality,
+            };
+            var made = try testPrepare(&from, settings);
+            defer made.deinit();
+            costs.set(quality, made.tree_statistics.sah_cost);
+        }
+        try std.testing.expect(costs.get(.high) < 0.97 * costs.get(.default));
+        try std.testing.expect(costs.get(.default) < 1.02 * costs.get(.fast));
     }
 }
 
@@ -465,19 +541,24 @@ test "a mesh brings only the vertices from its first to its last" {
 
 test "memory that runs out is an error that leaks nothing" {
     const gpa = std.testing.allocator;
-    // Enough of them to be cut by all threads first.
-    var corners: [5000][3]math.Vec3 = undefined;
-    for (&corners, 0..) |*triangle, index| {
+    // Enough of them to be cut by a grid and by all threads first.
+    const corners = try gpa.alloc([3]math.Vec3, 17_000);
+    defer gpa.free(corners);
+    for (corners, 0..) |*triangle, index| {
         const at: f32 = @floatFromInt(index);
         triangle.* = .{ .{ at, 0, 0 }, .{ at + 1, 0, 0 }, .{ at, 1, 0 } };
     }
-    var from = try TestScene.soup(gpa, &corners);
+    var from = try TestScene.soup(gpa, corners);
     defer from.deinit();
     const one = struct {
         fn one(failing: std.mem.Allocator, scene_from: *const Scene) !void {
             var diagnostic: Diagnostic = .{};
             var times: StageTimes = .{};
-            const settings: Settings = .{ .lanes = 4, .thread_count = 1 };
+            const settings: Settings = .{
+                .lanes = 4,
+                .thread_count = 1,
+                .tree_quality = .high,
+            };
             var result = try prepare(
                 failing,
                 std.testing.io,
@@ -503,5 +584,8 @@ test {
     _ = view;
     _ = @import("prepare/framing.zig");
     _ = @import("prepare/bvh_split.zig");
+    _ = bvh_input;
     _ = @import("prepare/bvh_build.zig");
+    _ = @import("prepare/bvh_cells.zig");
+    _ = @import("prepare/bvh_reinsert.zig");
 }

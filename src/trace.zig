@@ -118,7 +118,7 @@ fn Frame(comptime Kernel: type) type {
                 .tiles = .init(image.width, image.height, settings.tile_size),
                 .by_thread = @splat(.{}),
             };
-            parallel.run(settings.thread_count, &frame, work);
+            parallel.share(settings.thread_count, &frame, work);
             var total: Statistics = .{};
             var tests: statistics.TestCounts = .{};
             for (frame.by_thread[0..settings.thread_count]) |part| {

@@ -224,6 +224,8 @@ pub const World = struct {
     /// By vertex, linear RGBA; empty where no mesh has colours.
     colors: []const [4]f32,
     triangles: []const Triangle,
+    /// Box of twice the middles of the triangles' boxes, empty without any.
+    middles_twice: Box3,
     materials: []const Material,
     lights: []const Light,
     camera: Camera,

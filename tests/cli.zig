@@ -189,6 +189,7 @@ test "mistakes on the command line are usage errors in one line" {
         &.{ "builtin:cornell", "--threads=0" },
         &.{ "builtin:cornell", "--variant=fast" },
         &.{ "builtin:cornell", "--stats=xml" },
+        &.{ "builtin:cornell", "--bvh=best" },
         &.{ "builtin:cornell", "-r8x8", "--camera=no such camera" },
         &.{ "builtin:cornell", "-r8x8", "--camera=99" },
     }) |arguments| {
@@ -307,6 +308,14 @@ test "the report as JSON says what was done" {
     const plain_stats = try statsOf(&sandbox, plain.stdout);
     try testing.expectEqual(null, plain_stats.tests);
     try testing.expectEqualStrings(stats.image_hash, plain_stats.image_hash);
+
+    // Another tree of less cost, the same picture.
+    const careful = try sandbox.expectExit(0, &.{
+        "builtin:cornell", "--stats=json", "-r16x8", "--depth=3", "--bvh=high",
+    });
+    const careful_stats = try statsOf(&sandbox, careful.stdout);
+    try testing.expectEqualStrings(stats.image_hash, careful_stats.image_hash);
+    try testing.expect(careful_stats.bvh.sah_cost.? < stats.bvh.sah_cost.?);
 }
 
 test "every variant is listed, accepted, and gives the same picture" {

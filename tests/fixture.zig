@@ -172,6 +172,7 @@ pub const Options = struct {
     sample_count: u32 = 1,
     tile_size: u32 = 16,
     thread_count: usize = 1,
+    tree_quality: raylane.prepare.TreeQuality = .default,
     ambient: ?f32 = null,
     background: ?[3]f32 = null,
     transparent: bool = false,
@@ -188,6 +189,7 @@ pub fn prepare(scene: *const Scene, lanes: u8, options: Options) !World {
     return raylane.prepare.prepare(gpa, std.testing.io, scene, .{
         .lanes = lanes,
         .thread_count = options.thread_count,
+        .tree_quality = options.tree_quality,
         .resolution = .{ options.width, options.height },
         .ambient = options.ambient,
         .background = options.background,

@@ -91,6 +91,20 @@ test "threads, tiles and samples: the hash depends on the samples alone" {
     }
 }
 
+test "the quality of the tree changes nothing in the picture, by any variant" {
+    for ([_][]const u8{ "builtin:cornell", "builtin:handles" }) |name| {
+        var scene = try parse(name);
+        defer scene.deinit();
+        var options: fixture.Options = .{ .width = 32, .height = 32, .thread_count = 2 };
+        var first = try fixture.render(&scene, options);
+        defer first.deinit(gpa);
+        for (std.enums.values(raylane.prepare.TreeQuality)) |quality| {
+            options.tree_quality = quality;
+            try expectAllVariants(&scene, options, first.hash());
+        }
+    }
+}
+
 test "orthographic views, directional and spot lights, holes, veils and absorbing glass" {
     var builder: fixture.Builder = try .init();
     var glass = fixture.matte(.{ 0.9, 1, 0.9 });

@@ -5,6 +5,7 @@
 const std = @import("std");
 const raylane = @import("raylane");
 const batch_file = @import("batch.zig");
+const TreeQuality = raylane.prepare.TreeQuality;
 const assert = std.debug.assert;
 
 pub const help =
@@ -17,6 +18,8 @@ pub const help =
     \\  --reps N           repetitions, of all variants in turns (default 7)
     \\  -t N               threads, each held on one processor (default 1)
     \\  --build-threads N  threads that build the tree (default 1)
+    \\  --bvh QUALITY      fast, default or high; may be repeated, each takes its turns
+    \\                     (default: default)
     \\  --build-only       measure the building of the tree alone
     \\  --subdivide N      first split every triangle in four, N times
     \\  --json             one JSON object in place of the table
@@ -40,6 +43,9 @@ pub const Options = struct {
     thread_count: u32 = 1,
     build_thread_count: u32 = 1,
     build_only: bool = false,
+    /// In the order of their first mention.
+    qualities: [quality_count]TreeQuality = undefined,
+    qualities_len: usize = 0,
     subdivide: u32 = 0,
     json: bool = false,
     image: ?[]const u8 = null,
@@ -47,8 +53,14 @@ pub const Options = struct {
     count: bool = false,
 
     const variant_count = raylane.variant.compiled.len;
+    const quality_count = std.enums.values(TreeQuality).len;
 
-    /// What is to be measured.
+    /// The qualities of trees that are to be measured.
+    pub fn chosenQualities(options: *const Options) []const TreeQuality {
+        return options.qualities[0..options.qualities_len];
+    }
+
+    /// The variants that are to be measured.
     pub fn chosen(options: *const Options) []const usize {
         return options.variants[0..options.variants_len];
     }
@@ -69,6 +81,10 @@ pub fn parse(
     if (options.variants_len == 0) {
         for (&options.variants, 0..) |*variant, index| variant.* = index;
         options.variants_len = options.variants.len;
+    }
+    if (options.qualities_len == 0) {
+        options.qualities[0] = .default;
+        options.qualities_len = 1;
     }
     if (options.count) {
         if (options.thread_count > 1 or options.build_thread_count > 1)
@@ -104,6 +120,7 @@ const Reader = struct {
             @"--reps",
             @"-t",
             @"--build-threads",
+            @"--bvh",
             @"--build-only",
             @"--subdivide",
             @"--json",
@@ -134,6 +151,7 @@ const Reader = struct {
             .@"-t" => options.thread_count = try reader.number(argument, 1, threads_max),
             .@"--build-threads" => options.build_thread_count =
                 try reader.number(argument, 1, threads_max),
+            .@"--bvh" => try reader.readQuality(try reader.value(argument), options),
             .@"--build-only" => options.build_only = true,
             .@"--subdivide" => options.subdivide = try reader.number(argument, 0, 8),
             .@"--json" => options.json = true,
@@ -152,6 +170,16 @@ const Reader = struct {
         const result = std.fmt.parseInt(u32, text, 10) catch least -% 1;
         if (result >= least and result <= most) return result;
         return reader.fail("{s} is a number from {d} to {d}", .{ flag, least, most });
+    }
+
+    fn readQuality(reader: *Reader, name: []const u8, options: *Options) Error!void {
+        const quality = std.meta.stringToEnum(TreeQuality, name) orelse
+            return reader.fail("--bvh is fast, default or high", .{});
+        if (std.mem.findScalar(TreeQuality, options.chosenQualities(), quality) != null)
+            return reader.fail("quality {s} given twice", .{name});
+        assert(options.qualities_len < options.qualities.len);
+        options.qualities[options.qualities_len] = quality;
+        options.qualities_len += 1;
     }
 
     fn readVariant(reader: *Reader, name: []const u8, options: *Options) Error!void {

@@ -4,9 +4,11 @@
 //! instructions were counted instead, and `first_tag` says which of the counter's tags are whose.
 
 const std = @import("std");
+const raylane = @import("raylane");
 const phases = @import("phases.zig");
 const observer = @import("observer.zig");
 const Phase = phases.Phase;
+const Quality = raylane.prepare.TreeQuality;
 const Writer = std.Io.Writer;
 
 /// The least and the middle of some repetitions.
@@ -21,8 +23,9 @@ pub const Spread = struct {
     }
 };
 
-/// A tree of one width.
+/// A tree of one quality and width.
 pub const Build = struct {
+    bvh: Quality,
     lanes: u8,
     first_tag: u32,
     time_ms: ?Spread,
@@ -40,9 +43,10 @@ pub const PhaseCost = struct {
     mrays_per_s: ?f64,
 };
 
-/// One variant's pictures.
+/// One variant's pictures, through a tree of one quality.
 pub const Run = struct {
     name: []const u8,
+    bvh: Quality,
     first_tag: u32,
     frame_ms: ?Spread,
     mrays_per_s: ?f64,
@@ -103,7 +107,7 @@ pub fn writeTable(writer: *Writer, report: *const Report) Writer.Error!void {
 }
 
 fn writeBuild(writer: *Writer, build: *const Build) Writer.Error!void {
-    try writer.print("\ntree {d} wide", .{build.lanes});
+    try writer.print("\ntree {d} wide, {t}", .{ build.lanes, build.bvh });
     if (build.time_ms) |time| try writer.print(": {d:.2} ms (median {d:.2}), {d:.2} Mtris/s", .{
         time.min, time.median, build.mtriangles_per_s.?,
     });
@@ -113,7 +117,7 @@ fn writeBuild(writer: *Writer, build: *const Build) Writer.Error!void {
 }
 
 fn writeRun(writer: *Writer, run: *const Run) Writer.Error!void {
-    try writer.print("\n{s}\n", .{run.name});
+    try writer.print("\n{s}, {t}\n", .{ run.name, run.bvh });
     if (run.frame_ms) |time| {
         try writer.print("  {s:<15}{s:>10}{s:>10}{s:>10}{s:>10}\n", .{
             "", "min ms", "median", "rays", "Mrays/s",

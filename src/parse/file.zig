@@ -2,8 +2,14 @@
 //!
 //! In: a folder and a path. Out: the bytes, owned by the caller, or one line that says why not.
 //! The file is opened once and looked at through its handle, so that no other file can take its
-//! place in between, and a pipe or a device can neither block nor flood us. It is read rather than
-//! mapped: a mapped file that somebody shortens meanwhile would end the program with a signal.
+//! place in between, and a pipe or a device can neither block nor flood us.
+//!
+//! It is read rather than mapped. What was checked must still be so when it is used, and of a
+//! mapped file another program can change every byte in between, also where the mapping is private:
+//! an index that was within its range, the JSON text that cgltf trusts after `json.check`. A copy
+//! of what is checked would not help where somebody shortens the file: that ends the program by a
+//! signal. Mapping 4.5 MB takes 0.9 ms less than reading them (0.3 against 1.2), of 110 for the
+//! picture.
 
 const std = @import("std");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;

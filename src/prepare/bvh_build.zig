@@ -13,11 +13,16 @@ const math = @import("../math.zig");
 const parallel = @import("../parallel.zig");
 const world = @import("../world.zig");
 const huge_pages = @import("huge_pages.zig");
+const bvh_input = @import("bvh_input.zig");
+const cells_file = @import("bvh_cells.zig");
 const split = @import("bvh_split.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
-const Bins = split.Bins(split.bin_count_large);
+const Bins = split.Bins(split.bin_count_large, 3);
 const Binning = split.Binning(split.bin_count_large);
+const Cells = cells_file.Cells;
+const Input = bvh_input.Input;
+const Item = cells_file.Item;
 const Box = split.Box;
 const Box3 = math.Box3;
 const Side = split.Side;
@@ -26,6 +31,17 @@ const Vec3 = math.Vec3;
 
 /// References a thread takes at a time while large sets are cut.
 const chunk_size = 4096;
+
+/// Triangles of sets that are cut by their references rather than their cells: there are more and
+/// better planes between those, and they all fit in a cache of 256 KiB.
+const task_size_min = 8192;
+
+/// Leaves of a tree that is to be optimised hold this part of a block, so that triangles can change
+/// blocks.
+const high_leaf_share = 4;
+
+/// Sets in fewer cells than these are cut by their references: too few planes lie between them.
+const item_count_min = 8;
 
 /// A node of the binary tree, laid out as a `Box` with its free lanes in use:
 ///
@@ -43,7 +59,8 @@ pub const Node = extern struct {
         return @as(*const Box, @ptrCast(node)).*;
     }
 
-    fn of(bounds: Box, count: u32) Node {
+    /// A leaf.
+    pub fn of(bounds: Box, count: u32) Node {
         const lanes: [8]f32 = bounds;
         return .{
             .lower = lanes[0..3].*,
@@ -76,28 +93,17 @@ pub const Tree = struct {
     /// Frees the arrays.
     pub fn deinit(tree: *Tree, gpa: Allocator) void {
         gpa.free(tree.nodes);
-        gpa.free(tree.references);
+        huge_pages.free(gpa, tree.references);
         gpa.free(tree.stretches);
         gpa.free(tree.top_pairs);
         tree.* = undefined;
     }
 };
 
-/// What is to be built on.
-pub const Input = struct {
-    positions: []const Vec3,
-    triangles: []const world.Triangle,
-    /// `World.pad`.
-    pad: f32,
-    /// `World.node_margin`.
-    node_margin: f32,
-    thread_count: usize,
-};
-
 /// Triangles of the sets that one thread cuts on its own: small enough that many threads are busy,
 /// large enough that few sets are cut by all of them.
 pub fn taskSize(triangle_count: usize) usize {
-    return @max(triangle_count / 64, 4096);
+    return @max(triangle_count / 64, task_size_min);
 }
 
 /// Builds the tree over at least one triangle. `block_size` is how many triangles are tested at
@@ -114,16 +120,15 @@ pub fn build(
         .references = undefined,
         .nodes = undefined,
         .task_size = @intCast(taskSize(count)),
+        .leaf_size = if (input.quality == .high) block_size / high_leaf_share else block_size,
     };
-    builder.references = try gpa.alignedAlloc(Box, .@"64", count);
-    errdefer gpa.free(builder.references);
-    huge_pages.advise(builder.references);
+    builder.references = try huge_pages.alloc(gpa, Box, count);
+    errdefer huge_pages.free(gpa, builder.references);
     builder.nodes = try gpa.alloc(Node, 2 * @as(usize, count));
     errdefer gpa.free(builder.nodes);
     defer builder.deinit(gpa);
 
-    const root = try builder.makeReferences(gpa);
-    try builder.cutTop(gpa, root);
+    try builder.cutTop(gpa);
     const stretches = try gpa.alloc(Tree.Stretch, builder.tasks.items.len);
     errdefer gpa.free(stretches);
     builder.runTasks(stretches);
@@ -134,6 +139,18 @@ pub fn build(
         .top_pairs = try builder.top_pairs.toOwnedSlice(gpa),
     };
 }
+
+/// What one thread cuts.
+const Task = struct {
+    /// Of the triangles.
+    begin: u32,
+    end: u32,
+    /// The next pair that is free, and all before `end` are.
+    pair: u32,
+    /// Within `task_sets`.
+    sets_begin: u32,
+    sets_end: u32,
+};
 
 /// A set of triangles that is still to be cut.
 const Set = struct {
@@ -157,20 +174,45 @@ fn Builder(comptime block_size: u32) type {
         references: []align(64) Box,
         nodes: []Node,
         task_size: u32,
-        tasks: std.ArrayList(Set) = .empty,
+        /// Sets of that many triangles and less are leaves.
+        leaf_size: u32,
+        tasks: std.ArrayList(Task) = .empty,
+        /// Of tasks, those of each side by side.
+        task_sets: std.ArrayList(Set) = .empty,
         top_pairs: std.ArrayList(u32) = .empty,
 
         const Self = @This();
 
         fn deinit(builder: *Self, gpa: Allocator) void {
             builder.tasks.deinit(gpa);
+            builder.task_sets.deinit(gpa);
             builder.top_pairs.deinit(gpa);
         }
 
-        /// Makes the references and the root.
+        /// The sets to begin with: the whole, or where there is much of it, what a grid cuts it in.
+        /// Fills the references.
+        fn makeSets(
+            builder: *Self,
+            gpa: Allocator,
+            sets: *std.ArrayList(Set),
+        ) error{OutOfMemory}!void {
+            if (builder.references.len < cells_file.reference_count_min) {
+                return sets.append(gpa, try builder.makeReferences(gpa));
+            }
+            var cells: Cells = try .init(gpa, builder.input);
+            defer cells.deinit(gpa);
+            var bounds: [2]Box = @splat(split.box_empty);
+            for (cells.items) |*item| {
+                bounds[0] = split.join(bounds[0], item.box);
+                bounds[1] = split.join(bounds[1], item.centers);
+            }
+            try builder.cutItems(gpa, builder.makeRoot(bounds), cells.items, sets);
+            try cells.scatter(gpa, builder.references);
+        }
+
+        /// Makes the references in the order of the triangles, and the root.
         fn makeReferences(builder: *Self, gpa: Allocator) error{OutOfMemory}!Set {
-            const count: u32 = @intCast(builder.references.len);
-            const chunk_count = (count + chunk_size - 1) / chunk_size;
+            const chunk_count = (builder.references.len + chunk_size - 1) / chunk_size;
             var work: ReferenceWork = .{
                 .input = builder.input,
                 .references = builder.references,
@@ -178,35 +220,151 @@ fn Builder(comptime block_size: u32) type {
             };
             defer gpa.free(work.results);
             const thread_count = @min(builder.input.thread_count, chunk_count);
-            parallel.run(thread_count, &work, ReferenceWork.run);
-            var box = split.box_empty;
-            var centers = split.box_empty;
+            parallel.share(thread_count, &work, ReferenceWork.run);
+            var bounds: [2]Box = @splat(split.box_empty);
             for (work.results) |result| {
-                box = split.join(box, result[0]);
-                centers = split.join(centers, result[1]);
+                for (&bounds, result) |*bound, box| bound.* = split.join(bound.*, box);
             }
-            builder.nodes[0] = .of(box, count);
-            return .{
-                .node = 0,
-                .begin = 0,
-                .end = count,
-                .depth = 1,
-                .centers = centers,
-            };
+            return builder.makeRoot(bounds);
         }
 
-        /// Cuts sets larger than a task, level by level.
-        fn cutTop(builder: *Self, gpa: Allocator, root: Set) error{OutOfMemory}!void {
+        /// The root, of the join of all boxes and that of all `centerBox`es.
+        fn makeRoot(builder: *Self, bounds: [2]Box) Set {
+            const count: u32 = @intCast(builder.references.len);
+            builder.nodes[0] = .of(bounds[0], count);
+            return .{ .node = 0, .begin = 0, .end = count, .depth = 1, .centers = bounds[1] };
+        }
+
+        /// Cuts a set between cells, down to tasks, or to `sets` where few cells are left that hold
+        /// many. Their references are yet to be moved to where the cells are moved here.
+        fn cutItems(
+            builder: *Self,
+            gpa: Allocator,
+            root: Set,
+            items: []Item,
+            sets: *std.ArrayList(Set),
+        ) error{OutOfMemory}!void {
+            const fast = builder.input.quality == .fast;
+            // A set waits on each level at most.
+            var stack: [world.tree_depth_max]ItemSet = undefined;
+            stack[0] = .{ .set = root, .items = items, .in_task = false };
+            var stack_count: usize = 1;
+            while (stack_count > 0) {
+                const at = stack[stack_count - 1];
+                const set = &at.set;
+                const is_task = set.count() <= builder.task_size;
+                if (is_task and !at.in_task) try builder.beginTask(gpa, set);
+                const is_done = (set.count() <= task_size_min and !fast) or isTooDeep(set) or
+                    at.items.len <= @as(usize, if (fast) 1 else item_count_min);
+                const chosen = if (is_done) null else chooseItems(set, at.items);
+                const left = chosen orelse {
+                    if (is_task) {
+                        try builder.addTaskSet(gpa, set);
+                    } else {
+                        try sets.append(gpa, at.set);
+                    }
+                    stack_count -= 1;
+                    continue;
+                };
+                const pair = try builder.takePair(gpa, set.begin + left.count, is_task);
+                const children = builder.makeChildren(
+                    set,
+                    pair,
+                    left.count,
+                    left.boxes,
+                    left.centers,
+                );
+                for ([_]usize{ 1, 0 }, stack_count - 1..) |child, to| stack[to] = .{
+                    .set = children[child],
+                    .items = if (child == 0)
+                        at.items[0..left.item_count]
+                    else
+                        at.items[left.item_count..],
+                    .in_task = is_task,
+                };
+                stack_count += 1;
+            }
+        }
+
+        /// A pair for a cut whose left half ends at `left_end`, of the last task if it is in one.
+        fn takePair(
+            builder: *Self,
+            gpa: Allocator,
+            left_end: u32,
+            is_task: bool,
+        ) error{OutOfMemory}!u32 {
+            if (is_task) {
+                const task = &builder.tasks.items[builder.tasks.items.len - 1];
+                task.pair += 1;
+                return task.pair - 1;
+            }
+            // No task has this pair: theirs start one after their first triangle.
+            try builder.top_pairs.append(gpa, left_end);
+            return left_end;
+        }
+
+        fn beginTask(builder: *Self, gpa: Allocator, set: *const Set) error{OutOfMemory}!void {
+            const sets_begin: u32 = @intCast(builder.task_sets.items.len);
+            try builder.tasks.append(gpa, .{
+                .begin = set.begin,
+                .end = set.end,
+                .pair = set.begin + 1,
+                .sets_begin = sets_begin,
+                .sets_end = sets_begin,
+            });
+        }
+
+        /// Adds a set to the last task.
+        fn addTaskSet(builder: *Self, gpa: Allocator, set: *const Set) error{OutOfMemory}!void {
+            try builder.task_sets.append(gpa, set.*);
+            const task = &builder.tasks.items[builder.tasks.items.len - 1];
+            task.sets_end += 1;
+            assert(task.sets_end == builder.task_sets.items.len);
+        }
+
+        const ItemSet = struct { set: Set, items: []Item, in_task: bool };
+
+        const LeftItems = struct { item_count: usize, count: u32, boxes: [2]Box, centers: [2]Box };
+
+        /// Moves the cells that go left to the front; null where nothing separates them.
+        fn chooseItems(set: *const Set, items: []Item) ?LeftItems {
+            const binning: Binning = .init(set.centers);
+            var bins: Bins = undefined;
+            bins.clear(&binning);
+            for (items) |*item| bins.addItem(&binning, item);
+            const chosen = bins.choose(block_size) orelse return null;
+            const side: Side = .init(&binning, &chosen);
+            var left: LeftItems = .{
+                .item_count = 0,
+                .count = chosen.left_count,
+                .boxes = .{ chosen.left_box, chosen.right_box },
+                .centers = @splat(split.box_empty),
+            };
+            for (items) |*item| {
+                const middle = split.middleOf(item.centers);
+                const is_left = side.isLeft(&middle);
+                const centers = &left.centers[@intFromBool(!is_left)];
+                centers.* = split.join(item.centers, centers.*);
+                if (!is_left) continue;
+                std.mem.swap(Item, item, &items[left.item_count]);
+                left.item_count += 1;
+            }
+            return left;
+        }
+
+        /// Makes tasks; cuts sets larger than that level by level.
+        fn cutTop(builder: *Self, gpa: Allocator) error{OutOfMemory}!void {
             var level: std.ArrayList(Cut) = .empty;
             defer level.deinit(gpa);
             var next: std.ArrayList(Set) = .empty;
             defer next.deinit(gpa);
-            try next.append(gpa, root);
+            try builder.makeSets(gpa, &next);
             while (next.items.len > 0) {
                 level.clearRetainingCapacity();
                 for (next.items) |set| {
                     if (set.count() <= builder.task_size) {
-                        try builder.tasks.append(gpa, set);
+                        try builder.beginTask(gpa, &set);
+                        try builder.addTaskSet(gpa, &set);
                     } else {
                         try level.append(gpa, .{ .set = set, .binning = .init(set.centers) });
                     }
@@ -216,15 +374,18 @@ fn Builder(comptime block_size: u32) type {
                 var work = try LevelWork.init(gpa, builder, level.items);
                 defer work.deinit(gpa);
                 const thread_count = @min(builder.input.thread_count, work.chunks.len);
-                parallel.run(thread_count, &work, LevelWork.fillBins);
+                parallel.share(thread_count, &work, LevelWork.fillBins);
                 work.choose();
                 work.next.store(0, .monotonic);
-                parallel.run(thread_count, &work, LevelWork.partitionChunks);
+                parallel.share(thread_count, &work, LevelWork.partitionChunks);
                 work.next.store(0, .monotonic);
-                parallel.run(thread_count, &work, LevelWork.exchange);
+                parallel.share(thread_count, &work, LevelWork.exchange);
                 for (work.cuts, 0..) |*cut, index| {
-                    try builder.top_pairs.append(gpa, cut.left_end);
-                    try next.appendSlice(gpa, &work.finish(cut, @intCast(index)));
+                    try next.appendSlice(gpa, &work.finish(
+                        cut,
+                        @intCast(index),
+                        try builder.takePair(gpa, cut.left_end, false),
+                    ));
                 }
             }
         }
@@ -232,14 +393,14 @@ fn Builder(comptime block_size: u32) type {
         /// Cuts the sets that are tasks, the largest first.
         fn runTasks(builder: *Self, stretches: []Tree.Stretch) void {
             const larger = struct {
-                fn larger(_: void, a: Set, b: Set) bool {
-                    return a.count() > b.count();
+                fn larger(_: void, a: Task, b: Task) bool {
+                    return a.end - a.begin > b.end - b.begin;
                 }
             }.larger;
-            std.mem.sort(Set, builder.tasks.items, {}, larger);
+            std.mem.sort(Task, builder.tasks.items, {}, larger);
             var work: TaskWork = .{ .builder = builder, .stretches = stretches };
             const thread_count = @min(builder.input.thread_count, builder.tasks.items.len);
-            parallel.run(thread_count, &work, TaskWork.run);
+            parallel.share(thread_count, &work, TaskWork.run);
         }
 
         /// Makes the two children of a set in the given pair. Returns them as sets.
@@ -275,8 +436,7 @@ fn Builder(comptime block_size: u32) type {
         /// Whether a set must be halved now, for its leaves to stay within `world.tree_depth_max`
         /// however its heuristic cuts would fall.
         fn isTooDeep(set: *const Set) bool {
-            const block_count = (set.count() + block_size - 1) / block_size;
-            return set.depth + std.math.log2_int_ceil(u32, block_count) >= world.tree_depth_max;
+            return set.depth + std.math.log2_int_ceil(u32, set.count()) >= world.tree_depth_max;
         }
 
         const LevelWork = LevelWorkOf(Self, block_size);
@@ -291,22 +451,30 @@ fn Builder(comptime block_size: u32) type {
                 while (true) {
                     const index = work.next.fetchAdd(1, .monotonic);
                     if (index >= work.stretches.len) return;
-                    work.stretches[index] = work.cut(work.builder.tasks.items[index]);
+                    work.stretches[index] = work.cutTask(&work.builder.tasks.items[index]);
                 }
             }
 
-            /// Cuts a set down to leaves. Returns the pairs made.
-            fn cut(work: *TaskWork, task: Set) Tree.Stretch {
+            /// Cuts the sets of a task down to leaves. Returns its pairs.
+            fn cutTask(work: *TaskWork, task: *const Task) Tree.Stretch {
+                const sets = work.builder.task_sets.items[task.sets_begin..task.sets_end];
+                var pair = task.pair;
+                for (sets) |*set| pair = work.cut(set.*, pair);
+                assert(pair <= task.end);
+                return .{ .begin = task.begin + 1, .end = pair };
+            }
+
+            /// Cuts a set in pairs from `first_pair` on. Returns the next.
+            fn cut(work: *TaskWork, whole: Set, first_pair: u32) u32 {
                 const builder = work.builder;
                 // A set waits on each level at most.
                 var stack: [world.tree_depth_max]Set = undefined;
                 var stack_count: usize = 0;
-                const begin = task.begin + 1;
-                var pair = begin;
-                var set = task;
+                var pair = first_pair;
+                var set = whole;
                 while (true) {
-                    if (set.count() <= block_size) {
-                        if (stack_count == 0) break;
+                    if (set.count() <= builder.leaf_size) {
+                        if (stack_count == 0) return pair;
                         stack_count -= 1;
                         set = stack[stack_count];
                     } else {
@@ -317,18 +485,23 @@ fn Builder(comptime block_size: u32) type {
                         set = children[0];
                     }
                 }
-                assert(pair <= task.end);
-                return .{ .begin = begin, .end = pair };
             }
         };
 
         /// Cuts one set by one thread.
         fn cutSet(builder: *Self, set: *const Set, pair: u32) [2]Set {
             if (!isTooDeep(set)) {
-                const children = if (set.count() <= split.small_count_max)
-                    builder.cutByCost(set, pair, split.bin_count_small)
-                else
-                    builder.cutByCost(set, pair, split.bin_count_large);
+                const small = set.count() <= split.small_count_max;
+                const children = switch (builder.input.quality) {
+                    .fast => if (small)
+                        builder.cutByCost(set, pair, split.bin_count_small, 1)
+                    else
+                        builder.cutByCost(set, pair, split.bin_count_large, 1),
+                    .default, .high => if (small)
+                        builder.cutByCost(set, pair, split.bin_count_small, 3)
+                    else
+                        builder.cutByCost(set, pair, split.bin_count_large, 3),
+                };
                 if (children) |found| return found;
             }
             const left_count = set.count() / 2;
@@ -345,17 +518,18 @@ fn Builder(comptime block_size: u32) type {
             set: *const Set,
             pair: u32,
             comptime bin_count: comptime_int,
+            comptime axis_count: comptime_int,
         ) ?[2]Set {
             const references = builder.references[set.begin..set.end];
             const binning: split.Binning(bin_count) = .init(set.centers);
-            var bins: split.Bins(bin_count) = undefined;
-            bins.clear();
+            var bins: split.Bins(bin_count, axis_count) = undefined;
+            bins.clear(&binning);
             bins.add(&binning, references);
             const chosen = bins.choose(block_size) orelse return null;
             const side: Side = .init(&binning, &chosen);
             // Leaves have no use for the middles of what is in them.
             const largest = @max(chosen.left_count, set.count() - chosen.left_count);
-            const centers = if (largest > block_size)
+            const centers = if (largest > builder.leaf_size)
                 partition(references, &side, chosen.left_count, true)
             else
                 partition(references, &side, chosen.left_count, false);
@@ -424,7 +598,6 @@ const ReferenceWork = struct {
 
     fn run(work: *ReferenceWork, thread_index: usize) void {
         assert(thread_index < parallel.thread_count_max);
-        const positions = work.input.positions;
         while (true) {
             const chunk = work.next.fetchAdd(1, .monotonic);
             if (chunk >= work.results.len) return;
@@ -432,17 +605,8 @@ const ReferenceWork = struct {
             const end = @min(begin + chunk_size, work.references.len);
             var box = split.box_empty;
             var centers = split.box_empty;
-            for (
-                work.references[begin..end],
-                work.input.triangles[begin..end],
-                begin..,
-            ) |*reference, triangle, number| {
-                const grown = Box3.empty
-                    .include(positions[triangle.corner[0]])
-                    .include(positions[triangle.corner[1]])
-                    .include(positions[triangle.corner[2]])
-                    .grow(work.input.pad);
-                reference.* = split.reference(grown, @intCast(number));
+            for (work.references[begin..end], begin..) |*reference, number| {
+                reference.* = work.input.reference(number);
                 box = split.join(box, reference.*);
                 centers = split.join(centers, split.centerBox(reference.*));
             }
@@ -533,7 +697,7 @@ fn LevelWorkOf(comptime Self: type, comptime block_size: u32) type {
                 const chunk = &work.chunks[index];
                 const cut = &work.cuts[chunk.cut];
                 const references = work.builder.references[chunk.begin..chunk.end];
-                work.bins[index].clear();
+                work.bins[index].clear(&cut.binning);
                 work.bins[index].add(&cut.binning, references);
             }
         }
@@ -639,13 +803,11 @@ fn LevelWorkOf(comptime Self: type, comptime block_size: u32) type {
         }
 
         /// The children of a set whose references have been moved.
-        fn finish(work: *LevelWork, cut: *const Cut, cut_index: u32) [2]Set {
+        fn finish(work: *LevelWork, cut: *const Cut, cut_index: u32, pair: u32) [2]Set {
             var sides: Sides = .empty;
             for (work.chunksOf(cut_index)) |*chunk| sides.join(&chunk.sides);
             if (cut.split) |*chosen| sides.boxes = .{ chosen.left_box, chosen.right_box };
-            // No task has this pair: theirs start one after their first triangle.
-            const pair = cut.left_end;
-            const left_count = pair - cut.set.begin;
+            const left_count = cut.left_end - cut.set.begin;
             const builder = work.builder;
             return builder.makeChildren(&cut.set, pair, left_count, sides.boxes, sides.centers);
         }

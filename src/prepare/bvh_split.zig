@@ -63,7 +63,8 @@ pub inline fn toBox3(box: Box) Box3 {
     };
 }
 
-inline fn lowerHalf(box: Box) Vec4 {
+/// The lower corner.
+pub inline fn lowerHalf(box: Box) Vec4 {
     return @shuffle(f32, box, undefined, @Vector(4, i32){ 0, 1, 2, 3 });
 }
 
@@ -72,7 +73,7 @@ inline fn upperHalf(box: Box) Vec4 {
 }
 
 /// Twice the middle.
-inline fn centerTwice(box: Box) Vec4 {
+pub inline fn centerTwice(box: Box) Vec4 {
     return lowerHalf(box) - upperHalf(box);
 }
 
@@ -82,17 +83,38 @@ pub inline fn centerBox(box: Box) Box {
     return std.simd.join(center, -center);
 }
 
+/// The box of no size in the middle of a join of `centerBox`es, to be put in bins.
+pub inline fn middleOf(centers: Box) Box {
+    const half: Vec4 = @splat(0.25);
+    const center = lowerHalf(centers) * half - upperHalf(centers) * half;
+    return std.simd.join(center, -center);
+}
+
 /// Edge lengths, negated; the last lane means nothing.
 inline fn extentNegated(box: Box) Vec4 {
     return lowerHalf(box) + upperHalf(box);
 }
 
+/// Edge lengths; the last lane means nothing.
+pub inline fn extent(box: Box) Vec4 {
+    return -extentNegated(box);
+}
+
+/// Edges of bounds of middles up to this long have no room for bins.
+pub const extent_min = 0x1p-100;
+
 /// Half the surface area, infinite or NaN for the empty box.
 pub inline fn halfArea(box: Box) f32 {
-    const extent = extentNegated(box); // Both factors of each product, so the sign does not show.
-    const turned = @shuffle(f32, extent, undefined, @Vector(4, i32){ 1, 2, 0, 3 });
-    const product = extent * turned;
+    const edges = extentNegated(box); // Both factors of each product, so the sign does not show.
+    const turned = @shuffle(f32, edges, undefined, @Vector(4, i32){ 1, 2, 0, 3 });
+    const product = edges * turned;
     return product[0] + (product[1] + product[2]);
+}
+
+/// The axis along which a box of these edges is longest.
+pub inline fn longestAxis(edges: [4]f32) u8 {
+    const longer: u8 = if (edges[1] > edges[0]) 1 else 0;
+    return if (edges[2] > edges[longer]) 2 else longer;
 }
 
 /// From a middle to one of `bin_count` bins: (center - offset) * scale, rounded down.
@@ -101,19 +123,22 @@ pub fn Binning(comptime bin_count: comptime_int) type {
         offset: Vec4,
         /// 0 on axes where all middles are the same, or too near to tell apart.
         scale: Vec4,
+        /// The longest axis.
+        axis: u8,
 
         const Self = @This();
 
         /// Bins that span `centers`, the join of `centerBox`es.
         pub fn init(centers: Box) Self {
-            const extent = -extentNegated(centers);
+            const edges = extent(centers);
             // Just below the count, so that the last middle lands in the last bin after rounding.
             const width: Vec4 = @splat(bin_count * (1 - 0x1p-20));
-            const least: Vec4 = @splat(0x1p-100);
+            const least: Vec4 = @splat(extent_min);
             const zero: Vec4 = @splat(0);
             return .{
                 .offset = lowerHalf(centers),
-                .scale = @select(f32, extent > least, width / extent, zero),
+                .scale = @select(f32, edges > least, width / edges, zero),
+                .axis = longestAxis(edges),
             };
         }
 
@@ -166,11 +191,14 @@ pub const bin_count_small = 8;
 /// Sets of up to this many references get `bin_count_small` bins along each axis.
 pub const small_count_max = 32;
 
-/// Boxes and counts of what lies in the bins of three axes.
-pub fn Bins(comptime bin_count: comptime_int) type {
+/// Boxes and counts of what lies in the bins of all three axes, or of the longest alone.
+pub fn Bins(comptime bin_count: comptime_int, comptime axis_count: comptime_int) type {
+    assert(axis_count == 1 or axis_count == 3);
     return struct {
-        boxes: [3][bin_count]Box,
-        counts: [3][bin_count]i32,
+        boxes: [axis_count][bin_count]Box,
+        counts: [axis_count][bin_count]i32,
+        /// Of the only row where there is one.
+        axis: u8,
 
         const Self = @This();
         /// A value for each plane between two bins: lane i for that below bin i, lane 0 unused.
@@ -179,7 +207,8 @@ pub fn Bins(comptime bin_count: comptime_int) type {
 
         /// Makes all bins empty. By a loop: a constant of this size would be copied, at twice the
         /// instructions.
-        pub fn clear(bins: *Self) void {
+        pub fn clear(bins: *Self, binning: *const Binning(bin_count)) void {
+            bins.axis = binning.axis;
             for (&bins.boxes) |*boxes| {
                 for (boxes) |*box| box.* = box_empty;
             }
@@ -191,46 +220,64 @@ pub fn Bins(comptime bin_count: comptime_int) type {
             for (references) |box| {
                 // Indices into tables: lanes of an array, not of a vector.
                 const indices: [4]i32 = binning.binsOf(box);
-                inline for (0..3) |axis| {
-                    const index: usize = @intCast(indices[axis]);
+                inline for (&bins.boxes, &bins.counts, 0..) |*boxes, *counts, row| {
+                    const index: usize = @intCast(indices[bins.axisOf(row)]);
                     assert(index < bin_count);
-                    bins.boxes[axis][index] = join(box, loadBin(&bins.boxes[axis][index]));
-                    bins.counts[axis][index] += 1;
+                    boxes[index] = join(box, loadBin(&boxes[index]));
+                    counts[index] += 1;
                 }
             }
         }
 
+        /// Puts a cell of references into the bins of its middle.
+        pub fn addItem(bins: *Self, binning: *const Binning(bin_count), item: anytype) void {
+            const indices: [4]i32 = binning.binsOf(middleOf(item.centers));
+            inline for (&bins.boxes, &bins.counts, 0..) |*boxes, *counts, row| {
+                const index: usize = @intCast(indices[bins.axisOf(row)]);
+                assert(index < bin_count);
+                boxes[index] = join(item.box, boxes[index]);
+                counts[index] += @intCast(item.count);
+            }
+        }
+
+        inline fn axisOf(bins: *const Self, row: usize) usize {
+            return if (axis_count == 1) bins.axis else row;
+        }
+
+        inline fn rowOf(axis: usize) usize {
+            return if (axis_count == 1) 0 else axis;
+        }
+
         /// Adds the bins of another part of the same set.
         pub fn addBins(bins: *Self, other: *const Self) void {
-            for (0..3) |axis| {
-                for (0..bin_count) |index| {
-                    const boxes = &bins.boxes[axis];
-                    boxes[index] = join(boxes[index], other.boxes[axis][index]);
-                    bins.counts[axis][index] += other.counts[axis][index];
-                }
+            for (&bins.boxes, &bins.counts, &other.boxes, &other.counts) |*boxes, *counts, *b, *c| {
+                for (boxes, b) |*box, other_box| box.* = join(box.*, other_box);
+                for (counts, c) |*count, other_count| count.* += other_count;
             }
         }
 
         /// References left of a plane.
         pub fn countLeft(bins: *const Self, split: *const Split) u32 {
             var count: i32 = 0;
-            for (bins.counts[split.axis][0..split.bin]) |bin| count += bin;
+            for (bins.counts[rowOf(split.axis)][0..split.bin]) |bin| count += bin;
             return @intCast(count);
         }
 
         /// The cheapest plane: the sum over both sides of half area times blocks of `block_size`
         /// triangles. Null where all references share a bin on every axis.
         pub fn choose(bins: *const Self, comptime block_size: u32) ?Split {
-            var costs: [3]Planes = undefined;
+            var costs: [axis_count]Planes = undefined;
             inline for (&costs, &bins.boxes, &bins.counts) |*to, *boxes, *counts| {
                 to.* = planeCosts(boxes, counts, block_size);
             }
-            const least = leastLane(bin_count, lesser(costs[0], lesser(costs[1], costs[2])));
+            var lowest = costs[0];
+            for (costs[1..]) |row_costs| lowest = lesser(lowest, row_costs);
+            const least = leastLane(bin_count, lowest);
             if (least == std.math.inf(f32)) return null;
-            for (costs, 0..) |axis_costs, axis| {
-                const lanes: [bin_count]f32 = axis_costs;
+            for (costs, 0..) |row_costs, row| {
+                const lanes: [bin_count]f32 = row_costs;
                 const plane = std.mem.findScalar(f32, &lanes, least) orelse continue;
-                return bins.cutAt(axis, plane);
+                return bins.cutAt(bins.axisOf(row), plane);
             }
             unreachable; // One of them is the least.
         }
@@ -297,7 +344,7 @@ pub fn Bins(comptime bin_count: comptime_int) type {
                 .right_box = box_empty,
             };
             result.left_count = bins.countLeft(&result);
-            const boxes = &bins.boxes[axis];
+            const boxes = &bins.boxes[rowOf(axis)];
             for (boxes[0..plane]) |box| result.left_box = join(result.left_box, box);
             for (boxes[plane..]) |box| result.right_box = join(result.right_box, box);
             return result;
@@ -307,7 +354,7 @@ pub fn Bins(comptime bin_count: comptime_int) type {
 
 /// Volatile on x86, or LLVM turns the minimum and its store into a masked store (AVX), which the
 /// next load of the same bin has to wait for: 1.6 times as long for a whole tree.
-inline fn loadBin(box: *const Box) Box {
+pub inline fn loadBin(box: *const Box) Box {
     if (comptime !builtin.cpu.arch.isX86()) return box.*;
     const held: *const volatile Box = box;
     return held.*;
@@ -358,8 +405,8 @@ test "two heaps are cut apart" {
     var centers = box_empty;
     for (references) |box| centers = join(centers, centerBox(box));
     const binning: Binning(16) = .init(centers);
-    var bins: Bins(16) = undefined;
-    bins.clear();
+    var bins: Bins(16, 3) = undefined;
+    bins.clear(&binning);
     bins.add(&binning, &references);
     const split = bins.choose(4).?;
     try std.testing.expectEqual(1, split.axis);
@@ -374,11 +421,11 @@ test "two heaps are cut apart" {
     try std.testing.expectEqual(math.Vec3{ 6, 102.9, 8 }, right.upper);
 
     // The same in two parts.
-    var first: Bins(16) = undefined;
-    first.clear();
+    var first: Bins(16, 3) = undefined;
+    first.clear(&binning);
     first.add(&binning, references[0..7]);
-    var second: Bins(16) = undefined;
-    second.clear();
+    var second: Bins(16, 3) = undefined;
+    second.clear(&binning);
     second.add(&binning, references[7..]);
     second.addBins(&first);
     try std.testing.expectEqual(split.bin, second.choose(4).?.bin);
@@ -403,8 +450,8 @@ test "middles that are the same have no plane between them" {
     var centers = box_empty;
     for (references) |box| centers = join(centers, centerBox(box));
     const binning: Binning(16) = .init(centers);
-    var bins: Bins(16) = undefined;
-    bins.clear();
+    var bins: Bins(16, 3) = undefined;
+    bins.clear(&binning);
     bins.add(&binning, &references);
     try std.testing.expectEqual(null, bins.choose(4));
 }

@@ -11,7 +11,9 @@ const std = @import("std");
 const math = @import("../math.zig");
 const parallel = @import("../parallel.zig");
 const world = @import("../world.zig");
+const bvh_input = @import("bvh_input.zig");
 const bvh_build = @import("bvh_build.zig");
+const bvh_reinsert = @import("bvh_reinsert.zig");
 const bvh_split = @import("bvh_split.zig");
 const huge_pages = @import("huge_pages.zig");
 const assert = std.debug.assert;
@@ -20,7 +22,7 @@ const Box3 = math.Box3;
 const Vec3 = math.Vec3;
 
 /// What is to be built on.
-pub const Input = bvh_build.Input;
+pub const Input = bvh_input.Input;
 
 /// Cost of testing a ray against the boxes of a node, and against a block of triangles.
 const node_cost: f32 = 1;
@@ -47,6 +49,9 @@ pub fn build(
     }
     var binary = try bvh_build.build(gpa, input, width);
     defer binary.deinit(gpa);
+    if (input.quality == .high) {
+        try bvh_reinsert.optimize(gpa, &binary, input.thread_count, width);
+    }
     const costs = try gpa.alloc([width]f32, binary.nodes.len);
     defer gpa.free(costs);
     var collapse: Collapse(width) = .init(input, &binary, costs);
@@ -90,7 +95,7 @@ fn Collapse(comptime width: u32) type {
         fn weigh(collapse: *Self) void {
             var work: WeighWork = .{ .collapse = collapse };
             const stretch_count = collapse.binary.stretches.len;
-            parallel.run(@min(collapse.input.thread_count, stretch_count), &work, WeighWork.run);
+            parallel.share(@min(collapse.input.thread_count, stretch_count), &work, WeighWork.run);
             const pairs = collapse.binary.top_pairs;
             for (0..pairs.len) |index| collapse.weighPair(pairs[pairs.len - 1 - index]);
             collapse.weighNode(0);
@@ -243,7 +248,7 @@ fn Collapse(comptime width: u32) type {
             try collapse.findParts(gpa, &parts, limit);
             var work: EmitWork = .{ .collapse = collapse, .parts = parts.items, .limit = limit };
             const thread_count = @min(collapse.input.thread_count, parts.items.len);
-            parallel.run(thread_count, &work, EmitWork.count);
+            parallel.share(thread_count, &work, EmitWork.count);
 
             var node_count: u32 = 0;
             var block_count: u32 = 0;
@@ -257,12 +262,10 @@ fn Collapse(comptime width: u32) type {
                 statistics.sah_cost += part.cost;
             }
             assert(statistics.depth <= world.tree_depth_max);
-            work.nodes = try arena.alignedAlloc(Node, .@"64", node_count);
-            work.blocks = try arena.alignedAlloc(Block, .@"64", block_count);
-            huge_pages.advise(work.nodes);
-            huge_pages.advise(work.blocks);
+            work.nodes = try huge_pages.alloc(arena, Node, node_count);
+            work.blocks = try huge_pages.alloc(arena, Block, block_count);
             work.next.store(0, .monotonic);
-            parallel.run(thread_count, &work, EmitWork.write);
+            parallel.share(thread_count, &work, EmitWork.write);
             statistics.node_count = node_count;
             statistics.bytes = @as(u64, node_count) * @sizeOf(Node) +
                 @as(u64, block_count) * @sizeOf(Block);
@@ -331,8 +334,10 @@ fn Collapse(comptime width: u32) type {
             }
 
             fn take(work: *EmitWork) ?usize {
-                const index = work.next.fetchAdd(1, .monotonic);
-                return if (index < work.parts.len) index else null;
+                const turn = work.next.fetchAdd(1, .monotonic);
+                if (turn >= work.parts.len) return null;
+                const thread_count = work.collapse.input.thread_count;
+                return parallel.spread(turn, work.parts.len, thread_count);
             }
 
             /// Visits the wide nodes of a part in depth-first order.

@@ -43,6 +43,8 @@ pub const Surface = struct {
     triangles: []const world.Triangle,
     /// Box of the triangles' corners, empty without triangles.
     bounds: Box3,
+    /// Box of twice the middles of the triangles' boxes, empty without triangles.
+    middles_twice: Box3,
     /// Triangles left out.
     dropped_count: u64,
 };
@@ -67,6 +69,7 @@ const ChunkResult = struct {
     kept_count: u32 = 0,
     outside_count: u32 = 0,
     bounds: Box3 = .empty,
+    middles_twice: Box3 = .empty,
 };
 
 /// Flattens the whole scene. `maps` holds a world map for each node. The surface's arrays come from
@@ -86,20 +89,21 @@ pub fn flatten(
 
     var work: Work = .{
         .draws = draws,
-        .positions = try arena.alloc(Vec3, size.vertex_count),
-        .normals = try arena.alloc(Vec3, size.vertex_count),
-        .colors = try arena.alloc([4]f32, if (size.has_colors) size.vertex_count else 0),
-        .triangles = try arena.alloc(world.Triangle, size.triangle_count),
+        .positions = try huge_pages.alloc(arena, Vec3, size.vertex_count),
+        .normals = try huge_pages.alloc(arena, Vec3, size.vertex_count),
+        .colors = try huge_pages.alloc(
+            arena,
+            [4]f32,
+            if (size.has_colors) size.vertex_count else 0,
+        ),
+        .triangles = try huge_pages.alloc(arena, world.Triangle, size.triangle_count),
         .chunks = try gpa.alloc(ChunkResult, chunkCount(size.triangle_count)),
     };
     defer gpa.free(work.chunks);
-    inline for (.{ work.positions, work.normals, work.colors, work.triangles }) |array| {
-        huge_pages.advise(array);
-    }
     const vertex_chunk_count = chunkCount(size.vertex_count);
-    parallel.run(@min(thread_count, @max(vertex_chunk_count, 1)), &work, Work.placeVertices);
+    parallel.share(@min(thread_count, @max(vertex_chunk_count, 1)), &work, Work.placeVertices);
     work.next.store(0, .monotonic);
-    parallel.run(@min(thread_count, @max(work.chunks.len, 1)), &work, Work.placeTriangles);
+    parallel.share(@min(thread_count, @max(work.chunks.len, 1)), &work, Work.placeTriangles);
     return work.finish(diagnostic);
 }
 
@@ -313,7 +317,9 @@ const Work = struct {
                     .material = draw.mesh.material,
                 };
                 result.kept_count += 1;
-                result.bounds = result.bounds.include(a).include(b).include(c);
+                const box = Box3.empty.include(a).include(b).include(c);
+                result.bounds = result.bounds.join(box);
+                result.middles_twice = result.middles_twice.include(box.centerTwice());
             }
         }
     }
@@ -323,6 +329,7 @@ const Work = struct {
         var kept_count: usize = 0;
         var outside_count: u64 = 0;
         var bounds: Box3 = .empty;
+        var middles_twice: Box3 = .empty;
         for (work.chunks, 0..) |chunk, index| {
             const begin = index * chunk_size;
             assert(kept_count <= begin);
@@ -334,6 +341,7 @@ const Work = struct {
             kept_count += chunk.kept_count;
             outside_count += chunk.outside_count;
             bounds = bounds.join(chunk.bounds);
+            middles_twice = middles_twice.join(chunk.middles_twice);
         }
         if (outside_count > 0) diagnostic.warn(
             "{d} triangles left out: they reach farther than 2^40 m from the origin",
@@ -345,6 +353,7 @@ const Work = struct {
             .colors = work.colors,
             .triangles = work.triangles[0..kept_count],
             .bounds = bounds,
+            .middles_twice = middles_twice,
             .dropped_count = work.triangles.len - kept_count,
         };
     }

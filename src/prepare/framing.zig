@@ -277,6 +277,7 @@ const TestShape = struct {
             .colors = &.{},
             .triangles = shape.triangles,
             .bounds = bounds,
+            .middles_twice = .empty,
             .dropped_count = 0,
         };
     }

@@ -185,6 +185,7 @@ const test_surface: Surface = .{
     .colors = &.{},
     .triangles = &.{},
     .bounds = .empty,
+    .middles_twice = .empty,
     .dropped_count = 0,
 };
 
