@@ -7,7 +7,8 @@
 //! Threads are started once, when first asked for, and kept until the process ends: building a tree
 //! of 200,000 triangles asks a dozen times, and starting and joining one thread took a tenth of its
 //! time. In between they wait for a word of their own to change, at first by looking at it, then
-//! asleep in the kernel (a futex). Nothing is allocated and no lock is taken after the start.
+//! asleep in the kernel (a futex). More than are worth keeping are started for one job. Nothing is
+//! allocated and no lock is taken after the start.
 
 const std = @import("std");
 const builtin = @import("builtin");
@@ -58,7 +59,8 @@ fn start(
     const job: Job = .{ .call = call, .context = @ptrCast(@constCast(context)) };
     if (thread_count == 1) return job.do(0);
     // A second caller at the same time, or one from within a job, has threads of its own.
-    const has_pool = builtin.os.tag == .linux and !pool.is_taken.swap(true, .acquire);
+    const has_pool = builtin.os.tag == .linux and thread_count <= keptMax() and
+        !pool.is_taken.swap(true, .acquire);
     if (!has_pool) return runOnce(thread_count, job);
     defer pool.is_taken.store(false, .release);
     pool.run(thread_count, job, await_all);
@@ -73,6 +75,12 @@ pub fn spread(turn: usize, count: usize, stretch_count: usize) usize {
     const length = count / stretch_count;
     // The first few stretches have one piece more.
     return stretch * length + @min(stretch, count % stretch_count) + turn / stretch_count;
+}
+
+/// Threads at most that are kept: each holds 16 MiB of addresses for its stack, of which a 32-bit
+/// process has room for two hundred. More than there are processors gain nothing by it.
+fn keptMax() usize {
+    return @max(8, @min(64, std.Thread.getCpuCount() catch 1));
 }
 
 /// What a thread is to do.
