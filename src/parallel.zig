@@ -59,7 +59,7 @@ fn start(
     const job: Job = .{ .call = call, .context = @ptrCast(@constCast(context)) };
     if (thread_count == 1) return job.do(0);
     // A second caller at the same time, or one from within a job, has threads of its own.
-    const has_pool = builtin.os.tag == .linux and thread_count <= keptMax() and
+    const has_pool = builtin.os.tag == .linux and isKept(thread_count) and
         !pool.is_taken.swap(true, .acquire);
     if (!has_pool) return runOnce(thread_count, job);
     defer pool.is_taken.store(false, .release);
@@ -77,11 +77,15 @@ pub fn spread(turn: usize, count: usize, stretch_count: usize) usize {
     return stretch * length + @min(stretch, count % stretch_count) + turn / stretch_count;
 }
 
-/// Threads at most that are kept: each holds 16 MiB of addresses for its stack, of which a 32-bit
-/// process has room for two hundred. More than there are processors gain nothing by it.
-fn keptMax() usize {
-    return @max(8, @min(64, std.Thread.getCpuCount() catch 1));
+/// Whether so many threads are kept: each holds 16 MiB of addresses for its stack, of which a
+/// 32-bit process has room for two hundred. More than there are processors gain nothing by it.
+fn isKept(thread_count: usize) bool {
+    if (thread_count <= 8) return true;
+    return thread_count <= kept_max and thread_count <= std.Thread.getCpuCount() catch 1;
 }
+
+/// See `isKept`, with the caller's own.
+const kept_max = 64;
 
 /// What a thread is to do.
 const Job = struct {
@@ -118,7 +122,7 @@ const Pool = struct {
     look_count: std.atomic.Value(u32) = .init(0),
     /// Workers that are still at the job; `caller_asleep` on top where the caller sleeps meanwhile.
     busy_count: std.atomic.Value(u32) align(std.atomic.cache_line) = .init(0),
-    workers: [thread_count_max - 1]Worker = @splat(.{}),
+    workers: [kept_max - 1]Worker = @splat(.{}),
 
     const caller_asleep = 1 << 31;
 

@@ -86,11 +86,11 @@ const Grid = struct {
     }
 
     inline fn cellOf(grid: *const Grid, box: Box) u32 {
-        const at: Indices = @intFromFloat(
-            (split.centerTwice(box) - grid.offset) * grid.scale,
-        );
-        // Rounding may lead out of the bounds, by little.
-        const within = @min(@max(at, @as(Indices, @splat(0))), grid.last);
+        const at = (split.centerTwice(box) - grid.offset) * grid.scale;
+        // Boxes are grown, and rounded by that: their middles may lie beyond the bounds of all. An
+        // integer may not hold how far beyond.
+        const last: Vec4 = @floatFromInt(grid.last);
+        const within: Indices = @intFromFloat(@min(@max(at, @as(Vec4, @splat(0))), last));
         const moved = within << grid.shifts;
         return @intCast(moved[0] + moved[1] + moved[2]);
     }

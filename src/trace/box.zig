@@ -52,6 +52,21 @@ pub inline fn mayHold(
         .bitAnd(range.far.ge(after_t));
 }
 
+/// What is left of the ranges of all three axes between `after` and `nearest`: near <= far where
+/// there may be a hit. For culling only.
+pub inline fn between(
+    comptime Lanes: type,
+    near: [3]Lanes.F32,
+    far: [3]Lanes.F32,
+    after_t: Lanes.F32,
+    nearest_t: Lanes.F32,
+) Range(Lanes) {
+    return .{
+        .near = near[0].maxFast(near[1]).maxFast(near[2].maxFast(after_t)),
+        .far = far[0].minFast(far[1]).minFast(far[2].minFast(nearest_t)),
+    };
+}
+
 const Single = ray.Single;
 
 fn testSlab(line: ray.Slabs(Single), near: [3]f32, far: [3]f32) Range(Single) {

@@ -64,7 +64,7 @@ pub fn trace(
             left.* = left.andNot(group.active);
             count += group.active.popCount();
         }
-        if (count < rays_min or !company.isWithin(world.fused_reach)) {
+        if (count < rays_min) {
             for (groups) |*group| single.traceEach(Kernel, query, world, group, counts);
         } else {
             together(Kernel, query, world, groups, &views, company.octant, counts);
@@ -112,13 +112,6 @@ fn Company(comptime Rays: type) type {
             };
         }
 
-        /// Whether origins of members have coordinates below a limit.
-        fn isWithin(company: *const @This(), reach: f32) bool {
-            const from = company.origin.abs();
-            const largest = from.x.maxFast(from.y).maxFast(from.z).add(company.origin_apart);
-            return largest.extract(0) < reach;
-        }
-
         inline fn members(
             company: *const @This(),
             group: *const ray_file.Ray(Rays),
@@ -149,6 +142,10 @@ fn together(
     @setEvalBranchQuota(4000); // For what is inlined here.
     const tree = world.tree.get(Kernel.width);
     const ends: Ends = .of(Kernel, groups, views);
+    if (!(ends.reach() < world.fused_reach)) {
+        for (groups) |*group| single.traceEach(Kernel, query, world, group, counts);
+        return;
+    }
     var search: Search(Kernel, query) = .init(world, groups, views, octant, &ends);
     _ = walk.walk(Kernel, tree, &search, counts);
 }
@@ -189,6 +186,13 @@ const Ends = struct {
         ends.nearest_t = greatest[6].reduceMax();
         return ends;
     }
+
+    /// The largest |coordinate| of an origin.
+    fn reach(ends: *const Ends) f32 {
+        var largest: f32 = 0;
+        for (ends.origin) |range| largest = @max(largest, @abs(range[0]), @abs(range[1]));
+        return largest;
+    }
 };
 
 fn Search(comptime Kernel: type, comptime query: Query) type {
@@ -206,7 +210,6 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         after_t: F32,
         /// The greatest t that matters.
         limit: f32,
-        pad: f32,
         /// By how much boxes of triangles are grown: more than their own pad and a node's margin.
         grow: f32,
 
@@ -215,10 +218,6 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
 
         /// What of the rays the faces across an axis are tested against.
         const Slab = struct {
-            /// Rows of `Node.bounds`, lower x y z and upper x y z, that are the near faces and the
-            /// far.
-            near_row: usize,
-            far_row: usize,
             /// See `ray.Slabs.negative`.
             negative: Boxes.Mask,
             inverse: [2]F32,
@@ -226,13 +225,11 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             near_shift: [2]F32,
             far_shift: [2]F32,
 
-            inline fn init(axis: usize, negative: bool, origin: [2]f32, inverse: [2]f32) Slab {
+            inline fn init(negative: bool, origin: [2]f32, inverse: [2]f32) Slab {
                 const near_origin: F32 = .splat(origin[if (negative) 0 else 1]);
                 const far_origin: F32 = .splat(origin[if (negative) 1 else 0]);
                 const inverses = [2]F32{ .splat(inverse[0]), .splat(inverse[1]) };
                 return .{
-                    .near_row = axis + @as(usize, if (negative) 3 else 0),
-                    .far_row = axis + @as(usize, if (negative) 0 else 3),
                     .negative = .splat(negative),
                     .inverse = inverses,
                     .near_shift = shiftOf(near_origin, inverses),
@@ -278,10 +275,10 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
                 guide_ray = group.extract(@ctz(bits));
                 break;
             }
-            const guide: single.Search(Kernel, query, true) = .init(&guide_ray, world.pad);
+            const guide: single.Search(Kernel, query, true) = .init(&guide_ray, world);
             var slabs: [3]Slab = undefined;
-            for (&slabs, octant, ends.origin, ends.inverse, 0..) |*slab, down, from, inv, axis| {
-                slab.* = .init(axis, down, from, inv);
+            for (&slabs, octant, ends.origin, ends.inverse) |*slab, down, from, inverse| {
+                slab.* = .init(down, from, inverse);
             }
             return .{
                 .groups = groups,
@@ -290,7 +287,6 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
                 .slabs = slabs,
                 .after_t = .splat(ends.after_t),
                 .limit = ends.nearest_t,
-                .pad = world.pad,
                 .grow = world.pad + 2 * world.node_margin,
             };
         }
@@ -306,12 +302,13 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             const rows: *const Rows = @ptrCast(&node.bounds);
             var near: [3]F32 = undefined;
             var far: [3]F32 = undefined;
-            inline for (&near, &far, &search.slabs) |*first, *last, *slab| {
-                first.* = slab.near(.load(&rows[slab.near_row]));
-                last.* = slab.far(.load(&rows[slab.far_row]));
+            const guide = &search.guide;
+            inline for (&near, &far, &search.slabs, 0..) |*first, *last, *slab, axis| {
+                first.* = slab.near(.load(&rows[guide.near_row[axis]]));
+                last.* = slab.far(.load(&rows[guide.far_row[axis]]));
             }
             var range = search.within(near, far);
-            const guided = search.guide.meet(node, counts);
+            const guided = guide.meet(node, counts);
             var met = range.near.le(range.far).andNot(guided.near.le(guided.far)).bits();
             if (met == 0) return range;
             var nears = range.near.toArray();
@@ -338,11 +335,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         }
 
         inline fn within(search: *const Self, near: [3]F32, far: [3]F32) Range {
-            const limit: F32 = .splat(search.limit);
-            return .{
-                .near = near[0].maxFast(near[1]).maxFast(near[2].maxFast(search.after_t)),
-                .far = far[0].minFast(far[1]).minFast(far[2].minFast(limit)),
-            };
+            return box.between(Boxes, near, far, search.after_t, .splat(search.limit));
         }
 
         /// See `walk.walk`.
@@ -401,7 +394,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
                 if (group.active.none()) continue;
                 found = packet.intersectLane(Kernel, query, group, view, block, .{
                     .lane = lane,
-                    .pad = search.pad,
+                    .pad = search.guide.pad,
                 }, counts) or found;
             }
             return found;

@@ -76,7 +76,6 @@ pub fn Kernel(comptime chosen: Variant, comptime counting: bool) type {
         comptime {
             assert(group_width * group_height == ray_count);
             assert(group_count * ray_count == bundle_width * bundle_height);
-            assert(group_count <= 64); // Traversal keeps sets of groups in a word.
         }
     };
 }

@@ -34,7 +34,9 @@ pub fn trace(
     counts: *TestCounts,
 ) void {
     switch (Kernel.variant.traversal) {
-        .single => single.traceEach(Kernel, query, world, &bundle.groups[0], counts),
+        .single => if (bundle.groups[0].active.lane(0)) {
+            _ = single.trace(Kernel, query, world, &bundle.groups[0], counts);
+        },
         .packet2x2 => packet.trace(Kernel, query, world, &bundle.groups[0], counts),
         .packet => {
             switch (company) {

@@ -11,6 +11,7 @@ const ray_file = @import("ray.zig");
 const box = @import("box.zig");
 const triangle = @import("triangle.zig");
 const walk = @import("walk.zig");
+const assert = @import("std").debug.assert;
 const Query = walk.Query;
 const Single = ray_file.Single;
 const World = world_file.World;
@@ -23,12 +24,16 @@ pub fn trace(
     ray: *ray_file.Ray(Single),
     counts: *TestCounts,
 ) bool {
-    const origin = ray.line.origin.lane(0);
-    const reach = @max(@abs(origin[0]), @abs(origin[1]), @abs(origin[2]));
-    return if (reach < world.fused_reach)
+    return if (reachOf(ray) < world.fused_reach)
         travel(Kernel, query, true, world, ray, counts)
     else
         travel(Kernel, query, false, world, ray, counts);
+}
+
+/// The largest |coordinate| of where a ray starts.
+inline fn reachOf(ray: *const ray_file.Ray(Single)) f32 {
+    const origin = ray.line.origin.lane(0);
+    return @max(@abs(origin[0]), @abs(origin[1]), @abs(origin[2]));
 }
 
 /// Every active ray of a group by itself.
@@ -60,7 +65,7 @@ fn travel(
     ray: *ray_file.Ray(Single),
     counts: *TestCounts,
 ) bool {
-    var search: Search(Kernel, query, fused) = .init(ray, world.pad);
+    var search: Search(Kernel, query, fused) = .init(ray, world);
     const found = walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts);
     ray.nearest = .{
         .t = .splat(search.limit),
@@ -95,7 +100,8 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
         const Self = @This();
 
         /// The search of a ray. Asserts, with `fused`, that it starts within `World.fused_reach`.
-        pub inline fn init(ray: *const ray_file.Ray(Single), pad: f32) Self {
+        pub inline fn init(ray: *const ray_file.Ray(Single), world: *const World) Self {
+            if (fused) assert(reachOf(ray) < world.fused_reach);
             const slabs: ray_file.Slabs(Single) = .init(ray.line);
             const axis: ray_file.LongAxis(Single) = .of(ray.line.direction);
             const view: ray_file.View(Single) = .init(ray.line, axis);
@@ -129,7 +135,7 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
                 .skip = .splat(ray.skip.lane(0)),
                 .limit = ray.nearest.t.lane(0),
                 .nearest_primitive = ray.nearest.primitive.lane(0),
-                .pad = pad,
+                .pad = world.pad,
             };
         }
 
@@ -157,10 +163,7 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
                 far[axis] = along(.load(&rows[search.far_row[axis]]), shift, inverse);
             }
             const limit: F32 = .splat(search.limit);
-            return .{
-                .near = near[0].maxFast(near[1]).maxFast(near[2].maxFast(search.after.t)),
-                .far = far[0].minFast(far[1]).minFast(far[2].minFast(limit)),
-            };
+            return box.between(Boxes, near, far, search.after.t, limit);
         }
 
         const Range = box.Range(Boxes);

@@ -20,7 +20,7 @@ pub const Query = enum {
 
 /// Searches the whole tree, or until `search.isDone()`. Of a search it needs
 ///
-///     limit: f32          nothing that is farther matters; it may shrink
+///     limit: f32                nothing that is farther matters; it may shrink
 ///     meet(node, counts)        box.Range in lanes of children, near <= far where one may matter
 ///     intersect(block, counts)  tests a block of triangles, returns whether one was hit
 ///     isDone(found)             asked after every leaf

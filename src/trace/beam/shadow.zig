@@ -5,7 +5,8 @@
 //! where those of a block of 4x4 pixels have bounds: a parallelogram, since a flat surface seen
 //! aslant is one. A beam is a set of rays; where depth jumps the set covers far more of the plane
 //! than its blocks do, and is cut in two there. A beam that meets too many blocks of triangles, or
-//! has few rays, is left to single rays. In doubt, the exact test decides.
+//! has few rays, leaves them to find company by block (interval.zig). In doubt, the exact test
+//! decides.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
