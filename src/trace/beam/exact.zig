@@ -65,6 +65,36 @@ pub fn hitAt(
     return if (hit.mask.lane(0)) hit.t.lane(0) else null;
 }
 
+/// Where rays pass within the edges of a triangle, and where they hit it.
+pub fn Meeting(comptime Lanes: type) type {
+    return struct { inside: Lanes.Mask, mask: Lanes.Mask, t: Lanes.F32 };
+}
+
+/// The exact test of some rays of a group with the triangle in a slot.
+pub fn meet(
+    comptime Kernel: type,
+    tree: *const world_file.Tree(Kernel.width),
+    pad: f32,
+    group: *const ray_file.Ray(Kernel.Rays),
+    rays: Kernel.Rays.Mask,
+    slot: Slot,
+) Meeting(Kernel.Rays) {
+    @branchHint(.cold);
+    const Rays = Kernel.Rays;
+    const axis: ray_file.LongAxis(Rays) = .of(group.line.direction);
+    const view: ray_file.View(Rays) = .init(group.line, axis);
+    var corners: [3]Rays.Vec3 = undefined;
+    for (&corners, 0..) |*corner, index| {
+        corner.* = axis.turn(.splat(cornerAt(Kernel.width, tree, slot, index)));
+    }
+    const seen = triangle.project(Rays, corners, &view);
+    var weights = triangle.weigh(Rays, seen);
+    const agreeing = weights.agree().bitAnd(rays);
+    const inside = triangle.settle(Rays, seen, &weights, agreeing);
+    const hit = triangle.locate(Rays, seen, weights, corners, &view, pad);
+    return .{ .inside = inside, .mask = hit.mask, .t = hit.t };
+}
+
 /// Whether one ray passes within the edges of the triangle in a slot, which is all that is left to
 /// ask where the depth is certain.
 pub fn insideAt(

@@ -42,6 +42,15 @@ pub const Plane = struct {
         return plane;
     }
 
+    /// Value at points.
+    inline fn valueAtPoint(plane: *const Plane, comptime Lanes: type, point: Lanes.Vec3) Lanes.F32 {
+        var sum: Lanes.F32 = .splat(plane.offset);
+        inline for (.{ point.x, point.y, point.z }, 0..) |component, axis| {
+            sum = component.mulAdd(.splat(plane.normal[axis]), sum);
+        }
+        return sum;
+    }
+
     /// Value at the corners of a node's boxes on the given sides.
     inline fn valueAt(
         plane: *const Plane,
@@ -72,6 +81,22 @@ pub const Frustum = struct {
         };
         for (&frustum.sides, normals) |*side, normal| side.* = .init(normal, origin, slack);
         return frustum;
+    }
+
+    /// Triangles that are not wholly on the outer side of a plane.
+    pub inline fn mayMeet(
+        frustum: *const Frustum,
+        comptime Lanes: type,
+        corners: [3]Lanes.Vec3,
+    ) Lanes.Mask {
+        var least: Lanes.F32 = undefined;
+        inline for (&frustum.sides, 0..) |*side, index| {
+            const most = side.valueAtPoint(Lanes, corners[0])
+                .maxFast(side.valueAtPoint(Lanes, corners[1]))
+                .maxFast(side.valueAtPoint(Lanes, corners[2]));
+            least = if (index == 0) most else least.minFast(most);
+        }
+        return least.ge(.zero());
     }
 
     /// Pushes the children of a node that the beam may meet before `depth_max`, the nearest on

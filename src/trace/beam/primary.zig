@@ -253,6 +253,10 @@ fn Search(comptime Kernel: type) type {
                 .y = .load(&components[1]),
                 .z = .load(&components[2]),
             };
+            const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
+            const there = primitive.gt(.splat(ray_file.no_primitive))
+                .bitAnd(search.frustum.mayMeet(Boxes, corners));
+            if (there.none()) return;
             const grid = search.grid;
             const edges: edges_file.Edges(Boxes) =
                 .init(corners, .splat(grid.origin), search.reach_max);
@@ -282,8 +286,6 @@ fn Search(comptime Kernel: type) type {
             }
             const seen = most[0].minFast(most[1]).minFast(most[2]).ge(zero)
                 .bitAnd(most[3].gt(.splat(search.tile_lower)));
-            const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
-            const there = primitive.gt(.splat(ray_file.no_primitive));
             const open = there.andNot(edges.decisive);
             var undecided: u32 = 0;
             if (open.any()) undecided = open.bitAnd(mayTouch(&base, &right, &down, slack)).bits();

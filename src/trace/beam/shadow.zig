@@ -448,8 +448,8 @@ fn Search(comptime Kernel: type) type {
         /// Half of the set if it should be cut: what lies below the middle of the longer extent, in
         /// units of the median block.
         fn cut(search: *const Self, members: *const Members) ?Members {
-            var areas: [block_count]f32 = undefined;
-            var extents: [2][block_count]f32 = undefined;
+            var areas: [block_count]f32 = @splat(inf);
+            var extents: [2][block_count]f32 = @splat(@splat(inf));
             var count: usize = 0;
             for (0..block_count) |index| {
                 if (search.live >> @intCast(index) & 1 == 0) continue;
@@ -460,10 +460,10 @@ fn Search(comptime Kernel: type) type {
             }
             if (count == 0) return null;
             const share: f32 = @floatFromInt(count);
-            if (!(search.bounds.area() > cut_ratio * share * median(areas[0..count]))) return null;
+            if (!(search.bounds.area() > cut_ratio * share * median(&areas, count))) return null;
             const bounds = &search.bounds;
-            const along_u = (bounds.u[1] - bounds.u[0]) * median(extents[1][0..count]) >
-                (bounds.v[1] - bounds.v[0]) * median(extents[0][0..count]);
+            const along_u = (bounds.u[1] - bounds.u[0]) * median(&extents[1], count) >
+                (bounds.v[1] - bounds.v[0]) * median(&extents[0], count);
             const basis = &search.basis;
             const range = if (along_u) search.bounds.u else search.bounds.v;
             const middle: F32 = .splat(0.5 * (range[0] + range[1]));
@@ -484,9 +484,19 @@ fn Search(comptime Kernel: type) type {
             return half;
         }
 
-        fn median(values: []f32) f32 {
-            std.mem.sort(f32, values, {}, std.sort.asc(f32));
-            return values[values.len / 2];
+        /// What half of the first `count` values are less than, or nearly; the rest are infinite.
+        fn median(values: *const [block_count]f32, count: usize) f32 {
+            for (values[0..count]) |value| {
+                var less: usize = 0;
+                var not_more: usize = 0;
+                inline for (0..block_count / lanes) |part| {
+                    const others: F32 = .load(values[part * lanes ..][0..lanes]);
+                    less += others.lt(.splat(value)).popCount();
+                    not_more += others.le(.splat(value)).popCount();
+                }
+                if (less <= count / 2 and count / 2 < not_more) return value;
+            }
+            return values[0];
         }
 
         fn travel(search: *Self, members: *const Members) void {
@@ -509,7 +519,7 @@ fn Search(comptime Kernel: type) type {
                 meeting_count += entry.block_count;
                 if (meeting_count > meetingMax(width)) return search.apart(&search.left(members));
                 for (entry.child..entry.child + entry.block_count) |index| {
-                    search.meetBlock(@intCast(index));
+                    search.meetBlock(&frustum, @intCast(index));
                 }
             }
         }
@@ -571,7 +581,7 @@ fn Search(comptime Kernel: type) type {
         /// Sets up the triangles of a block and goes on with those that may stand in the way.
         ///
         /// Long: a score of lane values live through it, and stay in registers only here.
-        fn meetBlock(search: *Self, block_index: u32) void {
+        fn meetBlock(search: *Self, frustum: *const Frustum, block_index: u32) void {
             @setEvalBranchQuota(4000);
             const block_ = &search.tree.blocks[block_index];
             if (Kernel.counts_tests) search.countBlock(block_);
@@ -581,6 +591,10 @@ fn Search(comptime Kernel: type) type {
                 .y = .load(&components[1]),
                 .z = .load(&components[2]),
             };
+            const primitive: Boxes.I32 = .load(@ptrCast(&block_.primitive));
+            const there = primitive.gt(.splat(ray_file.no_primitive))
+                .bitAnd(frustum.mayMeet(Boxes, corners));
+            if (there.none()) return;
             const print: footprint_file.Footprint(Boxes) =
                 .init(
                     corners,
@@ -613,8 +627,6 @@ fn Search(comptime Kernel: type) type {
             const farthest = if (directional) -bounds.depth else 1 / bounds.depth;
             const seen = most[0].minFast(most[1]).minFast(most[2]).ge(.zero())
                 .bitAnd(most[3].gt(.splat(farthest)));
-            const primitive: Boxes.I32 = .load(@ptrCast(&block_.primitive));
-            const there = primitive.gt(.splat(ray_file.no_primitive));
             const open = there.andNot(print.decisive);
             var undecided: u32 = 0;
             if (open.any()) undecided = open
@@ -891,10 +903,7 @@ fn Search(comptime Kernel: type) type {
             before: Mask,
         ) bool {
             var met = certain;
-            if (doubtful.any()) {
-                const bits = search.decide(slot, group, doubtful.bits(), before.bits());
-                met = met.bitOr(.fromBits(bits));
-            }
+            if (doubtful.any()) met = met.bitOr(search.decide(slot, group, doubtful, before));
             if (met.none()) return false;
             const first = group * lanes;
             const near: F32 = .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
@@ -919,38 +928,13 @@ fn Search(comptime Kernel: type) type {
             search.setBlock(index, .{});
         }
 
-        /// Asks the exact test about single rays. Returns those that meet the triangle.
-        fn decide(
-            search: *Self,
-            slot: exact.Slot,
-            group: usize,
-            doubtful: u32,
-            before: u32,
-        ) u32 {
+        /// Asks the exact test. Returns those of the rays in doubt that meet the triangle.
+        fn decide(search: *Self, slot: exact.Slot, group: usize, doubtful: Mask, before: Mask) Mask {
             @branchHint(.unlikely);
-            var met: u32 = 0;
-            var rest = doubtful;
-            while (rest != 0) : (rest &= rest - 1) {
-                const lane = @ctz(rest);
-                const ray = &search.bundle.groups[group];
-                if (before >> @intCast(lane) & 1 != 0) {
-                    const inside = exact.insideAt(Kernel, search.tree, ray, lane, slot);
-                    met |= @as(u32, @intFromBool(inside)) << @intCast(lane);
-                    continue;
-                }
-                const t = exact.hitAt(
-                    Kernel,
-                    search.tree,
-                    search.world.pad,
-                    ray,
-                    lane,
-                    slot,
-                ) orelse continue;
-                if (t > 0 and t < ray.nearest.t.lane(lane)) {
-                    met |= @as(u32, 1) << @intCast(lane);
-                }
-            }
-            return met;
+            const ray = &search.bundle.groups[group];
+            const hit = exact.meet(Kernel, search.tree, search.world.pad, ray, doubtful, slot);
+            const stands = hit.mask.bitAnd(hit.t.gt(.zero())).bitAnd(hit.t.lt(ray.nearest.t));
+            return hit.inside.bitAnd(before.bitOr(stands));
         }
 
         /// A triangle seen edge-on, or out of all measure: rays are left to the exact test unless
