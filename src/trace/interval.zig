@@ -212,6 +212,8 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         limit: f32,
         /// By how much boxes of triangles are grown: more than their own pad and a node's margin.
         grow: f32,
+        /// See `World.pad`.
+        pad: f32,
 
         const Self = @This();
         const Range = box.Range(Boxes);
@@ -288,6 +290,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
                 .after_t = .splat(ends.after_t),
                 .limit = ends.nearest_t,
                 .grow = world.pad + 2 * world.node_margin,
+                .pad = world.pad,
             };
         }
 
@@ -343,58 +346,113 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             return false; // Nothing is near enough when all rays are done: see `shrink`.
         }
 
-        /// Tests the triangles of a block whose boxes some ray may enter. Returns whether any ray
-        /// hit one.
+        /// Tests the triangles of a block whose boxes the intervals meet, against those rays that
+        /// enter the box around these triangles: ray by ray or triangle by triangle, whichever are
+        /// fewer. Returns whether any ray hit one.
         pub inline fn intersect(
             search: *Self,
             block: *const world_file.TriangleBlock(Kernel.width),
             counts: *TestCounts,
         ) bool {
-            var met = search.meetBoxes(block);
+            const met = search.meetBoxes(block);
+            if (met.lanes == 0) return false;
+            const triangle_count = @popCount(met.lanes);
             var found = false;
-            while (met != 0) : (met &= met - 1) {
-                const lane = @ctz(met);
-                if (search.intersectOne(block, lane, counts)) found = true;
+            for (search.groups, search.views) |*group, *view| {
+                if (group.active.none()) continue;
+                packet.countBoxes(Kernel, group, counts);
+                const entering = packet.entering(Kernel, group, &view.slabs, met.lower, met.upper)
+                    .mask.bits();
+                if (entering == 0) continue;
+                const hit = if (@popCount(entering) < triangle_count)
+                    search.intersectEach(group, view, entering, block, counts)
+                else
+                    search.intersectAll(group, view, met.lanes, block, counts);
+                found = found or hit;
             }
             if (found) search.shrink();
             return found;
         }
 
-        /// Triangles whose grown boxes the intervals meet, a bit each.
+        /// Triangles of a block, a bit each, and the box around them.
+        const Met = struct { lanes: u32, lower: [3]f32, upper: [3]f32 };
+
+        /// Triangles whose grown boxes the intervals meet.
         inline fn meetBoxes(
             search: *const Self,
             block: *const world_file.TriangleBlock(Kernel.width),
-        ) u32 {
+        ) Met {
             const grow: F32 = .splat(search.grow);
             var near: [3]F32 = undefined;
             var far: [3]F32 = undefined;
+            var lowers: [3]F32 = undefined;
+            var uppers: [3]F32 = undefined;
             inline for (&near, &far, &search.slabs, 0..) |*first, *last, *slab, axis| {
                 const a: F32 = .load(&block.corner[0][axis]);
                 const b: F32 = .load(&block.corner[1][axis]);
                 const c: F32 = .load(&block.corner[2][axis]);
-                const lower = a.minFast(b).minFast(c).sub(grow);
-                const upper = a.maxFast(b).maxFast(c).add(grow);
-                first.* = slab.near(.select(slab.negative, upper, lower));
-                last.* = slab.far(.select(slab.negative, lower, upper));
+                lowers[axis] = a.minFast(b).minFast(c).sub(grow);
+                uppers[axis] = a.maxFast(b).maxFast(c).add(grow);
+                first.* = slab.near(.select(slab.negative, uppers[axis], lowers[axis]));
+                last.* = slab.far(.select(slab.negative, lowers[axis], uppers[axis]));
             }
             const range = search.within(near, far);
             const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
             const there = primitive.gt(.splat(ray_file.no_primitive));
-            return range.near.le(range.far).bitAnd(there).bits();
+            const lanes = range.near.le(range.far).bitAnd(there);
+            var met: Met = .{ .lanes = lanes.bits(), .lower = undefined, .upper = undefined };
+            if (met.lanes == 0) return met;
+            const inf: F32 = .splat(std.math.inf(f32));
+            inline for (&met.lower, &met.upper, lowers, uppers) |*lower, *upper, low, high| {
+                lower.* = F32.select(lanes, low, inf).reduceMin();
+                upper.* = F32.select(lanes, high, inf.neg()).reduceMax();
+            }
+            return met;
         }
 
-        fn intersectOne(
+        /// Some rays of a group, each against all triangles of a block.
+        fn intersectEach(
             search: *Self,
+            group: *ray_file.Ray(Rays),
+            view: *const packet.GroupView(Rays),
+            entering: u32,
             block: *const world_file.TriangleBlock(Kernel.width),
-            lane: usize,
+            counts: *TestCounts,
+        ) bool {
+            var found: u32 = 0;
+            var ts = group.nearest.t.toArray();
+            var primitives = group.nearest.primitive.toArray();
+            var rest = entering;
+            while (rest != 0) : (rest &= rest - 1) {
+                const lane = @ctz(rest);
+                const axis = view.uniform orelse view.axis.ofLane(lane);
+                const pad = search.pad;
+                var probe: single.Probe(Kernel) = .of(Rays, group, &view.view, axis, lane, pad);
+                if (!probe.intersect(block, counts)) continue;
+                found |= @as(u32, 1) << @intCast(lane);
+                ts[lane] = if (query == .any) -std.math.inf(f32) else probe.limit;
+                primitives[lane] = probe.nearest_primitive;
+            }
+            if (found == 0) return false;
+            group.nearest = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };
+            return true;
+        }
+
+        /// All rays of a group against some triangles of a block, one by one.
+        inline fn intersectAll(
+            search: *Self,
+            group: *ray_file.Ray(Rays),
+            view: *const packet.GroupView(Rays),
+            lanes: u32,
+            block: *const world_file.TriangleBlock(Kernel.width),
             counts: *TestCounts,
         ) bool {
             var found = false;
-            for (search.groups, search.views) |*group, *view| {
-                if (group.active.none()) continue;
+            var rest = lanes;
+            while (rest != 0) : (rest &= rest - 1) {
                 found = packet.intersectLane(Kernel, query, group, view, block, .{
-                    .lane = lane,
-                    .pad = search.guide.pad,
+                    .lane = @ctz(rest),
+                    .pad = search.pad,
                 }, counts) or found;
             }
             return found;

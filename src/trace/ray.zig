@@ -126,6 +126,11 @@ pub fn LongAxis(comptime Lanes: type) type {
             return null;
         }
 
+        /// That of one lane.
+        pub inline fn ofLane(axis: Self, index: usize) u2 {
+            return if (axis.x.lane(index)) 0 else if (axis.y.lane(index)) 1 else 2;
+        }
+
         /// Components in cyclic order with that of the long axis last.
         pub inline fn turn(axis: Self, v: Lanes.Vec3) Lanes.Vec3 {
             const F32 = Lanes.F32;

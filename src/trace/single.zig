@@ -69,12 +69,101 @@ fn travel(
     const found = walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts);
     ray.nearest = .{
         .t = .splat(search.limit),
-        .primitive = .splat(search.nearest_primitive),
+        .primitive = .splat(search.probe.nearest_primitive),
     };
     return found;
 }
 
-/// The nearest hit so far, and the ray in the lanes of boxes. With `fused`, nodes are tested by
+/// What of a ray the triangles of a block are tested against, in their lanes, and the nearest hit
+/// so far.
+pub fn Probe(comptime Kernel: type) type {
+    const Boxes = Kernel.Boxes;
+    return struct {
+        view: ray_file.View(Boxes),
+        /// The ray's longest axis.
+        axis: u2,
+        after: ray_file.Hit(Boxes),
+        skip: Boxes.I32,
+        /// t of the nearest hit so far.
+        limit: f32,
+        nearest_primitive: i32,
+        pad: f32,
+
+        const Self = @This();
+
+        /// The probe of the ray in one lane of a group; its view and its longest axis are given.
+        pub inline fn of(
+            comptime Rays: type,
+            group: *const ray_file.Ray(Rays),
+            view: *const ray_file.View(Rays),
+            axis: u2,
+            lane: usize,
+            pad: f32,
+        ) Self {
+            var negative: [3]Boxes.Mask = undefined;
+            for (&negative, view.negative) |*lanes, mask| lanes.* = .splat(mask.lane(lane));
+            return .{
+                .view = .{
+                    .origin = .splat(view.origin.lane(lane)),
+                    .direction_inv = .splat(view.direction_inv.lane(lane)),
+                    .negative = negative,
+                    .shear = .splat(view.shear.lane(lane)),
+                },
+                .axis = axis,
+                .after = .{
+                    .t = .splat(group.after.t.lane(lane)),
+                    .primitive = .splat(group.after.primitive.lane(lane)),
+                },
+                .skip = .splat(group.skip.lane(lane)),
+                .limit = group.nearest.t.lane(lane),
+                .nearest_primitive = group.nearest.primitive.lane(lane),
+                .pad = pad,
+            };
+        }
+
+        /// Tests the triangles of a block and keeps the nearest hit. Returns whether there was one.
+        pub inline fn intersect(
+            probe: *Self,
+            block: *const world_file.TriangleBlock(Kernel.width),
+            counts: *TestCounts,
+        ) bool {
+            walk.countBlock(Kernel, block, counts);
+            const corners = loadCorners(Boxes, block, probe.axis);
+            const seen = triangle.project(Boxes, corners, &probe.view);
+            var weights = triangle.weigh(Boxes, seen);
+            const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
+            const there = primitive.gt(.splat(ray_file.no_primitive));
+            if (weights.mayAgree().bitAnd(there).none()) return false;
+            const agreeing = weights.agree().bitAnd(there);
+            const inside = triangle.settle(Boxes, seen, &weights, agreeing);
+            const hit = triangle.locate(Boxes, seen, weights, corners, &probe.view, probe.pad);
+            const nearest: ray_file.Hit(Boxes) = .{
+                .t = .splat(probe.limit),
+                .primitive = .splat(probe.nearest_primitive),
+            };
+            const accepted = inside.bitAnd(hit.mask)
+                .bitAnd(probe.after.isBefore(hit.t, primitive))
+                .bitAnd(nearest.isAfter(hit.t, primitive))
+                .andNot(primitive.eq(probe.skip));
+            var bits = accepted.bits();
+            if (bits == 0) return false;
+            const ts = hit.t.toArray();
+            while (bits != 0) : (bits &= bits - 1) {
+                const lane = @ctz(bits);
+                const number: i32 = @bitCast(block.primitive[lane]);
+                const closer = ts[lane] < probe.limit or
+                    (ts[lane] == probe.limit and number < probe.nearest_primitive);
+                if (closer) {
+                    probe.limit = ts[lane];
+                    probe.nearest_primitive = number;
+                }
+            }
+            return true;
+        }
+    };
+}
+
+/// A ray in the lanes of boxes and of triangles. With `fused`, nodes are tested by
 /// multiply-adds.
 pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool) type {
     const Boxes = Kernel.Boxes;
@@ -87,15 +176,9 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
         /// Rows of `Node.bounds`, lower x y z and upper x y z, that are the near faces and the far.
         near_row: [3]usize,
         far_row: [3]usize,
-        view: ray_file.View(Boxes),
-        /// The ray's longest axis.
-        axis: u2,
-        after: ray_file.Hit(Boxes),
-        skip: Boxes.I32,
+        probe: Probe(Kernel),
         /// t of the nearest hit so far.
         limit: f32,
-        nearest_primitive: i32,
-        pad: f32,
 
         const Self = @This();
 
@@ -114,28 +197,13 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
                 near.* = row + @as(usize, if (down) 3 else 0);
                 far.* = row + @as(usize, if (down) 0 else 3);
             }
-            var negative: [3]Boxes.Mask = undefined;
-            for (&negative, view.negative) |*lanes, mask| lanes.* = .splat(mask.lane(0));
             return .{
                 .shift = if (fused) origin.mul(inverse).neg() else origin,
                 .inverse = inverse,
                 .near_row = near_row,
                 .far_row = far_row,
-                .view = .{
-                    .origin = spread(view.origin),
-                    .direction_inv = spread(view.direction_inv),
-                    .negative = negative,
-                    .shear = spread(view.shear),
-                },
-                .axis = axis.uniform(.splat(true)).?,
-                .after = .{
-                    .t = .splat(ray.after.t.lane(0)),
-                    .primitive = .splat(ray.after.primitive.lane(0)),
-                },
-                .skip = .splat(ray.skip.lane(0)),
+                .probe = .of(Single, ray, &view, axis.uniform(.splat(true)).?, 0, world.pad),
                 .limit = ray.nearest.t.lane(0),
-                .nearest_primitive = ray.nearest.primitive.lane(0),
-                .pad = world.pad,
             };
         }
 
@@ -163,7 +231,7 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
                 far[axis] = along(.load(&rows[search.far_row[axis]]), shift, inverse);
             }
             const limit: F32 = .splat(search.limit);
-            return box.between(Boxes, near, far, search.after.t, limit);
+            return box.between(Boxes, near, far, search.probe.after.t, limit);
         }
 
         const Range = box.Range(Boxes);
@@ -183,38 +251,9 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
             block: *const world_file.TriangleBlock(Kernel.width),
             counts: *TestCounts,
         ) bool {
-            walk.countBlock(Kernel, block, counts);
-            const corners = loadCorners(Boxes, block, search.axis);
-            const seen = triangle.project(Boxes, corners, &search.view);
-            var weights = triangle.weigh(Boxes, seen);
-            const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
-            const there = primitive.gt(.splat(ray_file.no_primitive));
-            if (weights.mayAgree().bitAnd(there).none()) return false;
-            const agreeing = weights.agree().bitAnd(there);
-            const inside = triangle.settle(Boxes, seen, &weights, agreeing);
-            const hit = triangle.locate(Boxes, seen, weights, corners, &search.view, search.pad);
-            const nearest: ray_file.Hit(Boxes) = .{
-                .t = .splat(search.limit),
-                .primitive = .splat(search.nearest_primitive),
-            };
-            const accepted = inside.bitAnd(hit.mask)
-                .bitAnd(search.after.isBefore(hit.t, primitive))
-                .bitAnd(nearest.isAfter(hit.t, primitive))
-                .andNot(primitive.eq(search.skip));
-            var bits = accepted.bits();
-            if (bits == 0) return false;
-            const ts = hit.t.toArray();
-            while (bits != 0) : (bits &= bits - 1) {
-                const lane = @ctz(bits);
-                const number: i32 = @bitCast(block.primitive[lane]);
-                const closer = ts[lane] < search.limit or
-                    (ts[lane] == search.limit and number < search.nearest_primitive);
-                if (closer) {
-                    search.limit = ts[lane];
-                    search.nearest_primitive = number;
-                }
-            }
-            return true;
+            const found = search.probe.intersect(block, counts);
+            search.limit = search.probe.limit;
+            return found;
         }
     };
 }
