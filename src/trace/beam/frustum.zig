@@ -20,104 +20,113 @@ pub const slack_pads = 8.0;
 /// meet a zero.
 const component_min = 1e-30;
 
-/// A half space: where normal . x + offset >= 0.
-pub const Plane = struct {
-    normal: [3]f32,
-    offset: f32,
-    /// By axis, the bound of a box (0 lower, 1 upper) that is farthest along the normal.
-    far_side: [3]u1,
+/// A half space: where normal . x + offset >= 0. Asked about nodes of this width.
+pub fn Plane(comptime width: u32) type {
+    return struct {
+        normal: [3]f32,
+        offset: f32,
+        /// Of the least and the greatest value in a box: by axis, the first place in a node's bounds
+        /// of the side that it is on. In floats, so that addresses cost nothing in the loop.
+        place: [2][3]usize,
 
-    /// The plane through `point`, `slack` metres behind it. A normal of any length.
-    pub fn init(normal: [3]f32, point: [3]f32, slack: f32) Plane {
-        var plane: Plane = .{ .normal = undefined, .offset = 0, .far_side = undefined };
-        var length: f32 = 0;
-        for (&plane.normal, normal, point, &plane.far_side) |*to, component, at, *side| {
-            const sign = std.math.copysign(@as(f32, component_min), component);
-            to.* = if (@abs(component) < component_min) sign else component;
-            side.* = @intFromBool(to.* > 0);
-            plane.offset -= to.* * at;
-            length += @abs(to.*);
-        }
-        plane.offset += slack * length;
-        return plane;
-    }
+        const Self = @This();
+        const Bounds = [6 * width]f32;
 
-    /// Value at points.
-    inline fn valueAtPoint(plane: *const Plane, comptime Lanes: type, point: Lanes.Vec3) Lanes.F32 {
-        var sum: Lanes.F32 = .splat(plane.offset);
-        inline for (.{ point.x, point.y, point.z }, 0..) |component, axis| {
-            sum = component.mulAdd(.splat(plane.normal[axis]), sum);
+        /// The plane through `point`, `slack` metres behind it. A normal of any length.
+        pub fn init(normal: [3]f32, point: [3]f32, slack: f32) Self {
+            var plane: Self = .{ .normal = undefined, .offset = 0, .place = undefined };
+            var length: f32 = 0;
+            for (&plane.normal, normal, point, 0..) |*to, component, at, axis| {
+                const sign = std.math.copysign(@as(f32, component_min), component);
+                to.* = if (@abs(component) < component_min) sign else component;
+                const rises = @intFromBool(to.* > 0);
+                plane.place[rises][axis] = (3 + axis) * width;
+                plane.place[1 - rises][axis] = axis * width;
+                plane.offset -= to.* * at;
+                length += @abs(to.*);
+            }
+            plane.offset += slack * length;
+            return plane;
         }
-        return sum;
-    }
 
-    /// Value at the corners of a node's boxes on the given sides.
-    inline fn valueAt(
-        plane: *const Plane,
-        comptime Lanes: type,
-        node: anytype,
-        side: [3]u1,
-    ) Lanes.F32 {
-        var sum: Lanes.F32 = .splat(plane.offset);
-        inline for (0..3) |axis| {
-            const bound: Lanes.F32 = .load(&node.bounds[side[axis]][axis]);
-            sum = bound.mulAdd(.splat(plane.normal[axis]), sum);
+        /// Value at points.
+        inline fn valueAtPoint(plane: *const Self, comptime Lanes: type, at: Lanes.Vec3) Lanes.F32 {
+            var sum: Lanes.F32 = .splat(plane.offset);
+            inline for (.{ at.x, at.y, at.z }, 0..) |component, axis| {
+                sum = component.mulAdd(.splat(plane.normal[axis]), sum);
+            }
+            return sum;
         }
-        return sum;
-    }
-};
+
+        /// The least (0) or the greatest (1) value in each of a node's boxes.
+        inline fn extreme(
+            plane: *const Self,
+            comptime Lanes: type,
+            node: *const world_file.Node(width),
+            comptime end: u1,
+        ) Lanes.F32 {
+            const bounds: *const Bounds = @ptrCast(&node.bounds);
+            var sum: Lanes.F32 = .splat(plane.offset);
+            inline for (plane.place[end], plane.normal) |place, component| {
+                const bound: Lanes.F32 = .load(bounds[place..][0..width]);
+                sum = bound.mulAdd(.splat(component), sum);
+            }
+            return sum;
+        }
+    };
+}
 
 /// A pyramid from the rays' origin and the direction in which it counts depth.
-pub const Frustum = struct {
-    sides: [4]Plane,
-    depth: Plane,
+pub fn Frustum(comptime Lanes: type) type {
+    const width = Lanes.count;
+    return struct {
+        sides: [4]Plane(width),
+        depth: Plane(width),
 
-    /// Planes through `origin`. Depth is counted along `depth_normal` from there.
-    pub fn init(origin: [3]f32, normals: [4][3]f32, depth_normal: [3]f32, pad: f32) Frustum {
-        const slack = slack_pads * pad;
-        var frustum: Frustum = .{
-            .sides = undefined,
-            .depth = .init(depth_normal, origin, -slack),
-        };
-        for (&frustum.sides, normals) |*side, normal| side.* = .init(normal, origin, slack);
-        return frustum;
-    }
+        const Self = @This();
 
-    /// Triangles that are not wholly on the outer side of a plane.
-    pub inline fn mayMeet(
-        frustum: *const Frustum,
-        comptime Lanes: type,
-        corners: [3]Lanes.Vec3,
-    ) Lanes.Mask {
-        var least: Lanes.F32 = undefined;
-        inline for (&frustum.sides, 0..) |*side, index| {
-            const most = side.valueAtPoint(Lanes, corners[0])
-                .maxFast(side.valueAtPoint(Lanes, corners[1]))
-                .maxFast(side.valueAtPoint(Lanes, corners[2]));
-            least = if (index == 0) most else least.minFast(most);
+        /// Planes through `origin`. Depth is counted along `depth_normal` from there.
+        pub fn init(origin: [3]f32, normals: [4][3]f32, depth_normal: [3]f32, pad: f32) Self {
+            const slack = slack_pads * pad;
+            var frustum: Self = .{
+                .sides = undefined,
+                .depth = .init(depth_normal, origin, -slack),
+            };
+            for (&frustum.sides, normals) |*side, normal| side.* = .init(normal, origin, slack);
+            return frustum;
         }
-        return least.ge(.zero());
-    }
 
-    /// Pushes the children of a node that the beam may meet before `depth_max`, the nearest on
-    /// top. Returns the new count of the stack.
-    pub inline fn pushChildren(
-        frustum: *const Frustum,
-        comptime Lanes: type,
-        node: *const world_file.Node(Lanes.count),
-        depth_max: f32,
-        entries: []stack.Entry,
-        entry_count: usize,
-    ) usize {
-        var least = frustum.sides[0].valueAt(Lanes, node, frustum.sides[0].far_side);
-        inline for (frustum.sides[1..]) |*side| {
-            least = least.minFast(side.valueAt(Lanes, node, side.far_side));
+        /// Triangles that are not wholly on the outer side of a plane.
+        pub inline fn mayMeet(
+            frustum: *const Self,
+            corners: [3]Lanes.Vec3,
+        ) Lanes.Mask {
+            var least: Lanes.F32 = undefined;
+            inline for (&frustum.sides, 0..) |*side, index| {
+                const most = side.valueAtPoint(Lanes, corners[0])
+                    .maxFast(side.valueAtPoint(Lanes, corners[1]))
+                    .maxFast(side.valueAtPoint(Lanes, corners[2]));
+                least = if (index == 0) most else least.minFast(most);
+            }
+            return least.ge(.zero());
         }
-        const depth = &frustum.depth;
-        var near_side = depth.far_side;
-        for (&near_side) |*side| side.* = 1 - side.*;
-        const near = depth.valueAt(Lanes, node, near_side);
-        const met = least.ge(.zero()).bitAnd(near.le(.splat(depth_max)));
-        return stack.push(Lanes, node, met.bits(), near, entries, entry_count);
-    }
-};
+
+        /// Pushes the children of a node that the beam may meet before `depth_max`, the nearest on
+        /// top. Returns the new count of the stack.
+        pub inline fn pushChildren(
+            frustum: *const Self,
+            node: *const world_file.Node(width),
+            depth_max: f32,
+            entries: []stack.Entry,
+            entry_count: usize,
+        ) usize {
+            var least = frustum.sides[0].extreme(Lanes, node, 1);
+            inline for (frustum.sides[1..]) |*side| {
+                least = least.minFast(side.extreme(Lanes, node, 1));
+            }
+            const near = frustum.depth.extreme(Lanes, node, 0);
+            const met = least.ge(.zero()).bitAnd(near.le(.splat(depth_max)));
+            return stack.push(Lanes, node, met.bits(), near, entries, entry_count);
+        }
+    };
+}

@@ -124,7 +124,7 @@ fn Search(comptime Kernel: type) type {
         grid: *const Grid,
         bundle: *packet.Bundle(Kernel),
         counts: *TestCounts,
-        frustum: Frustum,
+        frustum: Frustum(Boxes),
         /// Longest direction times roundings, for edge functions and for 1/t.
         edge_scale: f32,
         inverse_scale: f32,
@@ -171,7 +171,7 @@ fn Search(comptime Kernel: type) type {
             search.grid = grid;
             search.bundle = bundle;
             search.counts = counts;
-            search.frustum = frustumOf(grid, world.pad) orelse return false;
+            search.frustum = frustumOf(Boxes, grid, world.pad) orelse return false;
             // A direction off by d moves an edge function by 2 R L d, 1/t by L^2 / |det| d.
             search.edge_scale = unit * (edges_file.edge_roundings * longest +
                 edges_file.step_roundings * spread + 2 * roundings);
@@ -212,7 +212,7 @@ fn Search(comptime Kernel: type) type {
                     const node = &search.tree.nodes[entry.child];
                     if (Kernel.counts_tests) search.countNode(node);
                     entry_count = search.frustum
-                        .pushChildren(Boxes, node, depth_max, &entries, entry_count);
+                        .pushChildren(node, depth_max, &entries, entry_count);
                 } else {
                     for (entry.child..entry.child + entry.block_count) |block| {
                         search.meetBlock(@intCast(block));
@@ -255,7 +255,7 @@ fn Search(comptime Kernel: type) type {
             };
             const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
             const there = primitive.gt(.splat(ray_file.no_primitive))
-                .bitAnd(search.frustum.mayMeet(Boxes, corners));
+                .bitAnd(search.frustum.mayMeet(corners));
             if (there.none()) return;
             const grid = search.grid;
             const edges: edges_file.Edges(Boxes) =
@@ -653,7 +653,7 @@ fn length1(vector: [3]f32) f32 {
 }
 
 /// The pyramid around a beam's rays, or null where they are too far apart for one.
-fn frustumOf(grid: *const Grid, pad: f32) ?Frustum {
+fn frustumOf(comptime Boxes: type, grid: *const Grid, pad: f32) ?Frustum(Boxes) {
     const spread = last * (length1(grid.right) + length1(grid.down));
     if (!(spread <= 0.5 * length1(grid.corner))) return null;
     const to_right = vec3.add(grid.corner, vec3.scale(grid.right, last));

@@ -21,8 +21,6 @@ const exact = @import("exact.zig");
 const footprint_file = @import("footprint.zig");
 const frustum_file = @import("frustum.zig");
 const assert = std.debug.assert;
-const Frustum = frustum_file.Frustum;
-const Plane = frustum_file.Plane;
 const Projection = footprint_file.Projection;
 
 const side = kernel_file.beam_side;
@@ -152,6 +150,7 @@ fn Search(comptime Kernel: type) type {
         live: u32 = 0,
 
         const Self = @This();
+        const Frustum = frustum_file.Frustum(Boxes);
         const F32 = Rays.F32;
         const Mask = Rays.Mask;
         const inf = std.math.inf(f32);
@@ -513,7 +512,7 @@ fn Search(comptime Kernel: type) type {
                     const node = &search.tree.nodes[entry.child];
                     if (Kernel.counts_tests) search.countNode(node);
                     entry_count = frustum
-                        .pushChildren(Boxes, node, search.bounds.depth, &entries, entry_count);
+                        .pushChildren(node, search.bounds.depth, &entries, entry_count);
                     continue;
                 }
                 meeting_count += entry.block_count;
@@ -593,7 +592,7 @@ fn Search(comptime Kernel: type) type {
             };
             const primitive: Boxes.I32 = .load(@ptrCast(&block_.primitive));
             const there = primitive.gt(.splat(ray_file.no_primitive))
-                .bitAnd(frustum.mayMeet(Boxes, corners));
+                .bitAnd(frustum.mayMeet(corners));
             if (there.none()) return;
             const print: footprint_file.Footprint(Boxes) =
                 .init(
