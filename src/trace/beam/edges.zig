@@ -42,11 +42,12 @@ pub const inverse_roundings = 18.0;
 const inverse_relative_roundings = 36.0;
 const weight_roundings = 11.0;
 
-/// 1/t whose relative error may reach this is left to the exact test. It also makes sure that the
-/// sign of det is right.
+/// 1/t whose relative error may reach this is left to the exact test.
 pub const relative_error_max = 0.125;
 
-/// See above: |det| over u R^2 L that keeps a triangle from being turned over by rounding.
+/// See above: |det| over u R^2 L that keeps a triangle from being turned over by rounding. Then the
+/// sign of the rounded det is right, too: it is off by less than 8 u R S, S is at most 3 L^2, L at
+/// most 2 R.
 pub const turning_roundings = 64.0;
 
 /// Outside of this range of L^2 and R, in metres, products may leave the range of floats.
@@ -68,24 +69,24 @@ pub fn Edges(comptime Lanes: type) type {
     return struct {
         /// Edge function i of a ray with direction D is `normal[i]` . D.
         normal: [3]Vec3,
-        /// 1/t of it is `inverse` . D.
-        inverse: Vec3,
         /// Bound of the error of an edge function over u |D|, without its factor of roundings.
         slack: F32,
-        /// Bound of the relative error of 1/t.
-        inverse_relative: F32,
-        /// Bound of the rest of its error over u |D|, without its factor of roundings.
-        inverse_absolute: F32,
-        /// Lanes whose bounds hold and are worth anything; others are up to the exact test.
-        decisive: Lanes.Mask,
-
+        /// Lanes of which it is sure how they are turned, and where bounds hold.
+        turned: Lanes.Mask,
         /// The largest distance of a corner, and the length of the longest edge.
         reach: F32,
         length: F32,
+        /// What 1/t is made of: a corner, two edges, their cross product N, and det.
+        corner: Vec3,
+        sides: [2]Vec3,
+        plane: Vec3,
+        det: F32,
 
-        /// Sets up the triangles of a block. Those with a corner farther away than `reach_max` are
-        /// not decisive.
-        pub inline fn init(corners: [3]Vec3, origin: Vec3, reach_max: f32) @This() {
+        const Self = @This();
+
+        /// Sets up the triangles of a block. Bounds do not hold for those with a corner farther
+        /// away than `reach_max`.
+        pub inline fn init(corners: [3]Vec3, origin: Vec3, reach_max: f32) Self {
             const a = corners[0].sub(origin);
             const b = corners[1].sub(origin);
             const c = corners[2].sub(origin);
@@ -96,36 +97,71 @@ pub fn Edges(comptime Lanes: type) type {
             };
             const plane = cross(Lanes, edges[1], edges[2]);
             const det = dot(Lanes, a, plane);
-            const det_inv = F32.splat(1).div(det);
             const flip: F32 = .select(det.lt(.zero()), .splat(-1), .splat(1));
             const length_squared = longestSquared(Lanes, edges);
             const length = length_squared.sqrt();
             const reach = longestSquared(Lanes, .{ a, b, c }).sqrt();
             const unit: F32 = .splat(unit_roundoff);
-            const steepness = absoluteCross(Lanes, edges[1], edges[2]).mul(det_inv.abs());
-            const thinness = length_squared.mul(length).mul(det_inv.abs());
-            const relative = weighed(Lanes, steepness.mul(reach), thinness);
-            const turns_over = reach.mul(reach).mul(length)
-                .mul(.splat(turning_roundings * unit_roundoff));
             return .{
                 .normal = .{
                     cross(Lanes, c.add(b), edges[0]).scale(flip),
                     cross(Lanes, a.add(c), edges[1]).scale(flip),
                     cross(Lanes, b.add(a), edges[2]).scale(flip),
                 },
-                .inverse = plane.scale(det_inv),
+                .slack = reach.mul(reach.mulAdd(unit.add(unit), length)),
+                .turned = isTurned(Lanes, det, reach.mul(reach), length_squared, length)
+                    .bitAnd(reach.lt(.splat(reach_max))),
                 .reach = reach,
                 .length = length,
-                .slack = reach.mul(reach.mulAdd(unit.add(unit), length)),
-                .inverse_relative = relative,
-                .inverse_absolute = steepness,
-                .decisive = relative.lt(.splat(relative_error_max))
-                    .bitAnd(det.abs().gt(turns_over))
-                    .bitAnd(length_squared.gt(.splat(length_squared_min)))
-                    .bitAnd(reach.lt(.splat(reach_max))),
+                .corner = a,
+                .sides = .{ edges[1], edges[2] },
+                .plane = plane,
+                .det = det,
+            };
+        }
+
+        /// 1/t, of the triangles that the edges have left.
+        pub inline fn inverse(edges: *const Self) Inverse(Lanes) {
+            const det_inv = F32.splat(1).div(edges.det);
+            const steepness = absoluteCross(Lanes, edges.sides[0], edges.sides[1])
+                .mul(det_inv.abs());
+            const thinness = edges.length.mul(edges.length).mul(edges.length).mul(det_inv.abs());
+            const relative = weighed(Lanes, steepness.mul(edges.reach), thinness);
+            return .{
+                .vector = edges.plane.scale(det_inv),
+                .relative = relative,
+                .absolute = steepness,
+                .decisive = edges.turned.bitAnd(relative.lt(.splat(relative_error_max))),
             };
         }
     };
+}
+
+/// 1/t of triangles in lanes.
+pub fn Inverse(comptime Lanes: type) type {
+    return struct {
+        /// 1/t of a ray with direction D is `vector` . D.
+        vector: Lanes.Vec3,
+        /// Bound of its relative error.
+        relative: Lanes.F32,
+        /// Bound of the rest of its error over u |D|, without its factor of roundings.
+        absolute: Lanes.F32,
+        /// Lanes whose bounds hold and are worth anything; others are up to the exact test.
+        decisive: Lanes.Mask,
+    };
+}
+
+/// Lanes whose det has the sign that it should, rounding of corners by the exact test included, and
+/// whose edges are long enough for bounds to hold. `scale` is R^2, or what else stands for it.
+pub inline fn isTurned(
+    comptime Lanes: type,
+    det: Lanes.F32,
+    scale: Lanes.F32,
+    length_squared: Lanes.F32,
+    length: Lanes.F32,
+) Lanes.Mask {
+    const least = scale.mul(length).mul(.splat(turning_roundings * unit_roundoff));
+    return det.abs().gt(least).bitAnd(length_squared.gt(.splat(length_squared_min)));
 }
 
 /// Bound of the relative error of 1/t: `steepness` is R S / |det|, `thinness` L^3 / |det|.

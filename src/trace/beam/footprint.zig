@@ -85,21 +85,17 @@ pub fn Linear(comptime Lanes: type) type {
 pub fn Footprint(comptime Lanes: type) type {
     const F32 = Lanes.F32;
     const Vec3 = Lanes.Vec3;
+    const Edges = edges_file.Edges(Lanes);
     return struct {
         /// Positive within.
         edge: [3]Linear(Lanes),
-        /// Greater is nearer to the light.
-        nearness: Linear(Lanes),
         /// Bound of the error of an edge function.
         slack: F32,
-        /// Nearness n is within n (1 +- relative) +- absolute.
-        relative: F32,
-        absolute: F32,
-        decisive: Lanes.Mask,
-        /// Bounds R of the rounding of u and v.
-        reach: F32,
-        /// The longest edge.
-        length: F32,
+        /// What both kinds of light have in common; in a directional one's own axes, relative to
+        /// its own origin. `normal` and `slack` are those of a point light.
+        edges: Edges,
+
+        const Self = @This();
 
         /// Sets up triangles; slopes (or the rays' own) are at most `slope_max` along each axis.
         pub inline fn init(
@@ -107,11 +103,11 @@ pub fn Footprint(comptime Lanes: type) type {
             projection: *const Projection,
             slope_max: f32,
             reach_max: f32,
-        ) @This() {
-            return if (projection.slope == null)
-                pointLight(corners, projection, slope_max, reach_max)
+        ) Self {
+            return if (projection.slope) |slope|
+                directional(corners, projection, slope, slope_max, reach_max)
             else
-                directional(corners, projection, slope_max, reach_max);
+                pointLight(corners, projection, slope_max, reach_max);
         }
 
         inline fn pointLight(
@@ -119,40 +115,41 @@ pub fn Footprint(comptime Lanes: type) type {
             projection: *const Projection,
             slope_max: f32,
             reach_max: f32,
-        ) @This() {
-            const edges: edges_file.Edges(Lanes) =
-                .init(corners, .splat(projection.origin), reach_max);
+        ) Self {
+            const edges: Edges = .init(corners, .splat(projection.origin), reach_max);
             const sign: F32 = .splat(projection.sign);
-            const unit = edges_file.unit_roundoff * @sqrt(1 + 2 * slope_max * slope_max);
-            const axis = projection.axis;
+            var edge: [3]Linear(Lanes) = undefined;
+            inline for (&edge, edges.normal) |*to, normal| {
+                to.* = .of(turn(Lanes, projection.axis, normal.scale(sign)));
+            }
             return .{
-                .edge = .{
-                    .of(turn(Lanes, axis, edges.normal[0].scale(sign))),
-                    .of(turn(Lanes, axis, edges.normal[1].scale(sign))),
-                    .of(turn(Lanes, axis, edges.normal[2].scale(sign))),
-                },
-                .nearness = .of(turn(Lanes, axis, edges.inverse.scale(sign))),
-                .slack = edges.slack.mul(.splat(edges_file.edge_roundings * unit)),
-                .relative = edges.inverse_relative,
-                .absolute = edges.inverse_absolute
-                    .mul(.splat(edges_file.inverse_roundings * unit)),
-                .decisive = edges.decisive,
-                .reach = edges.reach,
-                .length = edges.length,
+                .edge = edge,
+                .slack = edges.slack
+                    .mul(.splat(edges_file.edge_roundings * unitOf(slope_max))),
+                .edges = edges,
             };
+        }
+
+        /// u times |D| over the depth of D.
+        fn unitOf(slope_max: f32) f32 {
+            return edges_file.unit_roundoff * stretchOf(slope_max);
+        }
+
+        fn stretchOf(slope_max: f32) f32 {
+            return @sqrt(1 + 2 * slope_max * slope_max);
         }
 
         /// An edge function is twice the area between an edge and a point of the plane; depth is
         /// that of the triangle's plane. R of the bounds is the distance to the origin, or from
         /// there to a ray's end, if that is larger. With the slopes m of the rays, |D| is
-        /// sqrt(1 + m . m), det the area on the plane and R S / |det| a length: depth is off by
-        /// (28 R + 9 L^3 / area) u |D| S / area.
+        /// sqrt(1 + m . m), det the area on the plane and R S / |det| a length.
         inline fn directional(
             corners: [3]Vec3,
             projection: *const Projection,
+            slope: [2]f32,
             slope_max: f32,
             reach_max: f32,
-        ) @This() {
+        ) Self {
             const axis = projection.axis;
             const origin: Vec3 = turn(Lanes, axis, .splat(projection.origin));
             const a = turn(Lanes, axis, corners[0]).sub(origin);
@@ -163,25 +160,15 @@ pub fn Footprint(comptime Lanes: type) type {
                 turn(Lanes, axis, corners[0].sub(corners[2])),
                 turn(Lanes, axis, corners[1].sub(corners[0])),
             };
-            const slope = projection.slope.?;
             const along: Vec3 = .{ .x = .splat(slope[0]), .y = .splat(slope[1]), .z = .splat(1) };
             const plane = edges_file.cross(Lanes, sides[1], sides[2]);
             const area = edges_file.dot(Lanes, plane, along);
-            const area_inv = F32.splat(1).div(area);
             const flip: F32 = .select(area.lt(.zero()), .splat(-1), .splat(1));
             const length_squared = edges_file.longestSquared(Lanes, sides);
             const reach = edges_file.longestSquared(Lanes, .{ a, b, c }).sqrt()
                 .add(.splat(projection.reach));
-            const stretch = @sqrt(1 + 2 * slope_max * slope_max);
-            const unit = edges_file.unit_roundoff * stretch;
+            const stretch = stretchOf(slope_max);
             const length = length_squared.sqrt();
-            const steepness = edges_file.absoluteCross(Lanes, sides[1], sides[2])
-                .mul(area_inv.abs());
-            const thinness = length_squared.mul(length).mul(area_inv.abs());
-            const absolute = reach.mulAdd(.splat(36), thinness.mul(.splat(11)))
-                .mulAdd(steepness.mul(.splat(unit)), reach.mul(.splat(5 * unit)));
-            const sign: F32 = .splat(projection.sign);
-            const nearness_scale = area_inv.mul(sign);
             const sums = [3]Vec3{ c.add(b), a.add(c), b.add(a) };
             var edge: [3]Linear(Lanes) = undefined;
             inline for (&edge, sides, sums) |*to, step, sum| {
@@ -191,25 +178,80 @@ pub fn Footprint(comptime Lanes: type) type {
                 const middle_v = sum.y.sub(sum.z.mul(along.y)).mul(.splat(0.5));
                 to.* = .{ .u = v.neg(), .v = u, .one = middle_u.mul(v).sub(middle_v.mul(u)) };
             }
+            const scale = reach.mul(.splat(stretch));
             return .{
                 .edge = edge,
-                .nearness = .{
-                    .u = plane.x.mul(nearness_scale),
-                    .v = plane.y.mul(nearness_scale),
-                    .one = edges_file.dot(Lanes, plane, a).mul(nearness_scale).neg(),
-                },
                 .slack = reach.mul(length.add(reach.mul(.splat(2 * edges_file.unit_roundoff))))
-                    .mul(.splat(edges_file.edge_roundings * unit * stretch)),
-                .relative = .zero(),
-                .absolute = absolute,
-                .reach = reach,
-                .length = length,
-                .decisive = absolute.lt(reach.mul(.splat(edges_file.relative_error_max)))
-                    .bitAnd(area.abs().gt(reach.mul(length)
-                        .mul(.splat(edges_file.turning_roundings * unit))))
-                    .bitAnd(length_squared.gt(.splat(edges_file.length_squared_min)))
-                    .bitAnd(reach.lt(.splat(reach_max))),
+                    .mul(.splat(edges_file.edge_roundings * unitOf(slope_max) * stretch)),
+                .edges = .{
+                    .normal = undefined,
+                    .slack = undefined,
+                    .turned = edges_file.isTurned(Lanes, area, scale, length_squared, length)
+                        .bitAnd(reach.lt(.splat(reach_max))),
+                    .reach = reach,
+                    .length = length,
+                    .corner = a,
+                    .sides = .{ sides[1], sides[2] },
+                    .plane = plane,
+                    .det = area,
+                },
             };
         }
+
+        /// Nearness of the triangles that the edges have left; arguments as for `init`.
+        pub inline fn nearness(
+            footprint: *const Self,
+            projection: *const Projection,
+            slope_max: f32,
+        ) Nearness(Lanes) {
+            const edges = &footprint.edges;
+            const sign: F32 = .splat(projection.sign);
+            const unit = unitOf(slope_max);
+            if (projection.slope != null) return parallelNearness(edges, sign, unit);
+            const inverse = edges.inverse();
+            return .{
+                .form = .of(turn(Lanes, projection.axis, inverse.vector.scale(sign))),
+                .relative = inverse.relative,
+                .absolute = inverse.absolute.mul(.splat(edges_file.inverse_roundings * unit)),
+                .decisive = inverse.decisive,
+            };
+        }
+
+        /// Depth is off by (28 R + 9 L^3 / area) u |D| S / area.
+        inline fn parallelNearness(edges: *const Edges, sign: F32, unit: f32) Nearness(Lanes) {
+            const area_inv = F32.splat(1).div(edges.det);
+            const length = edges.length;
+            const reach = edges.reach;
+            const steepness = edges_file.absoluteCross(Lanes, edges.sides[0], edges.sides[1])
+                .mul(area_inv.abs());
+            const thinness = length.mul(length).mul(length).mul(area_inv.abs());
+            const absolute = reach.mulAdd(.splat(36), thinness.mul(.splat(11)))
+                .mulAdd(steepness.mul(.splat(unit)), reach.mul(.splat(5 * unit)));
+            const scale = area_inv.mul(sign);
+            return .{
+                .form = .{
+                    .u = edges.plane.x.mul(scale),
+                    .v = edges.plane.y.mul(scale),
+                    .one = edges_file.dot(Lanes, edges.plane, edges.corner).mul(scale).neg(),
+                },
+                .relative = .zero(),
+                .absolute = absolute,
+                .decisive = edges.turned
+                    .bitAnd(absolute.lt(reach.mul(.splat(edges_file.relative_error_max)))),
+            };
+        }
+    };
+}
+
+/// Nearness of triangles in lanes.
+pub fn Nearness(comptime Lanes: type) type {
+    return struct {
+        /// Greater is nearer to the light.
+        form: Linear(Lanes),
+        /// Nearness n is within n (1 +- relative) +- absolute.
+        relative: Lanes.F32,
+        absolute: Lanes.F32,
+        /// Lanes whose bounds hold and are worth anything; others are up to the exact test.
+        decisive: Lanes.Mask,
     };
 }

@@ -254,42 +254,42 @@ fn Search(comptime Kernel: type) type {
                 .z = .load(&components[2]),
             };
             const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
-            const there = primitive.gt(.splat(ray_file.no_primitive))
+            var there = primitive.gt(.splat(ray_file.no_primitive))
                 .bitAnd(search.frustum.mayMeet(corners));
             if (there.none()) return;
             const grid = search.grid;
             const edges: edges_file.Edges(Boxes) =
                 .init(corners, .splat(grid.origin), search.reach_max);
-            const vectors = edges.normal ++ .{edges.inverse};
             const zero: Boxes.F32 = .zero();
             var base: [4]Boxes.F32 = undefined;
             var right: [4]Boxes.F32 = undefined;
             var down: [4]Boxes.F32 = undefined;
-            var most: [4]Boxes.F32 = undefined;
             const slack = edges.slack.mul(.splat(search.edge_scale));
-            const absolute = edges.inverse_absolute.mul(.splat(search.inverse_scale));
-            const one: Boxes.F32 = .splat(1);
-            const growth = one.add(edges.inverse_relative);
-            inline for (vectors, 0..) |vector, index| {
-                base[index] = edges_file.dot(Boxes, vector, .splat(grid.corner));
-                right[index] = edges_file.dot(Boxes, vector, .splat(grid.right));
-                down[index] = edges_file.dot(Boxes, vector, .splat(grid.down));
-                if (index < 3) {
-                    base[index] = base[index].add(slack);
-                } else {
-                    base[index] = base[index].mulAdd(growth, absolute);
-                    right[index] = right[index].mul(growth);
-                    down[index] = down[index].mul(growth);
-                }
+            var least: Boxes.F32 = .splat(std.math.inf(f32));
+            inline for (edges.normal, 0..) |normal, index| {
+                base[index] = edges_file.dot(Boxes, normal, .splat(grid.corner)).add(slack);
+                right[index] = edges_file.dot(Boxes, normal, .splat(grid.right));
+                down[index] = edges_file.dot(Boxes, normal, .splat(grid.down));
                 const reach = right[index].maxFast(zero).add(down[index].maxFast(zero));
-                most[index] = reach.mulAdd(.splat(last), base[index]);
+                least = least.minFast(reach.mulAdd(.splat(last), base[index]));
             }
-            const seen = most[0].minFast(most[1]).minFast(most[2]).ge(zero)
-                .bitAnd(most[3].gt(.splat(search.tile_lower)));
-            const open = there.andNot(edges.decisive);
+            there = there.andNot(edges.turned.bitAnd(least.lt(zero)));
+            if (there.none()) return;
+            const inverse = edges.inverse();
+            const absolute = inverse.absolute.mul(.splat(search.inverse_scale));
+            const one: Boxes.F32 = .splat(1);
+            const growth = one.add(inverse.relative);
+            base[3] = edges_file.dot(Boxes, inverse.vector, .splat(grid.corner))
+                .mulAdd(growth, absolute);
+            right[3] = edges_file.dot(Boxes, inverse.vector, .splat(grid.right)).mul(growth);
+            down[3] = edges_file.dot(Boxes, inverse.vector, .splat(grid.down)).mul(growth);
+            const most = right[3].maxFast(zero).add(down[3].maxFast(zero))
+                .mulAdd(.splat(last), base[3]);
+            const open = there.andNot(inverse.decisive);
             var undecided: u32 = 0;
             if (open.any()) undecided = open.bitAnd(mayTouch(&base, &right, &down, slack)).bits();
-            var rest = there.bitAnd(edges.decisive).bitAnd(seen).bits();
+            var rest = there.bitAnd(inverse.decisive)
+                .bitAnd(most.gt(.splat(search.tile_lower))).bits();
             const first: exact.Slot = @intCast(block_index * width);
             if (rest | undecided == 0) return;
             var window = Window.everywhere;
@@ -313,7 +313,7 @@ fn Search(comptime Kernel: type) type {
                 down[index].store(&table.down[index]);
             }
             slack.add(slack).store(&table.slack);
-            one.sub(edges.inverse_relative).div(growth).store(&table.shrink);
+            one.sub(inverse.relative).div(growth).store(&table.shrink);
             absolute.add(absolute).store(&table.drop);
             while (rest != 0) : (rest &= rest - 1) {
                 search.cover(&table.at(@ctz(rest), first));

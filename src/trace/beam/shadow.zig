@@ -591,53 +591,52 @@ fn Search(comptime Kernel: type) type {
                 .z = .load(&components[2]),
             };
             const primitive: Boxes.I32 = .load(@ptrCast(&block_.primitive));
-            const there = primitive.gt(.splat(ray_file.no_primitive))
+            var there = primitive.gt(.splat(ray_file.no_primitive))
                 .bitAnd(frustum.mayMeet(corners));
             if (there.none()) return;
+            const projection = &search.projection;
+            const reach_max = edges_file.reachMax(search.world.pad);
             const print: footprint_file.Footprint(Boxes) =
-                .init(
-                    corners,
-                    &search.projection,
-                    search.slope_max,
-                    edges_file.reachMax(search.world.pad),
-                );
-            const basis = &search.basis;
+                .init(corners, projection, search.slope_max, reach_max);
             const bounds = &search.bounds;
             const B = Boxes.F32;
-            const growth = B.splat(1).add(print.relative);
             // Upper bounds from here on.
-            var linear = print.edge ++ .{print.nearness};
-            inline for (linear[0..3]) |*form| form.one = form.one.add(print.slack);
-            linear[3] = .{
-                .u = print.nearness.u.mul(growth),
-                .v = print.nearness.v.mul(growth),
-                .one = print.nearness.one.mulAdd(growth, print.absolute),
-            };
-            var along_u: [4]B = undefined;
-            var along_v: [4]B = undefined;
-            var most: [4]B = undefined;
-            inline for (linear, 0..) |form, index| {
-                along_u[index] = form.u.mulAdd(.splat(basis.b00), form.v.mul(.splat(basis.b10)));
-                along_v[index] = form.u.mulAdd(.splat(basis.b01), form.v.mul(.splat(basis.b11)));
-                most[index] = maxOver(along_u[index], bounds.u)
-                    .add(maxOver(along_v[index], bounds.v)).add(form.one);
+            var linear: [4]footprint_file.Linear(Boxes) = print.edge ++ .{undefined};
+            var along_u: [3]B = undefined;
+            var along_v: [3]B = undefined;
+            var least: B = .splat(inf);
+            inline for (linear[0..3], &along_u, &along_v) |*form, *by_u, *by_v| {
+                form.one = form.one.add(print.slack);
+                by_u.*, by_v.* = search.inBasis(form);
+                least = least.minFast(maxOver(by_u.*, bounds.u)
+                    .add(maxOver(by_v.*, bounds.v)).add(form.one));
             }
-            const directional = search.projection.slope != null;
+            there = there.andNot(print.edges.turned.bitAnd(least.lt(.zero())));
+            if (there.none()) return;
+            const nearness = print.nearness(projection, search.slope_max);
+            const growth = B.splat(1).add(nearness.relative);
+            linear[3] = .{
+                .u = nearness.form.u.mul(growth),
+                .v = nearness.form.v.mul(growth),
+                .one = nearness.form.one.mulAdd(growth, nearness.absolute),
+            };
+            const near_by_u, const near_by_v = search.inBasis(&linear[3]);
+            const most = maxOver(near_by_u, bounds.u)
+                .add(maxOver(near_by_v, bounds.v)).add(linear[3].one);
+            const directional = projection.slope != null;
             const farthest = if (directional) -bounds.depth else 1 / bounds.depth;
-            const seen = most[0].minFast(most[1]).minFast(most[2]).ge(.zero())
-                .bitAnd(most[3].gt(.splat(farthest)));
-            const open = there.andNot(print.decisive);
+            const open = there.andNot(nearness.decisive);
             var undecided: u32 = 0;
             if (open.any()) undecided = open
                 .bitAnd(search.mayTouch(&along_u, &along_v, &linear, print.slack)).bits();
-            var rest = there.bitAnd(print.decisive).bitAnd(seen).bits();
+            var rest = there.bitAnd(nearness.decisive).bitAnd(most.gt(.splat(farthest))).bits();
             const first: exact.Slot = @intCast(block_index * width);
             if (rest | undecided == 0) return;
             var window = Window.everywhere;
             // Bounds tell more than edges of small triangles only.
             const extent = search.bounds.extent() * (if (directional) 1 else search.bounds.depth);
-            if (print.length.lt(.splat(extent)).any()) {
-                window = search.windowOf(corners, print.reach);
+            if (print.edges.length.lt(.splat(extent)).any()) {
+                window = search.windowOf(corners, print.edges.reach);
                 rest &= window.u[1].ge(.splat(bounds.u[0]))
                     .bitAnd(window.u[0].le(.splat(bounds.u[1])))
                     .bitAnd(window.v[1].ge(.splat(bounds.v[0])))
@@ -659,8 +658,8 @@ fn Search(comptime Kernel: type) type {
                 along_v[index].store(&table.along_v[index]);
             }
             print.slack.add(print.slack).store(&table.slack);
-            B.splat(1).sub(print.relative).div(growth).store(&table.shrink);
-            print.absolute.add(print.absolute).store(&table.drop);
+            B.splat(1).sub(nearness.relative).div(growth).store(&table.shrink);
+            nearness.absolute.add(nearness.absolute).store(&table.drop);
             while (rest != 0) : (rest &= rest - 1) {
                 const lane = @ctz(rest);
                 search.cover(&table.at(lane, first, block_.primitive[lane]));
@@ -725,15 +724,15 @@ fn Search(comptime Kernel: type) type {
         /// edge function is surely negative all over, and another surely positive.
         fn mayTouch(
             search: *const Self,
-            along_u: *const [4]Boxes.F32,
-            along_v: *const [4]Boxes.F32,
+            along_u: *const [3]Boxes.F32,
+            along_v: *const [3]Boxes.F32,
             linear: *const [4]footprint_file.Linear(Boxes),
             slack: Boxes.F32,
         ) Boxes.Mask {
             const bounds = &search.bounds;
             var negative: Boxes.Mask = .splat(false);
             var positive: Boxes.Mask = .splat(false);
-            for (along_u[0..3], along_v[0..3], linear[0..3]) |u, v, form| {
+            for (along_u, along_v, linear[0..3]) |u, v, form| {
                 const most = maxOver(u, bounds.u).add(maxOver(v, bounds.v)).add(form.one);
                 const less = maxOver(u.neg(), bounds.u).add(maxOver(v.neg(), bounds.v));
                 negative = negative.bitOr(most.lt(.zero()));
@@ -787,6 +786,18 @@ fn Search(comptime Kernel: type) type {
                 return coverage;
             }
         };
+
+        /// A linear form's factors of the coordinates in the axes of the parallelogram.
+        inline fn inBasis(
+            search: *const Self,
+            form: *const footprint_file.Linear(Boxes),
+        ) struct { Boxes.F32, Boxes.F32 } {
+            const basis = &search.basis;
+            return .{
+                form.u.mulAdd(.splat(basis.b00), form.v.mul(.splat(basis.b10))),
+                form.u.mulAdd(.splat(basis.b01), form.v.mul(.splat(basis.b11))),
+            };
+        }
 
         inline fn maxOver(factor: Boxes.F32, range: [2]f32) Boxes.F32 {
             return factor.mul(.splat(range[0])).maxFast(factor.mul(.splat(range[1])));
