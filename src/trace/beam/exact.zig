@@ -42,30 +42,8 @@ pub inline fn cornerAt(
     return .{ components[0][at.lane], components[1][at.lane], components[2][at.lane] };
 }
 
-/// t of the exact hit of one ray with the triangle in a slot, or null.
-pub fn hitAt(
-    comptime Kernel: type,
-    tree: *const world_file.Tree(Kernel.width),
-    pad: f32,
-    group: *const ray_file.Ray(Kernel.Rays),
-    lane: usize,
-    slot: Slot,
-) ?f32 {
-    @branchHint(.cold);
-    const Single = ray_file.Single;
-    const line: ray_file.Line(Single) = .init(
-        .splat(group.line.origin.lane(lane)),
-        .splat(group.line.direction.lane(lane)),
-    );
-    var corners: [3]Single.Vec3 = undefined;
-    for (&corners, 0..) |*corner, index| {
-        corner.* = .splat(cornerAt(Kernel.width, tree, slot, index));
-    }
-    const hit = triangle.intersect(Single, corners, line, pad);
-    return if (hit.mask.lane(0)) hit.t.lane(0) else null;
-}
-
-/// Where rays pass within the edges of a triangle, and where they hit it.
+/// Rays that pass within the edges of a triangle, those for which its plane has a place within its
+/// box, and t of that.
 pub fn Meeting(comptime Lanes: type) type {
     return struct { inside: Lanes.Mask, mask: Lanes.Mask, t: Lanes.F32 };
 }
@@ -80,52 +58,54 @@ pub fn meet(
     slot: Slot,
 ) Meeting(Kernel.Rays) {
     @branchHint(.cold);
-    const Rays = Kernel.Rays;
+    var corners: [3]Kernel.Rays.Vec3 = undefined;
+    for (&corners, 0..) |*corner, index| {
+        corner.* = .splat(cornerAt(Kernel.width, tree, slot, index));
+    }
+    return meetCorners(Kernel.Rays, pad, group, rays, corners);
+}
+
+fn meetCorners(
+    comptime Rays: type,
+    pad: f32,
+    group: *const ray_file.Ray(Rays),
+    rays: Rays.Mask,
+    corners: [3]Rays.Vec3,
+) Meeting(Rays) {
     const axis: ray_file.LongAxis(Rays) = .of(group.line.direction);
     const view: ray_file.View(Rays) = .init(group.line, axis);
-    var corners: [3]Rays.Vec3 = undefined;
-    for (&corners, 0..) |*corner, index| {
-        corner.* = axis.turn(.splat(cornerAt(Kernel.width, tree, slot, index)));
-    }
-    const seen = triangle.project(Rays, corners, &view);
+    const turned: [3]Rays.Vec3 = .{
+        axis.turn(corners[0]), axis.turn(corners[1]), axis.turn(corners[2]),
+    };
+    const seen = triangle.project(Rays, turned, &view);
     var weights = triangle.weigh(Rays, seen);
-    const agreeing = weights.agree().bitAnd(rays);
-    const inside = triangle.settle(Rays, seen, &weights, agreeing);
-    const hit = triangle.locate(Rays, seen, weights, corners, &view, pad);
+    const inside = triangle.settle(Rays, seen, &weights, weights.agree().bitAnd(rays));
+    const hit = triangle.locate(Rays, seen, weights, turned, &view, pad);
     return .{ .inside = inside, .mask = hit.mask, .t = hit.t };
 }
 
-/// Whether one ray passes within the edges of the triangle in a slot, which is all that is left to
-/// ask where the depth is certain.
-pub fn insideAt(
+/// Of rays that hit the triangle in `slot` at `t`, those whose own triangles in `others` do not come
+/// first, in the order of `ray.Hit`. Rays without one have no slot; the others do hit theirs.
+pub fn comeFirst(
     comptime Kernel: type,
     tree: *const world_file.Tree(Kernel.width),
+    pad: f32,
     group: *const ray_file.Ray(Kernel.Rays),
-    lane: usize,
+    rays: Kernel.Rays.Mask,
+    t: Kernel.Rays.F32,
     slot: Slot,
-) bool {
-    const Single = ray_file.Single;
-    const direction = group.line.direction.lane(lane);
-    const origin = group.line.origin.lane(lane);
-    const along: ray_file.LongAxis(Single) = .of(.splat(direction));
-    const axis = along.uniform(.splat(true)).?;
-    const a = ray_file.turnedIndex(axis, 0);
-    const b = ray_file.turnedIndex(axis, 1);
-    const shear: Single.Vec3 = .splat(.{
-        direction[a] / direction[axis], direction[b] / direction[axis], 1,
-    });
-    var offsets: [3]Single.Vec3 = undefined;
-    for (&offsets, 0..) |*offset, index| {
-        const corner = cornerAt(Kernel.width, tree, slot, index);
-        offset.* = .splat(.{
-            corner[a] - origin[a], corner[b] - origin[b], corner[axis] - origin[axis],
-        });
-    }
-    const seen = triangle.projectOffsets(Single, offsets, shear);
-    var weights = triangle.weigh(Single, seen);
-    const agreeing = weights.agree();
-    if (!agreeing.lane(0)) return false;
-    return triangle.settle(Single, seen, &weights, agreeing).lane(0);
+    others: *const [Kernel.ray_count]Slot,
+) Kernel.Rays.Mask {
+    @branchHint(.cold);
+    const Rays = Kernel.Rays;
+    const met = rays.bitAnd(Rays.I32.load(others).gt(.splat(no_slot)));
+    if (met.none()) return rays;
+    const gathered = gather(Kernel, tree, others);
+    const other = meetCorners(Rays, pad, group, met, gathered.corners);
+    assert(met.andNot(other.inside.bitAnd(other.mask)).none());
+    const number: Rays.I32 = .splat(primitiveAt(Kernel.width, tree, slot));
+    const first = t.lt(other.t).bitOr(t.eq(other.t).bitAnd(gathered.primitive.gt(number)));
+    return rays.andNot(met.andNot(first));
 }
 
 /// Corners and number of the triangle of each lane.

@@ -530,7 +530,7 @@ fn Search(comptime Kernel: type) type {
                         .storeAligned(slots);
                     const doubtful = possible.andNot(certain);
                     if (doubtful.any()) {
-                        search.decideNear(coverage.slot, group, doubtful, surely, value[3]);
+                        search.decide(coverage.slot, group, doubtful, surely, value[3]);
                     }
                     changed = true;
                 }
@@ -568,9 +568,9 @@ fn Search(comptime Kernel: type) type {
             search.block_lower[block] = least.reduceMin();
         }
 
-        /// Decides for rays that a triangle comes near to, with bounds of 1/t there: by its edges
-        /// alone where they tell it from what has been found before.
-        fn decideNear(
+        /// Asks the exact test about rays that a triangle comes near to, with bounds of 1/t there:
+        /// by its edges alone where they tell it from what has been found before.
+        fn decide(
             search: *Self,
             slot: exact.Slot,
             group: usize,
@@ -579,47 +579,25 @@ fn Search(comptime Kernel: type) type {
             upper: F32,
         ) void {
             @branchHint(.unlikely);
-            const known: F32 = .loadAligned(search.bounds("upper", group));
-            const nearer = doubtful.bitAnd(lower.gt(known));
-            const unclear = doubtful.andNot(nearer).bits();
-            var rest = nearer.bits();
-            while (rest != 0) : (rest &= rest - 1) {
-                const lane = @ctz(rest);
-                const ray = &search.bundle.groups[group];
-                if (!exact.insideAt(Kernel, search.tree, ray, lane, slot)) continue;
-                const pixel = group * lanes + lane;
-                search.slot[pixel] = slot;
-                search.lower[pixel] = lower.lane(lane);
-                search.upper[pixel] = upper.lane(lane);
-            }
-            if (unclear != 0) search.decide(slot, group, unclear);
-        }
-
-        /// Asks the exact test about single rays.
-        fn decide(search: *Self, slot: exact.Slot, group: usize, doubtful: u32) void {
-            @branchHint(.unlikely);
-            var rest = doubtful;
-            while (rest != 0) : (rest &= rest - 1) {
-                const lane = @ctz(rest);
-                const ray = &search.bundle.groups[group];
-                const pad = search.world.pad;
-                const tree = search.tree;
-                const t = exact.hitAt(Kernel, tree, pad, ray, lane, slot) orelse continue;
-                if (!(t > 0)) continue;
-                const pixel = group * lanes + lane;
-                const before = search.slot[pixel];
-                if (before != exact.no_slot) {
-                    // What was certain to the filter is so to the exact test.
-                    const other = exact.hitAt(Kernel, tree, pad, ray, lane, before).?;
-                    if (other < t) continue;
-                    const number = exact.primitiveAt(width, tree, slot);
-                    const number_before = exact.primitiveAt(width, tree, before);
-                    if (other == t and number_before <= number) continue;
-                }
-                search.slot[pixel] = slot;
-                search.lower[pixel] = 1 / t * (1 - 4 * edges_file.unit_roundoff);
-                search.upper[pixel] = 1 / t * (1 + 4 * edges_file.unit_roundoff);
-            }
+            const ray = &search.bundle.groups[group];
+            const pad = search.world.pad;
+            const hit = exact.meet(Kernel, search.tree, pad, ray, doubtful, slot);
+            const known_lower = search.bounds("lower", group);
+            const known_upper = search.bounds("upper", group);
+            const slots = search.bounds("slot", group);
+            const nearer = hit.inside.bitAnd(lower.gt(.loadAligned(known_upper)));
+            const unclear = hit.inside.bitAnd(hit.mask).bitAnd(hit.t.gt(.zero())).andNot(nearer);
+            const first = exact
+                .comeFirst(Kernel, search.tree, pad, ray, unclear, hit.t, slot, slots);
+            const inverse = F32.splat(1).div(hit.t);
+            const below = inverse.mul(.splat(1 - 4 * edges_file.unit_roundoff));
+            const above = inverse.mul(.splat(1 + 4 * edges_file.unit_roundoff));
+            F32.select(nearer, lower, .select(first, below, .loadAligned(known_lower)))
+                .storeAligned(known_lower);
+            F32.select(nearer, upper, .select(first, above, .loadAligned(known_upper)))
+                .storeAligned(known_upper);
+            Rays.I32.select(nearer.bitOr(first), .splat(slot), .loadAligned(slots))
+                .storeAligned(slots);
         }
 
         /// A triangle seen edge-on, or out of all measure: pixels are left to the exact test unless
@@ -640,8 +618,10 @@ fn Search(comptime Kernel: type) type {
                     negative = negative.bitOr(value.lt(.zero()));
                     positive = positive.bitOr(value.gt(slack));
                 }
-                const doubtful = ray.active.andNot(negative.bitAnd(positive)).bits();
-                if (doubtful != 0) search.decide(coverage.slot, group, doubtful);
+                const doubtful = ray.active.andNot(negative.bitAnd(positive));
+                // Nothing is known of 1/t.
+                const none: F32 = .splat(-std.math.inf(f32));
+                if (doubtful.any()) search.decide(coverage.slot, group, doubtful, none, none);
             }
             for (0..block_count) |block| search.boundBlock(@intCast(block));
         }
