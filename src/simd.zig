@@ -69,6 +69,34 @@ fn LanesOf(comptime chosen: Backend, comptime lanes: comptime_int) type {
                 even_high.interleaveHigh(odd_high),
             };
         }
+
+        /// The least lane of every vector, that of `vectors[l]` in lane l, by a third of the
+        /// instructions of as many reductions. For culling only, as `minFast`. Asserts (comptime)
+        /// that the number of lanes is a power of two.
+        pub inline fn minOfEach(vectors: *const [lanes]F32) F32 {
+            return ofEach(lanes, F32.minFast, vectors, 0, 1);
+        }
+
+        /// The same of the greatest.
+        pub inline fn maxOfEach(vectors: *const [lanes]F32) F32 {
+            return ofEach(lanes, F32.maxFast, vectors, 0, 1);
+        }
+
+        /// What is left of `vectors[first + i * step]`, i below `vector_count`, in turns in the
+        /// lanes: of two such by twice the step, halves side by side, and `join` of them.
+        inline fn ofEach(
+            comptime vector_count: usize,
+            comptime join: fn (F32, F32) callconv(.@"inline") F32,
+            vectors: *const [lanes]F32,
+            comptime first: usize,
+            comptime step: usize,
+        ) F32 {
+            if (vector_count == 1) return vectors[first];
+            comptime assert(vector_count % 2 == 0);
+            const even = ofEach(vector_count / 2, join, vectors, first, 2 * step);
+            const odd = ofEach(vector_count / 2, join, vectors, first + step, 2 * step);
+            return join(even.interleaveLow(odd), even.interleaveHigh(odd));
+        }
     };
 }
 

@@ -419,6 +419,30 @@ fn checkReductions(comptime L: type) anyerror!void {
     }
 }
 
+fn checkEach(comptime L: type) !void {
+    const count = L.F32.count;
+    if (!std.math.isPowerOfTwo(count)) return;
+    var random = std.Random.DefaultPrng.init(5);
+    for (0..20) |_| {
+        var vectors: [count]L.F32 = undefined;
+        for (&vectors) |*vector| {
+            var values: [count]f32 = undefined;
+            for (&values) |*value| value.* = random.random().floatNorm(f32);
+            values[random.random().uintLessThan(usize, count)] = std.math.inf(f32);
+            vector.* = .fromArray(values);
+        }
+        const least = L.minOfEach(&vectors).toArray();
+        const greatest = L.maxOfEach(&vectors).toArray();
+        for (vectors, least, greatest) |vector, low, high| {
+            try expect(low == vector.reduceMin() and high == vector.reduceMax());
+        }
+    }
+}
+
+test "every vector's least and greatest lane" {
+    try forAll(checkEach);
+}
+
 test "reductions keep their order" {
     try forAll(checkReductions);
 }

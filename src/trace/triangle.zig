@@ -239,16 +239,23 @@ pub inline fn locateWithin(
     weights: Weights(Lanes),
     range: box.Range(Lanes),
 ) Intersection(Lanes) {
-    const F32 = Lanes.F32;
+    const plane = locatePlane(Lanes, seen, weights);
+    return .{
+        .mask = plane.mask.bitAnd(range.near.le(range.far)),
+        .t = plane.t.max(range.near).min(range.far),
+    };
+}
+
+/// t of the plane, where the triangle has an area.
+pub inline fn locatePlane(
+    comptime Lanes: type,
+    seen: Projection(Lanes),
+    weights: Weights(Lanes),
+) Intersection(Lanes) {
     const area = weights.sum();
     const depth = weights.a.mul(seen.a.z).add(weights.b.mul(seen.b.z)).add(weights.c.mul(seen.c.z));
-    const t_plane = depth.div(area);
-    const zero: F32 = .zero();
-    const has_area = area.abs().gt(zero).bitAnd(area.abs().lt(.splat(std.math.inf(f32))));
-    return .{
-        .mask = has_area.bitAnd(range.near.le(range.far)),
-        .t = t_plane.max(range.near).min(range.far),
-    };
+    const has_area = area.abs().gt(.zero()).bitAnd(area.abs().lt(.splat(std.math.inf(f32))));
+    return .{ .mask = has_area, .t = depth.div(area) };
 }
 
 /// By component: `a` where the mask is set, else `b`.

@@ -81,14 +81,6 @@ const Bounds = struct {
     fn area(bounds: Bounds) f32 {
         return (bounds.u[1] - bounds.u[0]) * (bounds.v[1] - bounds.v[0]);
     }
-
-    fn join(a: Bounds, b: Bounds) Bounds {
-        return .{
-            .u = .{ @min(a.u[0], b.u[0]), @max(a.u[1], b.u[1]) },
-            .v = .{ @min(a.v[0], b.v[0]), @max(a.v[1], b.v[1]) },
-            .depth = @max(a.depth, b.depth),
-        };
-    }
 };
 
 /// Axes of the parallelogram, and the way back: U = i00 u + i01 v, V = i10 u + i11 v.
@@ -145,7 +137,6 @@ fn Search(comptime Kernel: type) type {
         /// Bounds of every block; empty ones of blocks that are done.
         block_u: [2][block_count]f32 align(64) = undefined,
         block_v: [2][block_count]f32 align(64) = undefined,
-        block_depth: [block_count]f32 align(64) = undefined,
         /// Blocks with rays that have met nothing yet.
         live: u32 = 0,
 
@@ -396,44 +387,80 @@ fn Search(comptime Kernel: type) type {
 
         /// Bounds of blocks and of all.
         fn bound(search: *Self, members: *const Members) void {
-            const basis = &search.basis;
             const unit = 64 * edges_file.unit_roundoff * (1 + 2 * search.slope_max);
             const length = if (search.projection.slope == null) 1 else search.projection.reach;
-            const margin = unit * basis.norm() * length;
-            search.bounds = .{};
+            const margin: F32 = .splat(unit * search.basis.norm() * length);
+            const nowhere: F32 = .splat(inf);
+            const nothing = [2]F32{ nowhere, nowhere.neg() };
+            const none: Ends = .{ .u = nothing, .v = nothing, .near = nowhere };
+            var all = none;
             search.live = 0;
-            for (0..block_count) |index| {
-                var u: [2]F32 = .{ .splat(inf), .splat(-inf) };
-                var v = u;
-                var nearest: F32 = .splat(inf);
-                var here: Bounds = .{};
-                if (members[index] != 0) {
-                    for (0..Kernel.block_groups) |row| {
-                        const first = index * block_pixels + row * lanes;
-                        const near: F32 =
-                            .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
-                        const there = near.lt(.splat(inf));
-                        const x: F32 = .loadAligned(@alignCast(search.u[first..][0..lanes]));
-                        const y: F32 = .loadAligned(@alignCast(search.v[first..][0..lanes]));
-                        const along_u = x.mul(.splat(basis.i00)).add(y.mul(.splat(basis.i01)));
-                        const along_v = x.mul(.splat(basis.i10)).add(y.mul(.splat(basis.i11)));
-                        u[0] = u[0].minFast(.select(there, along_u, .splat(inf)));
-                        u[1] = u[1].maxFast(.select(there, along_u, .splat(-inf)));
-                        v[0] = v[0].minFast(.select(there, along_v, .splat(inf)));
-                        v[1] = v[1].maxFast(.select(there, along_v, .splat(-inf)));
-                        nearest = nearest.minFast(near);
-                    }
-                    search.live |= @as(u32, 1) << @intCast(index);
-                    const near = nearest.reduceMin();
-                    here = .{
-                        .u = .{ u[0].reduceMin() - margin, u[1].reduceMax() + margin },
-                        .v = .{ v[0].reduceMin() - margin, v[1].reduceMax() + margin },
-                        .depth = if (search.projection.slope == null) 1 / near else -near,
-                    };
+            for (0..block_count / lanes) |part| {
+                const first = part * lanes;
+                var each: [5][lanes]F32 = undefined;
+                for (members[first..][0..lanes], first.., 0..) |set, index, at| {
+                    const block = if (set == 0) none else search.endsOf(index);
+                    each[0][at], each[1][at] = block.u;
+                    each[2][at], each[3][at] = block.v;
+                    each[4][at] = block.near;
                 }
-                search.bounds = search.bounds.join(here);
-                search.setBlock(index, here);
+                const blocks: Ends = .{
+                    .u = .{ Rays.minOfEach(&each[0]).sub(margin), Rays.maxOfEach(&each[1]).add(margin) },
+                    .v = .{ Rays.minOfEach(&each[2]).sub(margin), Rays.maxOfEach(&each[3]).add(margin) },
+                    .near = Rays.minOfEach(&each[4]),
+                };
+                all = all.join(blocks);
+                search.live |= blocks.near.lt(nowhere).bits() << @intCast(first);
+                for (0..2) |end| {
+                    blocks.u[end].storeAligned(@alignCast(search.block_u[end][first..][0..lanes]));
+                    blocks.v[end].storeAligned(@alignCast(search.block_v[end][first..][0..lanes]));
+                }
             }
+            const near = all.near.reduceMin();
+            search.bounds = .{
+                .u = .{ all.u[0].reduceMin(), all.u[1].reduceMax() },
+                .v = .{ all.v[0].reduceMin(), all.v[1].reduceMax() },
+                .depth = if (search.projection.slope == null) 1 / near else -near,
+            };
+        }
+
+        /// Ends of coordinates in the axes of the parallelogram, and the least nearness, in lanes of
+        /// pixels or of blocks.
+        const Ends = struct {
+            u: [2]F32,
+            v: [2]F32,
+            near: F32,
+
+            inline fn join(a: Ends, b: Ends) Ends {
+                return .{
+                    .u = .{ a.u[0].minFast(b.u[0]), a.u[1].maxFast(b.u[1]) },
+                    .v = .{ a.v[0].minFast(b.v[0]), a.v[1].maxFast(b.v[1]) },
+                    .near = a.near.minFast(b.near),
+                };
+            }
+        };
+
+        /// What the groups of a block leave, by lane.
+        inline fn endsOf(search: *const Self, index: usize) Ends {
+            const basis = &search.basis;
+            const nowhere: F32 = .splat(inf);
+            var ends: Ends = undefined;
+            inline for (0..Kernel.block_groups) |row| {
+                const first = index * block_pixels + row * lanes;
+                const near: F32 = .loadAligned(@alignCast(search.nearness[first..][0..lanes]));
+                const there = near.lt(nowhere);
+                const x: F32 = .loadAligned(@alignCast(search.u[first..][0..lanes]));
+                const y: F32 = .loadAligned(@alignCast(search.v[first..][0..lanes]));
+                const u = x.mul(.splat(basis.i00)).add(y.mul(.splat(basis.i01)));
+                const v = x.mul(.splat(basis.i10)).add(y.mul(.splat(basis.i11)));
+                const group: Ends = .{
+                    .u = .{ .select(there, u, nowhere), .select(there, u, nowhere.neg()) },
+                    .v = .{ .select(there, v, nowhere), .select(there, v, nowhere.neg()) },
+                    .near = near,
+                };
+                ends = if (row == 0) group else ends.join(group);
+            }
+            return ends;
         }
 
         fn setBlock(search: *Self, index: usize, bounds: Bounds) void {
@@ -441,22 +468,26 @@ fn Search(comptime Kernel: type) type {
                 search.block_u[end][index] = bounds.u[end];
                 search.block_v[end][index] = bounds.v[end];
             }
-            search.block_depth[index] = bounds.depth;
         }
 
         /// Half of the set if it should be cut: what lies below the middle of the longer extent, in
         /// units of the median block.
         fn cut(search: *const Self, members: *const Members) ?Members {
-            var areas: [block_count]f32 = @splat(inf);
-            var extents: [2][block_count]f32 = @splat(@splat(inf));
-            var count: usize = 0;
-            for (0..block_count) |index| {
-                if (search.live >> @intCast(index) & 1 == 0) continue;
-                extents[0][count] = search.block_u[1][index] - search.block_u[0][index];
-                extents[1][count] = search.block_v[1][index] - search.block_v[0][index];
-                areas[count] = extents[0][count] * extents[1][count];
-                count += 1;
+            var areas: [block_count]f32 = undefined;
+            var extents: [2][block_count]f32 = undefined;
+            for (0..block_count / lanes) |part| {
+                const first = part * lanes;
+                const low = boundsOf(&search.block_u[0], first);
+                const u = boundsOf(&search.block_u[1], first).sub(low);
+                const v = boundsOf(&search.block_v[1], first)
+                    .sub(boundsOf(&search.block_v[0], first));
+                const there = low.lt(.splat(inf));
+                const nowhere: F32 = .splat(inf);
+                F32.select(there, u.mul(v), nowhere).store(areas[first..][0..lanes]);
+                F32.select(there, u, nowhere).store(extents[0][first..][0..lanes]);
+                F32.select(there, v, nowhere).store(extents[1][first..][0..lanes]);
             }
+            const count = @popCount(search.live);
             if (count == 0) return null;
             const share: f32 = @floatFromInt(count);
             if (!(search.bounds.area() > cut_ratio * share * median(&areas, count))) return null;
@@ -869,7 +900,7 @@ fn Search(comptime Kernel: type) type {
             return blocks;
         }
 
-        inline fn boundsOf(bounds: *align(64) const [block_count]f32, comptime first: usize) F32 {
+        inline fn boundsOf(bounds: *align(64) const [block_count]f32, first: usize) F32 {
             return .loadAligned(@alignCast(bounds[first..][0..lanes]));
         }
 
