@@ -84,8 +84,8 @@ fn meetCorners(
     return .{ .inside = inside, .mask = hit.mask, .t = hit.t };
 }
 
-/// Of rays that hit the triangle in `slot` at `t`, those whose own triangles in `others` do not come
-/// first, in the order of `ray.Hit`. Rays without one have no slot; the others do hit theirs.
+/// Of rays that hit the triangle in `slot` at `t`, those whose own triangles in `others` do not
+/// come first, in the order of `ray.Hit`. Rays without one have no slot; the others do hit theirs.
 pub fn comeFirst(
     comptime Kernel: type,
     tree: *const world_file.Tree(Kernel.width),

@@ -25,8 +25,8 @@ pub fn Plane(comptime width: u32) type {
     return struct {
         normal: [3]f32,
         offset: f32,
-        /// Of the least and the greatest value in a box: by axis, the first place in a node's bounds
-        /// of the side that it is on. In floats, so that addresses cost nothing in the loop.
+        /// Of the least and the greatest value in a box: by axis, the first place in a node's
+        /// bounds of the side that it is on. In floats, so that addresses cost nothing in the loop.
         place: [2][3]usize,
 
         const Self = @This();

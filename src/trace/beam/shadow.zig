@@ -404,11 +404,13 @@ fn Search(comptime Kernel: type) type {
                     each[2][at], each[3][at] = block.v;
                     each[4][at] = block.near;
                 }
-                const blocks: Ends = .{
-                    .u = .{ Rays.minOfEach(&each[0]).sub(margin), Rays.maxOfEach(&each[1]).add(margin) },
-                    .v = .{ Rays.minOfEach(&each[2]).sub(margin), Rays.maxOfEach(&each[3]).add(margin) },
+                var blocks: Ends = .{
+                    .u = .{ Rays.minOfEach(&each[0]), Rays.maxOfEach(&each[1]) },
+                    .v = .{ Rays.minOfEach(&each[2]), Rays.maxOfEach(&each[3]) },
                     .near = Rays.minOfEach(&each[4]),
                 };
+                blocks.u = .{ blocks.u[0].sub(margin), blocks.u[1].add(margin) };
+                blocks.v = .{ blocks.v[0].sub(margin), blocks.v[1].add(margin) };
                 all = all.join(blocks);
                 search.live |= blocks.near.lt(nowhere).bits() << @intCast(first);
                 for (0..2) |end| {
@@ -424,8 +426,8 @@ fn Search(comptime Kernel: type) type {
             };
         }
 
-        /// Ends of coordinates in the axes of the parallelogram, and the least nearness, in lanes of
-        /// pixels or of blocks.
+        /// Ends of coordinates in the axes of the parallelogram, and the least nearness, in lanes
+        /// of pixels or of blocks.
         const Ends = struct {
             u: [2]F32,
             v: [2]F32,
@@ -970,7 +972,13 @@ fn Search(comptime Kernel: type) type {
         }
 
         /// Asks the exact test. Returns those of the rays in doubt that meet the triangle.
-        fn decide(search: *Self, slot: exact.Slot, group: usize, doubtful: Mask, before: Mask) Mask {
+        fn decide(
+            search: *Self,
+            slot: exact.Slot,
+            group: usize,
+            doubtful: Mask,
+            before: Mask,
+        ) Mask {
             @branchHint(.unlikely);
             const ray = &search.bundle.groups[group];
             const hit = exact.meet(Kernel, search.tree, search.world.pad, ray, doubtful, slot);
