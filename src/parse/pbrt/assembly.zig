@@ -44,8 +44,10 @@ materials: std.ArrayList(scene_data.Material) = .empty,
 lights: std.ArrayList(scene_data.Light) = .empty,
 emitters: std.ArrayList(Emitter) = .empty,
 parts: std.ArrayList(Part) = .empty,
-/// Radiance from everywhere, of all infinite lights.
+/// Radiance from everywhere, of all infinite lights that shine evenly.
 sky: ?Vec3 = null,
+/// There is an infinite light whose map is not read.
+has_unknown_sky: bool = false,
 /// Where the last mesh hangs: the next one most often has the same place.
 last_node: ?struct { index: u32, place: Transform } = null,
 
@@ -74,6 +76,7 @@ pub fn clear(assembly: *Assembly) void {
     assembly.emitters.clearRetainingCapacity();
     assembly.parts.clearRetainingCapacity();
     assembly.sky = null;
+    assembly.has_unknown_sky = false;
     assembly.last_node = null;
 }
 

@@ -166,6 +166,11 @@ pub fn warn(
     if (entry.found_existing) return;
     const text = input.top();
     const line = placeOf(text.bytes, position).line;
+    // The scene's own name stands before every warning about it.
+    if (input.texts.items.len == 1) {
+        input.diagnostic.warn("line {d}: " ++ format, .{line} ++ arguments);
+        return;
+    }
     // The end of a name says most where there is no room for all of it.
     const room = diagnostic_file.name_bytes_max;
     const name = text.name[text.name.len -| room..];

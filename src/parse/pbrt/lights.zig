@@ -25,6 +25,9 @@ const Vector = Transform.Vector;
 
 /// Points that a shining shape becomes, where there are not too many of them.
 pub const points_per_shape = 16;
+/// Radiance of a sky whose map is not read, where other lights shine; without any, the scene gets
+/// the lights of scenes without lights.
+pub const unknown_sky = 0.35;
 /// Points of all shapes together, one for each at the least.
 pub const point_count_aim = 256;
 
@@ -107,7 +110,11 @@ pub fn add(source: *const Source, name: []const u8) Error!void {
         .infinite, .exinfinite => {
             if (source.parameters.find("mapname") != null or
                 source.parameters.find("filename") != null)
-                try source.note(name, "its map is not read, it shines evenly");
+            {
+                try source.note(name, "its map is not read, a grey sky stands for it");
+                assembly.has_unknown_sky = true;
+                return;
+            }
             const radiance = try source.color("L");
             var sum = assembly.sky orelse Vec3{ 0, 0, 0 };
             for (&sum, radiance) |*to, part| to.* = @min(to.* + part, std.math.floatMax(f32));

@@ -655,6 +655,8 @@ pub fn finish(reader: *Reader, scene: *Scene) Error!void {
     scene.resolution = view.size;
     scene.sample_count = reader.sample_count;
     scene.depth = reader.depth;
+    if (reader.assembly.has_unknown_sky and reader.assembly.sky == null and
+        reader.assembly.lights.items.len > 0) reader.assembly.sky = @splat(lights.unknown_sky);
     if (reader.assembly.sky) |sky| {
         scene.background = sky;
         scene.ambient = spectra.luminance(sky);
