@@ -33,7 +33,7 @@ pub fn build(b: *std.Build) void {
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
         .bench_rays = b.step("bench:rays", "Time rays: zig build bench:rays -- SCENE [options]"),
-        .bench_parse = b.step("bench:parse", "Time parsing: zig build bench:parse -- FILE.pbrt"),
+        .bench_parse = b.step("bench:parse", "Time parsing: zig build bench:parse -- SCENE.pbrt"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
         .vendor = b.step("vendor", "Fetch and check the third-party headers"),
     };
