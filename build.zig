@@ -86,12 +86,18 @@ pub fn build(b: *std.Build) void {
     scenes.addArg("scenes/cornell.gltf");
     steps.scenes.dependOn(&scenes.step);
 
+    addLowering(steps.lowering);
+}
+
+/// Makes `step` write the table of what the compiler makes of the SIMD library.
+fn addLowering(step: *std.Build.Step) void {
+    const b = step.owner;
     const lowering = b.addSystemCommand(&.{ "python3", "bench/lowering.py" });
     lowering.setCwd(b.path("."));
     lowering.addFileArg(.zig_exe);
     lowering.addArg("docs/lowering.md");
     lowering.has_side_effects = true;
-    steps.lowering.dependOn(&lowering.step);
+    step.dependOn(&lowering.step);
 }
 
 /// The step that puts the headers in place, and the folder of copies that depends on it.

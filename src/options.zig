@@ -198,15 +198,16 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\usage: raylane [render] SCENE [options]
     \\
     \\SCENE is a glTF 2.0 file (.gltf, .glb), a PBRT scene (.pbrt) or builtin:NAME,
-    \\NAME being cornell, atrium, nave or handles. The image is written to the working directory under
-    \\the scene's name, as a whole or not at all; a report goes to standard output.
+    \\NAME being cornell, atrium, nave or handles. The image is written to the
+    \\working directory under the scene's name, as a whole or not at all; a report
+    \\goes to standard output.
     \\
     \\Image
     \\  -o, --output FILE        name ending in .png, .ppm or .pfm; - is standard
     \\                           output
     \\      --format FORMAT      png, ppm (8 bits) or pfm (linear floats)
-    \\  -r, --resolution WxH     size in pixels (default: 1024 on the long side, in
-    \\                           the camera's aspect)
+    \\  -r, --resolution WxH     size in pixels (default: the scene's own, or 1024 on
+    \\                           the long side, in the camera's aspect)
     \\      --exposure EV|auto   brighten by EV stops, or so that 95 % of the pixels
     \\                           are no brighter than 0.8 (default: 0)
     \\      --tonemap linear     clamp, then encode as sRGB: the only way there is

@@ -1,7 +1,8 @@
 //! Stage 1: a scene file becomes a `Scene`.
 //!
-//! In: the path of a glTF 2.0 file, JSON or binary, of a PBRT scene, or `builtin:NAME`. Out: a checked `Scene`, or
-//! one line that says what is wrong. The format is chosen here and nowhere else.
+//! In: the path of a glTF 2.0 file, JSON or binary, or of a PBRT scene, or `builtin:NAME`. Out: a
+//! checked `Scene`, or one line that says what is wrong. The format is chosen here and nowhere
+//! else.
 
 const std = @import("std");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;

@@ -1,4 +1,5 @@
-//! Broken scene files, most of them glTF: an error of one line, a warning, or a scene, and never a crash or a leak.
+//! Broken scene files, most of them glTF: an error of one line, a warning, or a scene, and never a
+//! crash or a leak.
 //!
 //! In: a small document that is right, changed in one place, byte by byte, or cut; the corpus
 //! beside the checkout where there is one. Out: what its manifest, or a table here, says.

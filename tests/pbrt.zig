@@ -112,7 +112,8 @@ test "fov spans the shorter side" {
     const sizes = [_][2]u32{ .{ 200, 100 }, .{ 100, 200 } };
     for (sizes) |size| {
         var buffer: [1024]u8 = undefined;
-        const film = "Film \"image\" \"integer xresolution\" {d} \"integer yresolution\" {d}\n{s}{s}";
+        const film = "Film \"image\" \"integer xresolution\" {d} " ++
+            "\"integer yresolution\" {d}\n{s}{s}";
         const squares = two_squares[std.mem.find(u8, two_squares, "WorldBegin").?..];
         const text = try std.mem.print(&buffer, film, .{ size[0], size[1], look, squares });
         var image = try renderText(text, size[0], size[1]);
@@ -148,7 +149,8 @@ test "a disk that shines lights what it looks at as its area does, and is dark f
         \\Shape "disk" "float radius" .1
         \\AttributeEnd
         \\Material "matte" "rgb Kd" [1 1 1]
-        \\Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point P" [-9 0 -9 9 0 -9 9 0 9 -9 0 9]
+        \\Shape "trianglemesh" "integer indices" [0 1 2 0 2 3]
+        \\  "point P" [-9 0 -9 9 0 -9 9 0 9 -9 0 9]
     ;
     const view = "LookAt 0 1 0  0 0 0  0 0 1\n";
     var image = try renderText(view ++ world(lamp), 33, 33);
@@ -385,7 +387,8 @@ test "transformations act in the order in which they stand" {
         .{ "Translate 1 0 0 Transform [1 0 0 0 0 1 0 0 0 0 1 0 5 6 7 1]", Vec3{ 6, 6, 7 } },
         .{ "Scale 2 2 2 ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 5 6 7 1]", Vec3{ 12, 12, 14 } },
         .{ "LookAt 1 0 0  1 0 1  0 1 0", Vec3{ 0, 0, 0 } },
-        .{ "Translate 1 0 0 CoordinateSystem \"a\" Identity CoordSysTransform \"a\"", Vec3{ 2, 0, 0 } },
+        .{ "Translate 1 0 0 CoordinateSystem \"a\" Identity " ++
+            "CoordSysTransform \"a\"", Vec3{ 2, 0, 0 } },
         .{ "CoordSysTransform \"camera\"", Vec3{ 1, 0, 0 } },
         .{ "Translate 4 0 0 CoordSysTransform \"world\"", Vec3{ 1, 0, 0 } },
         .{ "AttributeBegin Translate 1 0 0 AttributeEnd", Vec3{ 1, 0, 0 } },
@@ -542,11 +545,29 @@ test "materials as the table of docs/pbrt.md has them" {
             0.1,
             1.5,
         },
-        .{ "\"uber\" \"rgb opacity\" [.5 .5 .5] \"rgb Kr\" [1 1 1]", .{ 0.25, 0.25, 0.25, 0.5 }, 0, 0, 1.5 },
-        .{ "\"translucent\" \"rgb Ks\" [1 1 1] \"float roughness\" 1", .{ 0.25, 0.25, 0.25, 1 }, 0, 0.903602, 1.5 },
+        .{
+            "\"uber\" \"rgb opacity\" [.5 .5 .5] \"rgb Kr\" [1 1 1]",
+            .{ 0.25, 0.25, 0.25, 0.5 },
+            0,
+            0,
+            1.5,
+        },
+        .{
+            "\"translucent\" \"rgb Ks\" [1 1 1] \"float roughness\" 1",
+            .{ 0.25, 0.25, 0.25, 1 },
+            0,
+            0.903602,
+            1.5,
+        },
         .{ "\"kdsubsurface\" \"rgb Kd\" [.2 .5 .7]", .{ 0.2, 0.5, 0.7, 1 }, 0, 0, 1.3 },
         .{ "\"shinymetal\" \"rgb Kr\" [.2 .5 .7]", .{ 0.2, 0.5, 0.7, 1 }, 1, 0, 1.5 },
-        .{ "\"disney\" \"rgb color\" [.2 .5 .7] \"float metallic\" .5", .{ 0.2, 0.5, 0.7, 1 }, 0.5, 0.5, 1.5 },
+        .{
+            "\"disney\" \"rgb color\" [.2 .5 .7] \"float metallic\" .5",
+            .{ 0.2, 0.5, 0.7, 1 },
+            0.5,
+            0.5,
+            1.5,
+        },
     };
     for (cases) |case| {
         errdefer std.debug.print("{s}\n", .{case[0]});
@@ -588,7 +609,8 @@ test "named materials, mixtures and boundaries" {
     var scene = try readClean(comptime world(
         \\MakeNamedMaterial "a" "string type" "matte" "rgb Kd" [1 0 0]
         \\MakeNamedMaterial "b" "string type" [ "mirror" ] "rgb Kr" [0 0 1]
-        \\Material "mix" "string namedmaterial1" "a" "string namedmaterial2" "b" "rgb amount" [.75 .75 .75]
+        \\Material "mix" "string namedmaterial1" "a" "string namedmaterial2" "b"
+        \\  "rgb amount" [.75 .75 .75]
         \\Shape "sphere"
         \\NamedMaterial "b"
         \\Shape "sphere"
@@ -601,7 +623,8 @@ test "named materials, mixtures and boundaries" {
     try expectEqual(3, scene.instances.len);
     try expectEqual([4]f32{ 0.75, 0, 0.25, 1 }, materialOf(&scene).base_color);
     try expectEqual([4]f32{ 0, 0, 1, 1 }, scene.materials[scene.meshes[1].material].base_color);
-    try expectEqual([4]f32{ 0.25, 0, 0.75, 1 }, scene.materials[scene.meshes[2].material].base_color);
+    const third = scene.materials[scene.meshes[2].material];
+    try expectEqual([4]f32{ 0.25, 0, 0.75, 1 }, third.base_color);
 }
 
 test "textures count as their mean, said once a kind" {
@@ -743,8 +766,16 @@ test "errors name line and column" {
         },
         .{ "Scale 1e30 1 1 Scale 1e30 1 1", "1:16", "the transformation is out of range" },
         .{ "CoordSysTransform \"x\"", "1:1", "no coordinate system 'x'" },
-        .{ "Scale 0 1 1 Camera \"perspective\"", "1:13", "the camera's transformation has no inverse" },
-        .{ "Camera \"perspective\" \"float fov\" 180", "1:1", "the camera's fov is 180, not between 0 and 180" },
+        .{
+            "Scale 0 1 1 Camera \"perspective\"",
+            "1:13",
+            "the camera's transformation has no inverse",
+        },
+        .{
+            "Camera \"perspective\" \"float fov\" 180",
+            "1:1",
+            "the camera's fov is 180, not between 0 and 180",
+        },
         .{ "Film \"image\" \"integer xresolution\" 0", "1:1", "xresolution is 0, not 1 to 65536" },
         .{
             "Film \"image\" \"integer xresolution\" 60000 \"integer yresolution\" 60000",
@@ -777,7 +808,8 @@ test "errors name line and column" {
             "has 1 heights for 2 by 2 points",
         },
         .{
-            "WorldBegin Shape \"nurbs\" \"integer nu\" 2 \"integer uorder\" 3 \"float uknots\" [0 1]",
+            "WorldBegin Shape \"nurbs\" \"integer nu\" 2 \"integer uorder\" 3 " ++
+                "\"float uknots\" [0 1]",
             "1:12",
             "uorder is 3 for 2 points: it is 2 to 32, and not above their number",
         },
@@ -848,7 +880,12 @@ const Folder = struct {
         return scene;
     }
 
-    fn expectWrong(folder: *Folder, text: []const u8, place: []const u8, message: []const u8) !void {
+    fn expectWrong(
+        folder: *Folder,
+        text: []const u8,
+        place: []const u8,
+        message: []const u8,
+    ) !void {
         var said: Diagnostic = .{};
         if (folder.read(text, false, &said)) |found| {
             var scene = found;
@@ -884,8 +921,16 @@ test "files are included from within the folder, and none includes itself" {
         said.warnings[0].text(),
     );
     const start = "WorldBegin Include ";
-    try folder.expectWrong(start ++ "\"in/bad.pbrt\"", "in/bad.pbrt:2:31", "a number is expected, not 'x'");
-    try folder.expectWrong(start ++ "\"round.pbrt\"", "back.pbrt:1:9", "'round.pbrt' includes itself");
+    try folder.expectWrong(
+        start ++ "\"in/bad.pbrt\"",
+        "in/bad.pbrt:2:31",
+        "a number is expected, not 'x'",
+    );
+    try folder.expectWrong(
+        start ++ "\"round.pbrt\"",
+        "back.pbrt:1:9",
+        "'round.pbrt' includes itself",
+    );
     try folder.expectWrong(start ++ "\"no.pbrt\"", "text:1:20", "'no.pbrt' does not exist");
     try folder.expectWrong(start ++ "\"in\"", "text:1:20", "'in' is a folder");
     try folder.expectWrong(start ++ "\"\"", "text:1:20", "'' is not a valid path");
@@ -1125,7 +1170,7 @@ test "fuzz: no text crashes, leaks or takes memory that it does not explain" {
             const from = random.uintLessThan(usize, right_text.len);
             const piece = switch (random.uintLessThan(u8, 3)) {
                 0 => words[random.uintLessThan(usize, words.len)],
-                1 => right_text[from..][0..random.uintAtMost(usize, @min(right_text.len - from, 80))],
+                1 => right_text[from..@min(right_text.len, from + random.uintAtMost(usize, 80))],
                 else => &.{random.int(u8)},
             };
             try text.replaceRange(gpa, at, length, piece);

@@ -33,13 +33,14 @@ pub fn parse(
         defer opened.close(io);
         const identity = Input.identityOf(io, opened) catch
             return diagnostic.fail(error.InputOutput, "cannot be read", .{});
-        const bytes = file.readTerminated(gpa, io, opened, limits.file_bytes_max, &reason) catch |err|
+        const limit = limits.file_bytes_max;
+        const bytes = file.readTerminated(gpa, io, opened, limit, &reason) catch |err|
             return switch (err) {
                 error.OutOfMemory => error.OutOfMemory,
                 error.TooLarge => diagnostic.fail(
                     error.InvalidInput,
                     "is over the limit of {d} bytes",
-                    .{limits.file_bytes_max},
+                    .{limit},
                 ),
                 else => diagnostic.fail(error.InputOutput, "{s}", .{reason}),
             };

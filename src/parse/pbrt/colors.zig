@@ -187,8 +187,10 @@ fn mean(
             return .{ first[0] * second[0], first[1] * second[1], first[2] * second[2] };
         },
         .mix, .directionmix, .checkerboard => {
-            const first = try colors.rgb(parameters, "tex1", if (known == .mix) @splat(0) else white);
-            const second = try colors.rgb(parameters, "tex2", if (known == .mix) white else @splat(0));
+            const black: Vec3 = @splat(0);
+            const is_mix = known == .mix;
+            const first = try colors.rgb(parameters, "tex1", if (is_mix) black else white);
+            const second = try colors.rgb(parameters, "tex2", if (is_mix) white else black);
             const amount = if (known == .mix) try colors.float(parameters, "amount", 0.5) else 0.5;
             return blend(first, second, amount);
         },

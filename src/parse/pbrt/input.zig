@@ -164,6 +164,11 @@ pub fn warn(
 ) Allocator.Error!void {
     const entry = try input.said.getOrPut(input.gpa, std.hash.Wyhash.hash(0, kind));
     if (entry.found_existing) return;
+    if (input.diagnostic.warning_count == diagnostic_file.warning_count_max) {
+        // Not worth looking for its line.
+        input.diagnostic.warning_dropped_count += 1;
+        return;
+    }
     const text = input.top();
     const line = placeOf(text.bytes, position).line;
     // The scene's own name stands before every warning about it.

@@ -85,7 +85,10 @@ const Reader = struct {
         return switch (kind) {
             .matte => matte(try reader.rgb("Kd", 0.5)),
             .diffuse => matte(try reader.rgb("reflectance", 0.5)),
-            .plastic => reader.coated(try reader.rgb("Kd", 0.25), 0.04 * try reader.bright("Ks", 0.25)),
+            .plastic => reader.coated(
+                try reader.rgb("Kd", 0.25),
+                0.04 * try reader.bright("Ks", 0.25),
+            ),
             .substrate => reader.coated(try reader.rgb("Kd", 0.5), try reader.bright("Ks", 0.5)),
             .coateddiffuse => reader.coatedDiffuse(),
             .mirror => metal(try reader.rgb("Kr", 0.9), 0),

@@ -149,7 +149,10 @@ test "numbers in all their forms" {
     try expectFloat(0, "1e-45");
     try expectFloat(0, "0.00000000000000000000000000000000000000001");
     try expectFloat(3.4028235e38, "3.4028235e38");
-    for ([_][:0]const u8{ "nan", "inf", "-", ".", "1x", "1e", "1e+", "0x10", "1_0", "--1", "" }) |bad| {
+    const wrong = [_][:0]const u8{
+        "nan", "inf", "-", ".", "1x", "1e", "1e+", "0x10", "1_0", "--1", "",
+    };
+    for (wrong) |bad| {
         var start: usize = 0;
         try std.testing.expectError(error.NotANumber, float(bad, &start));
         try std.testing.expectEqual(0, start);

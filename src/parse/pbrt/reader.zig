@@ -137,10 +137,29 @@ const Directive = enum {
     /// Where it may stand: before the world, in it, or both.
     fn allowedIn(directive: Directive, phase: Phase) bool {
         return switch (directive) {
-            .Accelerator, .Camera, .Film, .Integrator, .PixelFilter, .Renderer, .Sampler => phase == .options,
-            .SurfaceIntegrator, .VolumeIntegrator, .WorldBegin, .TransformTimes => phase == .options,
-            .AreaLightSource, .LightSource, .Material, .NamedMaterial, .Shape => phase == .world,
-            .ObjectBegin, .ObjectEnd, .ObjectInstance, .Volume, .WorldEnd => phase == .world,
+            .Accelerator,
+            .Camera,
+            .Film,
+            .Integrator,
+            .PixelFilter,
+            .Renderer,
+            .Sampler,
+            .SurfaceIntegrator,
+            .TransformTimes,
+            .VolumeIntegrator,
+            .WorldBegin,
+            => phase == .options,
+            .AreaLightSource,
+            .LightSource,
+            .Material,
+            .NamedMaterial,
+            .ObjectBegin,
+            .ObjectEnd,
+            .ObjectInstance,
+            .Shape,
+            .Volume,
+            .WorldEnd,
+            => phase == .world,
             else => true,
         };
     }
@@ -359,10 +378,7 @@ fn keep(
     value: Value,
 ) Allocator.Error!void {
     const entry = try map.getOrPut(reader.arena, name);
-    if (!entry.found_existing) {
-        errdefer map.removeByPtr(entry.key_ptr);
-        entry.key_ptr.* = try reader.arena.dupe(u8, name);
-    }
+    if (!entry.found_existing) entry.key_ptr.* = try reader.arena.dupe(u8, name);
     entry.value_ptr.* = value;
 }
 

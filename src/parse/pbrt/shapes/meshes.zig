@@ -18,7 +18,8 @@ pub fn points(floats: []const f32) []const Vec3 {
 /// `P`, `indices` and perhaps `N`. One triangle needs no indices.
 pub fn triangles(maker: *Maker) Error!Geometry {
     const parameters = maker.parameters;
-    const from = points(parameters.floatsNamed("P") orelse return maker.fail("has no points P", .{}));
+    const from = points(parameters.floatsNamed("P") orelse
+        return maker.fail("has no points P", .{}));
     const one = [_]i32{ 0, 1, 2 };
     const indices: []const i32 = if (parameters.find("indices")) |parameter|
         parameters.integersOf(parameter)
@@ -59,7 +60,8 @@ inline fn checked(maker: *Maker, vertex: i32, vertex_count: usize) Error!u32 {
 /// Patches of four points each, cut into two triangles.
 pub fn bilinear(maker: *Maker) Error!Geometry {
     const parameters = maker.parameters;
-    const from = points(parameters.floatsNamed("P") orelse return maker.fail("has no points P", .{}));
+    const from = points(parameters.floatsNamed("P") orelse
+        return maker.fail("has no points P", .{}));
     const one = [_]i32{ 0, 1, 2, 3 };
     const indices: []const i32 = if (parameters.find("indices")) |parameter|
         parameters.integersOf(parameter)

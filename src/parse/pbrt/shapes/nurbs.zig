@@ -191,7 +191,8 @@ fn readDirection(maker: *Maker, comptime names: [5][]const u8) Error!Direction {
             .{ knots.len, point_count, order },
         );
     for (knots[1..], knots[0 .. knots.len - 1]) |knot, before| {
-        if (knot < before) return maker.fail(names[2] ++ " falls from {d} to {d}", .{ before, knot });
+        if (knot >= before) continue;
+        return maker.fail(names[2] ++ " falls from {d} to {d}", .{ before, knot });
     }
     const low = knots[@intCast(order - 1)];
     const high = knots[@intCast(point_count)];
@@ -209,7 +210,8 @@ fn readDirection(maker: *Maker, comptime names: [5][]const u8) Error!Direction {
 
 test "basis functions sum to one, their slopes to none" {
     const knots = [_]f32{ 0, 0, 0, 1, 2, 2, 3, 3, 3 };
-    const direction: Direction = .{ .point_count = 6, .order = 3, .knots = &knots, .from = 0, .to = 3 };
+    const direction: Direction =
+        .{ .point_count = 6, .order = 3, .knots = &knots, .from = 0, .to = 3 };
     for (0..31) |step| {
         const t = @as(f64, @floatFromInt(step)) / 10;
         const basis = Basis.at(&direction, t);

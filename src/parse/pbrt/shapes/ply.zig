@@ -107,8 +107,11 @@ const Reader = struct {
                 return reader.fail("the PLY header says {f}", .{quote(word)})) {
                 .comment, .obj_info => {},
                 .end_header => return,
-                .format => reader.format = std.meta.stringToEnum(Format, words.next() orelse "") orelse
-                    return reader.fail("is of an unknown PLY format", .{}),
+                .format => {
+                    const name = words.next() orelse "";
+                    reader.format = std.meta.stringToEnum(Format, name) orelse
+                        return reader.fail("is of an unknown PLY format", .{});
+                },
                 .element => try reader.addElement(&words),
                 .property => try reader.addProperty(&words),
             }
