@@ -217,11 +217,11 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\      --camera WHICH       name or index of a camera, or auto: all in view
     \\      --ambient L          radiance from all sides (default: 0.35 for scenes
     \\                           without lights, otherwise 0)
-    \\      --tessellation N     straight pieces of a circle in curved PBRT shapes, 4 to
-    \\                           1024 (default: 32)
+    \\      --tessellation N     straight pieces of a circle in curved PBRT shapes,
+    \\                           4 to 1024 (default: 32)
     \\      --allow-outside      let the scene name files outside of its own folder
     \\
-    \\Rendering
+    \\Rendering (PBRT scenes bring their own spp and depth)
     \\      --spp N              samples a pixel, 1 to 4096 (default: 1)
     \\      --depth N            reflections and refractions in a row, 0 to 32
     \\                           (default: 6)
@@ -800,6 +800,7 @@ test "limits in texts are those of the code" {
     const help_limits = .{
         .{ "1 to {d} (default: 1)", sample_count_max },
         .{ "0 to {d}\n", depth_max },
+        .{ "to {d} (default: 32)", tessellation_max },
         .{ "1 to {d} (default: as many", thread_count_max },
     };
     inline for (help_limits) |limit| {

@@ -45,7 +45,19 @@ const Graphics = struct {
 const Glow = struct { radiance: Vec3, two_sided: bool };
 
 const Kept = struct {
-    const Kind = enum { attribute, transform, object };
+    const Kind = enum {
+        attribute,
+        transform,
+        object,
+
+        fn name(kind: Kind) []const u8 {
+            return switch (kind) {
+                .attribute => "Attribute",
+                .transform => "Transform",
+                .object => "Object",
+            };
+        }
+    };
 
     kind: Kind,
     graphics: Graphics,
@@ -417,11 +429,11 @@ fn begin(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
 
 fn end(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
     const kept = reader.stack.getLastOrNull() orelse
-        return reader.input.fail(position, "nothing of the kind has begun", .{});
+        return reader.input.fail(position, "{s}End without {0s}Begin", .{kind.name()});
     if (kept.kind != kind) return reader.input.fail(
         position,
-        "the block that has begun last is of another kind: {t}",
-        .{kept.kind},
+        "{s}End, but {s}Begin came last",
+        .{ kind.name(), kept.kind.name() },
     );
     _ = reader.stack.pop();
     if (kind == .transform) {
@@ -582,6 +594,7 @@ fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
     const input = reader.input;
     reader.maker.parameters = &reader.parameters;
     reader.maker.position = position;
+    reader.maker.name = name;
     const kind = std.meta.stringToEnum(shapes.Kind, name) orelse return input.warn(
         position,
         name,

@@ -33,12 +33,14 @@ arena: std.mem.Allocator,
 parameters: *const Parameters = undefined,
 /// Where that directive stands.
 position: usize = 0,
+/// What kind of shape it is, for messages.
+name: []const u8 = "",
 /// Bytes of all geometry so far.
 bytes_used: u64 = 0,
 
 /// Fails where the shape stands.
 pub fn fail(maker: *Maker, comptime format: []const u8, arguments: anytype) error{InvalidInput} {
-    return maker.input.fail(maker.position, format, arguments);
+    return maker.input.fail(maker.position, "{s}: " ++ format, .{maker.name} ++ arguments);
 }
 
 /// Memory that lives as long as the scene.
