@@ -3,8 +3,8 @@
 //! In: `P`, `indices` and `levels` (or `nlevels`). Out: that many times four triangles for each,
 //! vertices at their limit on the surface, smooth normals. Weights: Loop, "Smooth subdivision
 //! surfaces based on triangles" (1987), with the simpler beta of Warren that PBRT uses; limits:
-//! Hoppe et al., "Piecewise smooth surface reconstruction" (1994), with that of cubic B-splines along
-//! borders, where PBRT has 1/5 for 1/6. Edges with other than two faces count as borders.
+//! Hoppe et al., "Piecewise smooth surface reconstruction" (1994), and that of cubic B-splines
+//! along borders, 1/6, where PBRT has 1/5. Edges with other than two faces count as borders.
 
 const std = @import("std");
 const limits = @import("../limits.zig");
