@@ -64,6 +64,13 @@ fn run(init: std.process.Init) ExitCode {
     }
 }
 
+comptime {
+    // What the options accept is what the reader of scenes expects.
+    assert(raylane.options.tessellation_min == raylane.parse.tessellation_min);
+    assert(raylane.options.tessellation_max == raylane.parse.tessellation_max);
+    assert(raylane.options.tessellation_default == raylane.parse.tessellation_default);
+}
+
 /// Renders one scene, then says what it cost or why it failed.
 fn renderAndReport(
     gpa: Allocator,

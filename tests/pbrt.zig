@@ -494,6 +494,9 @@ test "a world that only prepares another gives way to it, a second picture does 
     var both = try readClean(first ++ second);
     defer both.deinit();
     try expectEqual(1984, both.triangleCount());
+    var named = try readClean(first ++ "\nRenderer \"sampler\"" ++ second);
+    defer named.deinit();
+    try expectEqual(1984, named.triangleCount());
     try expectEqual(7, both.resolution.?[0]);
     var alone = try readClean(first);
     defer alone.deinit();
@@ -1024,6 +1027,50 @@ test "PLY as text and binary of both orders, polygons as fans; cut anywhere it i
                 return error.TestExpectedError;
             } else |err| try expectEqual(error.InvalidInput, err);
         }
+    }
+}
+
+test "no changed byte of a PLY file crashes" {
+    var folder: Folder = .{ .temporary = std.testing.tmpDir(.{}) };
+    defer folder.temporary.cleanup();
+    var random_state: std.Random.DefaultPrng = .init(7);
+    const random = random_state.random();
+    for ([_][]const u8{ "ascii", "binary_little_endian", "binary_big_endian" }) |format| {
+        const bytes = try plyFile(format);
+        defer gpa.free(bytes);
+        for (bytes) |*byte| {
+            const before = byte.*;
+            defer byte.* = before;
+            byte.* = if (random.boolean()) random.int(u8) else '0' + random.uintLessThan(u8, 10);
+            try folder.write("m.ply", bytes);
+            var said: Diagnostic = .{};
+            var scene = folder.read(ply_scene, false, &said) catch |err| {
+                try expectEqual(error.InvalidInput, err);
+                continue;
+            };
+            scene.deinit();
+        }
+    }
+}
+
+test "huge numbers stay within what a scene may hold" {
+    const cases = [_][]const u8{
+        "Scale 1e30 1e30 1e30 LightSource \"point\" \"point from\" [1e30 0 0]",
+        "Shape \"hyperboloid\" \"point p1\" [3e38 3e38 0] \"point p2\" [-3e38 3e38 3e38]",
+        "LightSource \"infinite\" \"rgb L\" [3e38 3e38 3e38] \"rgb scale\" [9 9 9]",
+        "AreaLightSource \"diffuse\" \"rgb L\" [3e38 1 1] Shape \"disk\" \"float radius\" 3e38",
+        "Shape \"sphere\" \"float radius\" 3e38",
+        "Material \"metal\" \"rgb eta\" [3e38 0 0] \"rgb k\" [3e38 0 0] Shape \"sphere\"",
+    };
+    for (cases) |case| {
+        var buffer: [400]u8 = undefined;
+        const text = try std.mem.print(&buffer, "{s}WorldBegin {s}", .{ plain_camera, case });
+        var said: Diagnostic = .{};
+        var scene = try read(text, &said);
+        defer scene.deinit();
+        for (scene.nodes) |node| try expect(node.local.isFinite());
+        for (scene.materials) |*material| try expect(std.math.isFinite(material.base_color[0]));
+        if (scene.ambient) |ambient| try expect(std.math.isFinite(ambient));
     }
 }
 

@@ -31,6 +31,9 @@ pub const unknown_sky = 0.35;
 /// Points of all shapes together, one for each at the least.
 pub const point_count_aim = 256;
 
+/// Radiance beyond which a sky is no brighter.
+const sky_max = 1e30;
+
 /// Cosine from which the spots of emitters shine in full.
 const emitter_cosine = 0.75;
 
@@ -117,7 +120,7 @@ pub fn add(source: *const Source, name: []const u8) Error!void {
             }
             const radiance = try source.color("L");
             var sum = assembly.sky orelse Vec3{ 0, 0, 0 };
-            for (&sum, radiance) |*to, part| to.* = @min(to.* + part, std.math.floatMax(f32));
+            for (&sum, radiance) |*to, part| to.* = @min(to.* + part, sky_max);
             assembly.sky = sum;
         },
     }

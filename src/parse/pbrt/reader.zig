@@ -196,7 +196,7 @@ pub fn run(reader: *Reader) Error!void {
                 try input.warn(position, "more", "only the first picture is made", .{});
                 break;
             }
-            reader.phase = .options;
+            reader.startAgain();
         }
         if (!directive.allowedIn(reader.phase)) return input.fail(
             position,
@@ -205,7 +205,7 @@ pub fn run(reader: *Reader) Error!void {
         );
         try reader.perform(directive, position);
     }
-    if (reader.phase == .options and !reader.is_preparation)
+    if (reader.phase == .options)
         return input.fail(input.top().bytes.len, "there is no WorldBegin", .{});
     if (reader.stack.items.len > 0) try input.warn(
         input.top().bytes.len,
@@ -473,12 +473,16 @@ fn objectInstance(reader: *Reader, position: usize) Error!void {
     try reader.assembly.showObject(object, &reader.graphics.transform);
 }
 
+/// Forgets a world that has only prepared the one that follows.
+fn startAgain(reader: *Reader) void {
+    reader.assembly.clear();
+    reader.objects.clearRetainingCapacity();
+    reader.known_meshes.clearRetainingCapacity();
+    reader.is_preparation = false;
+    reader.phase = .options;
+}
+
 fn worldBegin(reader: *Reader) Error!void {
-    if (reader.is_preparation and reader.assembly.nodes.items.len > 0) {
-        reader.assembly.clear();
-        reader.objects.clearRetainingCapacity();
-        reader.known_meshes.clearRetainingCapacity();
-    }
     reader.phase = .world;
     reader.graphics.transform = .identity;
     reader.graphics.at_start = true;

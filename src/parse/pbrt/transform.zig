@@ -166,9 +166,8 @@ pub fn isFinite(map: *const Transform) bool {
     return true;
 }
 
-/// In f32, denormals as zeros. Asserts that it `isFinite`.
+/// In f32, as `toVec3` has it.
 pub fn toAffine(map: *const Transform) Affine {
-    std.debug.assert(map.isFinite());
     return .{
         .x = toVec3(map.axes[0]),
         .y = toVec3(map.axes[1]),
@@ -177,11 +176,13 @@ pub fn toAffine(map: *const Transform) Affine {
     };
 }
 
-/// In f32, denormals as zeros.
+/// In f32, denormals as zeros, what is out of range at its end.
 pub fn toVec3(vector: Vector) math.Vec3 {
+    const largest: f64 = std.math.floatMax(f32);
     var result: math.Vec3 = undefined;
     for (vector, &result) |number, *component| {
-        component.* = math.vec3.flushDenormal(@floatCast(number));
+        const bounded = std.math.clamp(number, -largest, largest);
+        component.* = math.vec3.flushDenormal(@floatCast(bounded));
     }
     return result;
 }

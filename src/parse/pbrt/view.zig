@@ -114,8 +114,9 @@ pub fn projection(view: *View, input: *Input) Error!scene.Camera.Projection {
         [4]f64{ -aspect, aspect, -1, 1 }
     else
         [4]f64{ -1, 1, -1 / aspect, 1 / aspect };
-    const half_width = 0.5 * (window[1] - window[0]);
-    const half_height = 0.5 * (window[3] - window[2]);
+    // Within what a camera can show in the end.
+    const half_width = std.math.clamp(0.5 * (window[1] - window[0]), 1e-9, 1e9);
+    const half_height = std.math.clamp(0.5 * (window[3] - window[2]), 1e-9, 1e9);
     const middle: Transform.Vector =
         .{ 0.5 * (window[0] + window[1]), 0.5 * (window[2] + window[3]), 0 };
     if (@abs(half_width / half_height / film - 1) > 0.01) try input.warn(
