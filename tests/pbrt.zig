@@ -787,7 +787,11 @@ test "errors name line and column" {
         },
         .{ "WorldBegin NamedMaterial \"x\"", "1:12", "no material 'x'" },
         .{ "MakeNamedMaterial \"x\"", "1:1", "the material has no type" },
-        .{ "WorldBegin Shape \"sphere\" \"float radius\" 0", "1:12", "sphere: radius is 0, not above 0" },
+        .{
+            "WorldBegin Shape \"sphere\" \"float radius\" 0",
+            "1:12",
+            "sphere: radius is 0, not above 0",
+        },
         .{ "WorldBegin Shape \"trianglemesh\"", "1:12", "trianglemesh: has no points P" },
         .{
             "WorldBegin Shape \"trianglemesh\" \"point P\" [0 0 0] \"integer indices\" [0 0]",
