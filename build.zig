@@ -33,6 +33,7 @@ pub fn build(b: *std.Build) void {
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
         .bench_rays = b.step("bench:rays", "Time rays: zig build bench:rays -- SCENE [options]"),
+        .bench_parse = b.step("bench:parse", "Time parsing: zig build bench:parse -- SCENE.pbrt"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
         .vendor = b.step("vendor", "Fetch and check the third-party headers"),
     };
@@ -62,6 +63,7 @@ pub fn build(b: *std.Build) void {
     steps.@"asm".dependOn(&b.addInstallFile(program.getEmittedAsm(), "raylane.s").step);
 
     addBenchmark(steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
+    addBenchmark(steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
 
     const tests: Tests = .init(b, resolve(b, .{}), filters orelse &.{});
     const test_packages: TestPackages = .{
@@ -84,12 +86,18 @@ pub fn build(b: *std.Build) void {
     scenes.addArg("scenes/cornell.gltf");
     steps.scenes.dependOn(&scenes.step);
 
+    addLowering(steps.lowering);
+}
+
+/// Makes `step` write the table of what the compiler makes of the SIMD library.
+fn addLowering(step: *std.Build.Step) void {
+    const b = step.owner;
     const lowering = b.addSystemCommand(&.{ "python3", "bench/lowering.py" });
     lowering.setCwd(b.path("."));
     lowering.addFileArg(.zig_exe);
     lowering.addArg("docs/lowering.md");
     lowering.has_side_effects = true;
-    steps.lowering.dependOn(&lowering.step);
+    step.dependOn(&lowering.step);
 }
 
 /// The step that puts the headers in place, and the folder of copies that depends on it.

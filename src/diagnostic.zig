@@ -42,6 +42,9 @@ pub const Message = struct {
 pub const Diagnostic = struct {
     /// Why the run failed; empty until `fail`.
     message: Message = .{},
+    /// The place within a file that the message is about, `FILE:LINE:COLUMN`; empty: the file that
+    /// the user named, as a whole.
+    place: Message = .{},
     warnings: [warning_count_max]Message = undefined,
     warning_count: usize = 0,
     /// Warnings past `warning_count_max`.

@@ -64,6 +64,13 @@ fn run(init: std.process.Init) ExitCode {
     }
 }
 
+comptime {
+    // What the options accept is what the reader of scenes expects.
+    assert(raylane.options.tessellation_min == raylane.parse.tessellation_min);
+    assert(raylane.options.tessellation_max == raylane.parse.tessellation_max);
+    assert(raylane.options.tessellation_default == raylane.parse.tessellation_default);
+}
+
 /// Renders one scene, then says what it cost or why it failed.
 fn renderAndReport(
     gpa: Allocator,
@@ -89,7 +96,13 @@ fn renderAndReport(
         job.sayOfScene("warning: {d} more", .{diagnostic.warning_dropped_count});
     }
     const report = outcome catch |err| {
-        const file = if (err == error.OutputFailed) job.outputTitle() else options.scene;
+        const place = diagnostic.place.text();
+        const file = if (err == error.OutputFailed)
+            job.outputTitle()
+        else if (place.len > 0)
+            place
+        else
+            options.scene;
         const text = if (err == error.OutOfMemory) "out of memory" else diagnostic.message.text();
         assert(text.len > 0);
         say(io, "raylane: {f}: {s}\n", .{ printable(file), text });
@@ -110,6 +123,9 @@ const Job = struct {
     output_name: []const u8,
     diagnostic: *Diagnostic,
     progress: std.Progress.Node = .none,
+    /// Samples a pixel and bounces: what the user says, or the scene.
+    sample_count: u32 = raylane.options.sample_count_default,
+    depth: u32 = raylane.options.depth_default,
     /// Warnings that the user has seen.
     warning_count: usize = 0,
 
@@ -135,8 +151,12 @@ const Job = struct {
         const start = Io.Clock.awake.now(io);
         var scene = try raylane.parse.parse(gpa, io, job.options.scene, .{
             .allow_outside = job.options.allow_outside,
+            .tessellation = job.options.tessellation,
         }, job.diagnostic);
         const triangle_count = scene.triangleCount();
+        job.sample_count = job.options.sample_count orelse scene.sample_count orelse
+            raylane.options.sample_count_default;
+        job.depth = job.options.depth orelse scene.depth orelse raylane.options.depth_default;
         times.parse_ns = since(io, start);
 
         var world = prepared: {
@@ -190,8 +210,8 @@ const Job = struct {
             .triangle_count = 0,
             .width = image.width,
             .height = image.height,
-            .sample_count = job.options.sample_count,
-            .depth = job.options.depth,
+            .sample_count = job.sample_count,
+            .depth = job.depth,
             .thread_count = job.threadCount(),
             .variant = raylane.variant.names[job.options.variant_index],
             .times = .{},
@@ -251,8 +271,8 @@ const Job = struct {
     fn traceSettings(job: *const Job) raylane.trace.Settings {
         return .{
             .thread_count = job.threadCount(),
-            .sample_count = job.options.sample_count,
-            .depth_max = job.options.depth,
+            .sample_count = job.sample_count,
+            .depth_max = job.depth,
             .tile_size = job.options.tile_size,
             .transparent = job.options.background == .transparent,
             .progress = job.progress,

@@ -63,6 +63,13 @@ pub const thread_count_max = 256;
 pub const sample_count_max = 4096;
 /// Most bounces.
 pub const depth_max = 32;
+/// Samples a pixel and bounces where neither the user nor the scene says.
+pub const sample_count_default = 1;
+pub const depth_default = 6;
+/// Fewest and most straight pieces of a circle, and how many where the user does not say.
+pub const tessellation_min = 4;
+pub const tessellation_max = 1024;
+pub const tessellation_default = 32;
 /// Smallest and largest side of a tile, in pixels; sides are multiples of 4.
 pub const tile_size_min = 4;
 pub const tile_size_max = 512;
@@ -75,12 +82,17 @@ pub const Options = struct {
     /// Null: the scene's name in the working directory; "-": standard output.
     output: ?[]const u8 = null,
     format: Format = .png,
-    /// Width and height in pixels; null: the camera's aspect, 1024 on the long side.
+    /// Width and height in pixels; null: the scene's, or its camera's aspect with 1024 on the long
+    /// side.
     resolution: ?[2]u32 = null,
     /// Null: as many as the system has CPUs.
     thread_count: ?u16 = null,
-    sample_count: u32 = 1,
-    depth: u32 = 6,
+    /// Null: the scene's, or `sample_count_default`.
+    sample_count: ?u32 = null,
+    /// Null: the scene's, or `depth_default`.
+    depth: ?u32 = null,
+    /// Straight pieces that a full circle becomes.
+    tessellation: u32 = tessellation_default,
     tile_size: u32 = 32,
     bvh: Bvh = .default,
     camera: Camera = .default,
@@ -133,6 +145,7 @@ const Id = enum {
     resolution,
     spp,
     stats,
+    tessellation,
     thesis,
     threads,
     tile_size,
@@ -170,6 +183,7 @@ const flags: []const Flag = &.{
     .{ .id = .list_variants, .long = "--list-variants", .has_value = false },
     .{ .id = .stats, .long = "--stats" },
     .{ .id = .count_tests, .long = "--count-tests", .has_value = false },
+    .{ .id = .tessellation, .long = "--tessellation" },
     .{ .id = .allow_outside, .long = "--allow-outside", .has_value = false },
     .{ .id = .quiet, .long = "--quiet", .short = 'q', .has_value = false },
     .{ .id = .verbose, .long = "--verbose", .short = 'v', .has_value = false },
@@ -179,20 +193,21 @@ const flags: []const Flag = &.{
 
 /// What `--help` prints.
 pub const help: []const u8 = "raylane " ++ version ++
-    \\: renders a glTF scene to an image on the CPU
+    \\: renders a glTF or PBRT scene to an image on the CPU
     \\
     \\usage: raylane [render] SCENE [options]
     \\
-    \\SCENE is a glTF 2.0 file (.gltf, .glb) or builtin:NAME, NAME being cornell,
-    \\atrium, nave or handles. The image is written to the working directory under
-    \\the scene's name, as a whole or not at all; a report goes to standard output.
+    \\SCENE is a glTF 2.0 file (.gltf, .glb), a PBRT scene (.pbrt) or builtin:NAME,
+    \\NAME being cornell, atrium, nave or handles. The image is written to the
+    \\working directory under the scene's name, as a whole or not at all; a report
+    \\goes to standard output.
     \\
     \\Image
     \\  -o, --output FILE        name ending in .png, .ppm or .pfm; - is standard
     \\                           output
     \\      --format FORMAT      png, ppm (8 bits) or pfm (linear floats)
-    \\  -r, --resolution WxH     size in pixels (default: 1024 on the long side, in
-    \\                           the camera's aspect)
+    \\  -r, --resolution WxH     size in pixels (default: the scene's own, or 1024 on
+    \\                           the long side, in the camera's aspect)
     \\      --exposure EV|auto   brighten by EV stops, or so that 95 % of the pixels
     \\                           are no brighter than 0.8 (default: 0)
     \\      --tonemap linear     clamp, then encode as sRGB: the only way there is
@@ -202,9 +217,11 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\      --camera WHICH       name or index of a camera, or auto: all in view
     \\      --ambient L          radiance from all sides (default: 0.35 for scenes
     \\                           without lights, otherwise 0)
+    \\      --tessellation N     straight pieces of a circle in curved PBRT shapes,
+    \\                           4 to 1024 (default: 32)
     \\      --allow-outside      let the scene name files outside of its own folder
     \\
-    \\Rendering
+    \\Rendering (PBRT scenes bring their own spp and depth)
     \\      --spp N              samples a pixel, 1 to 4096 (default: 1)
     \\      --depth N            reflections and refractions in a row, 0 to 32
     \\                           (default: 6)
@@ -399,6 +416,9 @@ const Parser = struct {
                 return parser.bad(flag, value, "fast, default or high"),
             .variant => options.variant_index = try parser.variantOf(value),
             .count_tests => options.count_tests = true,
+            .tessellation => options.tessellation =
+                integer(u32, value, tessellation_min, tessellation_max) orelse
+                return parser.bad(flag, value, "4 to 1024"),
             .allow_outside => options.allow_outside = true,
             .quiet => options.quiet = true,
             .verbose => options.verbose = true,
@@ -780,6 +800,7 @@ test "limits in texts are those of the code" {
     const help_limits = .{
         .{ "1 to {d} (default: 1)", sample_count_max },
         .{ "0 to {d}\n", depth_max },
+        .{ "to {d} (default: 32)", tessellation_max },
         .{ "1 to {d} (default: as many", thread_count_max },
     };
     inline for (help_limits) |limit| {

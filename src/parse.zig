@@ -1,12 +1,15 @@
 //! Stage 1: a scene file becomes a `Scene`.
 //!
-//! In: the path of a glTF 2.0 file, JSON or binary, or `builtin:NAME`. Out: a checked `Scene`, or
-//! one line that says what is wrong. The format is chosen here and nowhere else.
+//! In: the path of a glTF 2.0 file, JSON or binary, or of a PBRT scene, or `builtin:NAME`. Out: a
+//! checked `Scene`, or one line that says what is wrong. The format is chosen here and nowhere
+//! else.
 
 const std = @import("std");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Scene = @import("scene.zig").Scene;
 const gltf = @import("parse/gltf.zig");
+const pbrt = @import("parse/pbrt.zig");
+const settings_file = @import("parse/settings.zig");
 const Allocator = std.mem.Allocator;
 
 /// Scenes that need no file.
@@ -16,8 +19,13 @@ pub const builtin = @import("parse/builtin.zig");
 /// what it should be, or it needs what is not supported.
 pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
 
-/// What the user allows a file to do.
-pub const Settings = gltf.Settings;
+/// What the user allows a file to do, and how finely curved shapes are cut.
+pub const Settings = settings_file.Settings;
+
+/// Bounds of `Settings.tessellation`.
+pub const tessellation_default = settings_file.tessellation_default;
+pub const tessellation_min = settings_file.tessellation_min;
+pub const tessellation_max = settings_file.tessellation_max;
 
 const builtin_prefix = "builtin:";
 
@@ -34,7 +42,7 @@ pub fn parse(
         return builtin.build(gpa, path[builtin_prefix.len..], diagnostic);
     }
     if (std.ascii.endsWithIgnoreCase(path, ".pbrt")) {
-        return diagnostic.fail(error.InvalidInput, "PBRT scenes are not read, only glTF 2.0", .{});
+        return pbrt.parse(gpa, io, path, settings, diagnostic);
     }
     return gltf.parse(gpa, io, path, settings, diagnostic);
 }
@@ -43,19 +51,24 @@ pub fn parse(
 /// Otherwise like `parse`.
 pub const parseBytes = gltf.parseBytes;
 
+/// The same for a PBRT text.
+pub const parsePbrt = pbrt.parseBytes;
+
 test {
     _ = builtin;
     _ = gltf;
+    _ = pbrt;
 }
 
 test "a scene is chosen by its prefix or its extension" {
     const gpa = std.testing.allocator;
     const io = std.testing.io;
     var diagnostic: Diagnostic = .{};
-    for ([_][]const u8{ "builtin:no such", "a.pbrt", "A.PBRT" }) |path| {
-        try std.testing.expectError(error.InvalidInput, parse(gpa, io, path, .{}, &diagnostic));
-        try std.testing.expect(diagnostic.message.text().len > 0);
+    const unknown = parse(gpa, io, "builtin:no such", .{}, &diagnostic);
+    try std.testing.expectError(error.InvalidInput, unknown);
+    try std.testing.expect(diagnostic.message.text().len > 0);
+    for ([_][]const u8{ "does not exist.glb", "a.pbrt", "A.PBRT" }) |path| {
+        const missing = parse(gpa, io, path, .{}, &diagnostic);
+        try std.testing.expectError(error.InputOutput, missing);
     }
-    const missing = parse(gpa, io, "does not exist.glb", .{}, &diagnostic);
-    try std.testing.expectError(error.InputOutput, missing);
 }

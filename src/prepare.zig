@@ -111,7 +111,8 @@ noinline fn placeAll(
         diagnostic,
     );
     var lights = try light.place(arena, from.lights, maps, diagnostic);
-    const lights_are_default = lights.len == 0;
+    // What shines from everywhere is a light too.
+    const lights_are_default = lights.len == 0 and from.ambient == null;
     if (lights_are_default) lights = try light.placeRig(arena, &seen.camera);
 
     const pads = pad.choose(surface.bounds, &seen.camera, lights);
@@ -138,7 +139,7 @@ noinline fn placeAll(
             lights_are_default,
             from.ambient,
             settings.ambient,
-            settings.background,
+            settings.background orelse from.background,
         ),
         .width = seen.width,
         .height = seen.height,

@@ -123,6 +123,14 @@ pub const Scene = struct {
     camera_default: u32 = none,
     /// Ambient radiance that the source of the scene asks for; null: by the rules of shading.
     ambient: ?f32 = null,
+    /// What is seen where there is nothing, linear RGB; null: by the rules of shading.
+    background: ?Vec3 = null,
+    /// Picture size in pixels that the file asks for, at least 1 each; null: by its camera.
+    resolution: ?[2]u32 = null,
+    /// Samples a pixel that the file asks for, at least 1.
+    sample_count: ?u32 = null,
+    /// Bounces that the file asks for.
+    depth: ?u32 = null,
 
     /// An empty scene whose memory comes from `gpa`.
     pub fn init(gpa: std.mem.Allocator) Scene {

@@ -127,6 +127,50 @@ const empty_scene =
     \\{"asset":{"version":"2.0"}}
 ;
 
+/// A PBRT scene of nothing, which asks for a picture of its own.
+const pbrt_scene =
+    \\Film "image" "integer xresolution" 30 "integer yresolution" 20 "string filename" "other.png"
+    \\Sampler "halton" "integer pixelsamples" 2
+    \\SurfaceIntegrator "whitted" "integer maxdepth" 4
+    \\Camera "perspective"
+    \\WorldBegin
+    \\Shape "sphere"
+    \\
+;
+
+test "a PBRT scene brings size, samples and depth, the command line has the last word" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("s.pbrt", pbrt_scene);
+    const own = try sandbox.expectExit(0, &.{ "s.pbrt", "--stats=json", "-q" });
+    for ([_][]const u8{ "\"width\":30", "\"height\":20", "\"samples\":2", "\"depth\":3" }) |part| {
+        try testing.expect(std.mem.find(u8, own.stdout, part) != null);
+    }
+    const asked = [_][]const u8{
+        "s.pbrt",         "--stats=json", "-q", "-r", "8x4", "--spp", "1", "--depth", "0",
+        "--tessellation", "4",
+    };
+    const other = try sandbox.expectExit(0, &asked);
+    const parts = [_][]const u8{
+        "\"triangles\":24", "\"width\":8", "\"height\":4", "\"samples\":1", "\"depth\":0",
+    };
+    for (parts) |part| try testing.expect(std.mem.find(u8, other.stdout, part) != null);
+    try sandbox.expectFiles(&.{ "s.pbrt", "s.png" });
+}
+
+test "an error in a PBRT scene names file, line and column" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("s.pbrt", "WorldBegin\n  Include \"in.pbrt\"\n  Bang\n");
+    try sandbox.write("in.pbrt", "Shape \"sphere\"");
+    const own = try sandbox.expectExit(3, &.{"s.pbrt"});
+    try testing.expectEqualStrings("raylane: s.pbrt:3:3: 'Bang' is no directive\n", own.stderr);
+    try sandbox.write("in.pbrt", "\nShape \"sphere\" 1");
+    const included = try sandbox.expectExit(3, &.{"s.pbrt"});
+    try testing.expectEqualStrings("raylane: in.pbrt:2:16: '1' is no directive\n", included.stderr);
+    try sandbox.expectFiles(&.{ "in.pbrt", "s.pbrt" });
+}
+
 /// A GLB of one triangle, 36 bytes of positions.
 fn triangleScene(arena: std.mem.Allocator) ![]const u8 {
     const json =

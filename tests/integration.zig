@@ -12,6 +12,7 @@ test {
     _ = @import("malformed.zig");
     _ = @import("offset.zig");
     _ = @import("output.zig");
+    _ = @import("pbrt.zig");
     _ = @import("samples.zig");
     _ = @import("beams.zig");
     _ = @import("soup.zig");

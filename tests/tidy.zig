@@ -42,6 +42,7 @@ const leaves = [_][]const u8{ "diagnostic", "math", "statistics", "std", "builti
 const roots = [_][]const u8{
     "build.zig",
     "bench/lowering.zig",
+    "bench/parse.zig",
     "bench/rays.zig",
     "src/main.zig",
     "src/raylane.zig",

@@ -59,6 +59,29 @@ pub fn read(
     bytes_max: u64,
     reason: *[]const u8,
 ) Error![]u8 {
+    const length = try lengthOf(io, file, bytes_max, reason);
+    const bytes = try gpa.alloc(u8, length);
+    errdefer gpa.free(bytes);
+    try fill(io, file, bytes, reason);
+    return bytes;
+}
+
+/// Like `read`, with a zero byte behind the content.
+pub fn readTerminated(
+    gpa: Allocator,
+    io: Io,
+    file: Io.File,
+    bytes_max: u64,
+    reason: *[]const u8,
+) Error![:0]u8 {
+    const length = try lengthOf(io, file, bytes_max, reason);
+    const bytes = try gpa.allocSentinel(u8, length, 0);
+    errdefer gpa.free(bytes);
+    try fill(io, file, bytes, reason);
+    return bytes;
+}
+
+fn lengthOf(io: Io, file: Io.File, bytes_max: u64, reason: *[]const u8) Error!usize {
     const length = file.length(io) catch |err| {
         reason.* = explain(err);
         return error.InputOutput;
@@ -67,13 +90,15 @@ pub fn read(
         reason.* = "is too large";
         return error.TooLarge;
     }
-    const bytes = try gpa.alloc(u8, @intCast(length));
-    errdefer gpa.free(bytes);
+    return @intCast(length);
+}
+
+fn fill(io: Io, file: Io.File, bytes: []u8, reason: *[]const u8) error{InputOutput}!void {
     const count = file.readPositionalAll(io, bytes, 0) catch |err| {
         reason.* = explain(err);
         return error.InputOutput;
     };
-    if (count == bytes.len) return bytes;
+    if (count == bytes.len) return;
     reason.* = "changed while it was read";
     return error.InputOutput;
 }

@@ -23,17 +23,12 @@ const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Document = @import("gltf/document.zig");
 const Meshes = @import("gltf/meshes.zig");
 const Scene = scene_data.Scene;
+const Settings = @import("settings.zig").Settings;
 const Skins = @import("gltf/skins.zig");
 const Source = @import("gltf/source.zig");
 
 /// See parse.zig.
 pub const Error = Source.Error;
-
-/// What the user allows a file to do.
-pub const Settings = struct {
-    /// Whether a scene may name files outside its own folder.
-    allow_outside: bool = false,
-};
 
 /// Reads the file at `path`; see `parse.parse`.
 pub fn parse(

@@ -82,8 +82,9 @@ pub fn decodePath(gpa: Allocator, encoded: []const u8, allow_outside: bool) Path
     return path.toOwnedSlice(gpa);
 }
 
-/// Whether a path, read step by step, is ever above the folder it starts from.
-fn leavesFolder(path: []const u8) bool {
+/// Whether a path, read step by step, is ever above the folder it starts from. Asserts that it is
+/// not empty.
+pub fn leavesFolder(path: []const u8) bool {
     if (path[0] == '/') return true;
     // A separator elsewhere, and part of no name that a portable file would use.
     if (std.mem.findScalar(u8, path, '\\') != null) return true;

@@ -58,7 +58,7 @@ pub fn choose(
 ) Error!View {
     if (try find(from, choice, diagnostic)) |index| {
         const camera = &from.cameras[index];
-        const size = resolution orelse sizeOf(aspectOf(camera));
+        const size = resolution orelse from.resolution orelse sizeOf(aspectOf(camera));
         if (place(camera, maps[camera.node], aspect(size))) |placed| return .{
             .camera = placed,
             .width = size[0],
@@ -67,7 +67,7 @@ pub fn choose(
         };
         diagnostic.warn("camera {d} not used: its node leaves it no place or direction", .{index});
     }
-    const size = resolution orelse sizeOf(aspect_default);
+    const size = resolution orelse from.resolution orelse sizeOf(aspect_default);
     return .{
         .camera = try framing.frame(gpa, surface, from.materials, aspect(size)),
         .width = size[0],

@@ -1,0 +1,249 @@
+//! Light sources, and shapes that shine as a number of points.
+//!
+//! In: the parameters of a LightSource; emitting shapes with their places. Out: point, spot and
+//! directional lights, and the radiance of the sky. An emitting shape becomes `points_per_shape`
+//! spots on its surface, in even shares of its area, the same ones each time: by the R2 sequence
+//! of Roberts ("The unreasonable effectiveness of quasirandom sequences", 2018) within triangles.
+//! Each shines as much as its share of the area. A Lambertian source falls off with the cosine;
+//! our spots fall off with the square of a ramp, here from cosine 0 to 0.75, which has the same
+//! flux: (1 - 0.75) + 0.75 / 3 = 1 / 2.
+
+const std = @import("std");
+const limits = @import("limits.zig");
+const math = @import("../../math.zig");
+const quote = @import("../../diagnostic.zig").quote;
+const scene = @import("../../scene.zig");
+const spectra = @import("spectra.zig");
+const Assembly = @import("assembly.zig");
+const Colors = @import("colors.zig");
+const Input = @import("input.zig");
+const Parameters = @import("parameters.zig");
+const Transform = @import("transform.zig");
+const Error = Input.Error;
+const Vec3 = math.Vec3;
+const Vector = Transform.Vector;
+
+/// Points that a shining shape becomes, where there are not too many of them.
+pub const points_per_shape = 16;
+/// Radiance of a sky whose map is not read, where other lights shine; without any, the scene gets
+/// the lights of scenes without lights.
+pub const unknown_sky = 0.35;
+/// Points of all shapes together, one for each at the least.
+pub const point_count_aim = 256;
+
+/// Radiance beyond which a sky is no brighter.
+const sky_max = 1e30;
+
+/// Cosine from which the spots of emitters shine in full.
+const emitter_cosine = 0.75;
+
+/// Directive and place of a light that is being read.
+pub const Source = struct {
+    colors: *Colors,
+    assembly: *Assembly,
+    parameters: *const Parameters,
+    place: *const Transform,
+    position: usize,
+
+    fn color(source: *const Source, name: []const u8) Error!Vec3 {
+        const rgb = try source.colors.rgb(source.parameters, name, .{ 1, 1, 1 });
+        const scale = try source.colors.rgb(source.parameters, "scale", .{ 1, 1, 1 });
+        var result: Vec3 = undefined;
+        for (&result, rgb, scale) |*to, a, b| {
+            const product = a * b;
+            to.* = if (product > 0) @min(product, std.math.floatMax(f32)) else 0;
+        }
+        return result;
+    }
+
+    fn point(source: *const Source, name: []const u8, default: Vec3) Vector {
+        const value = source.parameters.vector(name, default);
+        return source.place.point(.{ value[0], value[1], value[2] });
+    }
+
+    fn note(source: *const Source, kind: []const u8, comptime rest: []const u8) Error!void {
+        try source.colors.input.warn(
+            source.position,
+            kind,
+            "LightSource {f}: " ++ rest,
+            .{quote(kind)},
+        );
+    }
+};
+
+/// `LightSource "name" ...`.
+pub fn add(source: *const Source, name: []const u8) Error!void {
+    const Kind = enum {
+        point,
+        spot,
+        distant,
+        goniometric,
+        projection,
+        infinite,
+        exinfinite,
+    };
+    const assembly = source.assembly;
+    const kind = std.meta.stringToEnum(Kind, name) orelse
+        return source.note(name, "is not supported and left out");
+    if (source.parameters.find("power") != null or source.parameters.find("illuminance") != null)
+        try source.note(name, "power and illuminance are not read");
+    switch (kind) {
+        .point, .goniometric => {
+            if (kind == .goniometric) try source.note(name, "shines evenly, its map is not read");
+            const origin = source.point("from", .{ 0, 0, 0 });
+            try assembly.addLight(origin, .{ 0, 0, -1 }, .{
+                .kind = .point,
+                .node = undefined,
+                .color = try source.color("I"),
+            });
+        },
+        .spot, .projection => try addSpot(source, name, kind == .projection),
+        .distant => {
+            const from = source.point("from", .{ 0, 0, 0 });
+            const to = source.point("to", .{ 0, 0, 1 });
+            const way = Transform.subtract(to, from);
+            if (Transform.normalize(way) == null)
+                return source.colors.input.fail(source.position, "the light has no direction", .{});
+            try assembly.addLight(.{ 0, 0, 0 }, way, .{
+                .kind = .directional,
+                .node = undefined,
+                .color = try source.color("L"),
+            });
+        },
+        .infinite, .exinfinite => {
+            if (source.parameters.find("mapname") != null or
+                source.parameters.find("filename") != null)
+            {
+                try source.note(name, "its map is not read, a grey sky stands for it");
+                assembly.has_unknown_sky = true;
+                return;
+            }
+            const radiance = try source.color("L");
+            var sum = assembly.sky orelse Vec3{ 0, 0, 0 };
+            for (&sum, radiance) |*to, part| to.* = @min(to.* + part, sky_max);
+            assembly.sky = sum;
+        },
+    }
+}
+
+fn addSpot(source: *const Source, name: []const u8, is_projection: bool) Error!void {
+    const parameters = source.parameters;
+    const origin = source.point("from", .{ 0, 0, 0 });
+    // A projector looks along z.
+    const target = if (is_projection)
+        source.place.point(.{ 0, 0, 1 })
+    else
+        source.point("to", .{ 0, 0, 1 });
+    const way = Transform.subtract(target, origin);
+    if (Transform.normalize(way) == null)
+        return source.colors.input.fail(source.position, "the light has no direction", .{});
+    var outer_deg = parameters.float("coneangle", 30);
+    var inner_deg = outer_deg - parameters.float("conedeltaangle", 5);
+    if (is_projection) {
+        try source.note(name, "is shown as a spot, its map is not read");
+        outer_deg = 0.5 * parameters.float("fov", 45);
+        inner_deg = outer_deg - 1;
+    }
+    const outer = std.math.clamp(outer_deg, 0.1, 90) * (std.math.pi / 180.0);
+    const inner = std.math.clamp(inner_deg, 0, 90) * (std.math.pi / 180.0);
+    try source.assembly.addLight(origin, way, .{
+        .kind = .spot,
+        .node = undefined,
+        .color = try source.color("I"),
+        .inner_cone_rad = @min(inner, 0.999 * outer),
+        .outer_cone_rad = outer,
+    });
+}
+
+/// Makes lights of all shapes that shine.
+pub fn placeEmitters(assembly: *Assembly) Error!void {
+    const emitters = assembly.emitters.items;
+    if (emitters.len == 0) return;
+    const share = @max(1, point_count_aim / emitters.len);
+    const count: u32 = @intCast(@min(points_per_shape, share));
+    for (emitters) |*emitter| try placeEmitter(assembly, emitter, count);
+}
+
+/// Twice the area of a triangle in the world, and its normal of that length.
+fn facing(emitter: *const Assembly.Emitter, triangle: [3]u32) Vector {
+    var corners: [3]Vector = undefined;
+    for (&corners, triangle) |*corner, vertex| corner.* = cornerAt(emitter, vertex);
+    const normal = Transform.cross(
+        Transform.subtract(corners[1], corners[0]),
+        Transform.subtract(corners[2], corners[0]),
+    );
+    // Normals do not turn where the place mirrors.
+    return if (emitter.place.determinant() < 0) Transform.scaled(normal, -1) else normal;
+}
+
+fn cornerAt(emitter: *const Assembly.Emitter, vertex: u32) Vector {
+    const position = emitter.geometry.positions[vertex];
+    return emitter.place.point(.{ position[0], position[1], position[2] });
+}
+
+fn placeEmitter(
+    assembly: *Assembly,
+    emitter: *const Assembly.Emitter,
+    count: u32,
+) Error!void {
+    var area: f64 = 0;
+    for (emitter.geometry.triangles) |triangle| {
+        const normal = facing(emitter, triangle);
+        area += 0.5 * @sqrt(Transform.dot(normal, normal));
+    }
+    if (!(area > 0 and area < 1e30)) return;
+    const step = area / @as(f64, @floatFromInt(count));
+    // Off the surface, so that it does not shade its own light.
+    const lift = 1e-3 * @sqrt(area);
+    var passed: f64 = 0;
+    var made: u32 = 0;
+    for (emitter.geometry.triangles) |triangle| {
+        const normal = facing(emitter, triangle);
+        const doubled = @sqrt(Transform.dot(normal, normal));
+        passed += 0.5 * doubled;
+        while (made < count and (@as(f64, @floatFromInt(made)) + 0.5) * step < passed) {
+            const at = pointWithin(emitter, triangle, made);
+            made += 1;
+            const unit = Transform.normalize(normal) orelse continue;
+            try addPoint(assembly, emitter, at, Transform.scaled(unit, lift), step);
+        }
+    }
+}
+
+/// The point of the sequence's number `index` in a triangle.
+fn pointWithin(emitter: *const Assembly.Emitter, triangle: [3]u32, index: u32) Vector {
+    const number: f64 = @floatFromInt(index + 1);
+    var u = number * 0.7548776662466927;
+    var v = number * 0.5698402909980532;
+    u -= @floor(u);
+    v -= @floor(v);
+    if (u + v > 1) {
+        u = 1 - u;
+        v = 1 - v;
+    }
+    const a = cornerAt(emitter, triangle[0]);
+    const b = Transform.subtract(cornerAt(emitter, triangle[1]), a);
+    const c = Transform.subtract(cornerAt(emitter, triangle[2]), a);
+    return Transform.add(a, Transform.add(Transform.scaled(b, u), Transform.scaled(c, v)));
+}
+
+fn addPoint(
+    assembly: *Assembly,
+    emitter: *const Assembly.Emitter,
+    at: Vector,
+    lift: Vector,
+    area: f64,
+) Error!void {
+    const sides: usize = if (emitter.two_sided) 2 else 1;
+    for (0..sides) |side| {
+        const way = if (side == 0) lift else Transform.scaled(lift, -1);
+        try assembly.addLight(Transform.add(at, way), way, .{
+            .kind = .spot,
+            .node = undefined,
+            .color = emitter.radiance,
+            .intensity = @floatCast(area),
+            .inner_cone_rad = std.math.acos(@as(f32, emitter_cosine)),
+            .outer_cone_rad = std.math.pi / 2.0,
+        });
+    }
+}

@@ -1,0 +1,374 @@
+//! Parameter lists: `"float radius" [1] "rgb Kd" [.5 .5 .5] "string name" "x"`.
+//!
+//! In: the cursor behind a directive. Out: its parameters by name, with typed values. The lists of
+//! values are kept from directive to directive, so that only the longest allocates. Names and
+//! strings point into the text.
+
+const std = @import("std");
+const quote = @import("../../diagnostic.zig").quote;
+const limits = @import("limits.zig");
+const number = @import("number.zig");
+const Input = @import("input.zig");
+const Error = Input.Error;
+const Vec3 = @import("../../math.zig").Vec3;
+
+const Parameters = @This();
+
+/// What a parameter's values are. Spectra stand for themselves or name a file.
+pub const Type = enum {
+    integer,
+    float,
+    point2,
+    vector2,
+    point,
+    vector,
+    normal,
+    rgb,
+    xyz,
+    blackbody,
+    spectrum,
+    string,
+    bool,
+    texture,
+
+    /// How many numbers make one value.
+    fn components(type_: Type) usize {
+        return switch (type_) {
+            .point2, .vector2 => 2,
+            .point, .vector, .normal, .rgb, .xyz => 3,
+            else => 1,
+        };
+    }
+};
+
+const type_names: std.StaticStringMap(Type) = .initComptime(.{
+    .{ "integer", .integer }, .{ "float", .float },         .{ "point", .point },
+    .{ "point2", .point2 },   .{ "point3", .point },        .{ "vector", .vector },
+    .{ "vector2", .vector2 }, .{ "vector3", .vector },      .{ "normal", .normal },
+    .{ "normal3", .normal },  .{ "color", .rgb },           .{ "rgb", .rgb },
+    .{ "xyz", .xyz },         .{ "blackbody", .blackbody }, .{ "spectrum", .spectrum },
+    .{ "string", .string },   .{ "bool", .bool },           .{ "texture", .texture },
+});
+
+/// One parameter; its values are a range of the list of their kind.
+pub const Parameter = struct {
+    type: Type,
+    name: []const u8,
+    /// Where it stands in the top text.
+    offset: usize,
+    /// Values are strings: of strings, textures, and spectra by name.
+    is_text: bool,
+    first: usize,
+    count: usize,
+};
+
+items: std.ArrayList(Parameter) = .empty,
+floats: std.ArrayList(f32) = .empty,
+/// Integers, and booleans as 0 and 1.
+integers: std.ArrayList(i32) = .empty,
+strings: std.ArrayList([]const u8) = .empty,
+
+/// Frees everything.
+pub fn deinit(parameters: *Parameters, gpa: std.mem.Allocator) void {
+    parameters.items.deinit(gpa);
+    parameters.floats.deinit(gpa);
+    parameters.integers.deinit(gpa);
+    parameters.strings.deinit(gpa);
+    parameters.* = undefined;
+}
+
+/// Reads the list at the cursor, which replaces the one before.
+pub fn read(parameters: *Parameters, input: *Input) Error!void {
+    parameters.items.clearRetainingCapacity();
+    parameters.floats.clearRetainingCapacity();
+    parameters.integers.clearRetainingCapacity();
+    parameters.strings.clearRetainingCapacity();
+    while (input.peek() == '"') {
+        if (parameters.items.items.len == limits.parameter_count_max) return input.fail(
+            input.offset(),
+            "over {d} parameters",
+            .{limits.parameter_count_max},
+        );
+        try parameters.readOne(input);
+    }
+}
+
+fn readOne(parameters: *Parameters, input: *Input) Error!void {
+    const offset = input.offset();
+    const declaration = try input.string();
+    var words = std.mem.tokenizeAny(u8, declaration, " \t");
+    const type_name = words.next() orelse "";
+    const name = words.next() orelse return input.fail(
+        offset,
+        "a parameter is declared as \"type name\", not as {f}",
+        .{quote(declaration)},
+    );
+    const type_ = type_names.get(type_name) orelse
+        return input.fail(offset, "{f} is no type of parameters", .{quote(type_name)});
+    const first_byte = input.peek();
+    const bracketed = first_byte == '[';
+    if (bracketed) input.top().cursor += 1;
+    var parameter: Parameter = .{
+        .type = type_,
+        .name = name,
+        .offset = offset,
+        .is_text = type_ == .string or type_ == .texture or
+            (type_ == .spectrum and input.peek() == '"'),
+        .first = undefined,
+        .count = undefined,
+    };
+    if (parameter.is_text) {
+        parameter.first = parameters.strings.items.len;
+        try parameters.readStrings(input, bracketed);
+        parameter.count = parameters.strings.items.len - parameter.first;
+    } else switch (type_) {
+        .integer, .bool => {
+            parameter.first = parameters.integers.items.len;
+            if (type_ == .bool)
+                try parameters.readBools(input, bracketed)
+            else
+                try parameters.readIntegers(input, bracketed);
+            parameter.count = parameters.integers.items.len - parameter.first;
+        },
+        else => {
+            parameter.first = parameters.floats.items.len;
+            try parameters.readFloats(input, bracketed);
+            parameter.count = parameters.floats.items.len - parameter.first;
+            if (parameter.count % type_.components() != 0) return input.fail(
+                offset,
+                "{d} numbers make no whole {s} values",
+                .{ parameter.count, type_name },
+            );
+        },
+    }
+    if (bracketed) {
+        if (input.peek() != ']') return input.fail(input.offset(), "']' is expected", .{});
+        input.top().cursor += 1;
+    }
+    try parameters.items.append(input.gpa, parameter);
+}
+
+/// Numbers up to the bracket, or one. The inner loop of large scenes.
+fn readFloats(parameters: *Parameters, input: *Input, bracketed: bool) Error!void {
+    const text = input.top();
+    const bytes = text.bytes;
+    var cursor = text.cursor;
+    const list = &parameters.floats;
+    while (true) {
+        if (bytes[cursor] <= ' ' or bytes[cursor] == '#') cursor = Input.skip(bytes, cursor);
+        if (bytes[cursor] == ']' and bracketed) break;
+        const value = number.float(bytes, &cursor) catch |err|
+            return failNumber(input, cursor, err, "number");
+        if (list.items.len == list.capacity) try list.ensureUnusedCapacity(input.gpa, 1);
+        list.appendAssumeCapacity(value);
+        if (!bracketed) break;
+    }
+    text.cursor = cursor;
+}
+
+fn readIntegers(parameters: *Parameters, input: *Input, bracketed: bool) Error!void {
+    const text = input.top();
+    const bytes = text.bytes;
+    var cursor = text.cursor;
+    const list = &parameters.integers;
+    while (true) {
+        if (bytes[cursor] <= ' ' or bytes[cursor] == '#') cursor = Input.skip(bytes, cursor);
+        if (bytes[cursor] == ']' and bracketed) break;
+        const value = number.integer(bytes, &cursor) catch |err|
+            return failNumber(input, cursor, err, "whole number");
+        if (list.items.len == list.capacity) try list.ensureUnusedCapacity(input.gpa, 1);
+        list.appendAssumeCapacity(value);
+        if (!bracketed) break;
+    }
+    text.cursor = cursor;
+}
+
+/// Says what stands where a number should.
+pub fn failNumber(
+    input: *Input,
+    position: usize,
+    err: number.Error,
+    expected: []const u8,
+) error{InvalidInput} {
+    const bytes = input.top().bytes;
+    if (position == bytes.len) return input.fail(
+        position,
+        "a {s} is expected, the text ends",
+        .{expected},
+    );
+    const word = bytes[position..@max(number.endOf(bytes, position), position + 1)];
+    return switch (err) {
+        error.NotANumber => input.fail(position, "a {s} is expected, not {f}", .{
+            expected, quote(word),
+        }),
+        error.OutOfRange => input.fail(position, "{f} is out of range", .{quote(word)}),
+    };
+}
+
+/// Booleans are words, or strings in the older dialects.
+fn readBools(parameters: *Parameters, input: *Input, bracketed: bool) Error!void {
+    while (true) {
+        const byte = input.peek();
+        if (bracketed and byte == ']') return;
+        const offset = input.offset();
+        const word = if (byte == '"') try input.string() else input.word();
+        const value: i32 = if (std.mem.eql(u8, word, "true"))
+            1
+        else if (std.mem.eql(u8, word, "false"))
+            0
+        else
+            return input.fail(offset, "true or false is expected, not {f}", .{quote(word)});
+        try parameters.integers.append(input.gpa, value);
+        if (!bracketed) return;
+    }
+}
+
+fn readStrings(parameters: *Parameters, input: *Input, bracketed: bool) Error!void {
+    while (true) {
+        const byte = input.peek();
+        if (bracketed and byte == ']') return;
+        if (byte != '"') return input.fail(input.offset(), "a string is expected", .{});
+        try parameters.strings.append(input.gpa, try input.string());
+        if (!bracketed) return;
+    }
+}
+
+/// The parameter of that name, the last one where it stands twice.
+pub fn find(parameters: *const Parameters, name: []const u8) ?*const Parameter {
+    var index = parameters.items.items.len;
+    while (index > 0) {
+        index -= 1;
+        const parameter = &parameters.items.items[index];
+        if (std.mem.eql(u8, parameter.name, name)) return parameter;
+    }
+    return null;
+}
+
+/// Its numbers, none where it is made of others or of strings.
+pub fn floatsOf(parameters: *const Parameters, parameter: *const Parameter) []const f32 {
+    if (parameter.is_text or parameter.type == .integer or parameter.type == .bool) return &.{};
+    return parameters.floats.items[parameter.first..][0..parameter.count];
+}
+
+/// Its whole numbers or booleans, none where it is made of others.
+pub fn integersOf(parameters: *const Parameters, parameter: *const Parameter) []const i32 {
+    if (parameter.type != .integer and parameter.type != .bool) return &.{};
+    return parameters.integers.items[parameter.first..][0..parameter.count];
+}
+
+/// Its strings, none where it is made of numbers.
+pub fn stringsOf(parameters: *const Parameters, parameter: *const Parameter) []const []const u8 {
+    if (!parameter.is_text) return &.{};
+    return parameters.strings.items[parameter.first..][0..parameter.count];
+}
+
+/// The numbers of that name, null where it is absent or holds none.
+pub fn floatsNamed(parameters: *const Parameters, name: []const u8) ?[]const f32 {
+    const values = parameters.floatsOf(parameters.find(name) orelse return null);
+    return if (values.len > 0) values else null;
+}
+
+/// One number, whole or not, or `default` where it is absent.
+pub fn float(parameters: *const Parameters, name: []const u8, default: f32) f32 {
+    const parameter = parameters.find(name) orelse return default;
+    const floats = parameters.floatsOf(parameter);
+    if (floats.len > 0) return floats[0];
+    const integers = parameters.integersOf(parameter);
+    return if (integers.len > 0) @floatFromInt(integers[0]) else default;
+}
+
+/// One whole number, or null where it is absent.
+pub fn integer(parameters: *const Parameters, name: []const u8) ?i32 {
+    const values = parameters.integersOf(parameters.find(name) orelse return null);
+    return if (values.len > 0) values[0] else null;
+}
+
+/// A truth, or `default` where it is absent.
+pub fn boolean(parameters: *const Parameters, name: []const u8, default: bool) bool {
+    return (parameters.integer(name) orelse return default) != 0;
+}
+
+/// One string, or null where it is absent.
+pub fn string(parameters: *const Parameters, name: []const u8) ?[]const u8 {
+    const values = parameters.stringsOf(parameters.find(name) orelse return null);
+    return if (values.len > 0) values[0] else null;
+}
+
+/// One point or direction, or `default` where it is absent.
+pub fn vector(parameters: *const Parameters, name: []const u8, default: Vec3) Vec3 {
+    const values = parameters.floatsNamed(name) orelse return default;
+    return if (values.len >= 3) values[0..3].* else default;
+}
+
+const TestInput = struct {
+    diagnostic: @import("../../diagnostic.zig").Diagnostic = .{},
+    input: Input = undefined,
+    parameters: Parameters = .{},
+
+    fn parse(state: *TestInput, text: []const u8) !void {
+        const gpa = std.testing.allocator;
+        state.input = .{
+            .gpa = gpa,
+            .io = std.testing.io,
+            .folder = .cwd(),
+            .folder_name = "",
+            .settings = .{},
+            .diagnostic = &state.diagnostic,
+        };
+        errdefer state.deinit();
+        try state.input.push("x", try gpa.dupeSentinel(u8, text, 0), 0);
+        try state.parameters.read(&state.input);
+    }
+
+    fn deinit(state: *TestInput) void {
+        state.input.deinit();
+        state.parameters.deinit(std.testing.allocator);
+    }
+};
+
+test "every type, with and without brackets" {
+    var state: TestInput = .{};
+    try state.parse(
+        \\"integer n" [1 -2] # a comment
+        \\"float f" 1.5 "float g" [2] "point3 P" [0 0 0  1 2 3] "bool a" "true" "bool b" [false]
+        \\"string s" "x y" "texture t" ["u"] "spectrum file" "a.spd" "spectrum list" [400 1 500 2]
+        \\"rgb c" [.1 .2 .3] "normal N" [] "blackbody bb" [2700] "xyz x" [1 1 1] Shape
+    );
+    defer state.deinit();
+    const p = &state.parameters;
+    try std.testing.expectEqualSlices(i32, &.{ 1, -2 }, p.integersOf(p.find("n").?));
+    try std.testing.expectEqual(1.5, p.float("f", 0));
+    try std.testing.expectEqual(2, p.float("g", 0));
+    try std.testing.expectEqual(1, p.float("n", 0));
+    try std.testing.expectEqual(7, p.float("absent", 7));
+    try std.testing.expectEqual(6, p.floatsNamed("P").?.len);
+    try std.testing.expect(p.boolean("a", false) and !p.boolean("b", true));
+    try std.testing.expectEqualStrings("x y", p.string("s").?);
+    try std.testing.expectEqualStrings("u", p.string("t").?);
+    try std.testing.expectEqualStrings("a.spd", p.string("file").?);
+    try std.testing.expectEqual(4, p.floatsNamed("list").?.len);
+    try std.testing.expectEqual(Vec3{ 0.1, 0.2, 0.3 }, p.vector("c", .{ 0, 0, 0 }));
+    try std.testing.expectEqual(null, p.floatsNamed("N"));
+    try std.testing.expectEqualStrings("Shape", state.input.word());
+}
+
+test "what is wrong is named with its place" {
+    const cases = .{
+        .{ "\"float\" [1]", "x:1:1", "a parameter is declared as \"type name\", not as 'float'" },
+        .{ "\"half f\" [1]", "x:1:1", "'half' is no type of parameters" },
+        .{ "\"float f\" [nan]", "x:1:12", "a number is expected, not 'nan'" },
+        .{ "\"float f\" [1", "x:1:13", "a number is expected, the text ends" },
+        .{ "\"float f\" 1e99", "x:1:11", "'1e99' is out of range" },
+        .{ "\"integer i\" [0\n1.5]", "x:2:1", "a whole number is expected, not '1.5'" },
+        .{ "\"point P\" [1 2]", "x:1:1", "2 numbers make no whole point values" },
+        .{ "\"string s\" [1]", "x:1:13", "a string is expected" },
+        .{ "\"bool b\" maybe", "x:1:10", "true or false is expected, not 'maybe'" },
+        .{ "\"float f\" [1 \"a\"]", "x:1:14", "a number is expected, not '\"'" },
+    };
+    inline for (cases) |case| {
+        var state: TestInput = .{};
+        try std.testing.expectError(error.InvalidInput, state.parse(case[0]));
+        try std.testing.expectEqualStrings(case[1], state.diagnostic.place.text());
+        try std.testing.expectEqualStrings(case[2], state.diagnostic.message.text());
+    }
+}

@@ -1,0 +1,698 @@
+//! The directives of a PBRT text, one after the other, and the state that they change.
+//!
+//! In: texts. Out: an `Assembly` of everything they show, and what they ask of the picture.
+//! Nothing recurses: attributes, objects and included files lie on stacks with limits.
+
+const std = @import("std");
+const diagnostic_file = @import("../../diagnostic.zig");
+const lights = @import("lights.zig");
+const limits = @import("limits.zig");
+const materials = @import("materials.zig");
+const number = @import("number.zig");
+const scene_data = @import("../../scene.zig");
+const shapes = @import("shapes.zig");
+const spectra = @import("spectra.zig");
+const Assembly = @import("assembly.zig");
+const Colors = @import("colors.zig");
+const Input = @import("input.zig");
+const Maker = @import("shapes/maker.zig");
+const Parameters = @import("parameters.zig");
+const Transform = @import("transform.zig");
+const View = @import("view.zig");
+const Allocator = std.mem.Allocator;
+const Error = Input.Error;
+const Scene = scene_data.Scene;
+const Vec3 = @import("../../math.zig").Vec3;
+const assert = std.debug.assert;
+const quote = diagnostic_file.quote;
+
+const Reader = @This();
+
+/// Everything that AttributeBegin keeps and AttributeEnd brings back.
+const Graphics = struct {
+    transform: Transform = .identity,
+    /// Index into `Assembly.materials`, `scene_data.none` for the default one.
+    material: u32 = scene_data.none,
+    /// Surfaces only bound a medium and are not shown.
+    is_boundary: bool = false,
+    glow: ?Glow = null,
+    reverse: bool = false,
+    /// Whether transformations are those of the time when the shutter opens.
+    at_start: bool = true,
+};
+
+/// What AreaLightSource says of the shapes after it.
+const Glow = struct { radiance: Vec3, two_sided: bool };
+
+const Kept = struct {
+    const Kind = enum {
+        attribute,
+        transform,
+        object,
+
+        fn name(kind: Kind) []const u8 {
+            return switch (kind) {
+                .attribute => "Attribute",
+                .transform => "Transform",
+                .object => "Object",
+            };
+        }
+    };
+
+    kind: Kind,
+    graphics: Graphics,
+};
+
+const NamedMaterial = struct { index: u32, is_boundary: bool };
+
+const Phase = enum { options, world, done };
+
+input: *Input,
+/// Lives as long as the scene is read.
+arena: Allocator,
+assembly: *Assembly,
+colors: Colors,
+maker: Maker,
+parameters: Parameters = .{},
+graphics: Graphics = .{},
+stack: std.ArrayList(Kept) = .empty,
+phase: Phase = .options,
+/// A world has ended that is kept only if no other follows: its renderer makes no picture.
+is_preparation: bool = false,
+view: View = .{},
+sample_count: ?u32 = null,
+depth: ?u32 = null,
+/// The object that is being defined.
+object: ?struct { name: []const u8, first: usize } = null,
+objects: std.StringHashMapUnmanaged(Assembly.Object) = .empty,
+spaces: std.StringHashMapUnmanaged(Transform) = .empty,
+named: std.StringHashMapUnmanaged(NamedMaterial) = .empty,
+/// Meshes of curved shapes by all that they depend on.
+known_meshes: std.AutoHashMapUnmanaged(u64, u32) = .empty,
+default_material: u32 = scene_data.none,
+
+/// Frees what is not the arena's.
+pub fn deinit(reader: *Reader) void {
+    const gpa = reader.input.gpa;
+    reader.parameters.deinit(gpa);
+    reader.stack.deinit(gpa);
+    reader.* = undefined;
+}
+
+const Directive = enum {
+    Accelerator,
+    ActiveTransform,
+    AreaLightSource,
+    Attribute,
+    AttributeBegin,
+    AttributeEnd,
+    Camera,
+    ColorSpace,
+    ConcatTransform,
+    CoordSysTransform,
+    CoordinateSystem,
+    Film,
+    Identity,
+    Import,
+    Include,
+    Integrator,
+    LightSource,
+    LookAt,
+    MakeNamedMaterial,
+    MakeNamedMedium,
+    Material,
+    MediumInterface,
+    NamedMaterial,
+    ObjectBegin,
+    ObjectEnd,
+    ObjectInstance,
+    Option,
+    PixelFilter,
+    Renderer,
+    ReverseOrientation,
+    Rotate,
+    Sampler,
+    Scale,
+    Shape,
+    SurfaceIntegrator,
+    Texture,
+    Transform,
+    TransformBegin,
+    TransformEnd,
+    TransformTimes,
+    Translate,
+    Volume,
+    VolumeIntegrator,
+    WorldBegin,
+    WorldEnd,
+
+    /// Where it may stand: before the world, in it, or both.
+    fn allowedIn(directive: Directive, phase: Phase) bool {
+        return switch (directive) {
+            .Accelerator,
+            .Camera,
+            .Film,
+            .Integrator,
+            .PixelFilter,
+            .Renderer,
+            .Sampler,
+            .SurfaceIntegrator,
+            .TransformTimes,
+            .VolumeIntegrator,
+            .WorldBegin,
+            => phase == .options,
+            .AreaLightSource,
+            .LightSource,
+            .Material,
+            .NamedMaterial,
+            .ObjectBegin,
+            .ObjectEnd,
+            .ObjectInstance,
+            .Shape,
+            .Volume,
+            .WorldEnd,
+            => phase == .world,
+            else => true,
+        };
+    }
+};
+
+/// Reads the text on top of the input, and all that it includes.
+pub fn run(reader: *Reader) Error!void {
+    const input = reader.input;
+    while (true) {
+        if (input.atEnd()) {
+            if (input.texts.items.len == 1) break;
+            input.pop();
+            continue;
+        }
+        const position = input.offset();
+        const word = input.word();
+        if (word.len == 0) return input.fail(position, "a directive is expected", .{});
+        const directive = std.meta.stringToEnum(Directive, word) orelse
+            return input.fail(position, "{f} is no directive", .{quote(word)});
+        if (reader.phase == .done) {
+            if (!reader.is_preparation) {
+                try input.warn(position, "more", "only the first picture is made", .{});
+                break;
+            }
+            reader.startAgain();
+        }
+        if (!directive.allowedIn(reader.phase)) return input.fail(
+            position,
+            "{t} may not stand {s} WorldBegin",
+            .{ directive, if (reader.phase == .options) "before" else "after" },
+        );
+        try reader.perform(directive, position);
+    }
+    if (reader.phase == .options)
+        return input.fail(input.top().bytes.len, "there is no WorldBegin", .{});
+    if (reader.stack.items.len > 0) try input.warn(
+        input.top().bytes.len,
+        "end",
+        "{d} blocks are begun and not ended",
+        .{reader.stack.items.len},
+    );
+}
+
+fn perform(reader: *Reader, directive: Directive, position: usize) Error!void {
+    const graphics = &reader.graphics;
+    switch (directive) {
+        .Identity => try reader.setTransform(position, .identity),
+        .Translate => {
+            try reader.transform(position, .translation(try reader.numbers(3)));
+        },
+        .Scale => try reader.transform(position, .scaling(try reader.numbers(3))),
+        .Rotate => {
+            const n = try reader.numbers(4);
+            try reader.transform(position, Transform.rotation(n[0], n[1..4].*) orelse
+                return reader.input.fail(position, "the axis has no direction", .{}));
+        },
+        .LookAt => {
+            const n = try reader.numbers(9);
+            try reader.transform(position, Transform.lookAt(n[0..3].*, n[3..6].*, n[6..9].*) orelse
+                return reader.input.fail(position, "the three points leave no direction", .{}));
+        },
+        .Transform => try reader.setTransform(position, try reader.matrix(position)),
+        .ConcatTransform => try reader.transform(position, try reader.matrix(position)),
+        .CoordinateSystem => {
+            const name = try reader.text();
+            try reader.keep(Transform, &reader.spaces, name, graphics.transform);
+        },
+        .CoordSysTransform => {
+            const name = try reader.text();
+            const space = reader.spaces.get(name) orelse
+                return reader.input.fail(position, "no coordinate system {f}", .{quote(name)});
+            try reader.setTransform(position, space);
+        },
+        .ActiveTransform => try reader.activeTransform(),
+        .TransformTimes => _ = try reader.numbers(2),
+        .ReverseOrientation => graphics.reverse = !graphics.reverse,
+        .AttributeBegin => try reader.begin(.attribute, position),
+        .TransformBegin => try reader.begin(.transform, position),
+        .AttributeEnd => try reader.end(.attribute, position),
+        .TransformEnd => try reader.end(.transform, position),
+        .ObjectBegin => try reader.objectBegin(position),
+        .ObjectEnd => try reader.objectEnd(position),
+        .ObjectInstance => try reader.objectInstance(position),
+        .WorldBegin => try reader.worldBegin(),
+        .WorldEnd => try reader.worldEnd(),
+        .Include, .Import => {
+            const at = try reader.expectString();
+            const path = try reader.input.string();
+            try reader.input.include(at, path);
+        },
+        .ColorSpace => _ = try reader.text(),
+        .MediumInterface => {
+            _ = try reader.text();
+            if (reader.input.peek() == '"') _ = try reader.input.string();
+            try reader.note(directive, position, "participating media are not supported");
+        },
+        .NamedMaterial => try reader.namedMaterial(position),
+        .Option => try reader.parameters.read(reader.input),
+        .Texture => {
+            const name = try reader.text();
+            _ = try reader.text(); // Its type: all of them are colours here.
+            const class = try reader.text();
+            try reader.parameters.read(reader.input);
+            try reader.colors.define(name, class, position, &reader.parameters);
+        },
+        else => {
+            const name = try reader.text();
+            try reader.parameters.read(reader.input);
+            try reader.performNamed(directive, name, position);
+        },
+    }
+}
+
+/// Directives of the form `Directive "name" parameters`.
+fn performNamed(
+    reader: *Reader,
+    directive: Directive,
+    name: []const u8,
+    position: usize,
+) Error!void {
+    const parameters = &reader.parameters;
+    switch (directive) {
+        .Camera => {
+            const to_camera = &reader.graphics.transform;
+            try reader.view.setCamera(reader.input, name, position, parameters, to_camera);
+            try reader.keep(Transform, &reader.spaces, "camera", reader.view.place.?);
+        },
+        .Film => try reader.view.setFilm(reader.input, position, parameters),
+        .Sampler => try reader.sampler(),
+        .Integrator, .SurfaceIntegrator => try reader.integrator(name, position),
+        .Renderer => {
+            // These prepare what another rendering uses.
+            reader.is_preparation = std.mem.eql(u8, name, "surfacepoints") or
+                std.mem.eql(u8, name, "createprobes");
+        },
+        .Material => {
+            const made = try reader.makeMaterial(name, position);
+            reader.graphics.material = made.index;
+            reader.graphics.is_boundary = made.is_boundary;
+        },
+        .MakeNamedMaterial => {
+            const type_name = parameters.string("type") orelse
+                return reader.input.fail(position, "the material has no type", .{});
+            const made = try reader.makeMaterial(type_name, position);
+            try reader.keep(NamedMaterial, &reader.named, name, made);
+        },
+        .LightSource => try lights.add(&.{
+            .colors = &reader.colors,
+            .assembly = reader.assembly,
+            .parameters = parameters,
+            .place = &reader.graphics.transform,
+            .position = position,
+        }, name),
+        .AreaLightSource => try reader.areaLight(),
+        .Shape => try reader.shape(name, position),
+        .Volume, .MakeNamedMedium => {
+            try reader.note(directive, position, "participating media are not supported");
+        },
+        .Attribute => try reader.note(directive, position, "defaults of parameters are not read"),
+        else => {}, // What remains changes how PBRT computes the picture.
+    }
+}
+
+/// A warning about a directive, once.
+fn note(
+    reader: *Reader,
+    directive: Directive,
+    position: usize,
+    comptime rest: []const u8,
+) Error!void {
+    try reader.input.warn(position, @tagName(directive), "{t}: " ++ rest, .{directive});
+}
+
+/// Numbers, in brackets or not.
+fn numbers(reader: *Reader, comptime count: usize) Error![count]f64 {
+    const input = reader.input;
+    const bracketed = input.peek() == '[';
+    if (bracketed) input.top().cursor += 1;
+    var result: [count]f64 = undefined;
+    for (&result) |*to| {
+        _ = input.peek();
+        const top = input.top();
+        to.* = number.float(top.bytes, &top.cursor) catch |err|
+            return Parameters.failNumber(input, top.cursor, err, "number");
+    }
+    if (!bracketed) return result;
+    if (input.peek() != ']') return input.fail(input.offset(), "']' is expected", .{});
+    input.top().cursor += 1;
+    return result;
+}
+
+fn matrix(reader: *Reader, position: usize) Error!Transform {
+    const sixteen = try reader.numbers(16);
+    return Transform.fromMatrix(&sixteen) orelse
+        reader.input.fail(position, "the matrix is not affine", .{});
+}
+
+/// Position of the string that follows.
+fn expectString(reader: *Reader) Error!usize {
+    if (reader.input.peek() == '"') return reader.input.offset();
+    return reader.input.fail(reader.input.offset(), "a string is expected", .{});
+}
+
+/// A string.
+fn text(reader: *Reader) Error![]const u8 {
+    _ = try reader.expectString();
+    return reader.input.string();
+}
+
+/// Puts a value under a name that the text gives, which is copied.
+fn keep(
+    reader: *Reader,
+    comptime Value: type,
+    map: *std.StringHashMapUnmanaged(Value),
+    name: []const u8,
+    value: Value,
+) Allocator.Error!void {
+    const entry = try map.getOrPut(reader.arena, name);
+    if (!entry.found_existing) entry.key_ptr.* = try reader.arena.dupe(u8, name);
+    entry.value_ptr.* = value;
+}
+
+fn transform(reader: *Reader, position: usize, inner: Transform) Error!void {
+    try reader.setTransform(position, reader.graphics.transform.compose(&inner));
+}
+
+fn setTransform(reader: *Reader, position: usize, to: Transform) Error!void {
+    if (!reader.graphics.at_start) return;
+    if (!to.isFinite())
+        return reader.input.fail(position, "the transformation is out of range", .{});
+    reader.graphics.transform = to;
+}
+
+/// Things that move are shown as they are when the shutter opens.
+fn activeTransform(reader: *Reader) Error!void {
+    const position = reader.input.offset();
+    const word = if (reader.input.peek() == '"') try reader.input.string() else reader.input.word();
+    const Which = enum { StartTime, EndTime, All };
+    const which = std.meta.stringToEnum(Which, word) orelse
+        return reader.input.fail(position, "{f} is no time of transformations", .{quote(word)});
+    reader.graphics.at_start = which != .EndTime;
+    if (which != .All)
+        try reader.note(.ActiveTransform, position, "what moves is shown at the start");
+}
+
+fn begin(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
+    if (reader.stack.items.len == limits.attribute_depth_max) return reader.input.fail(
+        position,
+        "over {d} blocks within each other",
+        .{limits.attribute_depth_max},
+    );
+    const graphics = reader.graphics;
+    try reader.stack.append(reader.input.gpa, .{ .kind = kind, .graphics = graphics });
+}
+
+fn end(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
+    const kept = reader.stack.getLastOrNull() orelse
+        return reader.input.fail(position, "{s}End without {0s}Begin", .{kind.name()});
+    if (kept.kind != kind) return reader.input.fail(
+        position,
+        "{s}End, but {s}Begin came last",
+        .{ kind.name(), kept.kind.name() },
+    );
+    _ = reader.stack.pop();
+    if (kind == .transform) {
+        reader.graphics.transform = kept.graphics.transform;
+        reader.graphics.at_start = kept.graphics.at_start;
+    } else reader.graphics = kept.graphics;
+}
+
+fn objectBegin(reader: *Reader, position: usize) Error!void {
+    const name = try reader.text();
+    if (reader.object != null)
+        return reader.input.fail(position, "an object within an object", .{});
+    try reader.begin(.object, position);
+    reader.object = .{
+        .name = try reader.arena.dupe(u8, name),
+        .first = reader.assembly.parts.items.len,
+    };
+}
+
+fn objectEnd(reader: *Reader, position: usize) Error!void {
+    const object = reader.object orelse
+        return reader.input.fail(position, "no object has begun", .{});
+    try reader.end(.object, position);
+    reader.object = null;
+    try reader.keep(Assembly.Object, &reader.objects, object.name, .{
+        .first = object.first,
+        .count = reader.assembly.parts.items.len - object.first,
+    });
+}
+
+fn objectInstance(reader: *Reader, position: usize) Error!void {
+    const name = try reader.text();
+    if (reader.object != null)
+        return reader.input.fail(position, "an instance within an object", .{});
+    const object = reader.objects.get(name) orelse
+        return reader.input.fail(position, "no object {f}", .{quote(name)});
+    try reader.assembly.showObject(object, &reader.graphics.transform);
+}
+
+/// Forgets a world that has only prepared the one that follows.
+fn startAgain(reader: *Reader) void {
+    reader.assembly.clear();
+    reader.objects.clearRetainingCapacity();
+    reader.known_meshes.clearRetainingCapacity();
+    reader.is_preparation = false;
+    reader.phase = .options;
+}
+
+fn worldBegin(reader: *Reader) Error!void {
+    reader.phase = .world;
+    reader.graphics.transform = .identity;
+    reader.graphics.at_start = true;
+    try reader.keep(Transform, &reader.spaces, "world", .identity);
+}
+
+/// The state is that of a new text; the view stays, for it is this world's.
+fn worldEnd(reader: *Reader) Error!void {
+    if (reader.stack.items.len > 0) {
+        try reader.input.warn(
+            reader.input.offset(),
+            "end",
+            "{d} blocks are begun and not ended",
+            .{reader.stack.items.len},
+        );
+        reader.stack.clearRetainingCapacity();
+    }
+    reader.object = null;
+    reader.phase = .done;
+    reader.graphics = .{};
+}
+
+fn sampler(reader: *Reader) Error!void {
+    const parameters = &reader.parameters;
+    const across = parameters.integer("xsamples");
+    const down = parameters.integer("ysamples");
+    const asked: i64 = if (across != null and down != null)
+        @as(i64, across.?) * down.?
+    else
+        parameters.integer("pixelsamples") orelse return;
+    reader.sample_count = @intCast(std.math.clamp(asked, 1, limits.sample_count_max));
+}
+
+/// All integrators are Whitted's here; "maxdepth" counts rays in his and in direct lighting,
+/// bounces in the others.
+fn integrator(reader: *Reader, name: []const u8, position: usize) Error!void {
+    if (std.mem.eql(u8, name, "ambientocclusion") or std.mem.eql(u8, name, "ao")) {
+        try reader.input.warn(
+            position,
+            name,
+            "integrator {f} is not supported: the picture shows lights and materials",
+            .{quote(name)},
+        );
+    }
+    const asked = reader.parameters.integer("maxdepth") orelse return;
+    const counts_rays = std.mem.eql(u8, name, "whitted") or std.mem.eql(u8, name, "directlighting");
+    const bounces = @as(i64, asked) - @intFromBool(counts_rays);
+    reader.depth = @intCast(std.math.clamp(bounces, 0, limits.depth_max));
+}
+
+fn makeMaterial(reader: *Reader, name: []const u8, position: usize) Error!NamedMaterial {
+    const made: materials.Material = if (std.mem.eql(u8, name, "mix"))
+        .{ .surface = try reader.mixture(position) }
+    else
+        try materials.convert(&reader.colors, name, position, &reader.parameters);
+    return .{
+        .index = try reader.assembly.addMaterial(made.surface),
+        .is_boundary = made.is_boundary,
+    };
+}
+
+fn mixture(reader: *Reader, position: usize) Error!scene_data.Material {
+    const parameters = &reader.parameters;
+    var names = [_][]const u8{
+        parameters.string("namedmaterial1") orelse "",
+        parameters.string("namedmaterial2") orelse "",
+    };
+    var second_share = try reader.colors.float(parameters, "amount", 0.5);
+    if (parameters.find("materials")) |parameter| {
+        const list = parameters.stringsOf(parameter);
+        if (list.len != 2) return reader.input.fail(position, "two materials are mixed", .{});
+        names = list[0..2].*;
+    } else second_share = 1 - second_share; // The older dialects tell the first one's share.
+    var parts: [2]scene_data.Material = undefined;
+    for (names, &parts) |name, *part| {
+        const made = reader.named.get(name) orelse
+            return reader.input.fail(position, "no material {f}", .{quote(name)});
+        part.* = reader.assembly.materials.items[made.index];
+    }
+    return materials.mix(parts[0], parts[1], second_share);
+}
+
+fn namedMaterial(reader: *Reader, position: usize) Error!void {
+    const name = try reader.text();
+    const made = reader.named.get(name) orelse
+        return reader.input.fail(position, "no material {f}", .{quote(name)});
+    reader.graphics.material = made.index;
+    reader.graphics.is_boundary = made.is_boundary;
+}
+
+fn areaLight(reader: *Reader) Error!void {
+    const parameters = &reader.parameters;
+    const color = try reader.colors.rgb(parameters, "L", .{ 1, 1, 1 });
+    const scale = try reader.colors.rgb(parameters, "scale", .{ 1, 1, 1 });
+    var radiance: Vec3 = undefined;
+    for (&radiance, color, scale) |*to, a, b| {
+        const product = a * b;
+        to.* = if (product > 0) @min(product, 1e30) else 0;
+    }
+    const two_sided = parameters.boolean("twosided", false);
+    reader.graphics.glow = .{ .radiance = radiance, .two_sided = two_sided };
+}
+
+fn materialIndex(reader: *Reader) Allocator.Error!u32 {
+    if (reader.graphics.material != scene_data.none) return reader.graphics.material;
+    if (reader.default_material == scene_data.none)
+        reader.default_material = try reader.assembly.addMaterial(materials.matte_default);
+    return reader.default_material;
+}
+
+fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
+    const graphics = &reader.graphics;
+    const input = reader.input;
+    reader.maker.parameters = &reader.parameters;
+    reader.maker.position = position;
+    reader.maker.name = name;
+    const kind = std.meta.stringToEnum(shapes.Kind, name) orelse return input.warn(
+        position,
+        name,
+        "Shape {f} is not supported and left out",
+        .{quote(name)},
+    );
+    if (reader.parameters.find("alpha")) |alpha| {
+        const values = reader.parameters.floatsOf(alpha);
+        if (values.len > 0 and values[0] == 0) return;
+        if (alpha.type == .texture)
+            try input.warn(position, "alpha", "Shape: textures of holes are not supported", .{});
+    }
+    if (graphics.is_boundary) return;
+    const material = try reader.materialIndex();
+    if (graphics.glow) |glow| {
+        if (reader.object == null) return reader.shine(kind, material, glow);
+        try input.warn(position, "glow", "Shape: objects do not shine", .{});
+    }
+    const mesh = try reader.meshOf(kind, material);
+    if (reader.object == null)
+        try reader.assembly.show(mesh, &graphics.transform)
+    else
+        try reader.assembly.addPart(mesh, &graphics.transform);
+}
+
+/// The mesh of the shape that the parameters tell; curved ones are made once.
+fn meshOf(reader: *Reader, kind: shapes.Kind, material: u32) Error!u32 {
+    if (!kind.isCurved()) {
+        const geometry = try shapes.make(&reader.maker, kind, reader.graphics.reverse);
+        return reader.assembly.addMesh(geometry, material);
+    }
+    const key = shapes.hash(kind, reader.graphics.reverse, &reader.parameters) ^
+        (@as(u64, material) *% 0x9e3779b97f4a7c15);
+    if (reader.known_meshes.get(key)) |mesh| return mesh;
+    const geometry = try shapes.make(&reader.maker, kind, reader.graphics.reverse);
+    const mesh = try reader.assembly.addMesh(geometry, material);
+    try reader.known_meshes.put(reader.arena, key, mesh);
+    return mesh;
+}
+
+/// A shape that shines: seen bright from its front, plain from behind.
+fn shine(reader: *Reader, kind: shapes.Kind, material: u32, glow: Glow) Error!void {
+    const assembly = reader.assembly;
+    const place = &reader.graphics.transform;
+    const geometry = try shapes.make(&reader.maker, kind, reader.graphics.reverse);
+    var bright = assembly.materials.items[material];
+    bright.emissive = glow.radiance;
+    bright.double_sided = glow.two_sided;
+    const front = try assembly.addMesh(geometry, try assembly.addMaterial(bright));
+    try assembly.show(front, place);
+    if (!glow.two_sided) {
+        var plain = assembly.materials.items[material];
+        plain.double_sided = false;
+        const back = try shapes.turned(&reader.maker, &geometry);
+        try assembly.show(try assembly.addMesh(back, try assembly.addMaterial(plain)), place);
+    }
+    if (assembly.emitters.items.len >= limits.emitter_count_max) return reader.input.warn(
+        reader.maker.position,
+        "emitters",
+        "Shape: over {d} shapes shine, the others are bright but give no light",
+        .{limits.emitter_count_max},
+    );
+    try assembly.emitters.append(reader.input.gpa, .{
+        .geometry = geometry,
+        .place = place.*,
+        .radiance = glow.radiance,
+        .two_sided = glow.two_sided,
+    });
+}
+
+/// Makes the scene of what has been read.
+pub fn finish(reader: *Reader, scene: *Scene) Error!void {
+    const view = &reader.view;
+    if (view.place == null) {
+        view.place = .identity;
+        try reader.input.warn(
+            reader.input.top().bytes.len,
+            "camera",
+            "no Camera: PBRT's own at the origin looks along z with fov 90",
+            .{},
+        );
+    }
+    const projection = try view.projection(reader.input);
+    if (!view.place.?.isFinite())
+        return reader.input.fail(0, "the camera's screen is too far away", .{});
+    try lights.placeEmitters(reader.assembly);
+    scene.resolution = view.size;
+    scene.sample_count = reader.sample_count;
+    scene.depth = reader.depth;
+    if (reader.assembly.has_unknown_sky and reader.assembly.sky == null and
+        reader.assembly.lights.items.len > 0) reader.assembly.sky = @splat(lights.unknown_sky);
+    if (reader.assembly.sky) |sky| {
+        scene.background = sky;
+        scene.ambient = spectra.luminance(sky);
+    }
+    try reader.assembly.finish(&view.place.?, projection);
+}

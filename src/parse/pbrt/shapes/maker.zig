@@ -1,0 +1,173 @@
+//! What every shape needs to become triangles: memory within bounds, and a way to complain.
+//!
+//! Geometry lives as long as the scene; what only the making of it needs is given back. Curved
+//! shapes and subdivision make many triangles of few bytes, so that everything is counted before
+//! it is allocated.
+
+const std = @import("std");
+const limits = @import("../limits.zig");
+const math = @import("../../../math.zig");
+const Input = @import("../input.zig");
+const Parameters = @import("../parameters.zig");
+const Error = Input.Error;
+const Vec3 = math.Vec3;
+const Transform = @import("../transform.zig");
+const Vector = Transform.Vector;
+const assert = std.debug.assert;
+
+const Maker = @This();
+
+/// Triangles in the space of the shape.
+pub const Geometry = struct {
+    positions: []Vec3,
+    /// Null: flat faces.
+    normals: ?[]Vec3 = null,
+    /// Counter-clockwise seen from the side that PBRT's normal points to.
+    triangles: [][3]u32,
+};
+
+input: *Input,
+/// Where geometry lives.
+arena: std.mem.Allocator,
+/// Of the directive that is being read.
+parameters: *const Parameters = undefined,
+/// Where that directive stands.
+position: usize = 0,
+/// What kind of shape it is, for messages.
+name: []const u8 = "",
+/// Bytes of all geometry so far.
+bytes_used: u64 = 0,
+
+/// Fails where the shape stands.
+pub fn fail(maker: *Maker, comptime format: []const u8, arguments: anytype) error{InvalidInput} {
+    return maker.input.fail(maker.position, "{s}: " ++ format, .{maker.name} ++ arguments);
+}
+
+/// Memory that lives as long as the scene.
+pub fn alloc(maker: *Maker, comptime Element: type, count: u64) Error![]Element {
+    try maker.reserve(count, @sizeOf(Element));
+    return maker.arena.alloc(Element, @intCast(count));
+}
+
+/// Counts memory before it is asked for.
+pub fn reserve(maker: *Maker, element_count: u64, element_bytes: u64) Error!void {
+    const limit = limits.decodedBytesMax(maker.input.bytes_read);
+    const bytes = std.math.mul(u64, element_count, element_bytes) catch limit;
+    maker.bytes_used = std.math.add(u64, maker.bytes_used, bytes) catch limit + 1;
+    // Each array within half of the address space, too.
+    if (maker.bytes_used <= limit and bytes <= std.math.maxInt(usize) / 2) return;
+    return maker.fail("the scene's shapes need much more memory than its files explain", .{});
+}
+
+/// A number that has to be above 0.
+pub fn positive(maker: *Maker, name: []const u8, default: f32) Error!f64 {
+    const value = maker.parameters.float(name, default);
+    if (value > 0) return value;
+    return maker.fail("{s} is {d}, not above 0", .{ name, value });
+}
+
+/// The sweep "phimax" in radians, at most a full turn.
+pub fn sweep(maker: *Maker) Error!f64 {
+    const degrees = try maker.positive("phimax", 360);
+    return @min(degrees, 360) * (std.math.pi / 180.0);
+}
+
+/// Steps that an arc of `angle` radians is cut into, `least` at the least.
+pub fn steps(maker: *const Maker, angle: f64, least: u32) u32 {
+    assert(angle >= 0 and angle <= 2 * std.math.pi + 1e-9);
+    const full: f64 = @floatFromInt(maker.input.settings.tessellation);
+    // A little less, lest rounding adds a step to a whole number of them.
+    return @max(least, @as(u32, @intFromFloat(@ceil(full * angle / (2 * std.math.pi) - 1e-6))));
+}
+
+/// A surface over rows and columns: point and normal of each crossing.
+pub const Sample = struct { point: Vector, normal: Vector };
+
+/// How a grid is joined.
+pub const Grid = struct {
+    columns: u32,
+    rows: u32,
+    /// The last column is the first.
+    closed: bool = false,
+    /// All points of the first or last row are one.
+    first_row_is_point: bool = false,
+    last_row_is_point: bool = false,
+};
+
+/// Triangles of a grid: seen from the front, columns run to the right and rows upwards.
+/// `sampleAt` gives the crossing of a column and a row.
+pub fn grid(
+    maker: *Maker,
+    size: Grid,
+    context: anytype,
+    comptime sampleAt: fn (@TypeOf(context), u32, u32) Sample,
+) Error!Geometry {
+    assert(size.columns >= 1 and size.rows >= 1);
+    const stride: u64 = if (size.closed) size.columns else size.columns + 1;
+    const vertex_count = stride * (size.rows + 1);
+    const points: u32 = @as(u32, @intFromBool(size.first_row_is_point)) +
+        @intFromBool(size.last_row_is_point);
+    const triangle_count = @as(u64, size.columns) * (2 * @as(u64, size.rows) - points);
+    if (vertex_count > std.math.maxInt(u32)) return maker.fail("has too many vertices", .{});
+    const result: Geometry = .{
+        .positions = try maker.alloc(Vec3, vertex_count),
+        .normals = try maker.alloc(Vec3, vertex_count),
+        .triangles = try maker.alloc([3]u32, triangle_count),
+    };
+    for (0..size.rows + 1) |row| for (0..@intCast(stride)) |column| {
+        const sample = sampleAt(context, @intCast(column), @intCast(row));
+        const index = row * @as(usize, @intCast(stride)) + column;
+        result.positions[index] = Transform.toVec3(sample.point);
+        result.normals.?[index] = Transform.toVec3(sample.normal);
+    };
+    const wide: u32 = @intCast(stride);
+    var made: usize = 0;
+    for (0..size.rows) |row| for (0..size.columns) |column| {
+        const first: u32 = @intCast(row * wide);
+        const left: u32 = @intCast(column);
+        const right: u32 = if (size.closed and left + 1 == size.columns) 0 else left + 1;
+        if (row > 0 or !size.first_row_is_point) {
+            result.triangles[made] = .{ first + left, first + right, first + wide + right };
+            made += 1;
+        }
+        if (row + 1 < size.rows or !size.last_row_is_point) {
+            result.triangles[made] = .{ first + left, first + wide + right, first + wide + left };
+            made += 1;
+        }
+    };
+    assert(made == result.triangles.len);
+    return result;
+}
+
+/// Turns the faces around that look against their vertices' normals.
+pub fn orient(geometry: *const Geometry) void {
+    const normals = geometry.normals orelse return;
+    for (geometry.triangles) |*corners| {
+        const a, const b, const c = .{
+            geometry.positions[corners[0]],
+            geometry.positions[corners[1]],
+            geometry.positions[corners[2]],
+        };
+        const face = math.vec3.cross(math.vec3.sub(b, a), math.vec3.sub(c, a));
+        var agreement: f32 = 0;
+        for (corners) |corner| agreement += math.vec3.dot(face, normals[corner]);
+        if (agreement < 0) std.mem.swap(u32, &corners[1], &corners[2]);
+    }
+}
+
+/// Normals of a smooth surface: the sum of the faces around each vertex, by area.
+pub fn smooth(maker: *Maker, geometry: *Geometry) Error!void {
+    const normals = try maker.alloc(Vec3, geometry.positions.len);
+    @memset(normals, .{ 0, 0, 0 });
+    for (geometry.triangles) |corners| {
+        const a, const b, const c = .{
+            geometry.positions[corners[0]],
+            geometry.positions[corners[1]],
+            geometry.positions[corners[2]],
+        };
+        const face = math.vec3.cross(math.vec3.sub(b, a), math.vec3.sub(c, a));
+        for (corners) |corner| normals[corner] = math.vec3.add(normals[corner], face);
+    }
+    for (normals) |*normal| normal.* = math.vec3.normalize(normal.*) orelse .{ 0, 0, 0 };
+    geometry.normals = normals;
+}

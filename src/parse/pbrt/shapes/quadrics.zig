@@ -1,0 +1,253 @@
+//! Sphere, cylinder, disk, cone, paraboloid and hyperboloid, whole or swept in part.
+//!
+//! Each is a curve that turns about z, as in PBRT, whose normal is the cross product of the
+//! directions of growing angle and growing v. The normals are those of the true surface.
+
+const std = @import("std");
+const elementary = @import("../../../math.zig").elementary;
+const Maker = @import("maker.zig");
+const Transform = @import("../transform.zig");
+const Error = @import("../input.zig").Error;
+const Geometry = Maker.Geometry;
+const Grid = Maker.Grid;
+const Sample = Maker.Sample;
+const Vector = Transform.Vector;
+
+/// Where the turning curve is, and the normal there: distance from the axis and height each.
+const Outline = struct { radius: f64, height: f64, normal_out: f64, normal_up: f64 };
+
+/// A curve and its turn.
+fn Revolution(comptime Curve: type) type {
+    return struct {
+        curve: Curve,
+        size: Grid,
+        phi_max: f64,
+
+        fn sampleAt(self: *const @This(), column: u32, row: u32) Sample {
+            const phi = share(column, self.size.columns) * self.phi_max;
+            const cosine = elementary.cos(phi);
+            const sine = elementary.sin(phi);
+            const at = self.curve.at(share(row, self.size.rows));
+            return .{
+                .point = .{ at.radius * cosine, at.radius * sine, at.height },
+                .normal = .{ at.normal_out * cosine, at.normal_out * sine, at.normal_up },
+            };
+        }
+    };
+}
+
+fn share(index: u32, count: u32) f64 {
+    return @as(f64, @floatFromInt(index)) / @as(f64, @floatFromInt(count));
+}
+
+fn revolve(maker: *Maker, curve: anytype, rows: u32, ends: [2]bool) Error!Geometry {
+    const phi_max = try maker.sweep();
+    const revolution: Revolution(@TypeOf(curve)) = .{
+        .curve = curve,
+        .phi_max = phi_max,
+        .size = .{
+            .columns = maker.steps(phi_max, 3),
+            .rows = rows,
+            .closed = phi_max > 2 * std.math.pi - 1e-9,
+            .first_row_is_point = ends[0],
+            .last_row_is_point = ends[1],
+        },
+    };
+    return maker.grid(revolution.size, &revolution, Revolution(@TypeOf(curve)).sampleAt);
+}
+
+/// The lower and the higher of two heights, each held between bounds.
+fn heights(maker: *Maker, low_default: f32, high_default: f32) [2]f64 {
+    const a: f64 = maker.parameters.float("zmin", low_default);
+    const b: f64 = maker.parameters.float("zmax", high_default);
+    return .{ @min(a, b), @max(a, b) };
+}
+
+const SphereCurve = struct {
+    radius: f64,
+    /// Angles from the top, of the first and the last row.
+    from: f64,
+    to: f64,
+
+    fn at(curve: SphereCurve, v: f64) Outline {
+        const theta = curve.from + v * (curve.to - curve.from);
+        const cosine = elementary.cos(theta);
+        // Poles are points, exactly.
+        const pole = theta < 1e-9 or theta > std.math.pi - 1e-9;
+        const sine = if (pole) 0 else elementary.sin(theta);
+        return .{
+            .radius = curve.radius * sine,
+            .height = curve.radius * cosine,
+            .normal_out = sine,
+            .normal_up = cosine,
+        };
+    }
+};
+
+/// `radius`, cut at `zmin` and `zmax`: rows from the bottom up, as many as there are columns in a
+/// whole sphere.
+pub fn sphere(maker: *Maker) Error!Geometry {
+    const radius = try maker.positive("radius", 1);
+    const z = heights(maker, @floatCast(-radius), @floatCast(radius));
+    const from = angleOf(z[0] / radius);
+    const to = angleOf(z[1] / radius);
+    if (!(from > to)) return maker.fail("zmin and zmax leave nothing of the sphere", .{});
+    const rows = maker.steps(2 * (from - to), 2);
+    return revolve(maker, SphereCurve{ .radius = radius, .from = from, .to = to }, rows, .{
+        from > std.math.pi - 1e-9,
+        to < 1e-9,
+    });
+}
+
+/// Arc cosine of a number held within -1..1.
+fn angleOf(cosine: f64) f64 {
+    return std.math.acos(std.math.clamp(cosine, -1, 1));
+}
+
+const CylinderCurve = struct {
+    radius: f64,
+    z: [2]f64,
+
+    fn at(curve: CylinderCurve, v: f64) Outline {
+        return .{
+            .radius = curve.radius,
+            .height = (1 - v) * curve.z[0] + v * curve.z[1],
+            .normal_out = 1,
+            .normal_up = 0,
+        };
+    }
+};
+
+/// `radius` from `zmin` to `zmax`, without lids.
+pub fn cylinder(maker: *Maker) Error!Geometry {
+    const radius = try maker.positive("radius", 1);
+    const curve: CylinderCurve = .{ .radius = radius, .z = heights(maker, -1, 1) };
+    return revolve(maker, curve, 1, .{ false, false });
+}
+
+const DiskCurve = struct {
+    outer: f64,
+    inner: f64,
+    height: f64,
+
+    fn at(curve: DiskCurve, v: f64) Outline {
+        return .{
+            .radius = (1 - v) * curve.outer + v * curve.inner,
+            .height = curve.height,
+            .normal_out = 0,
+            .normal_up = 1,
+        };
+    }
+};
+
+/// At `height`, from `innerradius` to `radius`, looking up.
+pub fn disk(maker: *Maker) Error!Geometry {
+    const radius = try maker.positive("radius", 1);
+    const inner: f64 = std.math.clamp(maker.parameters.float("innerradius", 0), 0, radius);
+    const height = maker.parameters.float("height", 0);
+    const curve: DiskCurve = .{ .outer = radius, .inner = inner, .height = height };
+    return revolve(maker, curve, 1, .{ false, inner == 0 });
+}
+
+const ConeCurve = struct {
+    radius: f64,
+    height: f64,
+
+    fn at(curve: ConeCurve, v: f64) Outline {
+        const slant = @sqrt(curve.radius * curve.radius + curve.height * curve.height);
+        return .{
+            .radius = curve.radius * (1 - v),
+            .height = curve.height * v,
+            .normal_out = curve.height / slant,
+            .normal_up = curve.radius / slant,
+        };
+    }
+};
+
+/// `radius` at z = 0, a point at `height`.
+pub fn cone(maker: *Maker) Error!Geometry {
+    const radius = try maker.positive("radius", 1);
+    const height = try maker.positive("height", 1);
+    return revolve(maker, ConeCurve{ .radius = radius, .height = height }, 1, .{ false, true });
+}
+
+const ParaboloidCurve = struct {
+    radius: f64,
+    /// Height where it has that radius.
+    top: f64,
+    z: [2]f64,
+
+    fn at(curve: ParaboloidCurve, v: f64) Outline {
+        // Even steps of the radius, which is the root of the height.
+        const root = (1 - v) * @sqrt(curve.z[0]) + v * @sqrt(curve.z[1]);
+        const radius = curve.radius * root / @sqrt(curve.top);
+        const slope = 2 * curve.top * radius / (curve.radius * curve.radius);
+        const length = @sqrt(1 + slope * slope);
+        return .{
+            .radius = radius,
+            .height = root * root,
+            .normal_out = slope / length,
+            .normal_up = -1 / length,
+        };
+    }
+};
+
+/// z = zmax (r / radius)^2 from `zmin` to `zmax`.
+pub fn paraboloid(maker: *Maker) Error!Geometry {
+    const radius = try maker.positive("radius", 1);
+    const z = heights(maker, 0, 1);
+    const low = @max(z[0], 0);
+    if (!(z[1] > low)) return maker.fail("zmin and zmax leave nothing of the paraboloid", .{});
+    const rows = maker.steps(std.math.pi, 2);
+    const curve: ParaboloidCurve = .{ .radius = radius, .top = z[1], .z = .{ low, z[1] } };
+    return revolve(maker, curve, rows, .{ low == 0, false });
+}
+
+/// A line that turns about z.
+const Hyperboloid = struct {
+    first: Vector,
+    last: Vector,
+    size: Grid,
+    phi_max: f64,
+
+    fn sampleAt(self: *const Hyperboloid, column: u32, row: u32) Sample {
+        const phi = share(column, self.size.columns) * self.phi_max;
+        const cosine = elementary.cos(phi);
+        const sine = elementary.sin(phi);
+        const v = share(row, self.size.rows);
+        const along = Transform.subtract(self.last, self.first);
+        const on_line = Transform.add(self.first, Transform.scaled(along, v));
+        const point = turn(on_line, cosine, sine);
+        const across: Vector = .{ -point[1], point[0], 0 };
+        const normal = Transform.cross(across, turn(along, cosine, sine));
+        return .{ .point = point, .normal = Transform.normalize(normal) orelse .{ 0, 0, 0 } };
+    }
+
+    fn turn(vector: Vector, cosine: f64, sine: f64) Vector {
+        return .{
+            vector[0] * cosine - vector[1] * sine,
+            vector[0] * sine + vector[1] * cosine,
+            vector[2],
+        };
+    }
+};
+
+/// The line from `p1` to `p2`, turned about z.
+pub fn hyperboloid(maker: *Maker) Error!Geometry {
+    const first = maker.parameters.vector("p1", .{ 0, 0, 0 });
+    const last = maker.parameters.vector("p2", .{ 1, 1, 1 });
+    const phi_max = try maker.sweep();
+    const surface: Hyperboloid = .{
+        .first = .{ first[0], first[1], first[2] },
+        .last = .{ last[0], last[1], last[2] },
+        .phi_max = phi_max,
+        .size = .{
+            .columns = maker.steps(phi_max, 3),
+            .rows = maker.steps(std.math.pi, 2),
+            .closed = phi_max > 2 * std.math.pi - 1e-9,
+            .first_row_is_point = first[0] == 0 and first[1] == 0,
+            .last_row_is_point = last[0] == 0 and last[1] == 0,
+        },
+    };
+    return maker.grid(surface.size, &surface, Hyperboloid.sampleAt);
+}

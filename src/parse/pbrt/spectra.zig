@@ -1,0 +1,180 @@
+//! Spectra as linear RGB: tables of wavelengths, black bodies, CIE XYZ, and names.
+//!
+//! In: numbers as PBRT gives them. Out: linear RGB with sRGB's primaries, not clipped; a spectrum
+//! that is 1 everywhere has luminance 1, and the pink tint of the equal-energy white, as in PBRT.
+//! The observer is the fit of Wyman, Sloan and Shirley, "Simple analytic approximations to the CIE
+//! XYZ color matching functions" (2013), the multi-lobe one; elementary functions are our own.
+
+const std = @import("std");
+const math = @import("../../math.zig");
+const elementary = math.elementary;
+const Vec3 = math.Vec3;
+
+/// Wavelengths summed over, in nanometres.
+const wavelength_min = 380;
+const wavelength_max = 780;
+const wavelength_step = 5;
+
+/// A Gaussian with two widths.
+const Lobe = struct { height: f64, middle: f64, left: f64, right: f64 };
+
+const x_lobes = [_]Lobe{
+    .{ .height = 1.056, .middle = 599.8, .left = 37.9, .right = 31.0 },
+    .{ .height = 0.362, .middle = 442.0, .left = 16.0, .right = 26.7 },
+    .{ .height = -0.065, .middle = 501.1, .left = 20.4, .right = 26.2 },
+};
+const y_lobes = [_]Lobe{
+    .{ .height = 0.821, .middle = 568.8, .left = 46.9, .right = 40.5 },
+    .{ .height = 0.286, .middle = 530.9, .left = 16.3, .right = 31.1 },
+};
+const z_lobes = [_]Lobe{
+    .{ .height = 1.217, .middle = 437.0, .left = 11.8, .right = 36.0 },
+    .{ .height = 0.681, .middle = 459.0, .left = 26.0, .right = 13.8 },
+};
+
+fn observe(lobes: []const Lobe, wavelength: f64) f64 {
+    var sum: f64 = 0;
+    for (lobes) |lobe| {
+        const width = if (wavelength < lobe.middle) lobe.left else lobe.right;
+        const distance = (wavelength - lobe.middle) / width;
+        sum += lobe.height * elementary.exp(-0.5 * distance * distance);
+    }
+    return sum;
+}
+
+/// CIE XYZ to linear RGB with the primaries of sRGB (Rec. 709).
+pub fn fromXyz(xyz: [3]f64) Vec3 {
+    const x, const y, const z = xyz;
+    return finite(.{
+        3.240479 * x - 1.537150 * y - 0.498535 * z,
+        -0.969256 * x + 1.875991 * y + 0.041556 * z,
+        0.055648 * x - 0.204043 * y + 1.057311 * z,
+    });
+}
+
+/// In f32, what is too large as the largest, denormals as zeros.
+fn finite(rgb: [3]f64) Vec3 {
+    const largest: f64 = std.math.floatMax(f32);
+    var result: Vec3 = undefined;
+    for (rgb, &result) |from, *to| {
+        const bounded = if (from < largest) if (from > -largest) from else -largest else largest;
+        to.* = math.vec3.flushDenormal(@floatCast(bounded));
+    }
+    return result;
+}
+
+/// RGB of a spectrum given as a function of the wavelength.
+fn integrate(context: anytype, comptime valueAt: fn (@TypeOf(context), f64) f64) Vec3 {
+    var xyz: [3]f64 = .{ 0, 0, 0 };
+    var whole: f64 = 0;
+    var wavelength: u32 = wavelength_min;
+    while (wavelength <= wavelength_max) : (wavelength += wavelength_step) {
+        const at: f64 = @floatFromInt(wavelength);
+        const value = valueAt(context, at);
+        const y = observe(&y_lobes, at);
+        xyz[0] += value * observe(&x_lobes, at);
+        xyz[1] += value * y;
+        xyz[2] += value * observe(&z_lobes, at);
+        whole += y;
+    }
+    for (&xyz) |*component| component.* /= whole;
+    return fromXyz(xyz);
+}
+
+/// RGB of pairs of wavelength and value, in the order of rising wavelengths: straight lines
+/// between them, the outermost values beyond. Null where it is no such list.
+pub fn fromPairs(pairs: []const f32) ?Vec3 {
+    if (pairs.len < 2 or pairs.len % 2 != 0) return null;
+    var index: usize = 2;
+    while (index < pairs.len) : (index += 2) {
+        if (!(pairs[index] > pairs[index - 2])) return null;
+    }
+    return integrate(pairs, interpolate);
+}
+
+fn interpolate(pairs: []const f32, wavelength: f64) f64 {
+    if (wavelength <= pairs[0]) return pairs[1];
+    if (wavelength >= pairs[pairs.len - 2]) return pairs[pairs.len - 1];
+    var low: usize = 0;
+    var high = pairs.len / 2 - 1;
+    while (high - low > 1) {
+        const middle = (low + high) / 2;
+        if (pairs[2 * middle] <= wavelength) low = middle else high = middle;
+    }
+    const from: f64 = pairs[2 * low];
+    const share = (wavelength - from) / (pairs[2 * high] - from);
+    return (1 - share) * pairs[2 * low + 1] + share * pairs[2 * high + 1];
+}
+
+/// RGB of a black body of that temperature in kelvin, its brightest wavelength at 1; black where
+/// it is not above 0.
+pub fn fromBlackbody(temperature: f32) Vec3 {
+    if (!(temperature > 0)) return .{ 0, 0, 0 };
+    return integrate(@as(f64, temperature), planck);
+}
+
+/// Planck's law over its own maximum (Wien's law). Wavelength in nanometres.
+fn planck(temperature: f64, wavelength: f64) f64 {
+    const x = 1.4387769e7 / (wavelength * temperature);
+    // At the maximum x is 4.965114, and the law is x^5 / (e^x - 1) but for constants.
+    const x_peak = 4.965114231744276;
+    if (x > 600) return 0;
+    const ratio = x / x_peak;
+    const ratio_squared = ratio * ratio;
+    const growth = (elementary.exp(x_peak) - 1) / (elementary.exp(x) - 1);
+    return ratio_squared * ratio_squared * ratio * growth;
+}
+
+/// Spectra that PBRT knows by name: index of refraction (eta) and absorption (k) of metals,
+/// refraction of glasses at the sodium line.
+pub fn fromName(name: []const u8) ?Vec3 {
+    return named.get(name);
+}
+
+const named: std.StaticStringMap(Vec3) = .initComptime(.{
+    .{ "metal-Ag-eta", Vec3{ 0.1552, 0.1166, 0.1383 } },
+    .{ "metal-Ag-k", Vec3{ 4.8283, 3.1222, 2.1470 } },
+    .{ "metal-Al-eta", Vec3{ 1.6574, 0.8803, 0.5212 } },
+    .{ "metal-Al-k", Vec3{ 9.2238, 6.2695, 4.8370 } },
+    .{ "metal-Au-eta", Vec3{ 0.1431, 0.3749, 1.4424 } },
+    .{ "metal-Au-k", Vec3{ 3.9831, 2.3857, 1.6032 } },
+    .{ "metal-Cu-eta", Vec3{ 0.2004, 0.9240, 1.1022 } },
+    .{ "metal-Cu-k", Vec3{ 3.9129, 2.4528, 2.1421 } },
+    .{ "glass-BK7", Vec3{ 1.5168, 1.5168, 1.5168 } },
+    .{ "glass-BAF10", Vec3{ 1.67, 1.67, 1.67 } },
+    .{ "glass-FK51A", Vec3{ 1.4866, 1.4866, 1.4866 } },
+    .{ "glass-LASF9", Vec3{ 1.8503, 1.8503, 1.8503 } },
+    .{ "glass-F5", Vec3{ 1.6034, 1.6034, 1.6034 } },
+    .{ "glass-F10", Vec3{ 1.6237, 1.6237, 1.6237 } },
+    .{ "glass-F11", Vec3{ 1.6206, 1.6206, 1.6206 } },
+    .{ "stdillum-A", Vec3{ 2.22, 0.82, 0.20 } },
+    .{ "stdillum-D65", Vec3{ 1, 1, 1 } },
+});
+
+/// Luminance of linear RGB (Rec. 709).
+pub fn luminance(rgb: Vec3) f32 {
+    return 0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2];
+}
+
+test "a spectrum of ones has luminance one and the tint of the equal-energy white" {
+    const white = fromPairs(&.{ 400, 1, 700, 1 }).?;
+    try std.testing.expectApproxEqAbs(1, luminance(white), 1e-3);
+    const expected: Vec3 = .{ 1.205, 0.948, 0.909 };
+    for (expected, white) |a, b| try std.testing.expectApproxEqAbs(a, b, 0.02);
+    const red = fromPairs(&.{ 380, 0, 590, 0, 610, 1, 780, 1 }).?;
+    try std.testing.expect(red[0] > 4 * @abs(red[1]) and red[0] > 4 * @abs(red[2]));
+    for ([_][]const f32{ &.{}, &.{1}, &.{ 500, 1, 400, 1 }, &.{ 500, 1, 500, 2 } }) |bad| {
+        try std.testing.expectEqual(null, fromPairs(bad));
+    }
+}
+
+test "black bodies turn from red to blue" {
+    const warm = fromBlackbody(2700);
+    try std.testing.expect(warm[0] > 2 * warm[2]);
+    const cold = fromBlackbody(12000);
+    try std.testing.expect(cold[2] > cold[0]);
+    try std.testing.expectApproxEqAbs(1, planck(5000, 2.8977719e6 / 5000.0), 1e-6);
+    for ([_]f32{ 0, -1, 1e-30, 1e30 }) |temperature| {
+        try std.testing.expect(math.vec3.isFinite(fromBlackbody(temperature)));
+    }
+}

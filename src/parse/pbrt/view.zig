@@ -1,0 +1,151 @@
+//! Camera and film: what the picture shows, and how large it is.
+//!
+//! In: the parameters of Camera and Film. Out: a projection of ours and a size in pixels. PBRT's
+//! fov spans the shorter side of the picture; ours the vertical one.
+
+const std = @import("std");
+const elementary = @import("../../math.zig").elementary;
+const limits = @import("limits.zig");
+const quote = @import("../../diagnostic.zig").quote;
+const scene = @import("../../scene.zig");
+const Input = @import("input.zig");
+const Parameters = @import("parameters.zig");
+const Transform = @import("transform.zig");
+const Error = Input.Error;
+
+const View = @This();
+
+/// Of the film, in pixels.
+size: [2]u32 = .{ 640, 480 },
+kind: enum { perspective, orthographic } = .perspective,
+/// Angle over the shorter side.
+fov_deg: f64 = 90,
+/// Left, right, bottom and top on the screen, in units of half of the shorter side.
+window: ?[4]f64 = null,
+/// Width over height of the screen, where it is not the film's.
+aspect: ?f64 = null,
+/// From the camera's space into the world; null until a Camera stands there.
+place: ?Transform = null,
+
+/// `Film "name" ...`.
+pub fn setFilm(
+    view: *View,
+    input: *Input,
+    position: usize,
+    parameters: *const Parameters,
+) Error!void {
+    var size: [2]u32 = .{ 640, 480 };
+    for (&size, [_][]const u8{ "xresolution", "yresolution" }) |*side, name| {
+        const value = parameters.integer(name) orelse continue;
+        if (value < 1 or value > limits.film_side_max) return input.fail(
+            position,
+            "{s} is {d}, not 1 to {d}",
+            .{ name, value, limits.film_side_max },
+        );
+        side.* = @intCast(value);
+    }
+    if (@as(u64, size[0]) * size[1] > limits.film_pixel_count_max) return input.fail(
+        position,
+        "the film has over {d} pixels",
+        .{limits.film_pixel_count_max},
+    );
+    if (parameters.find("cropwindow") != null or parameters.find("pixelbounds") != null)
+        try input.warn(position, "cropwindow", "Film: crop windows are not supported", .{});
+    view.size = size;
+}
+
+/// `Camera "name" ...`; `to_camera` is the current transformation.
+pub fn setCamera(
+    view: *View,
+    input: *Input,
+    name: []const u8,
+    position: usize,
+    parameters: *const Parameters,
+    to_camera: *const Transform,
+) Error!void {
+    const place = to_camera.inverse() orelse
+        return input.fail(position, "the camera's transformation has no inverse", .{});
+    if (!place.isFinite()) return input.fail(position, "the camera is too far away", .{});
+    var result: View = .{ .size = view.size, .place = place };
+    if (std.mem.eql(u8, name, "orthographic")) {
+        result.kind = .orthographic;
+    } else if (!std.mem.eql(u8, name, "perspective")) {
+        try input.warn(
+            position,
+            name,
+            "Camera {f} is not supported: a perspective one with fov 90 stands for it",
+            .{quote(name)},
+        );
+    }
+    const fov_name = if (parameters.find("halffov") != null) "halffov" else "fov";
+    const factor: f64 = if (parameters.find("halffov") != null) 2 else 1;
+    result.fov_deg = factor * parameters.float(fov_name, @floatCast(90 / factor));
+    if (!(result.fov_deg > 0 and result.fov_deg < 180)) return input.fail(
+        position,
+        "the camera's fov is {d}, not between 0 and 180",
+        .{result.fov_deg},
+    );
+    if (parameters.find("frameaspectratio") != null) {
+        const aspect = parameters.float("frameaspectratio", 1);
+        if (!(aspect > 1e-4 and aspect < 1e4))
+            return input.fail(position, "the frame's aspect ratio is {d}", .{aspect});
+        result.aspect = aspect;
+    }
+    if (parameters.floatsNamed("screenwindow")) |window| {
+        if (window.len != 4 or !(window[1] > window[0] and window[3] > window[2]))
+            return input.fail(position, "the screen window is not [left right bottom top]", .{});
+        result.window = .{ window[0], window[1], window[2], window[3] };
+    }
+    if (parameters.float("lensradius", 0) > 0) try input.warn(
+        position,
+        "lensradius",
+        "Camera: lenses are not supported, all is in focus",
+        .{},
+    );
+    view.* = result;
+}
+
+/// The projection, and where it is seen from: windows beside the middle move an orthographic
+/// camera, a perspective one is turned to the middle.
+pub fn projection(view: *View, input: *Input) Error!scene.Camera.Projection {
+    const film = @as(f64, @floatFromInt(view.size[0])) / @as(f64, @floatFromInt(view.size[1]));
+    const aspect = view.aspect orelse film;
+    const window = view.window orelse if (aspect >= 1)
+        [4]f64{ -aspect, aspect, -1, 1 }
+    else
+        [4]f64{ -1, 1, -1 / aspect, 1 / aspect };
+    // Within what a camera can show in the end.
+    const half_width = std.math.clamp(0.5 * (window[1] - window[0]), 1e-9, 1e9);
+    const half_height = std.math.clamp(0.5 * (window[3] - window[2]), 1e-9, 1e9);
+    const middle: Transform.Vector =
+        .{ 0.5 * (window[0] + window[1]), 0.5 * (window[2] + window[3]), 0 };
+    if (@abs(half_width / half_height / film - 1) > 0.01) try input.warn(
+        0,
+        "stretch",
+        "Camera: the screen is not as wide as the film, its height counts",
+        .{},
+    );
+    switch (view.kind) {
+        .orthographic => {
+            view.place.?.origin = view.place.?.point(middle);
+            return .{ .orthographic = .{
+                .half_width = @floatCast(half_width),
+                .half_height = @floatCast(half_height),
+            } };
+        },
+        .perspective => {
+            if (middle[0] != 0 or middle[1] != 0) try input.warn(
+                0,
+                "window",
+                "Camera: the screen window is taken as if it were in the middle",
+                .{},
+            );
+            const slope = elementary.tan(0.5 * view.fov_deg * (std.math.pi / 180.0)) * half_height;
+            const angle = 2 * std.math.atan(slope);
+            return .{ .perspective = .{
+                .y_fov_rad = @floatCast(std.math.clamp(angle, 1e-6, 3.14159)),
+                .aspect = @floatCast(half_width / half_height),
+            } };
+        },
+    }
+}
