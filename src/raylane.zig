@@ -7,6 +7,7 @@
 const std = @import("std");
 
 pub const diagnostic = @import("diagnostic.zig");
+pub const energy = @import("energy.zig");
 pub const image = @import("image.zig");
 pub const math = @import("math.zig");
 pub const options = @import("options.zig");

@@ -30,7 +30,7 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
     .{ .part = "image", .may_import = &.{} },
     .{ .part = "output", .may_import = &.{ "image", "parallel" } },
     .{ .part = "report", .may_import = &.{ "config", "options", "variant", "world" } },
-    .{ .part = "energy", .may_import = &.{ "options", "variant" } },
+    .{ .part = "energy", .may_import = &.{} },
     .{ .part = "diagnostic", .may_import = &.{} },
     .{ .part = "statistics", .may_import = &.{} },
 };
