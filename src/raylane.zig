@@ -6,6 +6,7 @@
 
 const std = @import("std");
 
+pub const bench = @import("bench.zig");
 pub const diagnostic = @import("diagnostic.zig");
 pub const energy = @import("energy.zig");
 pub const image = @import("image.zig");

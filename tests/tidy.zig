@@ -31,6 +31,13 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
     .{ .part = "output", .may_import = &.{ "image", "parallel" } },
     .{ .part = "report", .may_import = &.{ "config", "options", "variant", "world" } },
     .{ .part = "energy", .may_import = &.{} },
+    .{
+        // The second program, beside `main`, that leads scenes through all stages.
+        .part = "bench",
+        .may_import = &.{
+            "parse", "prepare", "trace", "world", "image", "options", "variant", "energy",
+        },
+    },
     .{ .part = "diagnostic", .may_import = &.{} },
     .{ .part = "statistics", .may_import = &.{} },
 };

@@ -125,6 +125,13 @@ pub const Meter = struct {
         meter.cost.processor_ns = @intCast(@max(spent, 0));
     }
 
+    /// Whether the source has stopped to answer.
+    pub fn isLost(meter: *Meter) bool {
+        meter.mutex.lockUncancelable(meter.io);
+        defer meter.mutex.unlock(meter.io);
+        return meter.is_lost;
+    }
+
     /// Takes a reading.
     pub fn mark(meter: *Meter) Mark {
         meter.mutex.lockUncancelable(meter.io);
