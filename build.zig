@@ -29,6 +29,7 @@ pub fn build(b: *std.Build) void {
         .test_unit = b.step("test:unit", "Run the unit tests of this machine"),
         .test_fmt = b.step("test:fmt", "Check the formatting"),
         .test_tidy = b.step("test:tidy", "Check the style of the source tree"),
+        .test_report = b.step("test:report", "Test the report of the benchmark"),
         .check = b.step("check", "Compile the program and its tests, write nothing"),
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
@@ -75,6 +76,7 @@ pub fn build(b: *std.Build) void {
     tests.addUnit(steps.test_unit, targets[0]);
     tests.addFormat(steps.test_fmt);
     tests.addTidy(steps.test_tidy);
+    tests.addReport(steps.test_report);
     tests.addCheck(steps.check, targets[0]);
     steps.check.dependOn(&package.program().step);
 
@@ -84,12 +86,18 @@ pub fn build(b: *std.Build) void {
     scenes.addArg("scenes/cornell.gltf");
     steps.scenes.dependOn(&scenes.step);
 
+    addLowering(steps.lowering);
+}
+
+/// Makes `step` write docs/lowering.md.
+fn addLowering(step: *std.Build.Step) void {
+    const b = step.owner;
     const lowering = b.addSystemCommand(&.{ "python3", "bench/lowering.py" });
     lowering.setCwd(b.path("."));
     lowering.addFileArg(.zig_exe);
     lowering.addArg("docs/lowering.md");
     lowering.has_side_effects = true;
-    steps.lowering.dependOn(&lowering.step);
+    step.dependOn(&lowering.step);
 }
 
 /// The step that puts the headers in place, and the folder of copies that depends on it.

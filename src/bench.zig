@@ -204,7 +204,8 @@ pub const Bench = struct {
     fn measureScenes(bench: *Bench, deadline_ns: u64, results: *Results) Error!void {
         const names = bench.settings.scenes;
         const share: f64 = if (bench.settings.thread_count > 1) scaling_share else 0;
-        const scaling_ns: u64 = @trunc(share * 1e9 * @as(f64, @floatFromInt(bench.settings.time_s)));
+        const time_s: f64 = @floatFromInt(bench.settings.time_s);
+        const scaling_ns: u64 = @trunc(share * time_s * 1e9);
         const scenes = try bench.arena.alloc(results_file.Scene, names.len);
         for (scenes, names, 0..) |*scene, name, index| {
             bench.scene = name;

@@ -1,8 +1,8 @@
 //! What work costs in joules.
 //!
-//! In: the place of the kernel's files (`/sys`, or a copy of it), or a command that measures. Out: a
-//! source of energy readings that was found there, or why there is none; and a meter that reads it
-//! from a thread of its own while other threads work, and says what lies between two moments.
+//! In: the place of the kernel's files (`/sys`, or a copy of it), or a command that measures. Out:
+//! a source of energy readings that was found there, or why there is none; and a meter that reads
+//! it from a thread of its own while others work, and says what lies between two moments.
 
 const discover = @import("energy/discover.zig");
 const meter = @import("energy/meter.zig");

@@ -363,7 +363,9 @@ const Parser = struct {
             if (std.mem.eql(u8, candidate, name)) return index;
         }
         if (nearest(name, parser.variant_names)) |candidate| {
-            return parser.reader.fail("no variant {f}, did you mean '{s}'?", .{ quote(name), candidate });
+            return parser.reader.fail("no variant {f}, did you mean '{s}'?", .{
+                quote(name), candidate,
+            });
         }
         return parser.reader.fail("no variant {f}; --list-variants names them", .{quote(name)});
     }

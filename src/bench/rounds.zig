@@ -468,7 +468,8 @@ test "another image is an error that names its variant, early or late" {
         };
         defer fake.order.deinit(testing.allocator);
         var diagnostic: Diagnostic = .{};
-        const failed = FakeRounds.measure(arena.allocator(), &fake, planFor(9, 1 << 20), &diagnostic);
+        const plan = planFor(9, 1 << 20);
+        const failed = FakeRounds.measure(arena.allocator(), &fake, plan, &diagnostic);
         try testing.expectError(error.ImagesDiffer, failed);
         try testing.expectStringStartsWith(diagnostic.message.text(), "the image of third by 1");
         try testing.expect(fake.frame_count < frame + 4);

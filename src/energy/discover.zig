@@ -1,8 +1,8 @@
 //! Finds what this machine can measure energy by.
 //!
-//! In: the folder that stands for `/sys`, or the user's command. Out: the first source that answers,
-//! in the order command, powercap, hwmon, PMIC, battery (nearest to the processor first), or one
-//! line that says for each why it does not.
+//! In: the folder that stands for `/sys`, or the user's command. Out: the first source that
+//! answers, in the order command, powercap, hwmon, PMIC, battery (nearest to the processor first),
+//! or one line that says for each why it does not.
 
 const std = @import("std");
 const source_file = @import("source.zig");
@@ -164,7 +164,10 @@ const Finder = struct {
             const range = source_file.readInteger(finder.io, range_path, &ignored) catch 0;
             try rails.append(finder.arena, .{
                 .name = counter,
-                .access = .{ .counter = .{ .path = counter, .range_uj = @intCast(@max(range, 0)) } },
+                .access = .{ .counter = .{
+                    .path = counter,
+                    .range_uj = @intCast(@max(range, 0)),
+                } },
             });
         }
         if (rails.items.len == 0) return finder.none("powercap", "no zone");
@@ -221,7 +224,8 @@ const Finder = struct {
                 const is_current = std.mem.eql(u8, prefix, "curr");
                 const voltage = try arena.print("{s}/in{d}_input", .{ path, channel });
                 if (is_current and !finder.exists(voltage)) continue;
-                const is_total = try finder.isTotal(path, if (is_current) "in" else prefix, channel);
+                const label_prefix = if (is_current) "in" else prefix;
+                const is_total = try finder.isTotal(path, label_prefix, channel);
                 if (has_total and !is_total) continue;
                 if (is_total and !has_total) rails.shrinkRetainingCapacity(first_rail);
                 has_total = has_total or is_total;
@@ -364,9 +368,10 @@ const discoverFind = find;
 test "where there is nothing, every kind of source says so" {
     var tree: Tree = .init();
     defer tree.deinit();
-    for ([_][]const u8{ "powercap: no zone", "hwmon: no sensor", "PMIC: no", "supply: no battery" }) |
-        reason,
-    | try tree.expectNone(reason);
+    const reasons = [_][]const u8{
+        "powercap: no zone", "hwmon: no sensor", "PMIC: no", "supply: no battery",
+    };
+    for (reasons) |reason| try tree.expectNone(reason);
 }
 
 test "of RAPL the packages count and their memory, nothing twice" {

@@ -214,7 +214,8 @@ const TestMeter = struct {
 test "counters are subtracted and added over rails, across the end of their range" {
     var fixture: TestMeter = undefined;
     fixture.init(.{ 262_143_328_850, 10_000_000 });
-    const from = fixture.at(0, .{ .{ .counter_uj = 262_140_000_000 }, .{ .counter_uj = 9_000_000 } });
+    const start: Reading = .{ .counter_uj = 262_140_000_000 };
+    const from = fixture.at(0, .{ start, .{ .counter_uj = 9_000_000 } });
     _ = fixture.at(1, .{ .{ .counter_uj = 262_143_000_000 }, .{ .counter_uj = 9_900_000 } });
     const to = fixture.at(2, .{ .{ .counter_uj = 671_150 }, .{ .counter_uj = 400_000 } });
     const interval = fixture.meter.between(from, to).?;

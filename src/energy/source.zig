@@ -269,7 +269,8 @@ test "the rails of a Raspberry Pi 5 are paired by name and added" {
     ;
     try std.testing.expectApproxEqRel(0.1 * 3.7 + 2.0 * 0.9, parsePmic(text).?, 1e-12);
     try std.testing.expectEqual(null, parsePmic("VDD_CORE_A current(7)=2.0A"));
-    try std.testing.expectEqual(null, parsePmic("VDD_A current(7)=A\nVDD_V volt(1)=nanV\n= _A A\n"));
+    const garbage = "VDD_A current(7)=A\nVDD_V volt(1)=nanV\n= _A A\n";
+    try std.testing.expectEqual(null, parsePmic(garbage));
     try std.testing.expectEqual(null, parsePmic(""));
 }
 

@@ -162,18 +162,29 @@ fn set(
             return reader.bad(flag, value, "0 to 32"),
         .bvh => bench.bvh = std.meta.stringToEnum(options.Bvh, value) orelse
             return reader.bad(flag, value, "fast, default or high"),
-        .variants => bench.variants = if (isList(value)) value else return reader.bad(flag, value, "parts of names with commas between them"),
+        .variants => {
+            if (!isList(value)) return reader.bad(flag, value, "parts of names, with commas");
+            bench.variants = value;
+        },
         .rounds => bench.round_count = integer(u32, value, 2, round_count_max) orelse
             return reader.bad(flag, value, "2 to 1000"),
         .time_limit => bench.time_s = integer(u32, value, 1, time_s_max) orelse
             return reader.bad(flag, value, "1 to 1000000 seconds"),
-        .json => bench.json = if (value.len > 0) value else return reader.bad(flag, value, "a file name or -"),
-        .energy_root => bench.energy_root = if (value.len > 0) value else return reader.bad(flag, value, "a folder"),
-        .energy_command => bench.energy_command = if (value.len > 0) value else return reader.bad(flag, value, "a command"),
+        .json => bench.json = try notEmpty(reader, flag, value),
+        .energy_root => bench.energy_root = try notEmpty(reader, flag, value),
+        .energy_command => bench.energy_command = try notEmpty(reader, flag, value),
         .no_energy => bench.energy = false,
         .allow_outside => bench.allow_outside = true,
         .quiet => bench.quiet = true,
     }
+}
+
+fn notEmpty(
+    reader: *const Arguments(Id, flags),
+    flag: Flag(Id),
+    value: []const u8,
+) options.Error![]const u8 {
+    return if (value.len > 0) value else reader.bad(flag, value, "a name");
 }
 
 /// Whether all of the parts between commas are something.
@@ -206,8 +217,9 @@ test "what is not said is as in the thesis" {
 test "scenes, flags and filters" {
     var diagnostic: Diagnostic = .{};
     const bench = try parse(&.{
-        "a.glb",                    "-r8x4",      "--variants=scalar-single,packet-8", "-t2", "b.glb",
-        "--energy-command=echo 1W", "--rounds=5", "--json",                            "-",
+        "a.glb",      "-r8x4",  "--variants=scalar-single,packet-8",
+        "-t2",        "b.glb",  "--energy-command=echo 1W",
+        "--rounds=5", "--json", "-",
     }, &diagnostic);
     try testing.expectEqualStrings("b.glb", bench.scenes[1]);
     try testing.expectEqual(2, bench.scene_count);
