@@ -34,6 +34,7 @@ pub fn build(b: *std.Build) void {
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
         .bench_rays = b.step("bench:rays", "Time rays: zig build bench:rays -- SCENE [options]"),
+        .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
         .vendor = b.step("vendor", "Fetch and check the third-party headers"),
     };
@@ -64,6 +65,8 @@ pub fn build(b: *std.Build) void {
 
     addBenchmark(steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
 
+    addCompare(steps.compare, package, vendor.headers);
+
     const tests: Tests = .init(b, resolve(b, .{}), filters orelse &.{});
     const test_packages: TestPackages = .{
         .owner = b,
@@ -87,6 +90,39 @@ pub fn build(b: *std.Build) void {
     steps.scenes.dependOn(&scenes.step);
 
     addLowering(steps.lowering);
+}
+
+/// Makes `step` build a program for each variant and compare them with the one that holds all, on
+/// the scene that follows `--`.
+fn addCompare(step: *std.Build.Step, package: Package, headers: std.Build.LazyPath) void {
+    const b = step.owner;
+    const run = b.addSystemCommand(&.{"python3"});
+    run.addFileArg(b.path("bench/compare.py"));
+    run.setCwd(b.path("."));
+    run.has_side_effects = true;
+    run.addArtifactArg2(package.program(), .{ .prefix = "", .make_absolute = true });
+    const is_x86 = package.target.result.cpu.arch.isX86();
+    const widths: []const u8 = if (is_x86) &.{ 4, 8, 16 } else &.{4};
+    for (widths) |lanes| for (std.enums.values(Package.Backend)) |backend| {
+        // As in src/variant.zig: what is wide there is `vector` alone.
+        if (lanes > 4 and backend != .vector) continue;
+        for (std.enums.values(Package.Traversal)) |traversal| {
+            if (lanes > 4 and traversal == .packet2x2) continue;
+            const single: Package = .init(b, package.target, package.optimize, headers, .{
+                .backend = backend,
+                .traversal = traversal,
+                .lanes = lanes,
+                .variants = .one,
+            });
+            run.addArtifactArg2(single.program(), .{
+                .prefix = b.fmt("{t}-{t}-{d}=", .{ backend, traversal, lanes }),
+                .make_absolute = true,
+            });
+        }
+    };
+    run.addArg("--");
+    run.addPassthruArgs();
+    step.dependOn(&run.step);
 }
 
 /// Makes `step` write docs/lowering.md.

@@ -107,9 +107,8 @@ fn tidy(tests: Tests) LazyPath {
 /// The report of the benchmark; its figures are tested where matplotlib is installed.
 fn report(tests: Tests) LazyPath {
     const run, const log = tests.start("report", "sources");
-    run.addArgs(&.{
-        "--one", "--needs=python3", "--", "python3", "bench/reporting/test_report.py",
-    });
+    run.addArgs(&.{ "--one", "--needs=python3", "--", "python3", "-m", "unittest", "discover" });
+    run.addArgs(&.{ "-s", "bench/reporting", "-t", "bench" });
     return log;
 }
 

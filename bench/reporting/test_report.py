@@ -1,6 +1,6 @@
 """Tests of the report: numbers beside known ones, the page's text, figures where matplotlib is.
 
-Run: python3 bench/reporting/test_report.py
+Run: python3 -m unittest discover -s bench/reporting -t bench
 """
 
 import contextlib
