@@ -48,6 +48,7 @@ const leaves = [_][]const u8{ "diagnostic", "math", "statistics", "std", "builti
 /// Where the compiler starts to read; every other Zig file is imported from one of them.
 const roots = [_][]const u8{
     "build.zig",
+    "bench/kernels.zig",
     "bench/lowering.zig",
     "bench/rays.zig",
     "src/main.zig",
