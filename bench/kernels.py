@@ -4,8 +4,8 @@
 Usage: python3 bench/kernels.py ZIG OUT
 
 ZIG is the compiler, OUT the Markdown file to write (docs/kernels.md). bench/kernels.zig is compiled
-in fast mode for each processor below and each backend, as bench/lowering.py does it, and the code of
-each kernel is given to llvm-mca (Debian's llvm-19 or later) as a loop of 100 passes.
+in fast mode for each processor below and each backend, as bench/lowering.py does it, and the code
+of each kernel is given to llvm-mca (Debian's llvm-19 or later) as a loop of 100 passes.
 """
 
 import pathlib
@@ -28,7 +28,7 @@ BACKENDS = ["scalar", "vector", "intrinsics"]
 KERNELS = ["boxTest", "triangleCull", "triangleHit"]
 PASSES = 100
 
-# What no assembly can do without, counted by hand; pairs of registers are loaded and stored at once.
+# What no assembly can do without, counted by hand; two registers are loaded or stored at once.
 # boxTest: 6 loads of bounds at 6 addresses (3 loads), 4 of the ray and its limits, 1 spread over
 # lanes, 6 fmla that overwrite 3 copies, 6 minima and maxima, 1 store. triangleCull: 7 loads, 9
 # differences, 12 operations that shear, 9 of edge functions, 11 from their signs to the answer.
@@ -54,12 +54,12 @@ What to read from it:
   kernel by hand has 3 or 4 % of its own instructions to win, and kernels are not all of a frame.
 - The scalar backend is loops over four floats, and LLVM turns the simple ones into vectors by
   itself: its box test is the same code. The triangle test resists, at 1.7 to 2.6 times the
-  instructions. So the reference of the benchmark has some SIMD in it; the thesis's had as much as
-  GCC 4.8 found.
+  instructions. So the reference of the benchmark has some SIMD in it, as a compiler of today finds
+  it in plain code.
 - The out-of-order cores take far fewer cycles for the same code than the Cortex-A53: what a board
   owner gains by a better core is more than any of this.
-- ARMv7 is another matter: minima, maxima, divisions and roots of vectors (`docs/lowering.md`), where
-  the intrinsics are shorter.
+- ARMv7 is another matter: minima, maxima, divisions and roots of vectors (`docs/lowering.md`) are
+  shorter by intrinsics.
 
 What pays is what is not computed at all: `docs/performance.md` lists what each technique of
 beams saves, by factors.

@@ -1,4 +1,4 @@
-"""Tests of bench/compare.py and bench/instructions: what they conclude from what programs say.
+"""Tests of bench/compare.py, cores.py and instructions: what they conclude from what programs say.
 
 Run: python3 -m unittest discover -s bench/reporting -t bench
 """
@@ -13,6 +13,7 @@ import tempfile
 import unittest
 
 import compare
+import cores
 
 BENCH = pathlib.Path(__file__).resolve().parent.parent
 
@@ -64,6 +65,36 @@ class Compare(unittest.TestCase):
                           [bad, f"v={bad}", "--", "s", "--rounds", "1"]):
             code, out, err = self.run_with(*arguments)
             self.assertEqual((code, out, err.count("\n")), (1, "", 1))
+
+
+class Cores(unittest.TestCase):
+    def test_equal_tiles_on_equal_cores_scale_by_their_number(self):
+        self.assertEqual(cores.predict([2, 1, 1]), [1, 1.5, 2])
+        self.assertEqual(cores.simulate([1.0, 1.0], [1.0] * 10), 5)
+        # The slow core begins its second tile when the quick one begins its last.
+        self.assertEqual(cores.simulate([1.0, 0.5], [1.0] * 5), 4)
+
+    def test_the_picture_is_the_same_whatever_the_tiles(self):
+        whole = [sum(cores.works(tile, cores.random.Random(3))) for tile in (16, 32, 256)]
+        self.assertAlmostEqual(whole[0], whole[1])
+        self.assertAlmostEqual(whole[0], whole[2])
+
+    def test_classes_of_this_machine_and_their_speeds(self):
+        with tempfile.TemporaryDirectory() as name:
+            for core, capacity in enumerate([446, 1024, 446, 1024]):
+                folder = pathlib.Path(name, f"devices/system/cpu/cpu{core}")
+                folder.mkdir(parents=True)
+                (folder / "cpu_capacity").write_text(f"{capacity}\n")
+            found = cores.classes(name)
+            self.assertEqual(found, [(1024, [1, 3]), (446, [0, 2])])
+        # A stand-in for tracing: core 1 and 3 are twice as quick as 0 and 2.
+        original = cores.trace_ms
+        self.addCleanup(setattr, cores, "trace_ms", original)
+        cores.trace_ms = lambda program, scene, chosen, folder: 100 / sum(
+            2 if core in (1, 3) else 1 for core in chosen)
+        speeds, measured = cores.measure("raylane", "scene", found, 2)
+        self.assertEqual(speeds, [1, 1, 0.5, 0.5])
+        self.assertEqual([mean for mean, _ in measured], [1, 2, 2.5, 3])
 
 
 class Instructions(unittest.TestCase):
