@@ -34,6 +34,7 @@ pub fn build(b: *std.Build) void {
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
         .bench_rays = b.step("bench:rays", "Time rays: zig build bench:rays -- SCENE [options]"),
+        .bench_structures = b.step("bench:structures", "Trees beside each other: -- SCENE"),
         .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
         .vendor = b.step("vendor", "Fetch and check the third-party headers"),
@@ -48,9 +49,7 @@ pub fn build(b: *std.Build) void {
         .variants = b.option(Package.Variants, "variants", "Hold that variant only, or all") orelse
             .all,
     };
-
     const filters = b.option([]const []const u8, "test-filter", "Only tests with this in the name");
-
     const vendor = addVendor(b);
     steps.vendor.dependOn(vendor.step);
     const target = resolve(b, query);
@@ -64,7 +63,8 @@ pub fn build(b: *std.Build) void {
     steps.@"asm".dependOn(&b.addInstallFile(program.getEmittedAsm(), "raylane.s").step);
 
     addBenchmark(steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
-
+    const structures = package.benchmark("structures", "bench/structures.zig");
+    addBenchmark(steps.bench_structures, structures);
     addCompare(steps.compare, package, vendor.headers);
 
     const tests: Tests = .init(b, resolve(b, .{}), filters orelse &.{});

@@ -51,6 +51,7 @@ const roots = [_][]const u8{
     "bench/kernels.zig",
     "bench/lowering.zig",
     "bench/rays.zig",
+    "bench/structures.zig",
     "src/main.zig",
     "src/raylane.zig",
     "scenes/make.zig",
