@@ -103,7 +103,8 @@ def draw(figure, runs):
         for axis, scene in zip(row, run["scenes"]):
             draw_panel(axis, figure, scene)
         if len(runs) > 1:
-            row[0].set_title(f"{run['machine']['processor']}\n{row[0].get_title(loc='left')}", loc="left")
+            scene_title = row[0].get_title(loc="left")
+            row[0].set_title(f"{run['machine']['processor']}\n{scene_title}", loc="left")
     for axis in axes[-1]:
         axis.set_xlabel(figure.unit)
     names = [variant["name"] for run in runs for variant in run["scenes"][0]["variants"]]
