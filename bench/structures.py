@@ -31,9 +31,9 @@ Executed AArch64 instructions (Cortex-A72) a ray, four lanes, Zig's vectors: a p
 a shadow ray from a point light and a mirror ray a hit. All trees hold the same triangles in blocks
 of four, ask the same exact triangle test, and come to the same hits, bit for bit. All are built by
 the binned surface area heuristic: `bvh4` is the renderer's own; `bvh2` is a binary one in the same
-nodes with half the lanes idle; `kd` cuts boxes, not triangles, at its planes. `single` is one ray against
-the boxes of a node, then against four triangles; `packet` is four rays against one box, plane or
-triangle at a time. Beams, the renderer's best, are left out here.
+nodes with half the lanes idle; `kd` cuts boxes, not triangles, at its planes. `single` is one ray
+against the boxes of a node, then against four triangles; `packet` is four rays against one box,
+plane or triangle at a time. Beams, the renderer's best, are left out here.
 """
 
 TEXT = """\
