@@ -101,6 +101,8 @@ fn addCompare(step: *std.Build.Step, package: Package, headers: std.Build.LazyPa
     run.setCwd(b.path("."));
     run.has_side_effects = true;
     run.addArtifactArg2(package.program(), .{ .prefix = "", .make_absolute = true });
+    const description = "Only variants with this in their names";
+    const wanted = b.option([]const u8, "compare", description) orelse "";
     const is_x86 = package.target.result.cpu.arch.isX86();
     const widths: []const u8 = if (is_x86) &.{ 4, 8, 16 } else &.{4};
     for (widths) |lanes| for (std.enums.values(Package.Backend)) |backend| {
@@ -108,6 +110,8 @@ fn addCompare(step: *std.Build.Step, package: Package, headers: std.Build.LazyPa
         if (lanes > 4 and backend != .vector) continue;
         for (std.enums.values(Package.Traversal)) |traversal| {
             if (lanes > 4 and traversal == .packet2x2) continue;
+            const name = b.fmt("{t}-{t}-{d}", .{ backend, traversal, lanes });
+            if (std.mem.find(u8, name, wanted) == null) continue;
             const single: Package = .init(b, package.target, package.optimize, headers, .{
                 .backend = backend,
                 .traversal = traversal,
@@ -115,7 +119,7 @@ fn addCompare(step: *std.Build.Step, package: Package, headers: std.Build.LazyPa
                 .variants = .one,
             });
             run.addArtifactArg2(single.program(), .{
-                .prefix = b.fmt("{t}-{t}-{d}=", .{ backend, traversal, lanes }),
+                .prefix = b.fmt("{s}=", .{name}),
                 .make_absolute = true,
             });
         }
