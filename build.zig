@@ -29,11 +29,14 @@ pub fn build(b: *std.Build) void {
         .test_unit = b.step("test:unit", "Run the unit tests of this machine"),
         .test_fmt = b.step("test:fmt", "Check the formatting"),
         .test_tidy = b.step("test:tidy", "Check the style of the source tree"),
+        .test_report = b.step("test:report", "Test the report of the benchmark"),
         .check = b.step("check", "Compile the program and its tests, write nothing"),
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
         .bench_rays = b.step("bench:rays", "Time rays: zig build bench:rays -- SCENE [options]"),
         .bench_parse = b.step("bench:parse", "Time parsing: zig build bench:parse -- SCENE.pbrt"),
+        .bench_structures = b.step("bench:structures", "Trees beside each other: -- SCENE"),
+        .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
         .vendor = b.step("vendor", "Fetch and check the third-party headers"),
     };
@@ -47,9 +50,7 @@ pub fn build(b: *std.Build) void {
         .variants = b.option(Package.Variants, "variants", "Hold that variant only, or all") orelse
             .all,
     };
-
     const filters = b.option([]const []const u8, "test-filter", "Only tests with this in the name");
-
     const vendor = addVendor(b);
     steps.vendor.dependOn(vendor.step);
     const target = resolve(b, query);
@@ -64,6 +65,9 @@ pub fn build(b: *std.Build) void {
 
     addBenchmark(steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
     addBenchmark(steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
+    const structures = package.benchmark("structures", "bench/structures.zig");
+    addBenchmark(steps.bench_structures, structures);
+    addCompare(steps.compare, package, vendor.headers);
 
     const tests: Tests = .init(b, resolve(b, .{}), filters orelse &.{});
     const test_packages: TestPackages = .{
@@ -77,6 +81,7 @@ pub fn build(b: *std.Build) void {
     tests.addUnit(steps.test_unit, targets[0]);
     tests.addFormat(steps.test_fmt);
     tests.addTidy(steps.test_tidy);
+    tests.addReport(steps.test_report);
     tests.addCheck(steps.check, targets[0]);
     steps.check.dependOn(&package.program().step);
 
@@ -89,7 +94,44 @@ pub fn build(b: *std.Build) void {
     addLowering(steps.lowering);
 }
 
-/// Makes `step` write the table of what the compiler makes of the SIMD library.
+/// Makes `step` build a program for each variant and compare them with the one that holds all, on
+/// the scene that follows `--`.
+fn addCompare(step: *std.Build.Step, package: Package, headers: std.Build.LazyPath) void {
+    const b = step.owner;
+    const run = b.addSystemCommand(&.{"python3"});
+    run.addFileArg(b.path("bench/compare.py"));
+    run.setCwd(b.path("."));
+    run.has_side_effects = true;
+    run.addArtifactArg2(package.program(), .{ .prefix = "", .make_absolute = true });
+    const description = "Only variants with this in their names";
+    const wanted = b.option([]const u8, "compare", description) orelse "";
+    const is_x86 = package.target.result.cpu.arch.isX86();
+    const widths: []const u8 = if (is_x86) &.{ 4, 8, 16 } else &.{4};
+    for (widths) |lanes| for (std.enums.values(Package.Backend)) |backend| {
+        // As in src/variant.zig: what is wide there is `vector` alone.
+        if (lanes > 4 and backend != .vector) continue;
+        for (std.enums.values(Package.Traversal)) |traversal| {
+            if (lanes > 4 and traversal == .packet2x2) continue;
+            const name = b.fmt("{t}-{t}-{d}", .{ backend, traversal, lanes });
+            if (std.mem.find(u8, name, wanted) == null) continue;
+            const single: Package = .init(b, package.target, package.optimize, headers, .{
+                .backend = backend,
+                .traversal = traversal,
+                .lanes = lanes,
+                .variants = .one,
+            });
+            run.addArtifactArg2(single.program(), .{
+                .prefix = b.fmt("{s}=", .{name}),
+                .make_absolute = true,
+            });
+        }
+    };
+    run.addArg("--");
+    run.addPassthruArgs();
+    step.dependOn(&run.step);
+}
+
+/// Makes `step` write docs/lowering.md: what the compiler makes of the SIMD library.
 fn addLowering(step: *std.Build.Step) void {
     const b = step.owner;
     const lowering = b.addSystemCommand(&.{ "python3", "bench/lowering.py" });

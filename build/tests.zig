@@ -53,8 +53,9 @@ pub fn init(
 pub fn addAll(tests: Tests, step: *std.Build.Step, targets: []const Target) void {
     var logs: std.ArrayList(LazyPath) = .empty;
     const arena = tests.owner.allocator;
-    logs.appendSlice(arena, &.{ tests.format(), tests.tidy(), tests.machinery() }) catch
-        @panic("OOM");
+    logs.appendSlice(arena, &.{
+        tests.format(), tests.tidy(), tests.machinery(), tests.report(),
+    }) catch @panic("OOM");
     for (targets) |target| {
         logs.appendSlice(arena, &.{
             tests.unit(target), tests.integration(target), tests.commandLine(target),
@@ -78,6 +79,11 @@ pub fn addTidy(tests: Tests, step: *std.Build.Step) void {
     tests.close(step, &.{tests.tidy()}, .logs_only);
 }
 
+/// Makes `step` test the report of the benchmark.
+pub fn addReport(tests: Tests, step: *std.Build.Step) void {
+    tests.close(step, &.{tests.report()}, .logs_only);
+}
+
 /// Makes `step` compile the test programs of `target` without a file as the result.
 pub fn addCheck(tests: Tests, step: *std.Build.Step, target: Target) void {
     step.dependOn(&tests.unitProgram(target).step);
@@ -95,6 +101,14 @@ fn tidy(tests: Tests) LazyPath {
     const run, const log = tests.start("tidy", "sources");
     run.addArg("--");
     run.addArtifactArg(tests.hostProgram("tidy"));
+    return log;
+}
+
+/// The report of the benchmark; its figures are tested where matplotlib is installed.
+fn report(tests: Tests) LazyPath {
+    const run, const log = tests.start("report", "sources");
+    run.addArgs(&.{ "--one", "--needs=python3", "--", "python3", "-m", "unittest", "discover" });
+    run.addArgs(&.{ "-s", "bench/reporting", "-t", "bench" });
     return log;
 }
 

@@ -29,6 +29,8 @@ const ExitCode = enum(u8) {
     usage = 2,
     /// The scene is invalid or asks for what is not supported.
     invalid = 3,
+    /// Images that must be the same are not.
+    differ = 4,
     interrupted = 130,
 };
 
@@ -54,6 +56,7 @@ fn run(init: std.process.Init) ExitCode {
     };
     switch (command) {
         .help => return print(io, raylane.options.help),
+        .bench_help => return print(io, raylane.options.bench_help),
         .version => return print(io, "raylane " ++ raylane.options.version ++ "\n"),
         .list_variants => return print(io, comptime list: {
             var list: []const u8 = "";
@@ -61,6 +64,7 @@ fn run(init: std.process.Init) ExitCode {
             break :list list;
         }),
         .render => |*options| return renderAndReport(init.gpa, io, options, &diagnostic),
+        .bench => |*options| return bench(init, options, &diagnostic),
     }
 }
 
@@ -69,6 +73,135 @@ comptime {
     assert(raylane.options.tessellation_min == raylane.parse.tessellation_min);
     assert(raylane.options.tessellation_max == raylane.parse.tessellation_max);
     assert(raylane.options.tessellation_default == raylane.parse.tessellation_default);
+}
+
+/// Measures all variants on some scenes, then prints the tables, or why there are none.
+fn bench(
+    init: std.process.Init,
+    options: *const raylane.options.Bench,
+    diagnostic: *Diagnostic,
+) ExitCode {
+    const io = init.io;
+    const settings = benchSettings(options);
+    if (std.mem.findScalar(bool, &settings.wanted, true) == null) {
+        say(io, "raylane: no variant's name contains {f}; --list-variants names them\n", .{
+            raylane.diagnostic.quote(options.variants.?),
+        });
+        return .usage;
+    }
+    // Before the work, so that a place that cannot be written is an error in the first second.
+    var target = openJson(io, options.json, diagnostic) catch {
+        const text = diagnostic.message.text();
+        say(io, "raylane: {f}: {s}\n", .{ printable(options.json.?), text });
+        return .failed;
+    };
+    defer target.abandon();
+    var run_of: raylane.bench.Bench = .{
+        .arena = init.arena.allocator(),
+        .gpa = init.gpa,
+        .io = io,
+        .settings = &settings,
+        .diagnostic = diagnostic,
+        .progress = if (options.quiet)
+            .none
+        else
+            std.Progress.start(io, .{ .root_name = "raylane bench" }),
+    };
+    const outcome = run_of.run();
+    run_of.progress.end();
+    if (!options.quiet) for (diagnostic.warnings[0..diagnostic.warning_count]) |*warning| {
+        say(io, "raylane: warning: {s}\n", .{warning.text()});
+    };
+    const results = outcome catch |err| {
+        const text = if (err == error.OutOfMemory) "out of memory" else diagnostic.message.text();
+        say(io, "raylane: {f}: {s}\n", .{ printable(run_of.scene), text });
+        return switch (err) {
+            error.OutOfMemory, error.InputOutput => .failed,
+            error.CameraUnknown => .usage,
+            error.InvalidInput, error.SceneTooLarge => .invalid,
+            error.ImagesDiffer => .differ,
+        };
+    };
+    return printBench(init.gpa, io, options, &results, &target, diagnostic);
+}
+
+fn benchSettings(options: *const raylane.options.Bench) raylane.bench.Settings {
+    var settings: raylane.bench.Settings = .{
+        .version = raylane.options.version,
+        .scenes = options.scenes[0..options.scene_count],
+        .allow_outside = options.allow_outside,
+        .width = options.resolution[0],
+        .height = options.resolution[1],
+        .thread_count = options.thread_count orelse processorCount(),
+        .sample_count = options.sample_count,
+        .depth = options.depth,
+        .tree_quality = treeQuality(options.bvh),
+        .wanted = undefined,
+        .round_count = if (options.round_count) |count| count else null,
+        .time_s = options.time_s,
+        .energy = if (options.energy) .{
+            .root = options.energy_root,
+            .command = options.energy_command,
+        } else null,
+    };
+    if (options.scene_count == 0) settings.scenes = raylane.bench.default_scenes;
+    for (&settings.wanted, raylane.variant.names) |*is_wanted, name| {
+        is_wanted.* = options.wants(name);
+    }
+    return settings;
+}
+
+/// Prints the tables, and writes the file of `--json`; on standard output that is in their place.
+fn printBench(
+    gpa: Allocator,
+    io: Io,
+    options: *const raylane.options.Bench,
+    results: *const raylane.bench.Results,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) ExitCode {
+    var text: Io.Writer.Allocating = .init(gpa);
+    defer text.deinit();
+    var json: Io.Writer.Allocating = .init(gpa);
+    defer json.deinit();
+    raylane.bench.writeTables(results, &text.writer) catch return outOfMemory(io);
+    if (options.json) |path| {
+        raylane.bench.writeJson(results, &json.writer) catch return outOfMemory(io);
+        if (std.mem.eql(u8, path, "-")) return print(io, json.written());
+        target.finish(&.{json.written()}, diagnostic) catch {
+            _ = print(io, text.written()); // Minutes of work: show what was found.
+            say(io, "raylane: {f}: {s}\n", .{ printable(path), diagnostic.message.text() });
+            return .failed;
+        };
+    }
+    return print(io, text.written());
+}
+
+/// Where `--json` goes; standard output where it does not go to a file.
+fn openJson(
+    io: Io,
+    path: ?[]const u8,
+    diagnostic: *Diagnostic,
+) raylane.output.TargetError!Target {
+    const name = path orelse return .openStdout(io);
+    if (std.mem.eql(u8, name, "-")) return .openStdout(io);
+    return .openFile(io, name, diagnostic);
+}
+
+fn outOfMemory(io: Io) ExitCode {
+    say(io, "raylane: out of memory\n", .{});
+    return .failed;
+}
+
+fn processorCount() usize {
+    const cpu_count = std.Thread.getCpuCount() catch 1;
+    return @min(cpu_count, raylane.options.thread_count_max);
+}
+
+fn treeQuality(bvh: raylane.options.Bvh) raylane.prepare.TreeQuality {
+    return switch (bvh) {
+        inline else => |quality| @field(raylane.prepare.TreeQuality, @tagName(quality)),
+    };
 }
 
 /// Renders one scene, then says what it cost or why it failed.
@@ -244,9 +377,7 @@ const Job = struct {
         return .{
             .lanes = raylane.variant.compiled[options.variant_index].lanes,
             .thread_count = job.threadCount(),
-            .tree_quality = switch (options.bvh) {
-                inline else => |quality| @field(raylane.prepare.TreeQuality, @tagName(quality)),
-            },
+            .tree_quality = treeQuality(options.bvh),
             .camera = switch (options.camera) {
                 .default => .default,
                 .auto => .auto,
@@ -280,9 +411,7 @@ const Job = struct {
     }
 
     fn threadCount(job: *const Job) usize {
-        if (job.options.thread_count) |count| return count;
-        const cpu_count = std.Thread.getCpuCount() catch 1;
-        return @min(cpu_count, raylane.options.thread_count_max);
+        return job.options.thread_count orelse processorCount();
     }
 
     fn write(job: *Job, image: *const Image, target: *Target) Error!void {

@@ -5,8 +5,12 @@
 //! text `help` describes it, and a test holds the two together.
 
 const std = @import("std");
+const bench = @import("options/bench.zig");
 const config = @import("config");
+const Arguments = @import("options/arguments.zig").Arguments;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const Flag = @import("options/arguments.zig").Flag;
+const nearest = @import("options/nearest.zig").nearest;
 const quote = @import("diagnostic.zig").quote;
 const assert = std.debug.assert;
 
@@ -14,7 +18,19 @@ const assert = std.debug.assert;
 pub const version: []const u8 = config.version;
 
 /// What the user wants.
-pub const Command = union(enum) { help, version, list_variants, render: Options };
+pub const Command = union(enum) {
+    help,
+    version,
+    list_variants,
+    render: Options,
+    bench: Bench,
+    bench_help,
+};
+
+/// What `raylane bench` is to do.
+pub const Bench = bench.Bench;
+/// What `raylane bench --help` prints.
+pub const bench_help = bench.help;
 
 /// File formats of images.
 pub const Format = enum { png, ppm, pfm };
@@ -53,6 +69,8 @@ pub const Exposure = union(enum) {
     auto,
 };
 
+/// What a resolution is, for messages.
+pub const expected_resolution = "WxH, each 1 to 65536, 2^28 pixels at most";
 /// Largest side of a picture, in pixels.
 pub const side_max = 65_536;
 /// Most pixels of a picture.
@@ -155,16 +173,7 @@ const Id = enum {
     version,
 };
 
-const Flag = struct {
-    id: Id,
-    /// With its dashes.
-    long: []const u8,
-    /// 0: none.
-    short: u8 = 0,
-    has_value: bool = true,
-};
-
-const flags: []const Flag = &.{
+const flags: []const Flag(Id) = &.{
     .{ .id = .output, .long = "--output", .short = 'o' },
     .{ .id = .format, .long = "--format" },
     .{ .id = .resolution, .long = "--resolution", .short = 'r' },
@@ -196,6 +205,7 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\: renders a glTF or PBRT scene to an image on the CPU
     \\
     \\usage: raylane [render] SCENE [options]
+    \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
     \\
     \\SCENE is a glTF 2.0 file (.gltf, .glb), a PBRT scene (.pbrt) or builtin:NAME,
     \\NAME being cornell, atrium, nave or handles. The image is written to the
@@ -259,25 +269,26 @@ pub fn parse(
     diagnostic: *Diagnostic,
 ) Error!Command {
     assert(variant_names.len >= 1);
+    const is_bench = arguments.len > 0 and std.mem.eql(u8, arguments[0], "bench");
     // Help wins over everything, for it is what somebody asks for who got the rest wrong.
     for (arguments) |argument| {
         if (std.mem.eql(u8, argument, "--")) break;
-        if (std.mem.eql(u8, argument, "-h") or std.mem.eql(u8, argument, "--help")) return .help;
+        if (std.mem.eql(u8, argument, "-h") or std.mem.eql(u8, argument, "--help"))
+            return if (is_bench) .bench_help else .help;
     }
+    if (is_bench) return .{ .bench = try bench.parse(arguments[1..], diagnostic) };
     var parser: Parser = .{
-        .arguments = arguments,
+        .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
         .variant_names = variant_names,
-        .diagnostic = diagnostic,
     };
     return parser.run();
 }
 
+const Reader = Arguments(Id, flags);
+
 const Parser = struct {
-    arguments: []const [:0]const u8,
+    reader: Reader,
     variant_names: []const []const u8,
-    diagnostic: *Diagnostic,
-    /// Of the next argument.
-    index: usize = 0,
     options: Options = .{ .scene = "" },
     scene: ?[]const u8 = null,
     /// The explicit `--format`.
@@ -286,126 +297,65 @@ const Parser = struct {
     other: ?Command = null,
 
     fn run(parser: *Parser) Error!Command {
-        var flags_ended = false;
+        const reader = &parser.reader;
         var command_seen = false;
-        while (parser.index < parser.arguments.len) {
-            const argument = parser.arguments[parser.index];
-            parser.index += 1;
-            if (flags_ended or argument.len < 2 or argument[0] != '-') {
-                const is_command = std.mem.eql(u8, argument, "render") and !flags_ended and
+        while (try reader.next()) |argument| switch (argument) {
+            .flag => |flag| try parser.set(flag.flag, flag.value),
+            .word => |word| {
+                const is_command = std.mem.eql(u8, word, "render") and !reader.flags_ended and
                     !command_seen and parser.scene == null;
-                if (is_command) command_seen = true else try parser.positional(argument);
-            } else if (std.mem.eql(u8, argument, "--")) {
-                flags_ended = true;
-            } else if (argument[1] == '-') {
-                try parser.long(argument);
-            } else {
-                try parser.short(argument);
-            }
-        }
+                if (is_command) command_seen = true else try parser.positional(word);
+            },
+        };
         if (parser.other) |command| return command;
-        parser.options.scene = parser.scene orelse return parser.fail("no scene given", .{});
+        parser.options.scene = parser.scene orelse return reader.fail("no scene given", .{});
         try parser.settleFormat();
         return .{ .render = parser.options };
     }
 
-    fn fail(parser: *Parser, comptime format: []const u8, arguments: anytype) Error {
-        return parser.diagnostic.fail(
-            error.UsageInvalid,
-            format ++ " (see --help)",
-            arguments,
-        );
-    }
-
     fn positional(parser: *Parser, argument: []const u8) Error!void {
-        if (argument.len == 0) return parser.fail("the scene's name is empty", .{});
+        if (argument.len == 0) return parser.reader.fail("the scene's name is empty", .{});
         if (parser.scene) |scene| {
-            return parser.fail("one scene at a time: {f} and {f}", .{
+            return parser.reader.fail("one scene at a time: {f} and {f}", .{
                 quote(scene), quote(argument),
             });
         }
         parser.scene = argument;
     }
 
-    /// `--flag`, `--flag=value` or `--flag value`.
-    fn long(parser: *Parser, argument: []const u8) Error!void {
-        const equals = std.mem.findScalar(u8, argument, '=');
-        const name = argument[0 .. equals orelse argument.len];
-        for (flags) |flag| {
-            if (!std.mem.eql(u8, flag.long, name)) continue;
-            if (!flag.has_value) {
-                if (equals == null) return parser.set(flag, "");
-                return parser.fail("option '{s}' takes no value", .{flag.long});
-            }
-            const value = if (equals) |at| argument[at + 1 ..] else try parser.next(flag.long);
-            return parser.set(flag, value);
-        }
-        var names: [flags.len][]const u8 = undefined;
-        for (&names, flags) |*candidate, flag| candidate.* = flag.long;
-        if (nearest(name, &names)) |candidate| {
-            return parser.fail("unknown option {f}, did you mean '{s}'?", .{
-                quote(name), candidate,
-            });
-        }
-        return parser.fail("unknown option {f}", .{quote(name)});
-    }
-
-    /// `-f`, `-fvalue`, `-f value`, or several flags without values in one.
-    fn short(parser: *Parser, argument: []const u8) Error!void {
-        var at: usize = 1;
-        while (at < argument.len) : (at += 1) {
-            const flag = for (flags) |flag| {
-                if (flag.short == argument[at]) break flag;
-            } else return parser.fail("unknown option {f}", .{quote(argument)});
-            const name = [_]u8{ '-', flag.short };
-            if (flag.has_value) {
-                const rest = argument[at + 1 ..];
-                return parser.set(flag, if (rest.len > 0) rest else try parser.next(&name));
-            }
-            try parser.set(flag, "");
-        }
-    }
-
-    fn next(parser: *Parser, flag_name: []const u8) Error![]const u8 {
-        if (parser.index == parser.arguments.len) {
-            return parser.fail("option '{s}' needs a value", .{flag_name});
-        }
-        parser.index += 1;
-        return parser.arguments[parser.index - 1];
-    }
-
-    fn set(parser: *Parser, flag: Flag, value: []const u8) Error!void {
+    fn set(parser: *Parser, flag: Flag(Id), value: []const u8) Error!void {
         const options = &parser.options;
+        const reader = &parser.reader;
         switch (flag.id) {
             .output => {
-                if (value.len == 0) return parser.bad(flag, value, "a file name or -");
+                if (value.len == 0) return reader.bad(flag, value, "a file name or -");
                 options.output = value;
             },
             .format => parser.format = std.meta.stringToEnum(Format, value) orelse
-                return parser.bad(flag, value, "png, ppm or pfm"),
+                return reader.bad(flag, value, "png, ppm or pfm"),
             .resolution => options.resolution = resolutionOf(value) orelse
-                return parser.bad(flag, value, "WxH, each 1 to 65536, 2^28 pixels at most"),
+                return reader.bad(flag, value, expected_resolution),
             .threads => options.thread_count = integer(u16, value, 1, thread_count_max) orelse
-                return parser.bad(flag, value, "1 to 256"),
+                return reader.bad(flag, value, "1 to 256"),
             .spp => options.sample_count = integer(u32, value, 1, sample_count_max) orelse
-                return parser.bad(flag, value, "1 to 4096"),
+                return reader.bad(flag, value, "1 to 4096"),
             .depth => options.depth = integer(u32, value, 0, depth_max) orelse
-                return parser.bad(flag, value, "0 to 32"),
+                return reader.bad(flag, value, "0 to 32"),
             .tile_size => options.tile_size = tileSizeOf(value) orelse
-                return parser.bad(flag, value, "4 to 512, a multiple of 4"),
+                return reader.bad(flag, value, "4 to 512, a multiple of 4"),
             .camera => options.camera = cameraOf(value) orelse
-                return parser.bad(flag, value, "a camera's name, its index, or auto"),
+                return reader.bad(flag, value, "a camera's name, its index, or auto"),
             .background => options.background = backgroundOf(value) orelse
-                return parser.bad(flag, value, "transparent, #rrggbb, or R,G,B of 0 or more"),
+                return reader.bad(flag, value, "transparent, #rrggbb, or R,G,B of 0 or more"),
             .ambient => options.ambient = radiance(value) orelse
-                return parser.bad(flag, value, "a number of 0 or more"),
+                return reader.bad(flag, value, "a number of 0 or more"),
             .exposure => options.exposure = exposureOf(value) orelse
-                return parser.bad(flag, value, "-64 to 64, or auto"),
+                return reader.bad(flag, value, "-64 to 64, or auto"),
             .tonemap => if (!std.mem.eql(u8, value, "linear")) {
-                return parser.bad(flag, value, "linear");
+                return reader.bad(flag, value, "linear");
             },
             .stats => options.stats = std.meta.stringToEnum(Stats, value) orelse
-                return parser.bad(flag, value, "text, json or none"),
+                return reader.bad(flag, value, "text, json or none"),
             .thesis => {
                 options.resolution = .{ 1024, 1024 };
                 options.sample_count = 1;
@@ -413,12 +363,12 @@ const Parser = struct {
                 options.thread_count = null;
             },
             .bvh => options.bvh = std.meta.stringToEnum(Bvh, value) orelse
-                return parser.bad(flag, value, "fast, default or high"),
+                return reader.bad(flag, value, "fast, default or high"),
             .variant => options.variant_index = try parser.variantOf(value),
             .count_tests => options.count_tests = true,
             .tessellation => options.tessellation =
                 integer(u32, value, tessellation_min, tessellation_max) orelse
-                return parser.bad(flag, value, "4 to 1024"),
+                return reader.bad(flag, value, "4 to 1024"),
             .allow_outside => options.allow_outside = true,
             .quiet => options.quiet = true,
             .verbose => options.verbose = true,
@@ -428,18 +378,16 @@ const Parser = struct {
         }
     }
 
-    fn bad(parser: *Parser, flag: Flag, value: []const u8, comptime expected: []const u8) Error {
-        return parser.fail("option '{s}': {f} is not " ++ expected, .{ flag.long, quote(value) });
-    }
-
     fn variantOf(parser: *Parser, name: []const u8) Error!usize {
         for (parser.variant_names, 0..) |candidate, index| {
             if (std.mem.eql(u8, candidate, name)) return index;
         }
         if (nearest(name, parser.variant_names)) |candidate| {
-            return parser.fail("no variant {f}, did you mean '{s}'?", .{ quote(name), candidate });
+            return parser.reader.fail("no variant {f}, did you mean '{s}'?", .{
+                quote(name), candidate,
+            });
         }
-        return parser.fail("no variant {f}; --list-variants names them", .{quote(name)});
+        return parser.reader.fail("no variant {f}; --list-variants names them", .{quote(name)});
     }
 
     /// The format comes from `--format` or the output's extension, which may not disagree.
@@ -455,11 +403,11 @@ const Parser = struct {
         } else null;
         if (parser.format) |format| {
             if (implied == null or implied == format) return;
-            return parser.fail("'--format {t}' contradicts the name {f}", .{
+            return parser.reader.fail("'--format {t}' contradicts the name {f}", .{
                 format, quote(output),
             });
         }
-        options.format = implied orelse return parser.fail(
+        options.format = implied orelse return parser.reader.fail(
             "the name {f} ends in none of .png, .ppm and .pfm, and no --format says which",
             .{quote(output)},
         );
@@ -467,7 +415,7 @@ const Parser = struct {
 };
 
 /// A decimal integer in minimum..maximum, digits only.
-fn integer(comptime Int: type, text: []const u8, minimum: Int, maximum: Int) ?Int {
+pub fn integer(comptime Int: type, text: []const u8, minimum: Int, maximum: Int) ?Int {
     if (text.len == 0) return null;
     for (text) |byte| if (!std.ascii.isDigit(byte)) return null;
     const value = std.fmt.parseInt(Int, text, 10) catch return null;
@@ -490,7 +438,8 @@ fn radiance(text: []const u8) ?f32 {
     return if (value >= 0) value else null;
 }
 
-fn resolutionOf(text: []const u8) ?[2]u32 {
+/// Width and height, within the limits.
+pub fn resolutionOf(text: []const u8) ?[2]u32 {
     const at = std.mem.findAny(u8, text, "xX") orelse return null;
     const width = integer(u32, text[0..at], 1, side_max) orelse return null;
     const height = integer(u32, text[at + 1 ..], 1, side_max) orelse return null;
@@ -529,42 +478,6 @@ fn exposureOf(text: []const u8) ?Exposure {
     if (std.mem.eql(u8, text, "auto")) return .auto;
     const ev = number(text) orelse return null;
     return if (@abs(ev) <= exposure_ev_max) .{ .ev = ev } else null;
-}
-
-/// Changes of one character, up to which a name counts as misspelt.
-const misspelling_distance_max = 2;
-
-/// The candidate that `name` was most likely meant to be.
-fn nearest(name: []const u8, candidates: []const []const u8) ?[]const u8 {
-    var best: ?[]const u8 = null;
-    var best_distance: usize = misspelling_distance_max + 1;
-    for (candidates) |candidate| {
-        const distance = editDistance(name, candidate) orelse continue;
-        if (distance >= best_distance) continue;
-        best_distance = distance;
-        best = candidate;
-    }
-    return best;
-}
-
-/// Insertions, removals and replacements between two names (Wagner and Fischer 1974); null where
-/// they are too long or too different in length to be of interest.
-fn editDistance(a: []const u8, b: []const u8) ?usize {
-    const length_max = 32;
-    if (a.len > length_max or b.len > length_max) return null;
-    if (@max(a.len, b.len) - @min(a.len, b.len) > misspelling_distance_max) return null;
-    var row: [length_max + 1]usize = undefined;
-    for (row[0 .. b.len + 1], 0..) |*cell, column| cell.* = column;
-    for (a, 1..) |a_byte, line| {
-        var diagonal = row[0];
-        row[0] = line;
-        for (b, 1..) |b_byte, column| {
-            const replaced = diagonal + @intFromBool(a_byte != b_byte);
-            diagonal = row[column];
-            row[column] = @min(replaced, @min(diagonal, row[column - 1]) + 1);
-        }
-    }
-    return row[b.len];
 }
 
 const test_names: []const []const u8 = &.{ "vector-packet-8", "scalar-single-4" };
@@ -811,10 +724,22 @@ test "limits in texts are those of the code" {
     try std.testing.expect(std.mem.find(u8, help, tiles) != null);
 }
 
-test editDistance {
-    try std.testing.expectEqual(0, editDistance("", ""));
-    try std.testing.expectEqual(1, editDistance("", "a"));
-    try std.testing.expectEqual(2, editDistance("ab", "ba"));
-    try std.testing.expectEqual(3, editDistance("abc", "xyz"));
-    try std.testing.expectEqual(null, editDistance("a", "abcd"));
+test {
+    _ = bench;
+    _ = @import("options/arguments.zig");
+    _ = @import("options/nearest.zig");
+}
+
+test "bench is a command where it comes first" {
+    try std.testing.expectEqual(.bench_help, try parseForTest(&.{ "bench", "--wrong", "-h" }));
+    const command = try parseForTest(&.{ "bench", "bench", "-t2" });
+    try std.testing.expectEqualStrings("bench", command.bench.scenes[0]);
+    try std.testing.expectEqualStrings("bench", (try optionsOf("bench", &.{"render"})).scene);
+}
+
+fn optionsOf(scene: [:0]const u8, arguments: []const [:0]const u8) !Options {
+    var all: [8][:0]const u8 = undefined;
+    @memcpy(all[0..arguments.len], arguments);
+    all[arguments.len] = scene;
+    return (try parseForTest(all[0 .. arguments.len + 1])).render;
 }

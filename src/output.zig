@@ -16,6 +16,8 @@ const tonemap = @import("output/tonemap.zig");
 const assert = std.debug.assert;
 
 pub const Target = target_file.Target;
+/// What a target fails with.
+pub const TargetError = target_file.Error;
 pub const discardPending = target_file.discardPending;
 
 /// File formats.

@@ -609,3 +609,145 @@ test "signals end a long render and leave nothing behind" {
         try sandbox.expectEmpty();
     }
 }
+
+/// The part of the benchmark's JSON that these tests look at.
+const BenchResults = struct {
+    format: []const u8,
+    machine: struct { processor: []const u8, processor_count: usize },
+    build: struct { zig: []const u8, cpu_features: []const []const u8 },
+    reference: []const u8,
+    energy: struct {
+        source: ?[]const u8,
+        reason: ?[]const u8,
+        idle_w: ?f64,
+        readings: u64,
+    },
+    scenes: []const struct {
+        scene: []const u8,
+        image_hash: []const u8,
+        rounds: usize,
+        variants: []const struct {
+            name: []const u8,
+            tests: struct { box_issued: u64 },
+            trace_ms: []const f64,
+            energy: ?struct { trace_gross_j: []const f64, trace_s: []const f64 },
+        },
+    },
+    scaling: []const struct { threads: usize, trace_ms: []const f64 },
+};
+
+fn benchResultsOf(sandbox: *Sandbox, json: []const u8) !BenchResults {
+    const arena = sandbox.arena_state.allocator();
+    return std.json.parseFromSliceLeaky(BenchResults, arena, json, .{
+        .ignore_unknown_fields = true,
+    });
+}
+
+const small_bench = [_][]const u8{
+    "bench", "-r16x16", "-t2", "--rounds=2", "--time-limit=2", "-q", "builtin:cornell",
+};
+
+/// The argument that measures one variant alone, whichever the program holds.
+fn firstVariant(sandbox: *Sandbox) ![]const u8 {
+    const listed = try sandbox.expectExit(0, &.{"--list-variants"});
+    const name = std.mem.sliceTo(listed.stdout, '\n');
+    return sandbox.arena_state.allocator().print("--variants={s}", .{name});
+}
+
+test "the benchmark measures every variant, prints tables and keeps the samples" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const ending = try sandbox.expectExit(0, &(small_bench ++ .{ "--no-energy", "--json=b.json" }));
+    try testing.expectEqualStrings("", ending.stderr);
+    try sandbox.expectFiles(&.{"b.json"});
+    const results = try benchResultsOf(&sandbox, try sandbox.read("b.json"));
+    try testing.expectEqualStrings("raylane-bench-1", results.format);
+    try testing.expectEqual(null, results.energy.source);
+    try testing.expectEqual(1, results.scenes.len);
+    const listed = try sandbox.expectExit(0, &.{"--list-variants"});
+    const scene = &results.scenes[0];
+    try testing.expectEqual(std.mem.countScalar(u8, listed.stdout, '\n'), scene.variants.len);
+    for (scene.variants) |*variant| {
+        try testing.expectEqual(2, variant.trace_ms.len);
+        try testing.expect(variant.trace_ms[0] > 0 and variant.tests.box_issued > 0);
+        try testing.expect(std.mem.find(u8, listed.stdout, variant.name) != null);
+        try testing.expect(std.mem.find(u8, ending.stdout, variant.name) != null);
+    }
+    try testing.expectEqual(2, results.scaling[1].threads);
+    for ([_][]const u8{
+        "5.1", "5.2", "5.3", "5.4", "5.5", "C.1", "C.4", "C.5", "C.6", "C.8", scene.image_hash,
+    }) |word| {
+        errdefer std.debug.print("{s}\n", .{word});
+        try testing.expect(std.mem.find(u8, ending.stdout, word) != null);
+    }
+    // The image is the one that rendering makes.
+    const rendered = try sandbox.expectExit(0, &.{
+        "builtin:cornell", "-r16x16", "--depth=3", "--stats=json",
+    });
+    const stats = try statsOf(&sandbox, rendered.stdout);
+    try testing.expectEqualStrings(stats.image_hash, scene.image_hash);
+}
+
+test "the benchmark measures energy by the files that it is shown" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const folder = sandbox.folder.dir;
+    try folder.createDirPath(io, "sys/class/hwmon/hwmon0");
+    try sandbox.write("sys/class/hwmon/hwmon0/name", "ina226\n");
+    try sandbox.write("sys/class/hwmon/hwmon0/power1_input", "5250000\n");
+    const one_variant = small_bench ++ .{ try firstVariant(&sandbox), "--json=-" };
+    const ending = try sandbox.expectExit(0, &(one_variant ++ .{"--energy-root=sys"}));
+    const results = try benchResultsOf(&sandbox, ending.stdout);
+    try testing.expectEqualStrings("hwmon", results.energy.source.?);
+    try testing.expectApproxEqRel(5.25, results.energy.idle_w.?, 0.01);
+    const joules = results.scenes[0].variants[0].energy.?;
+    for (joules.trace_gross_j, joules.trace_s) |energy_j, duration_s| {
+        try testing.expectApproxEqRel(5.25 * duration_s, energy_j, 0.01);
+    }
+
+    try sandbox.write("sys/class/hwmon/hwmon0/power1_input", "garbage\n");
+    const broken = try sandbox.expectExit(0, &(one_variant ++ .{"--energy-root=sys"}));
+    const without = try benchResultsOf(&sandbox, broken.stdout);
+    try testing.expectEqual(null, without.energy.source);
+    try testing.expect(std.mem.find(u8, without.energy.reason.?, "not a number") != null);
+
+    const command = try sandbox.expectExit(0, &(one_variant ++ .{"--energy-command=echo 7 W"}));
+    const commanded = try benchResultsOf(&sandbox, command.stdout);
+    try testing.expectEqualStrings("command", commanded.energy.source.?);
+}
+
+test "a source of energy that disappears half way is said to be lost" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    // Each reading removes one file of ten; without any the command fails.
+    try sandbox.folder.dir.createDir(io, "left", .default_dir);
+    for (0..10) |index| {
+        var name: [8]u8 = undefined;
+        try sandbox.write(try std.fmt.bufPrint(&name, "left/{d}", .{index}), "");
+    }
+    const ending = try sandbox.expectExit(0, &(small_bench ++ .{
+        try firstVariant(&sandbox),
+        "--energy-command=f=$(ls left | head -n 1); test -n \"$f\" && rm left/$f && echo 3 W",
+    }));
+    try testing.expect(std.mem.find(u8, ending.stdout, "\nLost: ") != null);
+    try testing.expect(std.mem.find(u8, ending.stdout, "Render time") != null);
+}
+
+test "mistakes in what to measure are said before anything is measured" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const Case = struct { u8, []const []const u8 };
+    for ([_]Case{
+        .{ 2, &.{ "bench", "--rounds=0" } },
+        .{ 2, &.{ "bench", "-q", "--variants=neon" } },
+        .{ 3, &.{ "bench", "-q", "builtin:absent" } },
+        .{ 1, &.{ "bench", "-q", "absent.glb" } },
+        .{ 1, &.{ "bench", "-q", "--json=absent/b.json" } },
+    }) |case| {
+        const ending = try sandbox.expectExit(case[0], case[1]);
+        try expectOneErrorLine(ending);
+        try sandbox.expectEmpty();
+    }
+    const help = try sandbox.expectExit(0, &.{ "bench", "--help" });
+    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 60);
+}

@@ -30,7 +30,14 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
     .{ .part = "image", .may_import = &.{} },
     .{ .part = "output", .may_import = &.{ "image", "parallel" } },
     .{ .part = "report", .may_import = &.{ "config", "options", "variant", "world" } },
-    .{ .part = "energy", .may_import = &.{ "options", "variant" } },
+    .{ .part = "energy", .may_import = &.{} },
+    .{
+        // The second program, beside `main`, that leads scenes through all stages.
+        .part = "bench",
+        .may_import = &.{
+            "parse", "prepare", "trace", "world", "image", "options", "variant", "energy",
+        },
+    },
     .{ .part = "diagnostic", .may_import = &.{} },
     .{ .part = "statistics", .may_import = &.{} },
 };
@@ -41,9 +48,11 @@ const leaves = [_][]const u8{ "diagnostic", "math", "statistics", "std", "builti
 /// Where the compiler starts to read; every other Zig file is imported from one of them.
 const roots = [_][]const u8{
     "build.zig",
+    "bench/kernels.zig",
     "bench/lowering.zig",
     "bench/parse.zig",
     "bench/rays.zig",
+    "bench/structures.zig",
     "src/main.zig",
     "src/raylane.zig",
     "scenes/make.zig",

@@ -1,0 +1,67 @@
+//! What the builders of both trees share: references to triangles, blocks of them, costs.
+//!
+//! In: a world without regard to its own tree. Out: references with boxes as the tracer culls by
+//! them, so that a tree over these boxes loses no hit.
+
+const std = @import("std");
+const raylane = @import("raylane");
+const Allocator = std.mem.Allocator;
+const Box3 = raylane.math.Box3;
+const World = raylane.world.World;
+
+/// Lanes of all trees here.
+pub const width = 4;
+pub const Block = raylane.world.TriangleBlock(width);
+
+/// Cost of going on from a node to a child, and of testing a block of triangles: as instructions
+/// on NEON have it, about one to two.
+pub const node_cost: f32 = 1;
+pub const block_cost: f32 = 2;
+
+/// A triangle by its number, within its box.
+pub const Reference = struct { box: Box3, number: u32 };
+
+/// All triangles of a world, within their boxes grown as `World.pad` and `World.node_margin` ask.
+pub fn references(arena: Allocator, world: *const World) error{OutOfMemory}![]Reference {
+    const list = try arena.alloc(Reference, world.triangles.len);
+    for (list, world.triangles, 0..) |*reference, triangle, number| {
+        var box: Box3 = .empty;
+        for (triangle.corner) |corner| box = box.include(world.positions[corner]);
+        const grown = box.grow(world.pad + world.node_margin);
+        reference.* = .{ .box = grown, .number = @intCast(number) };
+    }
+    return list;
+}
+
+/// The box of all references.
+pub fn boundsOf(list: []const Reference) Box3 {
+    var box: Box3 = .empty;
+    for (list) |reference| box = box.join(reference.box);
+    return box;
+}
+
+/// Cost of testing so many triangles.
+pub fn leafCost(count: usize) f32 {
+    const block_count: f32 = @floatFromInt((count + width - 1) / width);
+    return block_cost * block_count;
+}
+
+/// Appends the triangles of references as blocks; returns how many.
+pub fn appendBlocks(
+    arena: Allocator,
+    blocks: *std.ArrayList(Block),
+    world: *const World,
+    list: []const Reference,
+) error{OutOfMemory}!u32 {
+    const first = blocks.items.len;
+    for (list, 0..) |reference, index| {
+        const lane = index % width;
+        if (lane == 0) try blocks.append(arena, .empty);
+        const block = &blocks.items[blocks.items.len - 1];
+        block.primitive[lane] = reference.number;
+        for (world.triangles[reference.number].corner, 0..) |corner, place| {
+            for (0..3) |axis| block.corner[place][axis][lane] = world.positions[corner][axis];
+        }
+    }
+    return @intCast(blocks.items.len - first);
+}
