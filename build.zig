@@ -86,12 +86,17 @@ pub fn build(b: *std.Build) void {
     steps.check.dependOn(&package.program().step);
 
     const here: Package = .init(b, resolve(b, .{}), .safe, vendor.headers, options);
-    const scenes = b.addRunArtifact(here.addProgram("make-scenes", "scenes/make.zig"));
-    scenes.setCwd(b.path("."));
-    scenes.addArg("scenes/cornell.gltf");
-    steps.scenes.dependOn(&scenes.step);
-
+    addScenes(steps.scenes, here);
     addLowering(steps.lowering);
+}
+
+/// Makes `step` write the scenes that come with Raylane.
+fn addScenes(step: *std.Build.Step, package: Package) void {
+    const b = step.owner;
+    const run = b.addRunArtifact(package.addProgram("make-scenes", "scenes/make.zig"));
+    run.setCwd(b.path("."));
+    run.addArg("scenes/cornell.gltf");
+    step.dependOn(&run.step);
 }
 
 /// Makes `step` build a program for each variant and compare them with the one that holds all, on
