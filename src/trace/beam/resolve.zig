@@ -109,9 +109,9 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
             return struct {
                 /// Turned corners from the origin.
                 offsets: [3]Value,
-                /// Near and far corner of its grown box from there.
-                near: Value,
-                far: Value,
+                /// Corners of its grown box from there.
+                lower: Value,
+                upper: Value,
             };
         }
 
@@ -136,7 +136,7 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
                     if (own[0] == exact.no_slot) continue;
                     if (own[0] != placed_slot) {
                         placed_slot = own[0];
-                        placed = placeOne(tree, world.pad, origin, down, placed_slot);
+                        placed = placeOne(tree, world.pad, origin, placed_slot);
                         placed_primitive = exact.primitiveAt(Kernel.width, tree, placed_slot);
                     }
                     const hit = intersect(group, &.{
@@ -145,8 +145,8 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
                             .splat(placed.offsets[1]),
                             .splat(placed.offsets[2]),
                         },
-                        .near = .splat(placed.near),
-                        .far = .splat(placed.far),
+                        .lower = .splat(placed.lower),
+                        .upper = .splat(placed.upper),
                     }, down, .splat(true));
                     if (shares) |all| all[index] = hit.shares();
                     group.nearest = .{ .t = hit.t, .primitive = .splat(placed_primitive) };
@@ -154,7 +154,7 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
                 }
                 const found = lanes.gt(.splat(exact.no_slot));
                 const gathered = exact.gather(Kernel, tree, own);
-                const each = placeEach(world.pad, origin, down, gathered.corners);
+                const each = placeEach(world.pad, origin, gathered.corners);
                 const hit = intersect(group, &each, down, found);
                 assert(found.andNot(hit.mask).none());
                 if (shares) |all| all[index] = hit.shares();
@@ -178,7 +178,6 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
             tree: *const world_file.Tree(Kernel.width),
             pad: f32,
             origin: [3]f32,
-            down: [3]bool,
             slot: exact.Slot,
         ) Placed([3]f32) {
             var corners: [3][3]f32 = undefined;
@@ -192,11 +191,9 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
                 const c = corners[2][component];
                 const low = if (b < a) b else a;
                 const high = if (b > a) b else a;
-                const lower = (if (c < low) c else low) - pad;
-                const upper = (if (c > high) c else high) + pad;
                 const from = origin[component];
-                placed.near[component] = (if (down[component]) upper else lower) - from;
-                placed.far[component] = (if (down[component]) lower else upper) - from;
+                placed.lower[component] = (if (c < low) c else low) - pad - from;
+                placed.upper[component] = (if (c > high) c else high) + pad - from;
                 for (&placed.offsets, corners) |*offset, corner| {
                     offset[component] = corner[component] - from;
                 }
@@ -208,7 +205,6 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
         inline fn placeEach(
             pad: f32,
             origin: [3]f32,
-            down: [3]bool,
             corners: [3]Vec3,
         ) Placed(Vec3) {
             const from: Vec3 = .splat(origin);
@@ -216,20 +212,10 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
             const a = turn(corners[0]);
             const b = turn(corners[1]);
             const c = turn(corners[2]);
-            const lower = c.min(b.min(a)).sub(grow).sub(from);
-            const upper = c.max(b.max(a)).add(grow).sub(from);
             return .{
                 .offsets = .{ a.sub(from), b.sub(from), c.sub(from) },
-                .near = .{
-                    .x = if (down[0]) upper.x else lower.x,
-                    .y = if (down[1]) upper.y else lower.y,
-                    .z = if (down[2]) upper.z else lower.z,
-                },
-                .far = .{
-                    .x = if (down[0]) lower.x else upper.x,
-                    .y = if (down[1]) lower.y else upper.y,
-                    .z = if (down[2]) lower.z else upper.z,
-                },
+                .lower = c.min(b.min(a)).sub(grow).sub(from),
+                .upper = c.max(b.max(a)).add(grow).sub(from),
             };
         }
 
@@ -257,12 +243,15 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
             const inside = triangle.settle(Rays, seen, &weights, group.active);
             const plane = triangle.locatePlane(Rays, seen, weights);
             const point = direction.scale(plane.t);
-            if (found.andNot(isWithin(point, placed, down)).none()) return .{
+            if (found.andNot(isWithin(point, placed)).none()) return .{
                 .mask = inside.bitAnd(plane.mask),
                 .t = plane.t,
                 .weights = weights,
             };
-            const range = box.slabOffsets(Rays, placed.near, placed.far, .{
+            const negative = [3]Rays.Mask{ .splat(down[0]), .splat(down[1]), .splat(down[2]) };
+            const near = triangle.select3(Rays, negative, placed.upper, placed.lower);
+            const far = triangle.select3(Rays, negative, placed.lower, placed.upper);
+            const range = box.slabOffsets(Rays, near, far, .{
                 .x = one.div(direction.x),
                 .y = one.div(direction.y),
                 .z = depth_inv,
@@ -274,16 +263,11 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
         /// Points so far within the box that t is surely within the range that the slab test gives:
         /// that is off by 3 u of a face's distance, the point by 1 u, and no component is longer
         /// than the last. Spares two divisions.
-        inline fn isWithin(point: Vec3, placed: *const Placed(Vec3), down: [3]bool) Rays.Mask {
-            const from_near = point.sub(placed.near);
-            const to_far = placed.far.sub(point);
-            var least: F32 = .splat(std.math.inf(f32));
-            inline for (.{ "x", "y", "z" }, down) |name, negative| {
-                const one = @field(from_near, name);
-                const other = @field(to_far, name);
-                least = least.minFast(if (negative) one.neg() else one)
-                    .minFast(if (negative) other.neg() else other);
-            }
+        inline fn isWithin(point: Vec3, placed: *const Placed(Vec3)) Rays.Mask {
+            const above = point.sub(placed.lower);
+            const below = placed.upper.sub(point);
+            const least = above.x.minFast(above.y).minFast(above.z)
+                .minFast(below.x).minFast(below.y).minFast(below.z);
             const margin = point.z.abs()
                 .mulAdd(.splat(16 * edges_file.unit_roundoff), .splat(1e-36));
             return least.gt(margin);
