@@ -14,6 +14,8 @@ pub const Meter = meter.Meter;
 pub const Source = source.Source;
 pub const Wanted = discover.Wanted;
 pub const find = discover.find;
+/// Reads a file such as those of the kernel.
+pub const readSystemFile = source.readSystemFile;
 
 test {
     _ = discover;

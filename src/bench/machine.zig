@@ -2,6 +2,7 @@
 
 const std = @import("std");
 const builtin = @import("builtin");
+const energy = @import("../energy.zig");
 const results = @import("results.zig");
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -26,11 +27,10 @@ pub fn describe(arena: Allocator, io: Io) error{OutOfMemory}!results.Machine {
 
 /// On x86 the model, elsewhere the board.
 fn processor(arena: Allocator, io: Io, buffer: []u8) error{OutOfMemory}![]const u8 {
-    const folder: Io.Dir = .cwd();
-    if (folder.readFile(io, "/proc/cpuinfo", buffer)) |text| {
+    if (energy.readSystemFile(io, "/proc/cpuinfo", buffer)) |text| {
         if (field(text, "model name")) |model| return arena.dupe(u8, model);
     } else |_| {}
-    const board = folder.readFile(io, "/sys/firmware/devicetree/base/model", buffer) catch
+    const board = energy.readSystemFile(io, "/sys/firmware/devicetree/base/model", buffer) catch
         return builtin.cpu.model.name;
     const name = std.mem.trim(u8, board, " \n\x00");
     return if (std.unicode.utf8ValidateSlice(name)) arena.dupe(u8, name) else "unknown";

@@ -136,6 +136,18 @@ pub fn readInteger(io: Io, path: []const u8, diagnostic: *Diagnostic) Error!i64 
         unreadable(diagnostic, path, if (digits.len == 0) "empty" else "not a plausible number");
 }
 
+/// The first bytes of a file such as those of the kernel, whose length is not known before. By
+/// positions: the standard library's `readFile` asks for ever at the end of them on 32-bit ARM.
+pub fn readSystemFile(
+    io: Io,
+    path: []const u8,
+    buffer: []u8,
+) (Io.File.OpenError || Io.File.ReadPositionalError)![]u8 {
+    const file = try Io.Dir.cwd().openFile(io, path, .{});
+    defer file.close(io);
+    return buffer[0..try file.readPositionalAll(io, buffer, 0)];
+}
+
 /// The words of a small file, without white space around them.
 pub fn readText(
     io: Io,
@@ -143,7 +155,7 @@ pub fn readText(
     buffer: []u8,
     diagnostic: *Diagnostic,
 ) Error![]const u8 {
-    const bytes = Io.Dir.cwd().readFile(io, path, buffer) catch |err| {
+    const bytes = readSystemFile(io, path, buffer) catch |err| {
         return unreadable(diagnostic, path, switch (err) {
             error.FileNotFound, error.NotDir => "is not there",
             error.AccessDenied, error.PermissionDenied => "may be read by root only",
