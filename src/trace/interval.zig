@@ -1,5 +1,5 @@
-//! A few rays through the tree as one: intervals that hold them all against boxes, then every ray
-//! against the triangles that are left.
+//! A few rays through the tree as one: intervals that hold them all against boxes, then those that
+//! enter a leaf against the triangles that are left there.
 //!
 //! In: the rays of a block of 4x4 pixels, by whatever way they came there. Out: the nearest hit of
 //! each, or whether there is any. The first ray takes with it those that go much the same way from

@@ -71,16 +71,7 @@ pub fn Edges(comptime Lanes: type) type {
         normal: [3]Vec3,
         /// Bound of the error of an edge function over u |D|, without its factor of roundings.
         slack: F32,
-        /// Lanes of which it is sure how they are turned, and where bounds hold.
-        turned: Lanes.Mask,
-        /// The largest distance of a corner, and the length of the longest edge.
-        reach: F32,
-        length: F32,
-        /// What 1/t is made of: a corner, two edges, their cross product N, and det.
-        corner: Vec3,
-        sides: [2]Vec3,
-        plane: Vec3,
-        det: F32,
+        facet: Facet(Lanes),
 
         const Self = @This();
 
@@ -109,29 +100,59 @@ pub fn Edges(comptime Lanes: type) type {
                     cross(Lanes, b.add(a), edges[2]).scale(flip),
                 },
                 .slack = reach.mul(reach.mulAdd(unit.add(unit), length)),
-                .turned = isTurned(Lanes, det, reach.mul(reach), length_squared, length)
-                    .bitAnd(reach.lt(.splat(reach_max))),
-                .reach = reach,
-                .length = length,
-                .corner = a,
-                .sides = .{ edges[1], edges[2] },
-                .plane = plane,
-                .det = det,
+                .facet = .{
+                    .turned = isTurned(Lanes, det, reach.mul(reach), length_squared, length)
+                        .bitAnd(reach.lt(.splat(reach_max))),
+                    .reach = reach,
+                    .length = length,
+                    .corner = a,
+                    .sides = .{ edges[1], edges[2] },
+                    .plane = plane,
+                    .det = det,
+                },
+            };
+        }
+    };
+}
+
+/// What depth is made of, kept until the edges have left something.
+pub fn Facet(comptime Lanes: type) type {
+    const F32 = Lanes.F32;
+    return struct {
+        /// Lanes of which it is sure how they are turned, and where bounds hold.
+        turned: Lanes.Mask,
+        /// The largest distance of a corner, and the length of the longest edge.
+        reach: F32,
+        length: F32,
+        /// A corner from the origin, two edges, their cross product N, and det.
+        corner: Lanes.Vec3,
+        sides: [2]Lanes.Vec3,
+        plane: Lanes.Vec3,
+        det: F32,
+
+        const Self = @This();
+
+        /// 1 / det, and of that bounds are made of: S / |det| and L^3 / |det|.
+        pub inline fn shape(facet: *const Self) struct { F32, F32, F32 } {
+            const det_inv = F32.splat(1).div(facet.det);
+            const size = det_inv.abs();
+            const length = facet.length;
+            return .{
+                det_inv,
+                absoluteCross(Lanes, facet.sides[0], facet.sides[1]).mul(size),
+                length.mul(length).mul(length).mul(size),
             };
         }
 
-        /// 1/t, of the triangles that the edges have left.
-        pub inline fn inverse(edges: *const Self) Inverse(Lanes) {
-            const det_inv = F32.splat(1).div(edges.det);
-            const steepness = absoluteCross(Lanes, edges.sides[0], edges.sides[1])
-                .mul(det_inv.abs());
-            const thinness = edges.length.mul(edges.length).mul(edges.length).mul(det_inv.abs());
-            const relative = weighed(Lanes, steepness.mul(edges.reach), thinness);
+        /// 1/t.
+        pub inline fn inverse(facet: *const Self) Inverse(Lanes) {
+            const det_inv, const steepness, const thinness = facet.shape();
+            const relative = weighed(Lanes, steepness.mul(facet.reach), thinness);
             return .{
-                .vector = edges.plane.scale(det_inv),
+                .vector = facet.plane.scale(det_inv),
                 .relative = relative,
                 .absolute = steepness,
-                .decisive = edges.turned.bitAnd(relative.lt(.splat(relative_error_max))),
+                .decisive = facet.turned.bitAnd(relative.lt(.splat(relative_error_max))),
             };
         }
     };

@@ -42,46 +42,20 @@ pub inline fn cornerAt(
     return .{ components[0][at.lane], components[1][at.lane], components[2][at.lane] };
 }
 
-/// Rays that pass within the edges of a triangle, those for which its plane has a place within its
-/// box, and t of that.
-pub fn Meeting(comptime Lanes: type) type {
-    return struct { inside: Lanes.Mask, mask: Lanes.Mask, t: Lanes.F32 };
-}
-
-/// The exact test of some rays of a group with the triangle in a slot.
+/// The exact test of a group's rays with the triangle in a slot.
 pub fn meet(
     comptime Kernel: type,
     tree: *const world_file.Tree(Kernel.width),
     pad: f32,
     group: *const ray_file.Ray(Kernel.Rays),
-    rays: Kernel.Rays.Mask,
     slot: Slot,
-) Meeting(Kernel.Rays) {
+) triangle.WeightedIntersection(Kernel.Rays) {
     @branchHint(.cold);
     var corners: [3]Kernel.Rays.Vec3 = undefined;
     for (&corners, 0..) |*corner, index| {
         corner.* = .splat(cornerAt(Kernel.width, tree, slot, index));
     }
-    return meetCorners(Kernel.Rays, pad, group, rays, corners);
-}
-
-fn meetCorners(
-    comptime Rays: type,
-    pad: f32,
-    group: *const ray_file.Ray(Rays),
-    rays: Rays.Mask,
-    corners: [3]Rays.Vec3,
-) Meeting(Rays) {
-    const axis: ray_file.LongAxis(Rays) = .of(group.line.direction);
-    const view: ray_file.View(Rays) = .init(group.line, axis);
-    const turned: [3]Rays.Vec3 = .{
-        axis.turn(corners[0]), axis.turn(corners[1]), axis.turn(corners[2]),
-    };
-    const seen = triangle.project(Rays, turned, &view);
-    var weights = triangle.weigh(Rays, seen);
-    const inside = triangle.settle(Rays, seen, &weights, weights.agree().bitAnd(rays));
-    const hit = triangle.locate(Rays, seen, weights, turned, &view, pad);
-    return .{ .inside = inside, .mask = hit.mask, .t = hit.t };
+    return triangle.intersect(Kernel.Rays, corners, group.line, pad);
 }
 
 /// Of rays that hit the triangle in `slot` at `t`, those whose own triangles in `others` do not
@@ -101,8 +75,8 @@ pub fn comeFirst(
     const met = rays.bitAnd(Rays.I32.load(others).gt(.splat(no_slot)));
     if (met.none()) return rays;
     const gathered = gather(Kernel, tree, others);
-    const other = meetCorners(Rays, pad, group, met, gathered.corners);
-    assert(met.andNot(other.inside.bitAnd(other.mask)).none());
+    const other = triangle.intersect(Rays, gathered.corners, group.line, pad);
+    assert(met.andNot(other.mask).none());
     const number: Rays.I32 = .splat(primitiveAt(Kernel.width, tree, slot));
     const first = t.lt(other.t).bitOr(t.eq(other.t).bitAnd(gathered.primitive.gt(number)));
     return rays.andNot(met.andNot(first));

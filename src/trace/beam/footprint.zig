@@ -86,14 +86,14 @@ pub fn Footprint(comptime Lanes: type) type {
     const F32 = Lanes.F32;
     const Vec3 = Lanes.Vec3;
     const Edges = edges_file.Edges(Lanes);
+    const Facet = edges_file.Facet(Lanes);
     return struct {
         /// Positive within.
         edge: [3]Linear(Lanes),
         /// Bound of the error of an edge function.
         slack: F32,
-        /// What both kinds of light have in common; in a directional one's own axes, relative to
-        /// its own origin. `normal` and `slack` are those of a point light.
-        edges: Edges,
+        /// In a directional light's own axes, its det the area on the plane.
+        facet: Facet,
 
         const Self = @This();
 
@@ -126,7 +126,7 @@ pub fn Footprint(comptime Lanes: type) type {
                 .edge = edge,
                 .slack = edges.slack
                     .mul(.splat(edges_file.edge_roundings * unitOf(slope_max))),
-                .edges = edges,
+                .facet = edges.facet,
             };
         }
 
@@ -183,9 +183,7 @@ pub fn Footprint(comptime Lanes: type) type {
                 .edge = edge,
                 .slack = reach.mul(length.add(reach.mul(.splat(2 * edges_file.unit_roundoff))))
                     .mul(.splat(edges_file.edge_roundings * unitOf(slope_max) * stretch)),
-                .edges = .{
-                    .normal = undefined,
-                    .slack = undefined,
+                .facet = .{
                     .turned = edges_file.isTurned(Lanes, area, scale, length_squared, length)
                         .bitAnd(reach.lt(.splat(reach_max))),
                     .reach = reach,
@@ -204,11 +202,11 @@ pub fn Footprint(comptime Lanes: type) type {
             projection: *const Projection,
             slope_max: f32,
         ) Nearness(Lanes) {
-            const edges = &footprint.edges;
+            const facet = &footprint.facet;
             const sign: F32 = .splat(projection.sign);
             const unit = unitOf(slope_max);
-            if (projection.slope != null) return parallelNearness(edges, sign, unit);
-            const inverse = edges.inverse();
+            if (projection.slope != null) return parallelNearness(facet, sign, unit);
+            const inverse = facet.inverse();
             return .{
                 .form = .of(turn(Lanes, projection.axis, inverse.vector.scale(sign))),
                 .relative = inverse.relative,
@@ -218,25 +216,21 @@ pub fn Footprint(comptime Lanes: type) type {
         }
 
         /// Depth is off by (28 R + 9 L^3 / area) u |D| S / area.
-        inline fn parallelNearness(edges: *const Edges, sign: F32, unit: f32) Nearness(Lanes) {
-            const area_inv = F32.splat(1).div(edges.det);
-            const length = edges.length;
-            const reach = edges.reach;
-            const steepness = edges_file.absoluteCross(Lanes, edges.sides[0], edges.sides[1])
-                .mul(area_inv.abs());
-            const thinness = length.mul(length).mul(length).mul(area_inv.abs());
+        inline fn parallelNearness(facet: *const Facet, sign: F32, unit: f32) Nearness(Lanes) {
+            const area_inv, const steepness, const thinness = facet.shape();
+            const reach = facet.reach;
             const absolute = reach.mulAdd(.splat(36), thinness.mul(.splat(11)))
                 .mulAdd(steepness.mul(.splat(unit)), reach.mul(.splat(5 * unit)));
             const scale = area_inv.mul(sign);
             return .{
                 .form = .{
-                    .u = edges.plane.x.mul(scale),
-                    .v = edges.plane.y.mul(scale),
-                    .one = edges_file.dot(Lanes, edges.plane, edges.corner).mul(scale).neg(),
+                    .u = facet.plane.x.mul(scale),
+                    .v = facet.plane.y.mul(scale),
+                    .one = edges_file.dot(Lanes, facet.plane, facet.corner).mul(scale).neg(),
                 },
                 .relative = .zero(),
                 .absolute = absolute,
-                .decisive = edges.turned
+                .decisive = facet.turned
                     .bitAnd(absolute.lt(reach.mul(.splat(edges_file.relative_error_max)))),
             };
         }

@@ -13,6 +13,7 @@ const kernel_file = @import("../kernel.zig");
 const ray_file = @import("../ray.zig");
 const packet = @import("../packet.zig");
 const stack = @import("../stack.zig");
+const walk = @import("../walk.zig");
 const vec3 = @import("../../math.zig").vec3;
 const edges_file = @import("edges.zig");
 const exact = @import("exact.zig");
@@ -210,7 +211,7 @@ fn Search(comptime Kernel: type) type {
                 if (entry.block_count == 0) {
                     assert(entry_count + width <= Kernel.stack_max);
                     const node = &search.tree.nodes[entry.child];
-                    if (Kernel.counts_tests) search.countNode(node);
+                    walk.countNode(Kernel, node, search.counts);
                     entry_count = search.frustum
                         .pushChildren(node, depth_max, &entries, entry_count);
                 } else {
@@ -219,13 +220,6 @@ fn Search(comptime Kernel: type) type {
                     }
                     depth_max = search.depthMax();
                 }
-            }
-        }
-
-        fn countNode(search: *Self, node: *const world_file.Node(width)) void {
-            search.counts.box_issued += width;
-            for (node.child) |child| {
-                search.counts.box_useful += @intFromBool(child != world_file.none);
             }
         }
 
@@ -246,7 +240,7 @@ fn Search(comptime Kernel: type) type {
         fn meetBlock(search: *Self, block_index: u32) void {
             @setEvalBranchQuota(2000);
             const block = &search.tree.blocks[block_index];
-            if (Kernel.counts_tests) search.countBlock(block);
+            walk.countBlock(Kernel, block, search.counts);
             var corners: [3]Boxes.Vec3 = undefined;
             inline for (&corners, &block.corner) |*corner, *components| corner.* = .{
                 .x = .load(&components[0]),
@@ -273,9 +267,9 @@ fn Search(comptime Kernel: type) type {
                 const reach = right[index].maxFast(zero).add(down[index].maxFast(zero));
                 least = least.minFast(reach.mulAdd(.splat(last), base[index]));
             }
-            there = there.andNot(edges.turned.bitAnd(least.lt(zero)));
+            there = there.andNot(edges.facet.turned.bitAnd(least.lt(zero)));
             if (there.none()) return;
-            const inverse = edges.inverse();
+            const inverse = edges.facet.inverse();
             const absolute = inverse.absolute.mul(.splat(search.inverse_scale));
             const one: Boxes.F32 = .splat(1);
             const growth = one.add(inverse.relative);
@@ -294,10 +288,10 @@ fn Search(comptime Kernel: type) type {
             if (rest | undecided == 0) return;
             var window = Window.everywhere;
             // Bounds tell more than edges of small triangles only.
-            const small = edges.length.mul(.splat(search.dual.gain))
-                .lt(edges.reach.mul(.splat(side)));
+            const small = edges.facet.length.mul(.splat(search.dual.gain))
+                .lt(edges.facet.reach.mul(.splat(side)));
             if (small.any()) {
-                window = search.windowOf(corners, edges.reach);
+                window = search.windowOf(corners, edges.facet.reach);
                 rest &= window.holds_pixels.bits();
                 undecided &= window.holds_pixels.bits();
                 if (rest | undecided == 0) return;
@@ -448,13 +442,6 @@ fn Search(comptime Kernel: type) type {
             }
         };
 
-        fn countBlock(search: *Self, block: *const world_file.TriangleBlock(width)) void {
-            search.counts.triangle_issued += width;
-            for (block.primitive) |primitive| {
-                search.counts.triangle_useful += @intFromBool(primitive != world_file.none);
-            }
-        }
-
         /// Steps a triangle over the blocks of pixels and goes on with those it may be seen in.
         inline fn cover(search: *Self, coverage: *const Coverage) void {
             var candidates = coverage.blocks();
@@ -568,8 +555,8 @@ fn Search(comptime Kernel: type) type {
             search.block_lower[block] = least.reduceMin();
         }
 
-        /// Asks the exact test about rays that a triangle comes near to, with bounds of 1/t there:
-        /// by its edges alone where they tell it from what has been found before.
+        /// Asks the exact test about rays that a triangle comes near to. With bounds of 1/t there:
+        /// where they tell it from what has been found before, nothing else is asked.
         fn decide(
             search: *Self,
             slot: exact.Slot,
@@ -581,12 +568,13 @@ fn Search(comptime Kernel: type) type {
             @branchHint(.unlikely);
             const ray = &search.bundle.groups[group];
             const pad = search.world.pad;
-            const hit = exact.meet(Kernel, search.tree, pad, ray, doubtful, slot);
+            const hit = exact.meet(Kernel, search.tree, pad, ray, slot);
+            const met = hit.mask.bitAnd(doubtful);
             const known_lower = search.bounds("lower", group);
             const known_upper = search.bounds("upper", group);
             const slots = search.bounds("slot", group);
-            const nearer = hit.inside.bitAnd(lower.gt(.loadAligned(known_upper)));
-            const unclear = hit.inside.bitAnd(hit.mask).bitAnd(hit.t.gt(.zero())).andNot(nearer);
+            const nearer = met.bitAnd(lower.gt(.loadAligned(known_upper)));
+            const unclear = met.bitAnd(hit.t.gt(.zero())).andNot(nearer);
             const first = exact
                 .comeFirst(Kernel, search.tree, pad, ray, unclear, hit.t, slot, slots);
             const inverse = F32.splat(1).div(hit.t);
