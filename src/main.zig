@@ -114,7 +114,7 @@ fn bench(
     };
     const results = outcome catch |err| {
         const text = if (err == error.OutOfMemory) "out of memory" else diagnostic.message.text();
-        say(io, "raylane: {f}: {s}\n", .{ printable(run_of.scene), text });
+        say(io, "raylane: {f}: {s}\n", .{ printable(placeOf(diagnostic, run_of.scene)), text });
         return switch (err) {
             error.OutOfMemory, error.InputOutput => .failed,
             error.CameraUnknown => .usage,
@@ -188,6 +188,12 @@ fn openJson(
     return .openFile(io, name, diagnostic);
 }
 
+/// Where an error of a scene is: a place in its text, or the file as a whole.
+fn placeOf(diagnostic: *const Diagnostic, scene: []const u8) []const u8 {
+    const place = diagnostic.place.text();
+    return if (place.len > 0) place else scene;
+}
+
 fn outOfMemory(io: Io) ExitCode {
     say(io, "raylane: out of memory\n", .{});
     return .failed;
@@ -229,13 +235,10 @@ fn renderAndReport(
         job.sayOfScene("warning: {d} more", .{diagnostic.warning_dropped_count});
     }
     const report = outcome catch |err| {
-        const place = diagnostic.place.text();
         const file = if (err == error.OutputFailed)
             job.outputTitle()
-        else if (place.len > 0)
-            place
         else
-            options.scene;
+            placeOf(diagnostic, options.scene);
         const text = if (err == error.OutOfMemory) "out of memory" else diagnostic.message.text();
         assert(text.len > 0);
         say(io, "raylane: {f}: {s}\n", .{ printable(file), text });

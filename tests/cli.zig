@@ -748,6 +748,9 @@ test "mistakes in what to measure are said before anything is measured" {
         try expectOneErrorLine(ending);
         try sandbox.expectEmpty();
     }
+    try sandbox.write("bad.pbrt", "WorldBegin\n  Frobnicate\n");
+    const bad = try sandbox.expectExit(3, &.{ "bench", "-q", "bad.pbrt" });
+    try testing.expectStringStartsWith(bad.stderr, "raylane: bad.pbrt:2:3: ");
     const help = try sandbox.expectExit(0, &.{ "bench", "--help" });
     try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 60);
 }

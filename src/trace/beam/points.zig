@@ -367,10 +367,10 @@ pub fn Points(comptime Kernel: type) type {
             var ends: Ends = undefined;
             inline for (0..Kernel.block_groups) |row| {
                 const first = index * block_pixels + row * lanes;
-                const near: F32 = .loadAligned(@alignCast(points.nearness[first..][0..lanes]));
+                const near = lanesOf(&points.nearness, first);
                 const there = near.lt(nowhere);
-                const x: F32 = .loadAligned(@alignCast(points.u[first..][0..lanes]));
-                const y: F32 = .loadAligned(@alignCast(points.v[first..][0..lanes]));
+                const x = lanesOf(&points.u, first);
+                const y = lanesOf(&points.v, first);
                 const u = x.mul(.splat(basis.i00)).add(y.mul(.splat(basis.i01)));
                 const v = x.mul(.splat(basis.i10)).add(y.mul(.splat(basis.i11)));
                 const group: Ends = .{
@@ -390,10 +390,10 @@ pub fn Points(comptime Kernel: type) type {
             var extents: [2][block_count]f32 = undefined;
             for (0..block_count / lanes) |part| {
                 const first = part * lanes;
-                const low = boundsOf(&points.block_u[0], first);
-                const u = boundsOf(&points.block_u[1], first).sub(low);
-                const v = boundsOf(&points.block_v[1], first)
-                    .sub(boundsOf(&points.block_v[0], first));
+                const low = lanesOf(&points.block_u[0], first);
+                const u = lanesOf(&points.block_u[1], first).sub(low);
+                const v = lanesOf(&points.block_v[1], first)
+                    .sub(lanesOf(&points.block_v[0], first));
                 const there = low.lt(.splat(inf));
                 const nowhere: F32 = .splat(inf);
                 F32.select(there, u.mul(v), nowhere).store(areas[first..][0..lanes]);
@@ -414,8 +414,8 @@ pub fn Points(comptime Kernel: type) type {
             const by_v: F32 = .splat(if (along_u) basis.i01 else basis.i11);
             var half: Members = @splat(0);
             for (0..Kernel.group_count) |group| {
-                const u: F32 = .loadAligned(@alignCast(points.u[group * lanes ..][0..lanes]));
-                const v: F32 = .loadAligned(@alignCast(points.v[group * lanes ..][0..lanes]));
+                const u = lanesOf(&points.u, group * lanes);
+                const v = lanesOf(&points.v, group * lanes);
                 setGroup(&half, group, u.mul(by_u).add(v.mul(by_v)).lt(middle).bits());
             }
             const below = count: {
@@ -446,9 +446,7 @@ pub fn Points(comptime Kernel: type) type {
         pub fn left(points: *const Self, members: *const Members) Members {
             var rest: Members = @splat(0);
             for (0..Kernel.group_count) |group| {
-                const near: F32 = .loadAligned(@alignCast(
-                    points.nearness[group * lanes ..][0..lanes],
-                ));
+                const near = lanesOf(&points.nearness, group * lanes);
                 setGroup(&rest, group, near.lt(.splat(inf)).bits());
             }
             for (&rest, members) |*one, all| one.* &= all;
@@ -488,19 +486,17 @@ pub fn Points(comptime Kernel: type) type {
             return frustum;
         }
 
-        /// One end of the blocks' bounds, in lanes of blocks from `first` on.
-        pub inline fn boundsOf(bounds: *align(64) const [block_count]f32, first: usize) F32 {
-            return .loadAligned(@alignCast(bounds[first..][0..lanes]));
+        /// Of an array by pixel or by block, the lanes from `first` on.
+        pub inline fn lanesOf(values: anytype, first: usize) F32 {
+            return .loadAligned(@alignCast(values[first..][0..lanes]));
         }
 
         /// Marks a block as done when all its rays are.
         pub inline fn checkBlock(points: *Self, index: u32) void {
             const first = index * block_pixels;
-            var least: F32 = .loadAligned(@alignCast(points.nearness[first..][0..lanes]));
+            var least = lanesOf(&points.nearness, first);
             inline for (1..Kernel.block_groups) |row| {
-                least = least.minFast(.loadAligned(@alignCast(
-                    points.nearness[first + row * lanes ..][0..lanes],
-                )));
+                least = least.minFast(lanesOf(&points.nearness, first + row * lanes));
             }
             if (least.lt(.splat(inf)).any()) return;
             points.live &= ~(@as(u32, 1) << @intCast(index));

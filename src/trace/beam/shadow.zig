@@ -152,7 +152,9 @@ fn Search(comptime Kernel: type) type {
                     continue;
                 }
                 meeting_count += entry.block_count;
-                if (meeting_count > meetingMax(width)) return search.apart(&search.points.left(members));
+                if (meeting_count > meetingMax(width)) {
+                    return search.apart(&search.points.left(members));
+                }
                 for (entry.child..entry.child + entry.block_count) |index| {
                     search.meetBlock(&frustum, @intCast(index));
                 }
@@ -216,7 +218,7 @@ fn Search(comptime Kernel: type) type {
             if (rest | undecided == 0) return;
             var window = Window.everywhere;
             // Bounds tell more than edges of small triangles only.
-            const extent = search.points.bounds.extent() * (if (directional) 1 else search.points.bounds.depth);
+            const extent = bounds.extent() * (if (directional) 1 else bounds.depth);
             if (print.facet.length.lt(.splat(extent)).any()) {
                 window = search.windowOf(corners, print.facet.reach);
                 rest &= window.u[1].ge(.splat(bounds.u[0]))
@@ -421,12 +423,8 @@ fn Search(comptime Kernel: type) type {
                 inline for (0..3) |index| {
                     const du = coverage.along_u[index];
                     const dv = coverage.along_v[index];
-                    const u: F32 = .loadAligned(@alignCast(
-                        search.points.block_u[@intFromBool(du > 0)][first..][0..lanes],
-                    ));
-                    const v: F32 = .loadAligned(@alignCast(
-                        search.points.block_v[@intFromBool(dv > 0)][first..][0..lanes],
-                    ));
+                    const u = Points.lanesOf(&search.points.block_u[@intFromBool(du > 0)], first);
+                    const v = Points.lanesOf(&search.points.block_v[@intFromBool(dv > 0)], first);
                     const most = u.mulAdd(.splat(du), v.mulAdd(.splat(dv), .splat(
                         coverage.one[index],
                     )));
@@ -434,11 +432,13 @@ fn Search(comptime Kernel: type) type {
                 }
                 const window_u = coverage.window_u;
                 const window_v = coverage.window_v;
+                const block_u = &search.points.block_u;
+                const block_v = &search.points.block_v;
                 const met = least.ge(.zero())
-                    .bitAnd(Points.boundsOf(&search.points.block_u[0], first).le(.splat(window_u[1])))
-                    .bitAnd(Points.boundsOf(&search.points.block_u[1], first).ge(.splat(window_u[0])))
-                    .bitAnd(Points.boundsOf(&search.points.block_v[0], first).le(.splat(window_v[1])))
-                    .bitAnd(Points.boundsOf(&search.points.block_v[1], first).ge(.splat(window_v[0])));
+                    .bitAnd(Points.lanesOf(&block_u[0], first).le(.splat(window_u[1])))
+                    .bitAnd(Points.lanesOf(&block_u[1], first).ge(.splat(window_u[0])))
+                    .bitAnd(Points.lanesOf(&block_v[0], first).le(.splat(window_v[1])))
+                    .bitAnd(Points.lanesOf(&block_v[1], first).ge(.splat(window_v[0])));
                 blocks |= met.bits() << first;
             }
             return blocks;
@@ -450,13 +450,13 @@ fn Search(comptime Kernel: type) type {
             inline for (0..Kernel.block_groups) |row| {
                 const group = index * Kernel.block_groups + row;
                 const first = group * lanes;
-                const u: F32 = .loadAligned(@alignCast(search.points.u[first..][0..lanes]));
-                const v: F32 = .loadAligned(@alignCast(search.points.v[first..][0..lanes]));
+                const u = Points.lanesOf(&search.points.u, first);
+                const v = Points.lanesOf(&search.points.v, first);
                 var value: [4]F32 = undefined;
                 inline for (&value, coverage.u, coverage.v, coverage.one) |*to, cu, cv, c1| {
                     to.* = u.mulAdd(.splat(cu), v.mulAdd(.splat(cv), .splat(c1)));
                 }
-                const near: F32 = .loadAligned(@alignCast(search.points.nearness[first..][0..lanes]));
+                const near = Points.lanesOf(&search.points.nearness, first);
                 const least = value[0].minFast(value[1]).minFast(value[2]);
                 var possible = least.ge(.zero()).bitAnd(value[3].gt(near));
                 if (possible.any()) {
@@ -487,7 +487,7 @@ fn Search(comptime Kernel: type) type {
             if (doubtful.any()) met = met.bitOr(search.decide(slot, group, doubtful, before));
             if (met.none()) return false;
             const first = group * lanes;
-            const near: F32 = .loadAligned(@alignCast(search.points.nearness[first..][0..lanes]));
+            const near = Points.lanesOf(&search.points.nearness, first);
             F32.select(met, .splat(inf), near)
                 .storeAligned(@alignCast(search.points.nearness[first..][0..lanes]));
             const ray = &search.bundle.groups[group];
@@ -519,9 +519,9 @@ fn Search(comptime Kernel: type) type {
                 const block = group / Kernel.block_groups;
                 if (search.points.live >> @intCast(block) & 1 == 0) continue;
                 const first = group * lanes;
-                const u: F32 = .loadAligned(@alignCast(search.points.u[first..][0..lanes]));
-                const v: F32 = .loadAligned(@alignCast(search.points.v[first..][0..lanes]));
-                const near: F32 = .loadAligned(@alignCast(search.points.nearness[first..][0..lanes]));
+                const u = Points.lanesOf(&search.points.u, first);
+                const v = Points.lanesOf(&search.points.v, first);
+                const near = Points.lanesOf(&search.points.nearness, first);
                 var negative: Mask = .splat(false);
                 var positive: Mask = .splat(false);
                 for (coverage.u[0..3], coverage.v[0..3], coverage.one[0..3]) |cu, cv, c1| {
