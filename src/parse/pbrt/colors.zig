@@ -171,12 +171,21 @@ fn mean(
         );
         return @splat(image_mean);
     };
-    if (known != .constant and known != .scale and known != .mix) try input.warn(
-        position,
-        class,
-        "Texture {f} is shown as its mean",
-        .{quote(class)},
-    );
+    switch (known) {
+        .constant, .scale, .mix => {},
+        .imagemap => try input.warn(
+            position,
+            class,
+            "Texture {f}: images are not read, their mean is taken as {d}",
+            .{ quote(class), image_mean },
+        ),
+        else => try input.warn(
+            position,
+            class,
+            "Texture {f} is shown as its mean",
+            .{quote(class)},
+        ),
+    }
     switch (known) {
         .constant => return colors.rgb(parameters, "value", white),
         .scale => {
