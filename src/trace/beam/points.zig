@@ -110,9 +110,7 @@ pub fn Points(comptime Kernel: type) type {
 
         /// How many rays a set has.
         pub fn rayCount(members: *const Members) u32 {
-            var count: u32 = 0;
-            for (members) |block| count += @popCount(block);
-            return count;
+            return @popCount(@as(@Int(.unsigned, pixel_count), @bitCast(members.*)));
         }
 
         /// The active rays of a bundle.
@@ -145,24 +143,52 @@ pub fn Points(comptime Kernel: type) type {
             members: *Members,
         ) Members {
             points.choosePlane(light, bundle, members);
-            const projection = &points.projection;
+            const all = rayCount(members) == pixel_count;
+            const unfit, const steepest = if (all)
+                points.placeEach(true, bundle, members)
+            else
+                points.placeEach(false, bundle, members);
+            var rest: Members = @splat(0);
+            if (unfit.any()) {
+                rest = members.*;
+                members.* = points.left(&rest);
+                for (&rest, members) |*one, fitting| one.* &= ~fitting;
+            }
+            points.slope_max = if (points.projection.slope) |slope|
+                @max(@abs(slope[0]), @abs(slope[1]))
+            else
+                steepest.reduceMax();
+            points.chooseBasis(members);
+            if (all and unfit.none()) points.bound(true, members) else points.bound(false, members);
+            return rest;
+        }
+
+        /// Every member's place. Returns lanes with rays that do not fit on the plane, and the
+        /// steepest slopes of those that do. `all`: every ray is a member.
+        fn placeEach(
+            points: *Self,
+            comptime all: bool,
+            bundle: *const Bundle,
+            members: *const Members,
+        ) struct { Mask, F32 } {
+            const point_light = points.projection.slope == null;
             var unfit: Mask = .splat(false);
             var steepest: F32 = .zero();
             for (&bundle.groups, 0..) |*group, index| {
-                const member = groupOf(members, index);
+                const member: Mask = if (all) .splat(true) else groupOf(members, index);
                 const first = index * lanes;
-                if (member.none()) {
+                if (!all and member.none()) {
                     F32.splat(inf).storeAligned(@alignCast(points.nearness[first..][0..lanes]));
                     continue;
                 }
                 const on_plane = points.placeGroup(group);
                 const steep = on_plane.u.abs().maxFast(on_plane.v.abs());
                 var fits = member;
-                if (projection.slope == null) fits = fits.bitAnd(on_plane.depth.gt(.zero()))
+                if (point_light) fits = fits.bitAnd(on_plane.depth.gt(.zero()))
                     .bitAnd(steep.le(.splat(slope_limit)));
                 unfit = unfit.bitOr(member.andNot(fits));
                 steepest = steepest.maxFast(.select(fits, steep, .zero()));
-                const near = if (projection.slope == null)
+                const near = if (point_light)
                     F32.splat(1).div(on_plane.depth.mul(group.nearest.t))
                 else
                     on_plane.depth.neg();
@@ -171,19 +197,7 @@ pub fn Points(comptime Kernel: type) type {
                 F32.select(fits, near, .splat(inf))
                     .storeAligned(@alignCast(points.nearness[first..][0..lanes]));
             }
-            var rest: Members = @splat(0);
-            if (unfit.any()) {
-                rest = members.*;
-                members.* = points.left(&rest);
-                for (&rest, members) |*one, fitting| one.* &= ~fitting;
-            }
-            points.slope_max = if (projection.slope) |slope|
-                @max(@abs(slope[0]), @abs(slope[1]))
-            else
-                steepest.reduceMax();
-            points.chooseBasis(members);
-            points.bound(members);
-            return rest;
+            return .{ unfit, steepest };
         }
 
         inline fn placeGroup(
@@ -303,8 +317,8 @@ pub fn Points(comptime Kernel: type) type {
             return corners;
         }
 
-        /// Bounds of blocks and of all.
-        fn bound(points: *Self, members: *const Members) void {
+        /// Bounds of blocks and of all. `all`: every ray is a member.
+        fn bound(points: *Self, comptime all_there: bool, members: *const Members) void {
             const unit = 64 * edges_file.unit_roundoff * (1 + 2 * points.slope_max);
             const length = if (points.projection.slope == null) 1 else points.projection.reach;
             const margin: F32 = .splat(unit * points.basis.norm() * length);
@@ -317,7 +331,8 @@ pub fn Points(comptime Kernel: type) type {
                 const first = part * lanes;
                 var each: [5][lanes]F32 = undefined;
                 for (members[first..][0..lanes], first.., 0..) |set, index, at| {
-                    const block = if (set == 0) none else points.endsOf(index);
+                    const gone = !all_there and set == 0;
+                    const block = if (gone) none else points.endsOf(all_there, index);
                     each[0][at], each[1][at] = block.u;
                     each[2][at], each[3][at] = block.v;
                     each[4][at] = block.near;
@@ -361,14 +376,14 @@ pub fn Points(comptime Kernel: type) type {
         };
 
         /// What the groups of a block leave, by lane.
-        inline fn endsOf(points: *const Self, index: usize) Ends {
+        inline fn endsOf(points: *const Self, comptime all_there: bool, index: usize) Ends {
             const basis = &points.basis;
             const nowhere: F32 = .splat(inf);
             var ends: Ends = undefined;
             inline for (0..Kernel.block_groups) |row| {
                 const first = index * block_pixels + row * lanes;
                 const near = lanesOf(&points.nearness, first);
-                const there = near.lt(nowhere);
+                const there: Mask = if (all_there) .splat(true) else near.lt(nowhere);
                 const x = lanesOf(&points.u, first);
                 const y = lanesOf(&points.v, first);
                 const u = x.mul(.splat(basis.i00)).add(y.mul(.splat(basis.i01)));
@@ -386,8 +401,13 @@ pub fn Points(comptime Kernel: type) type {
         /// Half of the set if it should be cut: what lies below the middle of the longer extent, in
         /// units of the median block.
         pub fn cut(points: *const Self, members: *const Members) ?Members {
-            var areas: [block_count]f32 = undefined;
+            const count = @popCount(points.live);
+            if (count == 0) return null;
+            const share: f32 = @floatFromInt(count);
+            // Of more than half of the blocks, and so of the median.
+            const area_max: F32 = .splat(points.bounds.area() / (cut_ratio * share));
             var extents: [2][block_count]f32 = undefined;
+            var small_count: u32 = 0;
             for (0..block_count / lanes) |part| {
                 const first = part * lanes;
                 const low = lanesOf(&points.block_u[0], first);
@@ -396,14 +416,11 @@ pub fn Points(comptime Kernel: type) type {
                     .sub(lanesOf(&points.block_v[0], first));
                 const there = low.lt(.splat(inf));
                 const nowhere: F32 = .splat(inf);
-                F32.select(there, u.mul(v), nowhere).store(areas[first..][0..lanes]);
+                small_count += there.bitAnd(u.mul(v).lt(area_max)).popCount();
                 F32.select(there, u, nowhere).store(extents[0][first..][0..lanes]);
                 F32.select(there, v, nowhere).store(extents[1][first..][0..lanes]);
             }
-            const count = @popCount(points.live);
-            if (count == 0) return null;
-            const share: f32 = @floatFromInt(count);
-            if (!(points.bounds.area() > cut_ratio * share * median(&areas, count))) return null;
+            if (small_count <= count / 2) return null;
             const bounds = &points.bounds;
             const along_u = (bounds.u[1] - bounds.u[0]) * median(&extents[1], count) >
                 (bounds.v[1] - bounds.v[0]) * median(&extents[0], count);

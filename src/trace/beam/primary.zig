@@ -3,8 +3,9 @@
 //! In: a bundle of 16x16 rays from one origin whose directions are linear in the pixel. Out: the
 //! nearest hit of every ray. The tree is travelled once for all of them, front to back. Where a
 //! triangle may be seen, its edge functions and 1/t are stepped over blocks of 4x4 pixels, then
-//! over the pixels of those that it may touch, in lanes (edges.zig). What that leaves in doubt, an
-//! edge or a depth too close to tell, the exact test decides; the winner's t is always its.
+//! over the pixels of those that it touches and does not fill, in lanes (edges.zig, found.zig).
+//! What that leaves in doubt, an edge or a depth too close to tell, the exact test decides; the
+//! winner's t is always its.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -17,15 +18,14 @@ const walk = @import("../walk.zig");
 const vec3 = @import("../../math.zig").vec3;
 const edges_file = @import("edges.zig");
 const exact = @import("exact.zig");
+const found_file = @import("found.zig");
 const resolve = @import("resolve.zig");
 const Frustum = @import("frustum.zig").Frustum;
 const assert = std.debug.assert;
 
 const side = kernel_file.beam_side;
 const block_side = kernel_file.block_side;
-const block_count = (side / block_side) * (side / block_side);
-const block_pixels = block_side * block_side;
-const pixel_count = side * side;
+const block_count = found_file.block_count;
 /// With no more blocks than this, triangles are not tested against each of them first.
 const few_blocks = 2;
 const last: f32 = side - 1;
@@ -56,7 +56,7 @@ pub fn trace(
     var search: Search(Kernel) = undefined;
     if (!search.init(world, grid, bundle, counts)) return false;
     search.travel();
-    resolve.resolve(Kernel, world, grid, &search.slot, bundle, shares);
+    resolve.resolve(Kernel, world, grid, &search.found, bundle, shares);
     return true;
 }
 
@@ -133,28 +133,11 @@ fn Search(comptime Kernel: type) type {
         reach_max: f32,
         /// From a point relative to the origin to column and row times t, and t; see `Dual`.
         dual: Dual,
-        /// By pixel, in the order of groups and lanes: what is hit, and bounds of 1/t there.
-        slot: [pixel_count]exact.Slot align(64),
-        lower: [pixel_count]f32 align(64),
-        upper: [pixel_count]f32 align(64),
-        /// Least `lower` of every block and of all.
-        block_lower: [block_count]f32 align(64),
-        tile_lower: f32,
+        found: Found,
 
         const Self = @This();
+        const Found = found_file.Found(Kernel);
         const F32 = Rays.F32;
-        /// Columns and rows of the blocks' first pixels.
-        const block_x = blockPlaces(false);
-        const block_y = blockPlaces(true);
-
-        fn blockPlaces(comptime rows: bool) [block_count]f32 {
-            var places: [block_count]f32 = undefined;
-            for (&places, 0..) |*to, block| {
-                const across = side / block_side;
-                to.* = @floatFromInt(block_side * (if (rows) block / across else block % across));
-            }
-            return places;
-        }
 
         fn init(
             search: *Self,
@@ -180,23 +163,8 @@ fn Search(comptime Kernel: type) type {
                 (edges_file.inverse_roundings * longest + 2 * roundings);
             search.reach_max = edges_file.reachMax(world.pad);
             search.dual = .of(grid);
-            search.block_lower = @splat(0);
-            search.tile_lower = 0;
-            search.clear();
+            search.found.clear(bundle);
             return true;
-        }
-
-        /// No hit yet anywhere; a pixel without a ray has one at no distance.
-        fn clear(search: *Self) void {
-            const none: Rays.I32 = .splat(exact.no_slot);
-            const zero: F32 = .zero();
-            const endless: F32 = .splat(std.math.inf(f32));
-            for (&search.bundle.groups, 0..) |*group, index| {
-                const bound: F32 = .select(group.active, zero, endless);
-                bound.storeAligned(@alignCast(search.lower[index * lanes ..][0..lanes]));
-                bound.storeAligned(@alignCast(search.upper[index * lanes ..][0..lanes]));
-                none.storeAligned(@alignCast(search.slot[index * lanes ..][0..lanes]));
-            }
         }
 
         fn travel(search: *Self) void {
@@ -218,20 +186,9 @@ fn Search(comptime Kernel: type) type {
                     for (entry.child..entry.child + entry.block_count) |block| {
                         search.meetBlock(@intCast(block));
                     }
-                    depth_max = search.depthMax();
+                    depth_max = search.found.depthMax();
                 }
             }
-        }
-
-        /// t beyond which nothing can be seen any more.
-        inline fn depthMax(search: *Self) f32 {
-            var least: F32 = .load(search.block_lower[0..lanes]);
-            inline for (1..block_count / lanes) |part| {
-                least = least.minFast(.load(search.block_lower[part * lanes ..][0..lanes]));
-            }
-            search.tile_lower = least.reduceMin();
-            if (search.tile_lower == 0) return std.math.inf(f32);
-            return 1 / search.tile_lower * (1 + 4 * edges_file.unit_roundoff);
         }
 
         /// Sets up the triangles of a block and goes on with those that the beam may see.
@@ -283,7 +240,7 @@ fn Search(comptime Kernel: type) type {
             var undecided: u32 = 0;
             if (open.any()) undecided = open.bitAnd(mayTouch(&base, &right, &down, slack)).bits();
             var rest = there.bitAnd(inverse.decisive)
-                .bitAnd(most.gt(.splat(search.tile_lower))).bits();
+                .bitAnd(most.gt(.splat(search.found.tile_lower))).bits();
             const first: exact.Slot = @intCast(block_index * width);
             if (rest | undecided == 0) return;
             var window = Window.everywhere;
@@ -451,35 +408,69 @@ fn Search(comptime Kernel: type) type {
             }
         }
 
-        /// The blocks that a triangle may be seen in.
+        /// The blocks that a triangle may be seen in, but for those that it surely fills, before
+        /// all that is known there: these are done.
         inline fn blocksOf(search: *Self, coverage: *const Coverage) u32 {
             var start: [4]F32 = undefined;
-            inline for (&start, coverage.base, coverage.right, coverage.down) |*to, b, r, d| {
-                const most = b + block_last * ((if (r > 0) r else 0) + (if (d > 0) d else 0));
-                to.* = .splat(most);
+            var span: [4]F32 = undefined;
+            inline for (&start, &span, 0..) |*to, *by, index| {
+                const r = block_last * coverage.right[index];
+                const d = block_last * coverage.down[index];
+                const most = (if (r > 0) r else 0) + (if (d > 0) d else 0);
+                to.* = .splat(coverage.base[index] + most);
+                by.* = .splat(@abs(r) + @abs(d));
             }
             var blocks: u32 = 0;
             inline for (0..block_count / lanes) |part| {
-                const x: F32 = .fromArray(block_x[part * lanes ..][0..lanes].*);
-                const y: F32 = .fromArray(block_y[part * lanes ..][0..lanes].*);
-                var value: [4]F32 = undefined;
-                inline for (&value, start, coverage.right, coverage.down) |*to, from, r, d| {
+                const first = part * lanes;
+                const x: F32 = .fromArray(Found.block_x[first..][0..lanes].*);
+                const y: F32 = .fromArray(Found.block_y[first..][0..lanes].*);
+                var most: [4]F32 = undefined;
+                inline for (&most, start, coverage.right, coverage.down) |*to, from, r, d| {
                     to.* = x.mulAdd(.splat(r), y.mulAdd(.splat(d), from));
                 }
-                const inside = value[0].minFast(value[1]).minFast(value[2]).ge(.zero());
-                const known: F32 = .loadAligned(@alignCast(
-                    search.block_lower[part * lanes ..][0..lanes],
-                ));
-                const bits = inside.bitAnd(value[3].gt(known)).bits();
-                blocks |= bits << @intCast(part * lanes);
+                const inside = most[0].minFast(most[1]).minFast(most[2]).ge(.zero());
+                const known: F32 = .loadAligned(search.found.ofBlocks("block_lower", first));
+                var seen = inside.bitAnd(most[3].gt(known));
+                const least = most[0].sub(span[0]).minFast(most[1].sub(span[1]))
+                    .minFast(most[2].sub(span[2]));
+                const covered = seen.bitAnd(least.gt(.splat(coverage.slack)));
+                if (covered.any()) {
+                    const depth = .{ most[3].sub(span[3]), most[3] };
+                    seen = seen.andNot(search.fill(coverage, first, covered, depth));
+                }
+                blocks |= seen.bits() << @intCast(first);
             }
             return blocks;
         }
 
+        /// Of the blocks from `first` on that a triangle covers, those where it comes first. With
+        /// the least and the greatest upper bound of 1/t in each.
+        inline fn fill(
+            search: *Self,
+            coverage: *const Coverage,
+            first: usize,
+            covered: Rays.Mask,
+            depth: [2]F32,
+        ) Rays.Mask {
+            const lower = depth[0].mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
+            const known: F32 = .loadAligned(search.found.ofBlocks("block_upper", first));
+            const filled = covered.bitAnd(lower.gt(known));
+            if (filled.any()) search.found.fill(first, filled, coverage.slot, &.{
+                .base = coverage.base[3],
+                .right = coverage.right[3],
+                .down = coverage.down[3],
+                .shrink = coverage.shrink,
+                .drop = coverage.drop,
+            }, lower, depth[1]);
+            return filled;
+        }
+
         /// Steps a triangle over the pixels of a block.
         inline fn coverBlock(search: *Self, coverage: *const Coverage, block: u32) void {
-            const x: F32 = .fromArray(lanePlaces(false));
-            const y: F32 = .fromArray(lanePlaces(true));
+            if (search.found.isWhole(block)) search.found.spread(block);
+            const x: F32 = .fromArray(Found.lane_x);
+            const y: F32 = .fromArray(Found.lane_y);
             const top = block / (side / block_side) * block_side;
             const row_first = (@max(coverage.first_y, top) - top) / Kernel.group_height;
             const row_last = (@min(coverage.last_y, top + block_side - 1) - top) /
@@ -490,8 +481,8 @@ fn Search(comptime Kernel: type) type {
             inline for (0..4) |index| {
                 const r = coverage.right[index];
                 const d = coverage.down[index];
-                const base = coverage.base[index] + block_x[block] * r +
-                    (block_y[block] + first) * d;
+                const base = coverage.base[index] + Found.block_x[block] * r +
+                    (Found.block_y[block] + first) * d;
                 var start: F32 = .splat(base);
                 if (Kernel.group_height > 1) start = y.mulAdd(.splat(d), start);
                 value[index] = x.mulAdd(.splat(r), start);
@@ -501,13 +492,13 @@ fn Search(comptime Kernel: type) type {
             var row = row_first;
             while (true) {
                 const group = block * Kernel.block_groups + row;
-                const lower = search.bounds("lower", group);
+                const lower = search.found.of("lower", group);
                 const least = value[0].minFast(value[1]).minFast(value[2]);
                 const known: F32 = .loadAligned(lower);
                 const possible = least.ge(.zero()).bitAnd(value[3].gt(known));
                 if (possible.any()) {
-                    const upper = search.bounds("upper", group);
-                    const slots = search.bounds("slot", group);
+                    const upper = search.found.of("upper", group);
+                    const slots = search.found.of("slot", group);
                     const surely = value[3].mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
                     const certain = least.gt(.splat(coverage.slack))
                         .bitAnd(surely.gt(.loadAligned(upper)));
@@ -525,34 +516,7 @@ fn Search(comptime Kernel: type) type {
                 row += 1;
                 inline for (&value, step) |*to, by| to.* = to.add(by);
             }
-            if (changed) search.boundBlock(block);
-        }
-
-        fn lanePlaces(comptime rows: bool) [lanes]f32 {
-            var places: [lanes]f32 = undefined;
-            for (&places, 0..) |*to, lane| to.* = @floatFromInt(if (rows)
-                lane / Kernel.group_width
-            else
-                lane % Kernel.group_width);
-            return places;
-        }
-
-        /// A group's part of one of the arrays by pixel.
-        inline fn bounds(
-            search: *Self,
-            comptime name: []const u8,
-            group: usize,
-        ) *align(lanes * 4) [lanes]std.meta.Elem(@FieldType(Self, name)) {
-            return @alignCast(@field(search, name)[group * lanes ..][0..lanes]);
-        }
-
-        inline fn boundBlock(search: *Self, block: u32) void {
-            const first = block * Kernel.block_groups;
-            var least: F32 = .loadAligned(search.bounds("lower", first));
-            inline for (1..Kernel.block_groups) |row| {
-                least = least.minFast(.loadAligned(search.bounds("lower", first + row)));
-            }
-            search.block_lower[block] = least.reduceMin();
+            if (changed) search.found.boundBlock(block);
         }
 
         /// Asks the exact test about rays that a triangle comes near to. With bounds of 1/t there:
@@ -570,9 +534,9 @@ fn Search(comptime Kernel: type) type {
             const pad = search.world.pad;
             const hit = exact.meet(Kernel, search.tree, pad, ray, slot);
             const met = hit.mask.bitAnd(doubtful);
-            const known_lower = search.bounds("lower", group);
-            const known_upper = search.bounds("upper", group);
-            const slots = search.bounds("slot", group);
+            const known_lower = search.found.of("lower", group);
+            const known_upper = search.found.of("upper", group);
+            const slots = search.found.of("slot", group);
             const nearer = met.bitAnd(lower.gt(.loadAligned(known_upper)));
             const unclear = met.bitAnd(hit.t.gt(.zero())).andNot(nearer);
             const first = exact
@@ -593,8 +557,11 @@ fn Search(comptime Kernel: type) type {
         fn coverUndecided(search: *Self, coverage: *const Coverage) void {
             @branchHint(.unlikely);
             const slack: F32 = .splat(coverage.slack);
-            const x: F32 = .fromArray(lanePlaces(false));
-            const y: F32 = .fromArray(lanePlaces(true));
+            const x: F32 = .fromArray(Found.lane_x);
+            const y: F32 = .fromArray(Found.lane_y);
+            for (0..block_count) |block| {
+                if (search.found.isWhole(@intCast(block))) search.found.spread(@intCast(block));
+            }
             for (&search.bundle.groups, 0..) |*ray, group| {
                 const first_x: F32 = .splat(@floatFromInt(Kernel.pixelX(group, 0)));
                 const first_y: F32 = .splat(@floatFromInt(Kernel.pixelY(group, 0)));
@@ -611,7 +578,7 @@ fn Search(comptime Kernel: type) type {
                 const none: F32 = .splat(-std.math.inf(f32));
                 if (doubtful.any()) search.decide(coverage.slot, group, doubtful, none, none);
             }
-            for (0..block_count) |block| search.boundBlock(@intCast(block));
+            for (0..block_count) |block| search.found.boundBlock(@intCast(block));
         }
     };
 }

@@ -14,16 +14,17 @@ const triangle = @import("../triangle.zig");
 const kernel_file = @import("../kernel.zig");
 const edges_file = @import("edges.zig");
 const exact = @import("exact.zig");
+const Found = @import("found.zig").Found;
 const Grid = @import("primary.zig").Grid;
 const assert = std.debug.assert;
 
-/// Puts the hits of triangles in `slots` (`exact.Slot`, by group and lane) into the bundle, and
-/// weights of the second and third corner into `shares`, if given.
+/// Puts the hits of the triangles found into the bundle, and weights of the second and third corner
+/// into `shares`, if given.
 pub fn resolve(
     comptime Kernel: type,
     world: *const world_file.World,
     grid: *const Grid,
-    slots: *align(64) const [kernel_file.beam_side * kernel_file.beam_side]exact.Slot,
+    found: *Found(Kernel),
     bundle: *packet.Bundle(Kernel),
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
 ) void {
@@ -31,9 +32,9 @@ pub fn resolve(
     switch (course.axis orelse 3) {
         inline 0...2 => |axis| {
             const tree = world.tree.get(Kernel.width);
-            Together(Kernel, axis).run(world, tree, &course, grid, slots, bundle, shares);
+            Together(Kernel, axis).run(world, tree, &course, grid, found, bundle, shares);
         },
-        else => apart(Kernel, world, slots, bundle, shares),
+        else => apart(Kernel, world, found, bundle, shares),
     }
 }
 
@@ -77,23 +78,26 @@ const Course = struct {
 fn apart(
     comptime Kernel: type,
     world: *const world_file.World,
-    slots: *align(64) const [kernel_file.beam_side * kernel_file.beam_side]exact.Slot,
+    found: *Found(Kernel),
     bundle: *packet.Bundle(Kernel),
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
 ) void {
     const Rays = Kernel.Rays;
+    for (0..Kernel.block_count) |block| {
+        if (found.isWhole(@intCast(block))) found.spread(@intCast(block));
+    }
     for (&bundle.groups, 0..) |*group, index| {
-        const own = slots[index * Kernel.ray_count ..][0..Kernel.ray_count];
-        const found = Rays.I32.load(own).gt(.splat(exact.no_slot));
-        if (found.none()) continue;
+        const own = found.of("slot", index);
+        const there = Rays.I32.loadAligned(own).gt(.splat(exact.no_slot));
+        if (there.none()) continue;
         const tree = world.tree.get(Kernel.width);
         const gathered = exact.gather(Kernel, tree, own);
         const hit = triangle.intersect(Rays, gathered.corners, group.line, world.pad);
-        assert(found.andNot(hit.mask).none());
+        assert(there.andNot(hit.mask).none());
         if (shares) |all| all[index] = hit.shares();
         group.nearest = .{
-            .t = .select(found, hit.t, group.nearest.t),
-            .primitive = .select(found, gathered.primitive, group.nearest.primitive),
+            .t = .select(there, hit.t, group.nearest.t),
+            .primitive = .select(there, gathered.primitive, group.nearest.primitive),
         };
     }
 }
@@ -120,50 +124,67 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
             tree: *const world_file.Tree(Kernel.width),
             course: *const Course,
             grid: *const Grid,
-            slots: *align(64) const [kernel_file.beam_side * kernel_file.beam_side]exact.Slot,
+            found: *Found(Kernel),
             bundle: *packet.Bundle(Kernel),
             shares: ?*[Kernel.group_count][2]F32,
         ) void {
             const origin = turned(grid.origin);
             const down = turned(course.negative);
-            var placed: Placed([3]f32) = undefined;
-            var placed_slot: exact.Slot = exact.no_slot;
-            var placed_primitive: i32 = ray_file.no_primitive;
-            for (&bundle.groups, 0..) |*group, index| {
-                const own = slots[index * Kernel.ray_count ..][0..Kernel.ray_count];
-                const lanes: Rays.I32 = .load(own);
-                if (lanes.eq(.splat(own[0])).all()) {
-                    if (own[0] == exact.no_slot) continue;
-                    if (own[0] != placed_slot) {
-                        placed_slot = own[0];
-                        placed = placeOne(tree, world.pad, origin, placed_slot);
-                        placed_primitive = exact.primitiveAt(Kernel.width, tree, placed_slot);
+            var last: Last = .{};
+            for (0..Kernel.block_count) |block| {
+                const whole = found.isWhole(@intCast(block));
+                const block_slot = found.block_slot[block];
+                if (whole and block_slot == exact.no_slot) continue;
+                for (block * Kernel.block_groups..(block + 1) * Kernel.block_groups) |index| {
+                    const group = &bundle.groups[index];
+                    const own = found.of("slot", index);
+                    const lanes: Rays.I32 = .loadAligned(own);
+                    if (whole or lanes.eq(.splat(own[0])).all()) {
+                        const slot = if (whole) block_slot else own[0];
+                        if (slot == exact.no_slot) continue;
+                        if (slot != last.slot) last = .{
+                            .slot = slot,
+                            .placed = placeOne(tree, world.pad, origin, slot),
+                            .primitive = exact.primitiveAt(Kernel.width, tree, slot),
+                        };
+                        const hit = intersect(group, &last.inLanes(), down, .splat(true));
+                        if (shares) |all| all[index] = hit.shares();
+                        group.nearest = .{ .t = hit.t, .primitive = .splat(last.primitive) };
+                        continue;
                     }
-                    const hit = intersect(group, &.{
-                        .offsets = .{
-                            .splat(placed.offsets[0]),
-                            .splat(placed.offsets[1]),
-                            .splat(placed.offsets[2]),
-                        },
-                        .lower = .splat(placed.lower),
-                        .upper = .splat(placed.upper),
-                    }, down, .splat(true));
+                    const there = lanes.gt(.splat(exact.no_slot));
+                    const gathered = exact.gather(Kernel, tree, own);
+                    const each = placeEach(world.pad, origin, gathered.corners);
+                    const hit = intersect(group, &each, down, there);
+                    assert(there.andNot(hit.mask).none());
                     if (shares) |all| all[index] = hit.shares();
-                    group.nearest = .{ .t = hit.t, .primitive = .splat(placed_primitive) };
-                    continue;
+                    group.nearest = .{
+                        .t = .select(there, hit.t, group.nearest.t),
+                        .primitive = .select(there, gathered.primitive, group.nearest.primitive),
+                    };
                 }
-                const found = lanes.gt(.splat(exact.no_slot));
-                const gathered = exact.gather(Kernel, tree, own);
-                const each = placeEach(world.pad, origin, gathered.corners);
-                const hit = intersect(group, &each, down, found);
-                assert(found.andNot(hit.mask).none());
-                if (shares) |all| all[index] = hit.shares();
-                group.nearest = .{
-                    .t = .select(found, hit.t, group.nearest.t),
-                    .primitive = .select(found, gathered.primitive, group.nearest.primitive),
-                };
             }
         }
+
+        /// The triangle that was met last.
+        const Last = struct {
+            slot: exact.Slot = exact.no_slot,
+            placed: Placed([3]f32) = undefined,
+            primitive: i32 = ray_file.no_primitive,
+
+            inline fn inLanes(one: *const Last) Placed(Vec3) {
+                const placed = &one.placed;
+                return .{
+                    .offsets = .{
+                        .splat(placed.offsets[0]),
+                        .splat(placed.offsets[1]),
+                        .splat(placed.offsets[2]),
+                    },
+                    .lower = .splat(placed.lower),
+                    .upper = .splat(placed.upper),
+                };
+            }
+        };
 
         fn turned(values: anytype) @TypeOf(values) {
             return .{

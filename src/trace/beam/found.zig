@@ -1,0 +1,205 @@
+//! What the pixels of a beam see so far: by block one triangle all over, or one for each pixel.
+//!
+//! In: triangles that surely lie before what is known, as linear forms over the pixels. Out: the
+//! triangle of every pixel, with bounds of 1/t there, and bounds by block. A block that one
+//! triangle fills, or none, is kept as that triangle's form until another touches a part of it:
+//! large triangles cost nothing by the pixel.
+
+const std = @import("std");
+const kernel_file = @import("../kernel.zig");
+const packet = @import("../packet.zig");
+const edges_file = @import("edges.zig");
+const exact = @import("exact.zig");
+
+const side = kernel_file.beam_side;
+const block_side = kernel_file.block_side;
+/// Blocks of a beam.
+pub const block_count = (side / block_side) * (side / block_side);
+/// Pixels of a beam.
+pub const pixel_count = side * side;
+
+/// Bounds of 1/t of a triangle, linear over the pixels; or of one in each block.
+pub fn Depth(comptime Value: type) type {
+    return struct {
+        /// Upper bound at the beam's first pixel, steps right and down.
+        base: Value,
+        right: Value,
+        down: Value,
+        /// How far below it the lower bound is: by a factor, and then by as much.
+        shrink: Value,
+        drop: Value,
+    };
+}
+
+const depth_names = std.meta.fieldNames(Depth(f32));
+
+/// Undefined until `clear`.
+pub fn Found(comptime Kernel: type) type {
+    const Rays = Kernel.Rays;
+    const lanes = Kernel.ray_count;
+    const block_groups = Kernel.block_groups;
+    return struct {
+        /// Blocks that one triangle fills, or none, a bit each: `block_slot` and `depth` tell of
+        /// these. Others have it by pixel.
+        whole: u32,
+        block_slot: [block_count]exact.Slot align(64),
+        depth: Depth([block_count]f32) align(64),
+        /// By pixel, in the order of groups and lanes: what is hit, and bounds of 1/t there; 0
+        /// where nothing is, infinity where there is no ray.
+        slot: [pixel_count]exact.Slot align(64),
+        lower: [pixel_count]f32 align(64),
+        upper: [pixel_count]f32 align(64),
+        /// By block, the least `lower`; of those in `whole` the greatest `upper`, else infinity.
+        block_lower: [block_count]f32 align(64),
+        block_upper: [block_count]f32 align(64),
+        /// The least `block_lower`, as of `depthMax`.
+        tile_lower: f32,
+
+        const Self = @This();
+        const F32 = Rays.F32;
+        const I32 = Rays.I32;
+        const Mask = Rays.Mask;
+        const inf = std.math.inf(f32);
+        /// Columns and rows of the blocks' first pixels.
+        pub const block_x = blockPlaces(false);
+        pub const block_y = blockPlaces(true);
+        /// Columns and rows of a group's pixels within it.
+        pub const lane_x = lanePlaces(false);
+        pub const lane_y = lanePlaces(true);
+
+        fn blockPlaces(comptime rows: bool) [block_count]f32 {
+            var places: [block_count]f32 = undefined;
+            for (&places, 0..) |*to, block| {
+                const across = side / block_side;
+                to.* = @floatFromInt(block_side * (if (rows) block / across else block % across));
+            }
+            return places;
+        }
+
+        fn lanePlaces(comptime rows: bool) [lanes]f32 {
+            var places: [lanes]f32 = undefined;
+            for (&places, 0..) |*to, lane| to.* = @floatFromInt(if (rows)
+                lane / Kernel.group_width
+            else
+                lane % Kernel.group_width);
+            return places;
+        }
+
+        /// No hit anywhere; a pixel without a ray has one at no distance.
+        pub fn clear(found: *Self, bundle: *const packet.Bundle(Kernel)) void {
+            found.block_slot = @splat(exact.no_slot);
+            inline for (depth_names) |name| @field(found.depth, name) = @splat(0);
+            found.block_lower = @splat(0);
+            found.block_upper = @splat(0);
+            found.tile_lower = 0;
+            found.whole = (1 << block_count) - 1;
+            for (0..block_count) |block| {
+                const groups = bundle.groups[block * block_groups ..][0..block_groups];
+                var all = groups[0].active;
+                inline for (groups[1..]) |*group| all = all.bitAnd(group.active);
+                if (all.all()) continue;
+                found.spread(@intCast(block));
+                for (groups, block * block_groups..) |*group, index| {
+                    const bound: F32 = .select(group.active, .zero(), .splat(inf));
+                    bound.storeAligned(found.of("lower", index));
+                    bound.storeAligned(found.of("upper", index));
+                }
+                found.boundBlock(@intCast(block));
+            }
+        }
+
+        /// A group's part of one of the arrays by pixel.
+        pub inline fn of(
+            found: *Self,
+            comptime name: []const u8,
+            group: usize,
+        ) *align(lanes * 4) [lanes]std.meta.Elem(@FieldType(Self, name)) {
+            return @alignCast(@field(found, name)[group * lanes ..][0..lanes]);
+        }
+
+        /// A part of one of the arrays by block, from block `first` on.
+        pub inline fn ofBlocks(
+            found: *Self,
+            comptime name: []const u8,
+            first: usize,
+        ) *align(lanes * 4) [lanes]std.meta.Elem(@FieldType(Self, name)) {
+            return @alignCast(@field(found, name)[first..][0..lanes]);
+        }
+
+        /// A triangle fills some of the blocks from `first` on, before all that is known there;
+        /// with bounds of 1/t in each of them.
+        pub inline fn fill(
+            found: *Self,
+            first: usize,
+            blocks: Mask,
+            slot: exact.Slot,
+            depth: *const Depth(f32),
+            lower: F32,
+            upper: F32,
+        ) void {
+            const slots = found.ofBlocks("block_slot", first);
+            I32.select(blocks, .splat(slot), .loadAligned(slots)).storeAligned(slots);
+            const lowest = found.ofBlocks("block_lower", first);
+            F32.select(blocks, lower, .loadAligned(lowest)).storeAligned(lowest);
+            const highest = found.ofBlocks("block_upper", first);
+            F32.select(blocks, upper, .loadAligned(highest)).storeAligned(highest);
+            inline for (depth_names) |name| {
+                const all = &@field(found.depth, name);
+                const known: *align(lanes * 4) [lanes]f32 = @alignCast(all[first..][0..lanes]);
+                F32.select(blocks, .splat(@field(depth, name)), .loadAligned(known))
+                    .storeAligned(known);
+            }
+            found.whole |= blocks.bits() << @intCast(first);
+        }
+
+        /// Whether one triangle fills this block, or none.
+        pub inline fn isWhole(found: *const Self, block: u32) bool {
+            return found.whole >> @intCast(block) & 1 != 0;
+        }
+
+        /// From one triangle for the block to one for each pixel.
+        pub fn spread(found: *Self, block: u32) void {
+            found.whole &= ~(@as(u32, 1) << @intCast(block));
+            found.block_upper[block] = inf;
+            var depth: Depth(f32) = undefined;
+            inline for (depth_names) |name| {
+                @field(depth, name) = @field(found.depth, name)[block];
+            }
+            const base = depth.base + block_x[block] * depth.right + block_y[block] * depth.down;
+            var value: F32 = .splat(base);
+            if (Kernel.group_height > 1)
+                value = F32.fromArray(lane_y).mulAdd(.splat(depth.down), value);
+            value = F32.fromArray(lane_x).mulAdd(.splat(depth.right), value);
+            const slot: I32 = .splat(found.block_slot[block]);
+            inline for (0..block_groups) |row| {
+                const group = block * block_groups + row;
+                value.mulAdd(.splat(depth.shrink), .splat(-depth.drop))
+                    .storeAligned(found.of("lower", group));
+                value.storeAligned(found.of("upper", group));
+                slot.storeAligned(found.of("slot", group));
+                value = value.add(.splat(depth.down * Kernel.group_height));
+            }
+        }
+
+        /// Bounds of a block that has its triangles by pixel.
+        pub inline fn boundBlock(found: *Self, block: u32) void {
+            const first = block * block_groups;
+            var least: F32 = .loadAligned(found.of("lower", first));
+            inline for (1..block_groups) |row| {
+                least = least.minFast(.loadAligned(found.of("lower", first + row)));
+            }
+            found.block_lower[block] = least.reduceMin();
+        }
+
+        /// t beyond which nothing can be seen any more.
+        pub inline fn depthMax(found: *Self) f32 {
+            var least: F32 = .loadAligned(found.ofBlocks("block_lower", 0));
+            inline for (1..block_count / lanes) |part| {
+                least = least.minFast(.loadAligned(found.ofBlocks("block_lower", part * lanes)));
+            }
+            found.tile_lower = least.reduceMin();
+            if (found.tile_lower == 0) return inf;
+            return 1 / found.tile_lower * (1 + 4 * edges_file.unit_roundoff);
+        }
+    };
+}
