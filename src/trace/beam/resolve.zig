@@ -144,12 +144,12 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
                         if (slot == exact.no_slot) continue;
                         if (slot != last.slot) last = .{
                             .slot = slot,
-                            .placed = placeOne(tree, world.pad, origin, slot),
-                            .primitive = exact.primitiveAt(Kernel.width, tree, slot),
+                            .placed = inLanes(&placeOne(tree, world.pad, origin, slot)),
+                            .primitive = .splat(exact.primitiveAt(Kernel.width, tree, slot)),
                         };
-                        const hit = intersect(group, &last.inLanes(), down, .splat(true));
+                        const hit = intersect(group, &last.placed, down, .splat(true));
                         if (shares) |all| all[index] = hit.shares();
-                        group.nearest = .{ .t = hit.t, .primitive = .splat(last.primitive) };
+                        group.nearest = .{ .t = hit.t, .primitive = last.primitive };
                         continue;
                     }
                     const there = lanes.gt(.splat(exact.no_slot));
@@ -166,24 +166,11 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
             }
         }
 
-        /// The triangle that was met last.
+        /// The triangle that was met last, in all lanes: mostly the next rays meet it, too.
         const Last = struct {
             slot: exact.Slot = exact.no_slot,
-            placed: Placed([3]f32) = undefined,
-            primitive: i32 = ray_file.no_primitive,
-
-            inline fn inLanes(one: *const Last) Placed(Vec3) {
-                const placed = &one.placed;
-                return .{
-                    .offsets = .{
-                        .splat(placed.offsets[0]),
-                        .splat(placed.offsets[1]),
-                        .splat(placed.offsets[2]),
-                    },
-                    .lower = .splat(placed.lower),
-                    .upper = .splat(placed.upper),
-                };
-            }
+            placed: Placed(Vec3) = undefined,
+            primitive: Rays.I32 = undefined,
         };
 
         fn turned(values: anytype) @TypeOf(values) {
@@ -220,6 +207,18 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
                 }
             }
             return placed;
+        }
+
+        inline fn inLanes(placed: *const Placed([3]f32)) Placed(Vec3) {
+            return .{
+                .offsets = .{
+                    .splat(placed.offsets[0]),
+                    .splat(placed.offsets[1]),
+                    .splat(placed.offsets[2]),
+                },
+                .lower = .splat(placed.lower),
+                .upper = .splat(placed.upper),
+            };
         }
 
         /// A triangle in each lane.
