@@ -246,27 +246,29 @@ pub fn Workload(comptime Kernel: type) type {
             /// Makes shadow rays to the hits, and turns the rays into their reflections unless
             /// these are the last. Returns whether there is any hit.
             fn shade(worker: *Worker, depth: u32, last: bool) bool {
+                // A copy, which nothing that is written can change.
+                const setup = worker.shared.setup.*;
                 const weight: f32 = if (depth == 0) 1 else bounce_weight;
                 var any: Lanes.Mask = .splat(false);
                 for (0..group_count) |group| {
-                    any = any.bitOr(worker.shadeGroup(group, weight, last));
+                    any = any.bitOr(worker.shadeGroup(&setup, group, weight, last));
                 }
                 return any.any();
             }
 
             inline fn shadeGroup(
                 worker: *Worker,
+                setup: *const Setup,
                 group: usize,
                 weight: f32,
                 last: bool,
             ) Lanes.Mask {
-                const setup = worker.shared.setup;
                 const ray = &worker.rays.groups[group];
                 const shadow = &worker.shadows.groups[group];
                 const direction = ray.line.direction;
                 const hit = ray.active.andNot(ray.nearest.primitive.lt(.zero()));
                 const t = F32.select(hit, ray.nearest.t, .zero());
-                const outward = worker.normalsOf(ray.nearest.primitive);
+                const outward = normalsOf(setup.normals, ray.nearest.primitive);
                 const sign = F32.splat(1).copySign(outward.dot(direction).neg());
                 const normal = outward.scale(sign);
                 const point = ray.line.origin.add(direction.scale(t))
@@ -289,8 +291,7 @@ pub fn Workload(comptime Kernel: type) type {
             }
 
             /// Unit normals of triangles; anything where there is none.
-            inline fn normalsOf(worker: *const Worker, primitives: I32) Vec3x {
-                const normals = worker.shared.setup.normals;
+            inline fn normalsOf(normals: []align(16) const [4]f32, primitives: I32) Vec3x {
                 const numbers = primitives.toArray();
                 if (primitives.eq(.splat(numbers[0])).all()) {
                     const normal = &normals[@intCast(numbers[0] + 1)];
@@ -328,13 +329,14 @@ pub fn Workload(comptime Kernel: type) type {
             /// From the order of groups to rows.
             fn write(worker: *const Worker, x: u32, y: u32) void {
                 const size = worker.shared.setup.size;
+                const all = worker.shared.pixels;
                 const span = if (Kernel.variant.traversal == .packet2x2) 2 else 4;
                 inline for (0..group_count) |group| {
                     const colors = worker.color[group].toArray();
                     inline for (0..Lanes.count / span) |part| {
                         const place = Batch.places[group * Lanes.count + part * span];
                         const first = @as(usize, y + place[1]) * size + x + place[0];
-                        const pixels = worker.shared.pixels[first..][0..span];
+                        const pixels = all[first..][0..span];
                         pixels.* = colors[part * span ..][0..span].*;
                     }
                 }
