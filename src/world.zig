@@ -30,28 +30,42 @@ pub const tree_depth_max = 64;
 /// Bytes that nodes and triangle blocks are aligned to: a cache line.
 pub const cache_line_bytes = 64;
 
+/// A child of a node. One word, since stacks write and read it as a whole: two stores that one load
+/// reads back make processors wait.
+pub const Child = packed struct(u64) {
+    /// Number of a node, or of the first triangle block; `none` if there is no child.
+    target: u32,
+    /// 0: a node; else that many blocks.
+    block_count: u32,
+
+    pub const missing: Child = .{ .target = none, .block_count = 0 };
+    pub const root: Child = .{ .target = 0, .block_count = 0 };
+
+    /// The numbers of its blocks, from the first to before the last; equal for a node.
+    pub inline fn blocks(child: Child) [2]usize {
+        return .{ child.target, @as(usize, child.target) + child.block_count };
+    }
+};
+
 /// A node with `width` children, structure of arrays.
 ///
 ///     width 4, bytes   0..47   bounds[0]  lower x x x x | y y y y | z z z z
 ///                     48..95   bounds[1]  upper x x x x | y y y y | z z z z
-///                     96..111  child      index of a node, or of the first triangle block
-///                    112..127  block_count  0: child is a node; else that many blocks
+///                     96..127  child      two words each, see `Child`
 ///
-/// A missing child has the empty box (+inf, -inf), `child = none` and `block_count = 0`.
+/// A missing child has the empty box (+inf, -inf).
 pub fn Node(comptime width: comptime_int) type {
     return extern struct {
         /// [lower, upper][axis][child].
         bounds: [2][3][width]f32 align(cache_line_bytes),
-        child: [width]u32,
-        block_count: [width]u32,
+        child: [width]Child,
 
         const Self = @This();
 
         /// A node without children.
         pub const empty: Self = .{
             .bounds = .{ @splat(@splat(std.math.inf(f32))), @splat(@splat(-std.math.inf(f32))) },
-            .child = @splat(none),
-            .block_count = @splat(0),
+            .child = @splat(.missing),
         };
 
         /// The box of one child.

@@ -57,8 +57,7 @@ const Builder = struct {
             const target = if (is_leaf) first else try builder.addNode(part, depth + 1);
             if (is_leaf and block_count == 0) continue;
             const node = &builder.nodes.items[index];
-            node.child[child] = target;
-            node.block_count[child] = block_count;
+            node.child[child] = .{ .target = target, .block_count = block_count };
             const box = cost.boundsOf(part);
             for (0..3) |axis| {
                 node.bounds[0][axis][child] = box.lower[axis];

@@ -454,8 +454,7 @@ fn Collapse(comptime width: u32) type {
                 node.bounds[0][axis][slot] = binary.lower[axis] - margin;
                 node.bounds[1][axis][slot] = margin - binary.upper_negated[axis];
             }
-            node.child[slot] = target;
-            node.block_count[slot] = block_count;
+            node.child[slot] = .{ .target = target, .block_count = block_count };
         }
 
         fn blockCount(triangle_count: u32) u32 {

@@ -47,16 +47,18 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
         if (checked.triangles.len > 0) depth = @max(depth, visit.depth);
         const node = &tree.nodes[visit.node];
         var joined: Box3 = .empty;
-        for (node.child, node.block_count, 0..) |child, leaf_blocks, index| {
+        for (node.child, 0..) |child, index| {
             const box = node.childBox(index);
             joined = joined.join(box);
-            if (child == world.none) {
-                assert(box.isEmpty() and leaf_blocks == 0);
-            } else if (leaf_blocks == 0) {
-                try stack.append(gpa, .{ .node = child, .depth = visit.depth + 1, .box = box });
+            if (child == world.Child.missing) {
+                assert(box.isEmpty());
+            } else if (child.block_count == 0) {
+                const below = visit.depth + 1;
+                try stack.append(gpa, .{ .node = child.target, .depth = below, .box = box });
             } else {
-                block_count += leaf_blocks;
-                checkLeaf(checked, tree.blocks[child..][0..leaf_blocks], box, seen);
+                block_count += child.block_count;
+                const first, const end = child.blocks();
+                checkLeaf(checked, tree.blocks[first..end], box, seen);
             }
         }
         // Boxes are unions, no larger: growing keeps their order.

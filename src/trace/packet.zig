@@ -79,7 +79,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         ) box.Range(Boxes) {
             var nears: [Kernel.width]f32 = @splat(inf);
             for (&nears, node.child, 0..) |*near, child, at| {
-                if (child == world_file.none) continue;
+                if (child == world_file.Child.missing) continue;
                 countBoxes(Kernel, search.group, counts);
                 near.* = enter(Kernel, search.group, &search.view.slabs, node, at) orelse continue;
             }

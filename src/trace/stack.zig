@@ -6,9 +6,7 @@ const world_file = @import("../world.zig");
 
 /// A child still to be visited.
 pub const Entry = struct {
-    child: u32,
-    /// 0: a node.
-    block_count: u32,
+    child: world_file.Child,
     /// A lower bound of what can be hit in it, in the unit of whoever pushed it.
     near: f32,
 };
@@ -31,7 +29,8 @@ pub inline fn push(
         const entry = entryOf(node, child, &nears);
         var slot = count;
         while (slot > entry_count and entries[slot - 1].near < entry.near) : (slot -= 1) {
-            entries[slot] = entries[slot - 1];
+            entries[slot].child = entries[slot - 1].child;
+            entries[slot].near = entries[slot - 1].near;
         }
         entries[slot] = entry;
         count += 1;
@@ -56,18 +55,20 @@ pub inline fn descend(
     const other = entryOf(node, @ctz(others), &nears);
     if (others & (others - 1) == 0) {
         const first = one.near <= other.near;
-        entries[entry_count.*] = if (first) other else one;
+        entries[entry_count.*] = .{
+            .child = if (first) other.child else one.child,
+            .near = if (first) other.near else one.near,
+        };
         entry_count.* += 1;
-        return if (first) one else other;
+        return .{
+            .child = if (first) one.child else other.child,
+            .near = if (first) one.near else other.near,
+        };
     }
     entry_count.* = push(Lanes, node, met, near, entries, entry_count.*) - 1;
     return entries[entry_count.*];
 }
 
 inline fn entryOf(node: anytype, child: usize, nears: anytype) Entry {
-    return .{
-        .child = node.child[child],
-        .block_count = node.block_count[child],
-        .near = nears[child],
-    };
+    return .{ .child = node.child[child], .near = nears[child] };
 }

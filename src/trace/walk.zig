@@ -33,11 +33,11 @@ pub inline fn walk(
     var stack: [Kernel.stack_max]Entry = undefined;
     var stack_count: usize = 0;
     var found = false;
-    var entry: Entry = .{ .child = 0, .block_count = 0, .near = 0 };
+    var entry: Entry = .{ .child = .root, .near = 0 };
     while (true) {
-        if (entry.block_count == 0) {
+        if (entry.child.block_count == 0) {
             assert(stack_count + Kernel.width <= Kernel.stack_max);
-            const node = &tree.nodes[entry.child];
+            const node = &tree.nodes[entry.child.target];
             const range = search.meet(node, counts);
             const met = range.near.le(range.far).bits();
             if (met != 0) {
@@ -46,7 +46,8 @@ pub inline fn walk(
                 continue;
             }
         } else {
-            for (tree.blocks[entry.child..][0..entry.block_count]) |*block| {
+            const first, const end = entry.child.blocks();
+            for (tree.blocks[first..end]) |*block| {
                 found = search.intersect(block, counts) or found;
             }
             if (search.isDone(found)) break;
@@ -64,7 +65,7 @@ pub inline fn walk(
 pub fn countNode(comptime Kernel: type, node: anytype, counts: *TestCounts) void {
     if (!Kernel.counts_tests) return;
     counts.box_issued += Kernel.width;
-    for (node.child) |child| counts.box_useful += @intFromBool(child != world_file.none);
+    for (node.child) |child| counts.box_useful += @intFromBool(child != world_file.Child.missing);
 }
 
 /// Counts the test of a ray against the triangles of a block.

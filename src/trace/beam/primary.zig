@@ -169,21 +169,22 @@ fn Search(comptime Kernel: type) type {
 
         fn travel(search: *Self) void {
             var entries: [Kernel.stack_max]stack.Entry = undefined;
-            entries[0] = .{ .child = 0, .block_count = 0, .near = -std.math.inf(f32) };
+            entries[0] = .{ .child = .root, .near = -std.math.inf(f32) };
             var entry_count: usize = 1;
             var depth_max = std.math.inf(f32);
             while (entry_count > 0) {
                 entry_count -= 1;
                 const entry = entries[entry_count];
                 if (entry.near > depth_max) continue;
-                if (entry.block_count == 0) {
+                if (entry.child.block_count == 0) {
                     assert(entry_count + width <= Kernel.stack_max);
-                    const node = &search.tree.nodes[entry.child];
+                    const node = &search.tree.nodes[entry.child.target];
                     walk.countNode(Kernel, node, search.counts);
                     entry_count = search.frustum
                         .pushChildren(node, depth_max, &entries, entry_count);
                 } else {
-                    for (entry.child..entry.child + entry.block_count) |block| {
+                    const first, const end = entry.child.blocks();
+                    for (first..end) |block| {
                         search.meetBlock(@intCast(block));
                     }
                     depth_max = search.found.depthMax();

@@ -137,25 +137,26 @@ fn Search(comptime Kernel: type) type {
         fn travel(search: *Self, members: *const Members) void {
             const frustum = search.points.frustumOf(search.world.pad);
             var entries: [Kernel.stack_max]stack.Entry = undefined;
-            entries[0] = .{ .child = 0, .block_count = 0, .near = -inf };
+            entries[0] = .{ .child = .root, .near = -inf };
             var entry_count: usize = 1;
             var meeting_count: u32 = 0;
             while (entry_count > 0 and search.points.live != 0) {
                 entry_count -= 1;
-                const entry = entries[entry_count];
-                if (entry.block_count == 0) {
+                const child = entries[entry_count].child;
+                if (child.block_count == 0) {
                     assert(entry_count + width <= Kernel.stack_max);
-                    const node = &search.tree.nodes[entry.child];
+                    const node = &search.tree.nodes[child.target];
                     walk.countNode(Kernel, node, search.counts);
                     entry_count = frustum
                         .pushChildren(node, search.points.bounds.depth, &entries, entry_count);
                     continue;
                 }
-                meeting_count += entry.block_count;
+                meeting_count += child.block_count;
                 if (meeting_count > meetingMax(width)) {
                     return search.apart(&search.points.left(members));
                 }
-                for (entry.child..entry.child + entry.block_count) |index| {
+                const first, const end = child.blocks();
+                for (first..end) |index| {
                     search.meetBlock(&frustum, @intCast(index));
                 }
             }
