@@ -180,6 +180,7 @@ test {
     _ = query;
     _ = whitted;
     _ = Tiles;
+    _ = @import("trace/beam/found.zig");
     _ = @import("trace/camera.zig");
     _ = @import("trace/exponential.zig");
     _ = @import("trace/offset.zig");

@@ -203,3 +203,59 @@ pub fn Found(comptime Kernel: type) type {
         }
     };
 }
+
+test "a block that a triangle fills says the same by pixel; a pixel without a ray stays out" {
+    inline for (.{ 4, 8, 16 }) |lane_count| {
+        const Kernel = kernel_file.Kernel(.{
+            .backend = .vector,
+            .traversal = .packet,
+            .lanes = lane_count,
+        }, false);
+        const Mask = Kernel.Rays.Mask;
+        var bundle: packet.Bundle(Kernel) = undefined;
+        for (&bundle.groups) |*group| group.active = .splat(true);
+        bundle.groups[0].active = Mask.splat(true).andNot(.fromBits(2));
+        var found: Found(Kernel) = undefined;
+        found.clear(&bundle);
+        try std.testing.expect(!found.isWhole(0));
+        try std.testing.expectEqual(std.math.inf(f32), found.lower[1]);
+        try std.testing.expectEqual(0, found.lower[0]);
+        try std.testing.expectEqual(std.math.inf(f32), found.depthMax());
+
+        const block = block_count - 2;
+        const first = block / Kernel.ray_count * Kernel.ray_count;
+        const lower: f32 = 1;
+        const upper: f32 = 2;
+        const depth: Depth(f32) =
+            .{ .base = 1.25, .right = 0.015625, .down = 0.03125, .shrink = 0.875, .drop = 0.125 };
+        found.fill(
+            first,
+            .fromBits(@as(u32, 1) << @intCast(block - first)),
+            7,
+            &depth,
+            .splat(lower),
+            .splat(upper),
+        );
+        try std.testing.expect(found.isWhole(block) and found.block_slot[block] == 7);
+        try std.testing.expectEqual(exact.no_slot, found.block_slot[block - 1]);
+        try std.testing.expectEqual([2]f32{ 1, 2 }, .{
+            found.block_lower[block], found.block_upper[block],
+        });
+        found.spread(block);
+        try std.testing.expect(!found.isWhole(block));
+        for (0..block_side * block_side) |pixel| {
+            const at = block * block_side * block_side + pixel;
+            const group = at / Kernel.ray_count;
+            const x: f32 = @floatFromInt(Kernel.pixelX(group, at % Kernel.ray_count));
+            const y: f32 = @floatFromInt(Kernel.pixelY(group, at % Kernel.ray_count));
+            const value = 1.25 + 0.015625 * x + 0.03125 * y;
+            try std.testing.expectEqual(7, found.slot[at]);
+            try std.testing.expectEqual(value, found.upper[at]);
+            try std.testing.expectEqual(value * 0.875 - 0.125, found.lower[at]);
+        }
+        found.boundBlock(block);
+        const corner = 1.25 + 0.015625 * Found(Kernel).block_x[block] +
+            0.03125 * Found(Kernel).block_y[block];
+        try std.testing.expectEqual(corner * 0.875 - 0.125, found.block_lower[block]);
+    }
+}
