@@ -14,6 +14,12 @@ const assert = std.debug.assert;
 pub const beam_side = 16;
 /// See `beam_side`.
 pub const block_side = 4;
+/// Pixels of a beam, and of a block.
+pub const beam_pixels = beam_side * beam_side;
+/// See `beam_pixels`.
+pub const block_pixels = block_side * block_side;
+/// Blocks of a beam.
+pub const beam_blocks = beam_pixels / block_pixels;
 
 /// Everything below `trace` is generic over this.
 pub fn Kernel(comptime chosen: Variant, comptime counting: bool) type {
@@ -50,10 +56,7 @@ pub fn Kernel(comptime chosen: Variant, comptime counting: bool) type {
         else
             1;
         /// Blocks of a bundle; they follow each other in rows.
-        pub const block_count = if (chosen.traversal == .packet)
-            beam_side * beam_side / (block_side * block_side)
-        else
-            1;
+        pub const block_count = if (chosen.traversal == .packet) beam_blocks else 1;
         /// Groups of a bundle.
         pub const group_count = block_count * block_groups;
 

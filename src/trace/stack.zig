@@ -29,6 +29,7 @@ pub inline fn push(
         const entry = entryOf(node, child, &nears);
         var slot = count;
         while (slot > entry_count and entries[slot - 1].near < entry.near) : (slot -= 1) {
+            // By parts, of which each is read as it was written.
             entries[slot].child = entries[slot - 1].child;
             entries[slot].near = entries[slot - 1].near;
         }
@@ -54,6 +55,7 @@ pub inline fn descend(
     if (others == 0) return one;
     const other = entryOf(node, @ctz(others), &nears);
     if (others & (others - 1) == 0) {
+        // By parts, so that the choice is made in registers.
         const first = one.near <= other.near;
         entries[entry_count.*] = .{
             .child = if (first) other.child else one.child,

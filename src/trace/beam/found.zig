@@ -13,10 +13,8 @@ const exact = @import("exact.zig");
 
 const side = kernel_file.beam_side;
 const block_side = kernel_file.block_side;
-/// Blocks of a beam.
-pub const block_count = (side / block_side) * (side / block_side);
-/// Pixels of a beam.
-pub const pixel_count = side * side;
+const block_count = kernel_file.beam_blocks;
+const pixel_count = kernel_file.beam_pixels;
 
 /// Bounds of 1/t of a triangle, linear over the pixels; or of one in each block.
 pub fn Depth(comptime Value: type) type {
@@ -98,13 +96,13 @@ pub fn Found(comptime Kernel: type) type {
                 var all = groups[0].active;
                 inline for (groups[1..]) |*group| all = all.bitAnd(group.active);
                 if (all.all()) continue;
-                found.spread(@intCast(block));
+                found.spread(block);
                 for (groups, block * block_groups..) |*group, index| {
                     const bound: F32 = .select(group.active, .zero(), .splat(inf));
                     bound.storeAligned(found.of("lower", index));
                     bound.storeAligned(found.of("upper", index));
                 }
-                found.boundBlock(@intCast(block));
+                found.boundBlock(block);
             }
         }
 
@@ -153,12 +151,12 @@ pub fn Found(comptime Kernel: type) type {
         }
 
         /// Whether one triangle fills this block, or none.
-        pub inline fn isWhole(found: *const Self, block: u32) bool {
+        pub inline fn isWhole(found: *const Self, block: usize) bool {
             return found.whole >> @intCast(block) & 1 != 0;
         }
 
         /// From one triangle for the block to one for each pixel.
-        pub fn spread(found: *Self, block: u32) void {
+        pub fn spread(found: *Self, block: usize) void {
             found.whole &= ~(@as(u32, 1) << @intCast(block));
             found.block_upper[block] = inf;
             var depth: Depth(f32) = undefined;
@@ -181,8 +179,13 @@ pub fn Found(comptime Kernel: type) type {
             }
         }
 
+        /// The same for all blocks.
+        pub fn spreadAll(found: *Self) void {
+            for (0..block_count) |block| if (found.isWhole(block)) found.spread(block);
+        }
+
         /// Bounds of a block that has its triangles by pixel.
-        pub inline fn boundBlock(found: *Self, block: u32) void {
+        pub inline fn boundBlock(found: *Self, block: usize) void {
             const first = block * block_groups;
             var least: F32 = .loadAligned(found.of("lower", first));
             inline for (1..block_groups) |row| {
@@ -224,8 +227,6 @@ test "a block that a triangle fills says the same by pixel; a pixel without a ra
 
         const block = block_count - 2;
         const first = block / Kernel.ray_count * Kernel.ray_count;
-        const lower: f32 = 1;
-        const upper: f32 = 2;
         const depth: Depth(f32) =
             .{ .base = 1.25, .right = 0.015625, .down = 0.03125, .shrink = 0.875, .drop = 0.125 };
         found.fill(
@@ -233,8 +234,8 @@ test "a block that a triangle fills says the same by pixel; a pixel without a ra
             .fromBits(@as(u32, 1) << @intCast(block - first)),
             7,
             &depth,
-            .splat(lower),
-            .splat(upper),
+            .splat(1),
+            .splat(2),
         );
         try std.testing.expect(found.isWhole(block) and found.block_slot[block] == 7);
         try std.testing.expectEqual(exact.no_slot, found.block_slot[block - 1]);
@@ -243,8 +244,8 @@ test "a block that a triangle fills says the same by pixel; a pixel without a ra
         });
         found.spread(block);
         try std.testing.expect(!found.isWhole(block));
-        for (0..block_side * block_side) |pixel| {
-            const at = block * block_side * block_side + pixel;
+        for (0..kernel_file.block_pixels) |pixel| {
+            const at = block * kernel_file.block_pixels + pixel;
             const group = at / Kernel.ray_count;
             const x: f32 = @floatFromInt(Kernel.pixelX(group, at % Kernel.ray_count));
             const y: f32 = @floatFromInt(Kernel.pixelY(group, at % Kernel.ray_count));

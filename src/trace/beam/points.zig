@@ -16,12 +16,9 @@ const frustum_file = @import("frustum.zig");
 const Projection = footprint_file.Projection;
 
 const side = kernel_file.beam_side;
-/// Blocks of a bundle.
-pub const block_count = kernel_file.beam_side * kernel_file.beam_side /
-    (kernel_file.block_side * kernel_file.block_side);
-/// Pixels of a block.
-pub const block_pixels = kernel_file.block_side * kernel_file.block_side;
-const pixel_count = side * side;
+const block_count = kernel_file.beam_blocks;
+const block_pixels = kernel_file.block_pixels;
+const pixel_count = kernel_file.beam_pixels;
 
 /// A beam is cut where its bounds cover more than this many times what its blocks do.
 const cut_ratio = 2.0;

@@ -25,7 +25,7 @@ const assert = std.debug.assert;
 
 const side = kernel_file.beam_side;
 const block_side = kernel_file.block_side;
-const block_count = found_file.block_count;
+const block_count = kernel_file.beam_blocks;
 /// With no more blocks than this, triangles are not tested against each of them first.
 const few_blocks = 2;
 const last: f32 = side - 1;
@@ -560,9 +560,7 @@ fn Search(comptime Kernel: type) type {
             const slack: F32 = .splat(coverage.slack);
             const x: F32 = .fromArray(Found.lane_x);
             const y: F32 = .fromArray(Found.lane_y);
-            for (0..block_count) |block| {
-                if (search.found.isWhole(@intCast(block))) search.found.spread(@intCast(block));
-            }
+            search.found.spreadAll();
             for (&search.bundle.groups, 0..) |*ray, group| {
                 const first_x: F32 = .splat(@floatFromInt(Kernel.pixelX(group, 0)));
                 const first_y: F32 = .splat(@floatFromInt(Kernel.pixelY(group, 0)));
@@ -579,7 +577,7 @@ fn Search(comptime Kernel: type) type {
                 const none: F32 = .splat(-std.math.inf(f32));
                 if (doubtful.any()) search.decide(coverage.slot, group, doubtful, none, none);
             }
-            for (0..block_count) |block| search.found.boundBlock(@intCast(block));
+            for (0..block_count) |block| search.found.boundBlock(block);
         }
     };
 }

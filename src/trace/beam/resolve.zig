@@ -83,9 +83,7 @@ fn apart(
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
 ) void {
     const Rays = Kernel.Rays;
-    for (0..Kernel.block_count) |block| {
-        if (found.isWhole(@intCast(block))) found.spread(@intCast(block));
-    }
+    found.spreadAll();
     for (&bundle.groups, 0..) |*group, index| {
         const own = found.of("slot", index);
         const there = Rays.I32.loadAligned(own).gt(.splat(exact.no_slot));
@@ -132,7 +130,7 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
             const down = turned(course.negative);
             var last: Last = .{};
             for (0..Kernel.block_count) |block| {
-                const whole = found.isWhole(@intCast(block));
+                const whole = found.isWhole(block);
                 const block_slot = found.block_slot[block];
                 if (whole and block_slot == exact.no_slot) continue;
                 for (block * Kernel.block_groups..(block + 1) * Kernel.block_groups) |index| {

@@ -10,6 +10,7 @@
 const std = @import("std");
 const world_file = @import("../../world.zig");
 const TestCounts = @import("../../statistics.zig").TestCounts;
+const kernel_file = @import("../kernel.zig");
 const ray_file = @import("../ray.zig");
 const packet = @import("../packet.zig");
 const interval = @import("../interval.zig");
@@ -22,8 +23,7 @@ const frustum_file = @import("frustum.zig");
 const points_file = @import("points.zig");
 const assert = std.debug.assert;
 const Members = points_file.Members;
-const block_count = points_file.block_count;
-const block_pixels = points_file.block_pixels;
+const block_count = kernel_file.beam_blocks;
 
 /// Cuts of a beam at most, one after the other.
 const cut_depth_max = 1;
