@@ -68,7 +68,8 @@ pub fn Tracer(comptime Kernel: type) type {
                     group.* = bundle.groups[0];
                 },
                 .single => for (&batch.groups) |*group| {
-                    raylane.trace.single.traceEach(Kernel, query, world, group, tests);
+                    const view = packet.viewOf(Lanes, group);
+                    raylane.trace.single.traceEach(Kernel, query, world, group, &view, tests);
                 },
             }
         }

@@ -33,13 +33,35 @@ const direction_apart_max = 0.06;
 /// See `direction_apart_max`.
 const origin_apart_max = 0.01;
 
+/// Whether shadow rays do well in company: every node that a company visits earns a little, every
+/// child that its intervals meet though none of its rays enters it costs as much. Once all is
+/// spent, rays go alone. One for a bundle: its rays are much alike in this.
+pub const Credit = struct {
+    balance: i32 = 16,
+
+    const balance_max = 48;
+
+    inline fn lasts(credit: *const Credit) bool {
+        return credit.balance > 0;
+    }
+
+    inline fn earn(credit: *Credit) void {
+        credit.balance = @min(credit.balance + 1, balance_max);
+    }
+
+    inline fn spend(credit: *Credit) void {
+        credit.balance -= 1;
+    }
+};
+
 /// Looks for hits of the active rays and keeps them in `nearest`. With `Query.any` a ray that found
-/// one is out of the search; its `nearest.primitive` tells.
+/// one is out of the search; its `nearest.primitive` tells. Other queries leave `credit` alone.
 pub fn trace(
     comptime Kernel: type,
     comptime query: Query,
     world: *const World,
     groups: *[Kernel.block_groups]ray_file.Ray(Kernel.Rays),
+    credit: *Credit,
     counts: *TestCounts,
 ) void {
     const Rays = Kernel.Rays;
@@ -50,7 +72,8 @@ pub fn trace(
         view.* = packet.viewOf(Rays, group);
     }
     var rest = active;
-    while (firstOf(Rays, &rest)) |first| {
+    while (credit.lasts()) {
+        const first = firstOf(Rays, &rest) orelse break;
         const leader = &groups[first.group];
         const company: Company(Rays) = .of(world, leader, &views[first.group], first.lane);
         var count: u32 = 0;
@@ -65,11 +88,13 @@ pub fn trace(
             count += group.active.popCount();
         }
         if (count < rays_min) {
-            for (groups) |*group| single.traceEach(Kernel, query, world, group, counts);
+            alone(Kernel, query, world, groups, &views, counts);
         } else {
-            together(Kernel, query, world, groups, &views, company.octant, counts);
+            together(Kernel, query, world, groups, &views, company.octant, credit, counts);
         }
     }
+    for (groups, rest) |*group, left| group.active = left;
+    alone(Kernel, query, world, groups, &views, counts);
     for (groups, active) |*group, mask| group.active = mask;
 }
 
@@ -129,6 +154,21 @@ fn Company(comptime Rays: type) type {
     };
 }
 
+/// Active rays, one by one.
+inline fn alone(
+    comptime Kernel: type,
+    comptime query: Query,
+    world: *const World,
+    groups: *[Kernel.block_groups]ray_file.Ray(Kernel.Rays),
+    views: *const [Kernel.block_groups]packet.GroupView(Kernel.Rays),
+    counts: *TestCounts,
+) void {
+    for (groups, views) |*group, *view| {
+        if (group.active.none()) continue;
+        single.traceEach(Kernel, query, world, group, view, counts);
+    }
+}
+
 /// Active rays, all of one octant.
 fn together(
     comptime Kernel: type,
@@ -137,17 +177,24 @@ fn together(
     groups: *[Kernel.block_groups]ray_file.Ray(Kernel.Rays),
     views: *const [Kernel.block_groups]packet.GroupView(Kernel.Rays),
     octant: [3]bool,
+    credit: *Credit,
     counts: *TestCounts,
 ) void {
     @setEvalBranchQuota(4000); // For what is inlined here.
     const tree = world.tree.get(Kernel.width);
     const ends: Ends = .of(Kernel, groups, views);
     if (!(ends.reach() < world.fused_reach)) {
-        for (groups) |*group| single.traceEach(Kernel, query, world, group, counts);
-        return;
+        return alone(Kernel, query, world, groups, views, counts);
     }
-    var search: Search(Kernel, query) = .init(world, groups, views, octant, &ends);
+    var search: Search(Kernel, query) = .init(world, groups, views, octant, &ends, credit.*);
     _ = walk.walk(Kernel, tree, &search, counts);
+    credit.* = search.credit;
+    if (credit.lasts()) return;
+    for (groups) |*group| {
+        const found = group.nearest.primitive.gt(.splat(ray_file.no_primitive));
+        group.active = group.active.andNot(found);
+    }
+    alone(Kernel, query, world, groups, views, counts);
 }
 
 /// The least and the greatest of what rays have.
@@ -214,6 +261,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         grow: f32,
         /// See `World.pad`.
         pad: f32,
+        credit: Credit,
 
         const Self = @This();
         const Range = box.Range(Boxes);
@@ -269,15 +317,12 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             views: *const [Kernel.block_groups]packet.GroupView(Rays),
             octant: [3]bool,
             ends: *const Ends,
+            credit: Credit,
         ) Self {
-            var guide_ray: ray_file.Ray(ray_file.Single) = undefined;
-            for (groups) |*group| {
+            const guide: single.Search(Kernel, query, true) = for (groups, views) |*group, *view| {
                 const bits = group.active.bits();
-                if (bits == 0) continue;
-                guide_ray = group.extract(@ctz(bits));
-                break;
-            }
-            const guide: single.Search(Kernel, query, true) = .init(&guide_ray, world);
+                if (bits != 0) break .of(Rays, world, group, view, @ctz(bits));
+            } else unreachable;
             var slabs: [3]Slab = undefined;
             for (&slabs, octant, ends.origin, ends.inverse) |*slab, down, from, inverse| {
                 slab.* = .init(down, from, inverse);
@@ -291,13 +336,15 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
                 .limit = ends.nearest_t,
                 .grow = world.pad + 2 * world.node_margin,
                 .pad = world.pad,
+                .credit = credit,
             };
         }
 
         /// Bounds of where rays are within the children's boxes. Where the intervals meet a child
-        /// that the guide does not enter, the rays decide.
+        /// that the guide does not enter, the rays decide. Without credit left, nothing is
+        /// met any more.
         pub inline fn meet(
-            search: *const Self,
+            search: *Self,
             node: *const world_file.Node(Kernel.width),
             counts: *TestCounts,
         ) Range {
@@ -313,11 +360,18 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             var range = search.within(near, far);
             const guided = guide.meet(node, counts);
             var met = range.near.le(range.far).andNot(guided.near.le(guided.far)).bits();
+            if (query == .any) search.credit.earn();
             if (met == 0) return range;
             var nears = range.near.toArray();
             while (met != 0) : (met &= met - 1) {
                 const child = @ctz(met);
-                if (!search.isEntered(node, child, counts)) nears[child] = std.math.inf(f32);
+                if (search.isEntered(node, child, counts)) continue;
+                nears[child] = std.math.inf(f32);
+                if (query == .any) search.credit.spend();
+            }
+            if (query == .any and !search.credit.lasts()) {
+                search.limit = -std.math.inf(f32);
+                return .{ .near = .splat(0), .far = .splat(search.limit) };
             }
             range.near = .fromArray(nears);
             return range;

@@ -9,9 +9,9 @@ const world_file = @import("../world.zig");
 const TestCounts = @import("../statistics.zig").TestCounts;
 const ray_file = @import("ray.zig");
 const box = @import("box.zig");
+const packet = @import("packet.zig");
 const triangle = @import("triangle.zig");
 const walk = @import("walk.zig");
-const assert = @import("std").debug.assert;
 const Query = walk.Query;
 const Single = ray_file.Single;
 const World = world_file.World;
@@ -24,16 +24,11 @@ pub fn trace(
     ray: *ray_file.Ray(Single),
     counts: *TestCounts,
 ) bool {
-    return if (reachOf(ray) < world.fused_reach)
-        travel(Kernel, query, true, world, ray, counts)
-    else
-        travel(Kernel, query, false, world, ray, counts);
-}
-
-/// The largest |coordinate| of where a ray starts.
-inline fn reachOf(ray: *const ray_file.Ray(Single)) f32 {
-    const origin = ray.line.origin.lane(0);
-    return @max(@abs(origin[0]), @abs(origin[1]), @abs(origin[2]));
+    const view = packet.viewOf(Single, ray);
+    const nearest = traceLane(Kernel, query, Single, world, ray, &view, 0, counts) orelse
+        return false;
+    ray.nearest = .{ .t = .splat(nearest.t), .primitive = .splat(nearest.primitive) };
+    return true;
 }
 
 /// Every active ray of a group by itself.
@@ -42,36 +37,58 @@ pub fn traceEach(
     comptime query: Query,
     world: *const World,
     group: anytype,
+    view: anytype,
     counts: *TestCounts,
 ) void {
+    const Rays = @TypeOf(view.*).Rays;
     var ts = group.nearest.t.toArray();
     var primitives = group.nearest.primitive.toArray();
     var bits = group.active.bits();
     while (bits != 0) : (bits &= bits - 1) {
         const lane = @ctz(bits);
-        var ray = group.extract(lane);
-        _ = trace(Kernel, query, world, &ray, counts);
-        ts[lane] = ray.nearest.t.lane(0);
-        primitives[lane] = ray.nearest.primitive.lane(0);
+        const nearest = traceLane(Kernel, query, Rays, world, group, view, lane, counts) orelse
+            continue;
+        ts[lane] = nearest.t;
+        primitives[lane] = nearest.primitive;
     }
     group.nearest = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };
+}
+
+const Found = struct { t: f32, primitive: i32 };
+
+/// The hit of the ray in one lane of a group.
+fn traceLane(
+    comptime Kernel: type,
+    comptime query: Query,
+    comptime Rays: type,
+    world: *const World,
+    group: *const ray_file.Ray(Rays),
+    view: *const packet.GroupView(Rays),
+    lane: usize,
+    counts: *TestCounts,
+) ?Found {
+    const origin = group.line.origin.lane(lane);
+    const reach = @max(@abs(origin[0]), @abs(origin[1]), @abs(origin[2]));
+    if (!(reach < world.fused_reach)) {
+        return travel(Kernel, query, false, Rays, world, group, view, lane, counts);
+    }
+    return travel(Kernel, query, true, Rays, world, group, view, lane, counts);
 }
 
 fn travel(
     comptime Kernel: type,
     comptime query: Query,
     comptime fused: bool,
+    comptime Rays: type,
     world: *const World,
-    ray: *ray_file.Ray(Single),
+    group: *const ray_file.Ray(Rays),
+    view: *const packet.GroupView(Rays),
+    lane: usize,
     counts: *TestCounts,
-) bool {
-    var search: Search(Kernel, query, fused) = .init(ray, world);
-    const found = walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts);
-    ray.nearest = .{
-        .t = .splat(search.limit),
-        .primitive = .splat(search.probe.nearest_primitive),
-    };
-    return found;
+) ?Found {
+    var search: Search(Kernel, query, fused) = .of(Rays, world, group, view, lane);
+    if (!walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts)) return null;
+    return .{ .t = search.limit, .primitive = search.probe.nearest_primitive };
 }
 
 /// What of a ray the triangles of a block are tested against, in their lanes, and the nearest hit
@@ -100,13 +117,13 @@ pub fn Probe(comptime Kernel: type) type {
             lane: usize,
             pad: f32,
         ) Self {
-            var negative: [3]Boxes.Mask = undefined;
-            for (&negative, view.negative) |*lanes, mask| lanes.* = .splat(mask.lane(lane));
+            const inverse: Boxes.Vec3 = .splat(view.direction_inv.lane(lane));
+            const zero: Boxes.F32 = .zero();
             return .{
                 .view = .{
                     .origin = .splat(view.origin.lane(lane)),
-                    .direction_inv = .splat(view.direction_inv.lane(lane)),
-                    .negative = negative,
+                    .direction_inv = inverse,
+                    .negative = .{ inverse.x.lt(zero), inverse.y.lt(zero), inverse.z.lt(zero) },
                     .shear = .splat(view.shear.lane(lane)),
                 },
                 .axis = axis,
@@ -182,33 +199,34 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
 
         const Self = @This();
 
-        /// The search of a ray. Asserts, with `fused`, that it starts within `World.fused_reach`.
-        pub inline fn init(ray: *const ray_file.Ray(Single), world: *const World) Self {
-            if (fused) assert(reachOf(ray) < world.fused_reach);
-            const slabs: ray_file.Slabs(Single) = .init(ray.line);
-            const axis: ray_file.LongAxis(Single) = .of(ray.line.direction);
-            const view: ray_file.View(Single) = .init(ray.line, axis);
-            const inverse = spread(slabs.direction_inv);
-            const origin = spread(slabs.origin);
+        /// The search of the ray in one lane of a group. Asserts, with `fused`, that it starts
+        /// within `World.fused_reach`.
+        pub inline fn of(
+            comptime Rays: type,
+            world: *const World,
+            group: *const ray_file.Ray(Rays),
+            view: *const packet.GroupView(Rays),
+            lane: usize,
+        ) Self {
+            const inverses = view.slabs.direction_inv.lane(lane);
+            const inverse: Boxes.Vec3 = .splat(inverses);
+            const origin: Boxes.Vec3 = .splat(group.line.origin.lane(lane));
             var near_row: [3]usize = undefined;
             var far_row: [3]usize = undefined;
-            for (&near_row, &far_row, slabs.negative, 0..) |*near, *far, negative, row| {
-                const down = negative.lane(0);
-                near.* = row + @as(usize, if (down) 3 else 0);
-                far.* = row + @as(usize, if (down) 0 else 3);
+            for (&near_row, &far_row, inverses, 0..) |*near, *far, component, row| {
+                const down = @as(usize, @intFromBool(component < 0)) * 3;
+                near.* = row + down;
+                far.* = row + 3 - down;
             }
+            const axis = view.uniform orelse view.axis.ofLane(lane);
             return .{
                 .shift = if (fused) origin.mul(inverse).neg() else origin,
                 .inverse = inverse,
                 .near_row = near_row,
                 .far_row = far_row,
-                .probe = .of(Single, ray, &view, axis.uniform(.splat(true)).?, 0, world.pad),
-                .limit = ray.nearest.t.lane(0),
+                .probe = .of(Rays, group, &view.view, axis, lane, world.pad),
+                .limit = group.nearest.t.lane(lane),
             };
-        }
-
-        inline fn spread(v: Single.Vec3) Boxes.Vec3 {
-            return .splat(v.lane(0));
         }
 
         /// Where the ray is within the children's boxes and its own limits: near <= far where a

@@ -68,6 +68,7 @@ fn Search(comptime Kernel: type) type {
         bundle: *packet.Bundle(Kernel),
         counts: *TestCounts,
         points: Points = undefined,
+        credit: interval.Credit = .{},
 
         const Self = @This();
         const Points = points_file.Points(Kernel);
@@ -129,7 +130,7 @@ fn Search(comptime Kernel: type) type {
                     mask.* = group.active;
                     group.active = Points.groupOf(members, at);
                 }
-                interval.trace(Kernel, .any, search.world, groups, search.counts);
+                interval.trace(Kernel, .any, search.world, groups, &search.credit, search.counts);
                 for (active_before, groups) |mask, *group| group.active = mask;
             }
         }
