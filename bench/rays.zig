@@ -262,7 +262,8 @@ const Bench = struct {
     /// Makes the picture once by each candidate to see what comes out, then in turns for the times.
     fn runAll(bench: *Bench) ![]const report_file.Run {
         const options = bench.options;
-        bench.pixels = try bench.arena.alloc(f32, @as(usize, options.size) * options.size);
+        const pixel_count = @as(usize, options.size) * options.size;
+        bench.pixels = try raylane.huge_pages.alloc(bench.arena, f32, pixel_count);
         const chosen = try bench.candidates();
         const observers = try bench.arena.alloc(Observer, chosen.len);
         for (observers, 0..) |*observer, position| {

@@ -4,6 +4,7 @@
 //! green and blue are premultiplied with alpha, in radiance, and always finite.
 
 const std = @import("std");
+const huge_pages = @import("huge_pages.zig");
 const assert = std.debug.assert;
 
 /// A frame of linear RGBA.
@@ -20,13 +21,13 @@ pub const Image = struct {
         return .{
             .width = width,
             .height = height,
-            .pixels = try gpa.alignedAlloc([4]f32, .@"64", count),
+            .pixels = try huge_pages.alloc(gpa, [4]f32, count),
         };
     }
 
     /// Frees the pixels.
     pub fn deinit(image: *Image, gpa: std.mem.Allocator) void {
-        gpa.free(image.pixels);
+        huge_pages.free(gpa, image.pixels);
         image.* = undefined;
     }
 

@@ -21,12 +21,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <time.h>
 #include <unistd.h>
 #ifdef __x86_64__
 #include <immintrin.h>
 #endif
 
+enum { LARGE_PAGE = 2 << 20 };
 enum { SIDE = 16, RAY_COUNT = SIDE * SIDE, NONE = -1, REPETITIONS_MAX = 1000, TAGS_PER_RUN = 16 };
 static const float shadow_end = 0.9999f;
 static const float shadow_share = 0.1f;
@@ -41,7 +43,10 @@ static void fail(const char *subject, const char *what)
 static void *allocate(size_t size)
 {
     void *memory = NULL;
-    if (posix_memalign(&memory, 64, size) != 0) fail("memory", "none left");
+    // On large pages, as ours is.
+    bool large = size >= LARGE_PAGE;
+    if (posix_memalign(&memory, large ? LARGE_PAGE : 64, size) != 0) fail("memory", "none left");
+    if (large) madvise(memory, size / LARGE_PAGE * LARGE_PAGE, MADV_HUGEPAGE);
     memset(memory, 0, size);
     return memory;
 }
@@ -532,6 +537,10 @@ static void render_tile(int x, int y)
     mark(GENERATION);
     generate(x, y);
     mark(PRIMARY);
+    // As in bench/rays/workload.zig.
+    for (int row = 0; row < SIDE; row++) {
+        __builtin_prefetch(pixels + (size_t)(y + row) * setup.size + x, 1);
+    }
     intersect(&rays, true);
     observe_hits(true);
     mark(SHADING);

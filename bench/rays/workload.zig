@@ -175,6 +175,7 @@ pub fn Workload(comptime Kernel: type) type {
                 worker.marks.to(.generation);
                 const grid = worker.generate(x, y);
                 worker.marks.to(.primary);
+                worker.prefetchPixels(x, y);
                 worker.tracer.primary(&worker.rays, &grid);
                 if (observer) |o| o.sawPrimary(&worker.rays);
                 worker.marks.to(.shading);
@@ -323,6 +324,14 @@ pub fn Workload(comptime Kernel: type) type {
                 for (&worker.shadows.groups, worker.brightness, &worker.color) |*s, b, *color| {
                     const free = s.nearest.primitive.lt(.zero());
                     color.* = color.add(b.mul(.select(free, lit, .splat(shadow_share))));
+                }
+            }
+
+            /// The picture does not fit into the inner caches, and its rows are on different pages.
+            fn prefetchPixels(worker: *const Worker, x: u32, y: u32) void {
+                const size = worker.shared.setup.size;
+                for (0..side) |row| {
+                    @prefetch(&worker.shared.pixels[(y + row) * size + x], .{ .rw = .write });
                 }
             }
 

@@ -104,12 +104,17 @@ pub inline fn settle(
     const unsettled = weights.a.eq(zero).bitOr(weights.b.eq(zero)).bitOr(weights.c.eq(zero));
     const rare = agreeing.bitAnd(unsettled).bits();
     if (rare == 0) return agreeing;
-    return settleRare(Lanes, seen, weights, agreeing, rare);
+    // Copies, so that nothing is put into memory unless it comes to this.
+    const seen_copy = seen;
+    var weights_copy = weights.*;
+    const inside = settleRare(Lanes, &seen_copy, &weights_copy, agreeing, rare);
+    weights.* = weights_copy;
+    return inside;
 }
 
 fn settleRare(
     comptime Lanes: type,
-    seen: Projection(Lanes),
+    seen: *const Projection(Lanes),
     weights: *Weights(Lanes),
     agreeing: Lanes.Mask,
     rare: u32,
