@@ -17,6 +17,7 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
     .{ .part = "options", .may_import = &.{ "config", "variant" } },
     .{ .part = "variant", .may_import = &.{"config"} },
     .{ .part = "simd", .may_import = &.{"variant"} },
+    .{ .part = "huge_pages", .may_import = &.{} },
     .{ .part = "math", .may_import = &.{} },
     .{ .part = "parallel", .may_import = &.{"simd"} },
     .{ .part = "parse", .may_import = &.{ "scene", "cgltf", "stb_image", "parallel" } },
@@ -43,7 +44,7 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
 };
 
 /// Parts that import no other part and that all may import; `raylane` re-exports everything.
-const leaves = [_][]const u8{ "diagnostic", "math", "statistics", "std", "builtin" };
+const leaves = [_][]const u8{ "diagnostic", "huge_pages", "math", "statistics", "std", "builtin" };
 
 /// Where the compiler starts to read; every other Zig file is imported from one of them.
 const roots = [_][]const u8{
