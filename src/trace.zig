@@ -23,6 +23,8 @@ pub const ray = @import("trace/ray.zig");
 pub const triangle = @import("trace/triangle.zig");
 /// One ray through the tree.
 pub const single = @import("trace/single.zig");
+/// A few rays that go much the same way.
+pub const interval = @import("trace/interval.zig");
 /// The way through the tree, and what rays want to know.
 pub const walk = @import("trace/walk.zig");
 /// A bundle of rays through the tree.

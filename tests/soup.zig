@@ -107,18 +107,51 @@ fn expectBundles(
         const part = queries[first..@min(first + size, queries.len)];
         var bundle = makeBundle(Kernel, part);
         var shadows = bundle;
+        if (Kernel.variant.traversal == .packet) for ([_]i32{ 0, 1, 3 }) |balance| {
+            var poor = bundle;
+            traceWithCredit(Kernel, world, &poor, balance, &counts);
+            try expectBlocked(Kernel, &poor, expected[first..][0..part.len]);
+        };
         raylane.trace.query.trace(Kernel, .nearest, world, &bundle, .unknown, &counts);
         raylane.trace.query.trace(Kernel, .any, world, &shadows, .unknown, &counts);
+        try expectBlocked(Kernel, &shadows, expected[first..][0..part.len]);
         for (0..part.len) |index| {
             if (!isActive(index)) continue;
             const hit = expected[first + index];
             const group = &bundle.groups[index / Kernel.ray_count];
             const lane = index % Kernel.ray_count;
             try expectHit(hit, group.nearest.t.lane(lane), group.nearest.primitive.lane(lane));
-            const blocker = shadows.groups[index / Kernel.ray_count].nearest.primitive.lane(lane);
-            const blocked = blocker != ray_file.no_primitive;
-            try std.testing.expectEqual(hit.primitive != ray_file.no_primitive, blocked);
         }
+    }
+}
+
+/// Shadow rays whose companies have this much credit: most run out of it on their way.
+fn traceWithCredit(
+    comptime Kernel: type,
+    world: *const World,
+    bundle: *raylane.trace.packet.Bundle(Kernel),
+    balance: i32,
+    counts: *raylane.statistics.TestCounts,
+) void {
+    for (0..Kernel.block_count) |block| {
+        const groups = bundle.groups[block * Kernel.block_groups ..][0..Kernel.block_groups];
+        var credit: raylane.trace.interval.Credit = .{ .balance = balance };
+        raylane.trace.interval.trace(Kernel, .any, world, groups, &credit, counts);
+    }
+}
+
+/// Fails unless those rays found anything that have a hit.
+fn expectBlocked(
+    comptime Kernel: type,
+    bundle: *const raylane.trace.packet.Bundle(Kernel),
+    expected: []const Hit,
+) !void {
+    for (expected, 0..) |hit, index| {
+        if (!isActive(index)) continue;
+        const group = &bundle.groups[index / Kernel.ray_count];
+        const found = group.nearest.primitive.lane(index % Kernel.ray_count);
+        const blocked = found != ray_file.no_primitive;
+        try std.testing.expectEqual(hit.primitive != ray_file.no_primitive, blocked);
     }
 }
 
