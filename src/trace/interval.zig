@@ -46,7 +46,7 @@ pub const Credit = struct {
     }
 
     inline fn earn(credit: *Credit) void {
-        credit.balance = @min(credit.balance + 1, balance_max);
+        credit.balance += 1;
     }
 
     inline fn spend(credit: *Credit) void {
@@ -188,7 +188,7 @@ fn together(
     }
     var search: Search(Kernel, query) = .init(world, groups, views, octant, &ends, credit.*);
     _ = walk.walk(Kernel, tree, &search, counts);
-    credit.* = search.credit;
+    credit.balance = @min(search.credit.balance, Credit.balance_max);
     if (credit.lasts()) return;
     for (groups) |*group| {
         const found = group.nearest.primitive.gt(.splat(ray_file.no_primitive));

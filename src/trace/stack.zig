@@ -49,13 +49,12 @@ pub inline fn descend(
     entries: []Entry,
     entry_count: *usize,
 ) Entry {
+    const nears = near.toArray();
     const others = met & (met - 1);
-    const one_child = @ctz(met);
-    if (others == 0) return .{ .child = node.child[one_child], .near = undefined };
+    const one = entryOf(node, @ctz(met), &nears);
+    if (others == 0) return one;
+    const other = entryOf(node, @ctz(others), &nears);
     if (others & (others - 1) == 0) {
-        const one: Entry = .{ .child = node.child[one_child], .near = near.lane(one_child) };
-        const other_child = @ctz(others);
-        const other: Entry = .{ .child = node.child[other_child], .near = near.lane(other_child) };
         // By parts, so that the choice is made in registers.
         const first = one.near <= other.near;
         entries[entry_count.*] = .{
