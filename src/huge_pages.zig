@@ -1,11 +1,11 @@
 //! Large arrays on large pages.
 //!
 //! In: how many items. Out: an array, from the start of a large page on where it is that long, and
-//! a hint to the system that there be large pages. A build touches some 150 bytes a triangle for
-//! the first time, and a page fault for every 4 KiB of them was a third of its time; those before
-//! the first large page and after the last were still a twentieth, and most of what two threads
-//! waited for each other. Only for arrays that are used to their end: a large page is there as a
-//! whole or not at all.
+//! a hint to the system that there be large pages. The build of a tree touches some 150 bytes a
+//! triangle for the first time, and a page fault for every 4 KiB of them was a third of its time;
+//! those before the first large page and after the last were still a twentieth, and most of what
+//! two threads waited for each other. A tile of a picture touches a page in every row. Only for
+//! arrays that are used to their end: a large page is there as a whole or not at all.
 
 const std = @import("std");
 const builtin = @import("builtin");

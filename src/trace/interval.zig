@@ -37,6 +37,7 @@ const origin_apart_max = 0.01;
 /// child that its intervals meet though none of its rays enters it costs as much. Once all is
 /// spent, rays go alone. One for a bundle: its rays are much alike in this.
 pub const Credit = struct {
+    /// What is left; what there is at first lets a company see a few nodes.
     balance: i32 = 16,
 
     const balance_max = 48;

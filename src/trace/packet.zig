@@ -21,7 +21,9 @@ pub fn Bundle(comptime Kernel: type) type {
 /// How boxes and triangles look to a group.
 pub fn GroupView(comptime Lanes: type) type {
     return struct {
+        /// The lanes that hold the rays.
         pub const Rays = Lanes;
+
         slabs: ray_file.Slabs(Rays),
         axis: ray_file.LongAxis(Rays),
         /// The one axis of all active rays, if there is one.

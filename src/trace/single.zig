@@ -12,6 +12,7 @@ const box = @import("box.zig");
 const packet = @import("packet.zig");
 const triangle = @import("triangle.zig");
 const walk = @import("walk.zig");
+const assert = @import("std").debug.assert;
 const Query = walk.Query;
 const Single = ray_file.Single;
 const World = world_file.World;
@@ -31,7 +32,7 @@ pub fn trace(
     return true;
 }
 
-/// Every active ray of a group by itself.
+/// Every active ray of a group, of which `view` is the `packet.GroupView`, by itself.
 pub fn traceEach(
     comptime Kernel: type,
     comptime query: Query,
@@ -67,27 +68,21 @@ fn traceLane(
     lane: usize,
     counts: *TestCounts,
 ) ?Found {
-    const origin = group.line.origin.lane(lane);
-    const reach = @max(@abs(origin[0]), @abs(origin[1]), @abs(origin[2]));
-    if (!(reach < world.fused_reach)) {
-        return travel(Kernel, query, false, Rays, world, group, view, lane, counts);
+    if (reachOf(group.line.origin.lane(lane)) < world.fused_reach) {
+        var search: Search(Kernel, query, true) = .of(Rays, world, group, view, lane);
+        return travel(Kernel, world, &search, counts);
     }
-    return travel(Kernel, query, true, Rays, world, group, view, lane, counts);
+    var search: Search(Kernel, query, false) = .of(Rays, world, group, view, lane);
+    return travel(Kernel, world, &search, counts);
 }
 
-fn travel(
-    comptime Kernel: type,
-    comptime query: Query,
-    comptime fused: bool,
-    comptime Rays: type,
-    world: *const World,
-    group: *const ray_file.Ray(Rays),
-    view: *const packet.GroupView(Rays),
-    lane: usize,
-    counts: *TestCounts,
-) ?Found {
-    var search: Search(Kernel, query, fused) = .of(Rays, world, group, view, lane);
-    if (!walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts)) return null;
+/// The largest |coordinate| of where a ray starts.
+inline fn reachOf(origin: [3]f32) f32 {
+    return @max(@abs(origin[0]), @abs(origin[1]), @abs(origin[2]));
+}
+
+fn travel(comptime Kernel: type, world: *const World, search: anytype, counts: *TestCounts) ?Found {
+    if (!walk.walk(Kernel, world.tree.get(Kernel.width), search, counts)) return null;
     return .{ .t = search.limit, .primitive = search.probe.nearest_primitive };
 }
 
@@ -199,6 +194,11 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
 
         const Self = @This();
 
+        /// The search of a ray that is in no group; see `of`.
+        pub inline fn init(ray: *const ray_file.Ray(Single), world: *const World) Self {
+            return .of(Single, world, ray, &packet.viewOf(Single, ray), 0);
+        }
+
         /// The search of the ray in one lane of a group. Asserts, with `fused`, that it starts
         /// within `World.fused_reach`.
         pub inline fn of(
@@ -210,7 +210,9 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
         ) Self {
             const inverses = view.slabs.direction_inv.lane(lane);
             const inverse: Boxes.Vec3 = .splat(inverses);
-            const origin: Boxes.Vec3 = .splat(group.line.origin.lane(lane));
+            const start = group.line.origin.lane(lane);
+            if (fused) assert(reachOf(start) < world.fused_reach);
+            const origin: Boxes.Vec3 = .splat(start);
             var near_row: [3]usize = undefined;
             var far_row: [3]usize = undefined;
             for (&near_row, &far_row, inverses, 0..) |*near, *far, component, row| {

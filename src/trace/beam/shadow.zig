@@ -68,6 +68,7 @@ fn Search(comptime Kernel: type) type {
         bundle: *packet.Bundle(Kernel),
         counts: *TestCounts,
         points: Points = undefined,
+        /// Of the rays that go without a beam.
         credit: interval.Credit = .{},
 
         const Self = @This();
