@@ -288,7 +288,7 @@ pub fn traceSingle(
     }
     ray.nearest = .{
         .t = .splat(search.limit),
-        .primitive = .splat(search.nearest_primitive),
+        .primitive = .splat(search.probe.nearest_primitive),
     };
 }
 
