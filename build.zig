@@ -30,7 +30,7 @@ pub fn build(b: *std.Build) void {
         .test_fmt = b.step("test:fmt", "Check the formatting"),
         .test_tidy = b.step("test:tidy", "Check the style of the source tree"),
         .test_report = b.step("test:report", "Test the report of the benchmark"),
-        .check = b.step("check", "Compile the program and its tests, write nothing"),
+        .check = b.step("check", "Compile the program, its benchmarks and tests, write nothing"),
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
         .bench_rays = b.step("bench:rays", "Time rays: zig build bench:rays -- SCENE [options]"),
@@ -63,10 +63,10 @@ pub fn build(b: *std.Build) void {
     steps.run.dependOn(&run.step);
     steps.@"asm".dependOn(&b.addInstallFile(program.getEmittedAsm(), "raylane.s").step);
 
-    addBenchmark(steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
-    addBenchmark(steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
+    addBenchmark(steps.check, steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
+    addBenchmark(steps.check, steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
     const structures = package.benchmark("structures", "bench/structures.zig");
-    addBenchmark(steps.bench_structures, structures);
+    addBenchmark(steps.check, steps.bench_structures, structures);
     addCompare(steps.compare, package, vendor.headers);
 
     const tests: Tests = .init(b, resolve(b, .{}), filters orelse &.{});
@@ -236,13 +236,15 @@ const TestPackages = struct {
     }
 };
 
-/// Makes `step` install a benchmark and run it with the arguments that follow `--`.
-fn addBenchmark(step: *std.Build.Step, benchmark: *Compile) void {
+/// Makes `step` install a benchmark and run it with the arguments that follow `--`, and `check`
+/// compile it.
+fn addBenchmark(check: *std.Build.Step, step: *std.Build.Step, benchmark: *Compile) void {
     const b = step.owner;
     const run = runOn(b, benchmark);
     run.addPassthruArgs();
     step.dependOn(&b.addInstallArtifact(benchmark, .{}).step);
     step.dependOn(&run.step);
+    check.dependOn(&benchmark.step);
 }
 
 /// Runs a program where it is, or under qemu-user when it is built for another machine.
