@@ -57,7 +57,7 @@ const reference = struct {
     fn lt(x: anytype, y: @TypeOf(x)) bool {
         return x < y;
     }
-    fn le(x: f32, y: f32) bool {
+    fn le(x: anytype, y: @TypeOf(x)) bool {
         return x <= y;
     }
     fn gt(x: anytype, y: @TypeOf(x)) bool {
@@ -206,8 +206,8 @@ fn checkComparisons(comptime L: type) anyerror!void {
     while (first < pair_count) : (first += L.count) {
         inline for (.{ L.F32, L.I32 }, .{ f32, i32 }) |T, Element| {
             const a, const b = operands(T, Element, first);
-            const common = .{ "eq", "lt", "gt" };
-            const names = if (T == L.F32) common ++ .{ "le", "ge" } else common;
+            const common = .{ "eq", "lt", "le", "gt" };
+            const names = if (T == L.F32) common ++ .{"ge"} else common;
             inline for (names) |name| {
                 const mask = @field(T, name)(a, b);
                 const selected = T.select(mask, a, b).toArray();

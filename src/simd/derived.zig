@@ -4,6 +4,7 @@
 //! declarations that the backend's type re-exports.
 
 const std = @import("std");
+const hardware = @import("hardware.zig");
 const assert = std.debug.assert;
 
 /// Operations of a lane type `Self` over `Element` that only move values, never compute.
@@ -102,6 +103,31 @@ pub fn Floats(comptime Self: type, comptime I32: type, comptime Mask: type) type
         /// The same bits as integers.
         pub inline fn bitcast(a: Self) I32 {
             return .{ .v = @bitCast(a.v) };
+        }
+
+        /// The lesser of two, or something negative where either is: for culling only, since -0
+        /// may count as negative. Words of floats are in the order of the floats but for those of
+        /// negative ones, which come in the opposite order before all others; the minimum of
+        /// integers takes one cycle on x86-64, that of floats four.
+        pub inline fn minOrNegative(a: Self, b: Self) Self {
+            if (!hardware.has_integer_extremes) return a.minFast(b);
+            return a.bitcast().min(b.bitcast()).bitcast();
+        }
+
+        /// The greater of two, or something negative where both are; see `minOrNegative`.
+        pub inline fn maxOrNegative(a: Self, b: Self) Self {
+            if (!hardware.has_integer_extremes) return a.maxFast(b);
+            return a.bitcast().max(b.bitcast()).bitcast();
+        }
+
+        /// a < 0; for culling only, since -0 may count as negative.
+        pub inline fn isNegative(a: Self) Mask {
+            return a.bitcast().lt(.zero());
+        }
+
+        /// a <= b unless both are negative; see `minOrNegative`.
+        pub inline fn leOrNegative(a: Self, b: Self) Mask {
+            return a.bitcast().le(b.bitcast());
         }
 
         /// `base[index]` of every lane of `indices`: a load a lane. Asserts that none is negative.

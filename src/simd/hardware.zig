@@ -32,6 +32,9 @@ pub const has_mask_registers = arch == .x86 and
 /// A blend that looks at sign bits only; without it a select is three bitwise operations.
 pub const has_sign_blend = arch == .x86 and cpu.has(.x86, .sse4_1);
 
+/// Minima and maxima of signed integers are one instruction.
+pub const has_integer_extremes = arch != .x86 or cpu.has(.x86, .sse4_1);
+
 comptime {
     if (arch == .arm and !cpu.has(.arm, .neon)) @compileError(
         "this ARM target has no NEON; choose a CPU that has, such as -Dcpu=cortex_a15",

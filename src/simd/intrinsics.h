@@ -52,6 +52,7 @@ rl_i32x4 rl_i32x4_shift_right_arithmetic(rl_i32x4 a, uint32_t amount);
 rl_i32x4 rl_i32x4_shift_right_logical(rl_i32x4 a, uint32_t amount);
 rl_u32x4 rl_i32x4_eq(rl_i32x4 a, rl_i32x4 b);
 rl_u32x4 rl_i32x4_lt(rl_i32x4 a, rl_i32x4 b);
+rl_u32x4 rl_i32x4_le(rl_i32x4 a, rl_i32x4 b);
 rl_i32x4 rl_i32x4_select(rl_u32x4 mask, rl_i32x4 a, rl_i32x4 b);
 rl_f32x4 rl_i32x4_to_f32(rl_i32x4 a);
 

@@ -40,6 +40,10 @@ pub fn F32x(comptime lanes: comptime_int) type {
         pub const ge = floats.ge;
         pub const reduceSum = floats.reduceSum;
         pub const bitcast = floats.bitcast;
+        pub const minOrNegative = floats.minOrNegative;
+        pub const maxOrNegative = floats.maxOrNegative;
+        pub const isNegative = floats.isNegative;
+        pub const leOrNegative = floats.leOrNegative;
         pub const gather = floats.gather;
 
         /// a + b, exact.
@@ -267,6 +271,11 @@ pub fn I32x(comptime lanes: comptime_int) type {
             return .{ .v = rl_i32x4_lt(a.v, b.v) };
         }
 
+        /// a <= b, signed.
+        pub inline fn le(a: Self, b: Self) Truths {
+            return .{ .v = rl_i32x4_le(a.v, b.v) };
+        }
+
         /// The lane of `a` where the mask is set, else of `b`.
         pub inline fn select(mask: Truths, a: Self, b: Self) Self {
             return .{ .v = rl_i32x4_select(mask.v, a.v, b.v) };
@@ -405,6 +414,7 @@ extern fn rl_i32x4_shift_right_arithmetic(a: IntegerQuad, amount: u32) callconv(
 extern fn rl_i32x4_shift_right_logical(a: IntegerQuad, amount: u32) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_eq(a: IntegerQuad, b: IntegerQuad) callconv(.c) WordQuad;
 extern fn rl_i32x4_lt(a: IntegerQuad, b: IntegerQuad) callconv(.c) WordQuad;
+extern fn rl_i32x4_le(a: IntegerQuad, b: IntegerQuad) callconv(.c) WordQuad;
 extern fn rl_i32x4_select(mask: WordQuad, a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_to_f32(a: IntegerQuad) callconv(.c) FloatQuad;
 extern fn rl_mask4_and(a: WordQuad, b: WordQuad) callconv(.c) WordQuad;

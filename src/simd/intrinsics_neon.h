@@ -101,6 +101,7 @@ rl_i32x4 rl_i32x4_shift_right_logical(rl_i32x4 a, uint32_t amount) {
 
 rl_u32x4 rl_i32x4_eq(rl_i32x4 a, rl_i32x4 b) { return vceqq_s32(a, b); }
 rl_u32x4 rl_i32x4_lt(rl_i32x4 a, rl_i32x4 b) { return vcltq_s32(a, b); }
+rl_u32x4 rl_i32x4_le(rl_i32x4 a, rl_i32x4 b) { return vcleq_s32(a, b); }
 rl_i32x4 rl_i32x4_select(rl_u32x4 mask, rl_i32x4 a, rl_i32x4 b) { return vbslq_s32(mask, a, b); }
 rl_f32x4 rl_i32x4_to_f32(rl_i32x4 a) { return vcvtq_f32_s32(a); }
 

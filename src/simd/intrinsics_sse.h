@@ -84,6 +84,7 @@ rl_i32x4 rl_i32x4_not(rl_i32x4 a) { return I32(_mm_xor_si128(INT(a), _mm_set1_ep
 
 rl_u32x4 rl_i32x4_eq(rl_i32x4 a, rl_i32x4 b) { return U32(_mm_cmpeq_epi32(INT(a), INT(b))); }
 rl_u32x4 rl_i32x4_lt(rl_i32x4 a, rl_i32x4 b) { return U32(_mm_cmplt_epi32(INT(a), INT(b))); }
+rl_u32x4 rl_i32x4_le(rl_i32x4 a, rl_i32x4 b) { return ~U32(_mm_cmpgt_epi32(INT(a), INT(b))); }
 
 rl_i32x4 rl_i32x4_select(rl_u32x4 mask, rl_i32x4 a, rl_i32x4 b) {
     return I32(rl_f32x4_select(mask, F32(a), F32(b)));

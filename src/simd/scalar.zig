@@ -37,6 +37,10 @@ pub fn F32x(comptime lanes: comptime_int) type {
         pub const ge = floats.ge;
         pub const reduceSum = floats.reduceSum;
         pub const bitcast = floats.bitcast;
+        pub const minOrNegative = floats.minOrNegative;
+        pub const maxOrNegative = floats.maxOrNegative;
+        pub const isNegative = floats.isNegative;
+        pub const leOrNegative = floats.leOrNegative;
         pub const gather = floats.gather;
 
         /// a + b, exact.
@@ -352,6 +356,13 @@ pub fn I32x(comptime lanes: comptime_int) type {
         pub inline fn lt(a: Self, b: Self) Truths {
             var result: Truths = undefined;
             for (&result.v, a.v, b.v) |*r, x, y| r.* = x < y;
+            return result;
+        }
+
+        /// a <= b, signed.
+        pub inline fn le(a: Self, b: Self) Truths {
+            var result: Truths = undefined;
+            for (&result.v, a.v, b.v) |*r, x, y| r.* = x <= y;
             return result;
         }
 

@@ -45,6 +45,10 @@ pub fn F32x(comptime lanes: comptime_int) type {
         pub const ge = floats.ge;
         pub const reduceSum = floats.reduceSum;
         pub const bitcast = floats.bitcast;
+        pub const minOrNegative = floats.minOrNegative;
+        pub const maxOrNegative = floats.maxOrNegative;
+        pub const isNegative = floats.isNegative;
+        pub const leOrNegative = floats.leOrNegative;
         pub const gather = floats.gather;
 
         /// a + b, exact.
@@ -309,6 +313,11 @@ pub fn I32x(comptime lanes: comptime_int) type {
         /// a < b, signed.
         pub inline fn lt(a: Self, b: Self) Truths {
             return .fromBools(a.v < b.v);
+        }
+
+        /// a <= b, signed.
+        pub inline fn le(a: Self, b: Self) Truths {
+            return .fromBools(a.v <= b.v);
         }
 
         /// The lane of `a` where the mask is set, else of `b`.

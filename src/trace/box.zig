@@ -6,11 +6,20 @@
 //! with respect to `triangle.zig`, which tests the triangle's own box the same way (world.zig).
 
 const std = @import("std");
+const simd = @import("../simd.zig");
 const ray = @import("ray.zig");
 
 /// Range of t of a line within a box; empty if near > far.
 pub fn Range(comptime Lanes: type) type {
-    return struct { near: Lanes.F32, far: Lanes.F32 };
+    return struct {
+        near: Lanes.F32,
+        far: Lanes.F32,
+
+        /// Set where near <= far, of a range whose one end is not negative: that of `between`.
+        pub inline fn isMet(range: @This()) Lanes.Mask {
+            return range.near.leOrNegative(range.far);
+        }
+    };
 }
 
 /// The slab test (Kay and Kajiya 1986). No operand is NaN: corners are finite or, in empty boxes,
@@ -52,8 +61,10 @@ pub inline fn mayHold(
         .bitAnd(range.far.ge(after_t));
 }
 
-/// What is left of the ranges of all three axes between `after` and `nearest`: near <= far where
-/// there may be a hit. For culling only.
+/// What is left of the ranges of all three axes between `after_t`, which is not negative, and
+/// `nearest_t`: `Range.isMet` where there may be a hit. For culling only. The way from node to node
+/// is little but a chain of minima and maxima, so they are the quickest. A far end of -0 may be
+/// missed: boxes are grown (`World.pad`), so that no hit lies at their very end.
 pub inline fn between(
     comptime Lanes: type,
     near: [3]Lanes.F32,
@@ -62,8 +73,8 @@ pub inline fn between(
     nearest_t: Lanes.F32,
 ) Range(Lanes) {
     return .{
-        .near = near[0].maxFast(near[1]).maxFast(near[2].maxFast(after_t)),
-        .far = far[0].minFast(far[1]).minFast(far[2].minFast(nearest_t)),
+        .near = near[0].maxOrNegative(near[1]).maxOrNegative(near[2].maxOrNegative(after_t)),
+        .far = far[0].minOrNegative(far[1]).minOrNegative(far[2].minOrNegative(nearest_t)),
     };
 }
 
@@ -108,5 +119,31 @@ test "an empty box is never entered, a flat one can be, a larger one gives a lar
         const outer = testSlab(up, lower, upper);
         try std.testing.expect(outer.near.lane(0) <= inner.near.lane(0));
         try std.testing.expect(outer.far.lane(0) >= inner.far.lane(0));
+    }
+}
+
+test "what is left of ranges is what minima and maxima leave" {
+    const Lanes = simd.Lanes(.vector, 4);
+    const values = [_]f32{
+        -std.math.inf(f32), -3, -1e-40, -0.0, 0, 1e-40, 1, 1.5, 3, std.math.inf(f32),
+    };
+    var random = std.Random.DefaultPrng.init(3);
+    for (0..100_000) |_| {
+        var ends: [7]f32 = undefined;
+        for (&ends) |*end| end.* = values[random.random().uintLessThan(usize, values.len)];
+        const after_t = @abs(ends[6]);
+        const nearest_t = values[random.random().uintLessThan(usize, values.len)];
+        var near: [3]Lanes.F32 = undefined;
+        var far: [3]Lanes.F32 = undefined;
+        for (&near, &far, ends[0..3], ends[3..6]) |*first, *last, low, high| {
+            first.* = .splat(low);
+            last.* = .splat(high);
+        }
+        const range = between(Lanes, near, far, .splat(after_t), .splat(nearest_t));
+        const first = @max(ends[0], ends[1], ends[2], after_t);
+        const last = @min(ends[3], ends[4], ends[5], nearest_t);
+        if (first == 0 and last == 0) continue; // -0 may be missed.
+        try std.testing.expectEqual(first <= last, range.isMet().lane(0));
+        if (first <= last) try std.testing.expectEqual(first, range.near.lane(0));
     }
 }

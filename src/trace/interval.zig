@@ -302,13 +302,13 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             /// The least t at which a ray comes through the near face.
             inline fn near(slab: *const Slab, bound: F32) F32 {
                 const both = slab.ts(bound, slab.near_shift);
-                return both[0].minFast(both[1]);
+                return both[0].minOrNegative(both[1]);
             }
 
             /// The greatest t at which a ray goes out through the far face.
             inline fn far(slab: *const Slab, bound: F32) F32 {
                 const both = slab.ts(bound, slab.far_shift);
-                return both[0].maxFast(both[1]);
+                return both[0].maxOrNegative(both[1]);
             }
         };
 
@@ -360,7 +360,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             }
             var range = search.within(near, far);
             const guided = guide.meet(node, counts);
-            var met = range.near.le(range.far).andNot(guided.near.le(guided.far)).bits();
+            var met = range.isMet().andNot(guided.isMet()).bits();
             if (query == .any) search.credit.earn();
             if (met == 0) return range;
             var nears = range.near.toArray();
@@ -454,7 +454,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             const range = search.within(near, far);
             const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
             const there = primitive.gt(.splat(ray_file.no_primitive));
-            const lanes = range.near.le(range.far).bitAnd(there);
+            const lanes = range.isMet().bitAnd(there);
             var met: Met = .{ .lanes = lanes.bits(), .lower = undefined, .upper = undefined };
             if (met.lanes == 0) return met;
             const inf: F32 = .splat(std.math.inf(f32));

@@ -231,8 +231,8 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
             };
         }
 
-        /// Where the ray is within the children's boxes and its own limits: near <= far where a
-        /// child may hold a hit.
+        /// Where the ray is within the children's boxes and its own limits: met where a child may
+        /// hold a hit.
         pub inline fn meet(
             search: *const Self,
             node: *const world_file.Node(Kernel.width),

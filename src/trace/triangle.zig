@@ -68,11 +68,11 @@ pub fn Weights(comptime Lanes: type) type {
             return front.bitOr(back);
         }
 
-        /// Set where they agree, and perhaps where one is NaN: quicker, to leave early.
+        /// Set where they agree, and perhaps where one is NaN or -0: quicker, to leave early.
         pub inline fn mayAgree(weights: @This()) Lanes.Mask {
             const zero: Lanes.F32 = .zero();
-            const least = weights.a.minFast(weights.b).minFast(weights.c);
-            const greatest = weights.a.maxFast(weights.b).maxFast(weights.c);
+            const least = weights.a.minOrNegative(weights.b).minOrNegative(weights.c);
+            const greatest = weights.a.maxOrNegative(weights.b).maxOrNegative(weights.c);
             return least.ge(zero).bitOr(greatest.le(zero));
         }
 

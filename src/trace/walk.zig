@@ -21,7 +21,7 @@ pub const Query = enum {
 /// Searches the whole tree, or until `search.isDone()`. Of a search it needs
 ///
 ///     limit: f32                nothing that is farther matters; it may shrink
-///     meet(node, counts)        box.Range in lanes of children, near <= far where one may matter
+///     meet(node, counts)        box.Range in lanes of children, `isMet` where one may matter
 ///     intersect(block, counts)  tests a block of triangles, returns whether one was hit
 ///     isDone(found)             asked after every leaf
 pub inline fn walk(
@@ -39,7 +39,7 @@ pub inline fn walk(
             assert(stack_count + Kernel.width <= Kernel.stack_max);
             const node = &tree.nodes[entry.child.target];
             const range = search.meet(node, counts);
-            const met = range.near.le(range.far).bits();
+            const met = range.isMet().bits();
             if (met != 0) {
                 const near = range.near;
                 entry = stack_file.descend(Kernel.Boxes, node, met, near, &stack, &stack_count);

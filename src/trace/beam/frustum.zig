@@ -104,11 +104,11 @@ pub fn Frustum(comptime Lanes: type) type {
             var least: Lanes.F32 = undefined;
             inline for (&frustum.sides, 0..) |*side, index| {
                 const most = side.valueAtPoint(Lanes, corners[0])
-                    .maxFast(side.valueAtPoint(Lanes, corners[1]))
-                    .maxFast(side.valueAtPoint(Lanes, corners[2]));
-                least = if (index == 0) most else least.minFast(most);
+                    .maxOrNegative(side.valueAtPoint(Lanes, corners[1]))
+                    .maxOrNegative(side.valueAtPoint(Lanes, corners[2]));
+                least = if (index == 0) most else least.minOrNegative(most);
             }
-            return least.ge(.zero());
+            return least.isNegative().bitNot();
         }
 
         /// Pushes the children of a node that the beam may meet before `depth_max`, the nearest on
@@ -122,10 +122,10 @@ pub fn Frustum(comptime Lanes: type) type {
         ) usize {
             var least = frustum.sides[0].extreme(Lanes, node, 1);
             inline for (frustum.sides[1..]) |*side| {
-                least = least.minFast(side.extreme(Lanes, node, 1));
+                least = least.minOrNegative(side.extreme(Lanes, node, 1));
             }
             const near = frustum.depth.extreme(Lanes, node, 0);
-            const met = least.ge(.zero()).bitAnd(near.le(.splat(depth_max)));
+            const met = near.le(.splat(depth_max)).andNot(least.isNegative());
             return stack.push(Lanes, node, met.bits(), near, entries, entry_count);
         }
     };

@@ -223,9 +223,9 @@ fn Search(comptime Kernel: type) type {
                 right[index] = edges_file.dot(Boxes, normal, .splat(grid.right));
                 down[index] = edges_file.dot(Boxes, normal, .splat(grid.down));
                 const reach = right[index].maxFast(zero).add(down[index].maxFast(zero));
-                least = least.minFast(reach.mulAdd(.splat(last), base[index]));
+                least = least.minOrNegative(reach.mulAdd(.splat(last), base[index]));
             }
-            there = there.andNot(edges.facet.turned.bitAnd(least.lt(zero)));
+            there = there.andNot(edges.facet.turned.bitAnd(least.isNegative()));
             if (there.none()) return;
             const inverse = edges.facet.inverse();
             const absolute = inverse.absolute.mul(.splat(search.inverse_scale));
@@ -430,11 +430,11 @@ fn Search(comptime Kernel: type) type {
                 inline for (&most, start, coverage.right, coverage.down) |*to, from, r, d| {
                     to.* = x.mulAdd(.splat(r), y.mulAdd(.splat(d), from));
                 }
-                const inside = most[0].minFast(most[1]).minFast(most[2]).ge(.zero());
+                const outside = most[0].minOrNegative(most[1]).minOrNegative(most[2]).isNegative();
                 const known: F32 = .loadAligned(search.found.ofBlocks("block_lower", first));
-                var seen = inside.bitAnd(most[3].gt(known));
-                const least = most[0].sub(span[0]).minFast(most[1].sub(span[1]))
-                    .minFast(most[2].sub(span[2]));
+                var seen = most[3].gt(known).andNot(outside);
+                const least = most[0].sub(span[0]).minOrNegative(most[1].sub(span[1]))
+                    .minOrNegative(most[2].sub(span[2]));
                 const covered = seen.bitAnd(least.gt(.splat(coverage.slack)));
                 if (covered.any()) {
                     const depth = .{ most[3].sub(span[3]), most[3] };
@@ -494,9 +494,9 @@ fn Search(comptime Kernel: type) type {
             while (true) {
                 const group = block * Kernel.block_groups + row;
                 const lower = search.found.of("lower", group);
-                const least = value[0].minFast(value[1]).minFast(value[2]);
+                const least = value[0].minOrNegative(value[1]).minOrNegative(value[2]);
                 const known: F32 = .loadAligned(lower);
-                const possible = least.ge(.zero()).bitAnd(value[3].gt(known));
+                const possible = value[3].gt(known).andNot(least.isNegative());
                 if (possible.any()) {
                     const upper = search.found.of("upper", group);
                     const slots = search.found.of("slot", group);

@@ -284,8 +284,8 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
         inline fn isWithin(point: Vec3, placed: *const Placed(Vec3)) Rays.Mask {
             const above = point.sub(placed.lower);
             const below = placed.upper.sub(point);
-            const least = above.x.minFast(above.y).minFast(above.z)
-                .minFast(below.x).minFast(below.y).minFast(below.z);
+            const least = above.x.minOrNegative(above.y).minOrNegative(above.z)
+                .minOrNegative(below.x.minOrNegative(below.y).minOrNegative(below.z));
             const margin = point.z.abs()
                 .mulAdd(.splat(16 * edges_file.unit_roundoff), .splat(1e-36));
             return least.gt(margin);

@@ -195,10 +195,10 @@ fn Search(comptime Kernel: type) type {
             inline for (linear[0..3], &along_u, &along_v) |*form, *by_u, *by_v| {
                 form.one = form.one.add(print.slack);
                 by_u.*, by_v.* = search.inBasis(form);
-                least = least.minFast(maxOver(by_u.*, bounds.u)
+                least = least.minOrNegative(maxOver(by_u.*, bounds.u)
                     .add(maxOver(by_v.*, bounds.v)).add(form.one));
             }
-            there = there.andNot(print.facet.turned.bitAnd(least.lt(.zero())));
+            there = there.andNot(print.facet.turned.bitAnd(least.isNegative()));
             if (there.none()) return;
             const nearness = print.nearness(projection, search.points.slope_max);
             const growth = B.splat(1).add(nearness.relative);
@@ -431,17 +431,17 @@ fn Search(comptime Kernel: type) type {
                     const most = u.mulAdd(.splat(du), v.mulAdd(.splat(dv), .splat(
                         coverage.one[index],
                     )));
-                    least = least.minFast(most);
+                    least = least.minOrNegative(most);
                 }
                 const window_u = coverage.window_u;
                 const window_v = coverage.window_v;
                 const block_u = &search.points.block_u;
                 const block_v = &search.points.block_v;
-                const met = least.ge(.zero())
-                    .bitAnd(Points.lanesOf(&block_u[0], first).le(.splat(window_u[1])))
+                const met = Points.lanesOf(&block_u[0], first).le(.splat(window_u[1]))
                     .bitAnd(Points.lanesOf(&block_u[1], first).ge(.splat(window_u[0])))
                     .bitAnd(Points.lanesOf(&block_v[0], first).le(.splat(window_v[1])))
-                    .bitAnd(Points.lanesOf(&block_v[1], first).ge(.splat(window_v[0])));
+                    .bitAnd(Points.lanesOf(&block_v[1], first).ge(.splat(window_v[0])))
+                    .andNot(least.isNegative());
                 blocks |= met.bits() << first;
             }
             return blocks;
@@ -460,8 +460,8 @@ fn Search(comptime Kernel: type) type {
                     to.* = u.mulAdd(.splat(cu), v.mulAdd(.splat(cv), .splat(c1)));
                 }
                 const near = Points.lanesOf(&search.points.nearness, first);
-                const least = value[0].minFast(value[1]).minFast(value[2]);
-                var possible = least.ge(.zero()).bitAnd(value[3].gt(near));
+                const least = value[0].minOrNegative(value[1]).minOrNegative(value[2]);
+                var possible = value[3].gt(near).andNot(least.isNegative());
                 if (possible.any()) {
                     const own = search.bundle.groups[group].skip.eq(.splat(coverage.primitive));
                     possible = possible.andNot(own);
