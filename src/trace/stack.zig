@@ -2,7 +2,10 @@
 //!
 //! In: a node, which of its children are met, where. Out: entries sorted by depth among themselves.
 
+const std = @import("std");
+const simd = @import("../simd.zig");
 const world_file = @import("../world.zig");
+const box = @import("box.zig");
 
 /// A child still to be visited.
 pub const Entry = struct {
@@ -11,44 +14,44 @@ pub const Entry = struct {
     near: f32,
 };
 
-/// Pushes the children in `met`, a bit each, so that the one with the least `near` is on top.
-/// Returns the new count. By insertion: mostly one or two are met.
+/// Pushes the children in `met` so that the one with the least `near` is on top. Returns the new
+/// count. Each goes where the number of those that are farther puts it: an insertion would branch
+/// on the order, which nobody can foresee.
 pub inline fn push(
     comptime Lanes: type,
     node: *const world_file.Node(Lanes.count),
-    met: u32,
+    met: Lanes.Mask,
     near: Lanes.F32,
     entries: []Entry,
     entry_count: usize,
 ) usize {
+    const I32 = Lanes.I32;
     const nears = near.toArray();
-    var count = entry_count;
-    var rest = met;
+    // No two alike: the last bits are the child's number.
+    const numbered = near.bitcast().bitAnd(.splat(-Lanes.count)).bitOr(.iota());
+    const keys: I32 = .select(met, numbered, .splat(std.math.minInt(i32)));
+    const words = keys.toArray();
+    var rest = met.bits();
+    const count = entry_count + @popCount(rest);
     while (rest != 0) : (rest &= rest - 1) {
         const child = @ctz(rest);
-        const entry = entryOf(node, child, &nears);
-        var slot = count;
-        while (slot > entry_count and entries[slot - 1].near < entry.near) : (slot -= 1) {
-            // By parts, of which each is read as it was written.
-            entries[slot].child = entries[slot - 1].child;
-            entries[slot].near = entries[slot - 1].near;
-        }
-        entries[slot] = entry;
-        count += 1;
+        const farther = keys.gt(.splat(words[child])).popCount();
+        entries[entry_count + farther] = entryOf(node, child, &nears);
     }
     return count;
 }
 
-/// Takes the child with the least `near` of those in `met`, a bit each and at least one, and pushes
-/// the others, nearer ones on top.
+/// Takes the nearest of the children that are met, a bit each in `met` and at least one, and pushes
+/// the others, nearer ones on top. `range` is a `box.Range` of the children.
 pub inline fn descend(
     comptime Lanes: type,
     node: *const world_file.Node(Lanes.count),
+    range: anytype,
     met: u32,
-    near: Lanes.F32,
     entries: []Entry,
     entry_count: *usize,
 ) Entry {
+    const near = range.near;
     const nears = near.toArray();
     const others = met & (met - 1);
     const one = entryOf(node, @ctz(met), &nears);
@@ -67,10 +70,44 @@ pub inline fn descend(
             .near = if (first) one.near else other.near,
         };
     }
-    entry_count.* = push(Lanes, node, met, near, entries, entry_count.*) - 1;
+    entry_count.* = push(Lanes, node, range.isMet(), near, entries, entry_count.*) - 1;
     return entries[entry_count.*];
 }
 
 inline fn entryOf(node: anytype, child: usize, nears: anytype) Entry {
     return .{ .child = node.child[child], .near = nears[child] };
+}
+
+test "children come from the stack in order, however many are met and in whatever order" {
+    inline for (.{ 4, 8, 16 }) |width| {
+        const Lanes = simd.Lanes(.vector, width);
+        var node: world_file.Node(width) = .empty;
+        for (&node.child, 0..) |*child, at| child.* = .{ .target = @intCast(at), .block_count = 0 };
+        var random = std.Random.DefaultPrng.init(5);
+        for (0..20_000) |_| {
+            var nears: [width]f32 = undefined;
+            // Few values, so that many are alike.
+            for (&nears) |*near| near.* = @floatFromInt(random.random().uintLessThan(u32, width));
+            const met = random.random().int(@Int(.unsigned, width)) | 1;
+            const range: box.Range(Lanes) = .{
+                .near = .fromArray(nears),
+                .far = .select(.fromBits(met), .splat(width), .splat(-1)),
+            };
+            var entries: [width + 1]Entry = undefined;
+            var count: usize = 1;
+            entries[0] = .{ .child = .root, .near = std.math.inf(f32) };
+            var seen: u32 = 0;
+            var last = descend(Lanes, &node, range, met, &entries, &count);
+            try std.testing.expectEqual(@popCount(met), count);
+            while (true) {
+                try std.testing.expectEqual(nears[last.child.target], last.near);
+                seen |= @as(u32, 1) << @intCast(last.child.target);
+                count -= 1;
+                if (count == 0) break;
+                try std.testing.expect(last.near <= entries[count].near);
+                last = entries[count];
+            }
+            try std.testing.expectEqual(met, seen);
+        }
+    }
 }

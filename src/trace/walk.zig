@@ -41,8 +41,7 @@ pub inline fn walk(
             const range = search.meet(node, counts);
             const met = range.isMet().bits();
             if (met != 0) {
-                const near = range.near;
-                entry = stack_file.descend(Kernel.Boxes, node, met, near, &stack, &stack_count);
+                entry = stack_file.descend(Kernel.Boxes, node, range, met, &stack, &stack_count);
                 continue;
             }
         } else {

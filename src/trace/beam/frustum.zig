@@ -126,7 +126,7 @@ pub fn Frustum(comptime Lanes: type) type {
             }
             const near = frustum.depth.extreme(Lanes, node, 0);
             const met = near.le(.splat(depth_max)).andNot(least.isNegative());
-            return stack.push(Lanes, node, met.bits(), near, entries, entry_count);
+            return stack.push(Lanes, node, met, near, entries, entry_count);
         }
     };
 }
