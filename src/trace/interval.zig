@@ -68,9 +68,11 @@ pub fn trace(
     const Rays = Kernel.Rays;
     var active: [Kernel.block_groups]Rays.Mask = undefined;
     var views: [Kernel.block_groups]packet.GroupView(Rays) = undefined;
-    for (&active, &views, groups) |*mask, *view, *group| {
+    var shifts: [Kernel.block_groups]Rays.Vec3 = undefined;
+    for (&active, &views, &shifts, groups) |*mask, *view, *shift, *group| {
         mask.* = group.active;
         view.* = packet.viewOf(Rays, group);
+        shift.* = group.line.origin.mul(view.slabs.direction_inv).neg();
     }
     var rest = active;
     while (credit.lasts()) {
@@ -91,7 +93,7 @@ pub fn trace(
         if (count < rays_min) {
             alone(Kernel, query, world, groups, &views, counts);
         } else {
-            together(Kernel, query, world, groups, &views, company.octant, credit, counts);
+            together(Kernel, query, world, groups, &views, &shifts, company.octant, credit, counts);
         }
     }
     for (groups, rest) |*group, left| group.active = left;
@@ -177,6 +179,7 @@ fn together(
     world: *const World,
     groups: *[Kernel.block_groups]ray_file.Ray(Kernel.Rays),
     views: *const [Kernel.block_groups]packet.GroupView(Kernel.Rays),
+    shifts: *const [Kernel.block_groups]Kernel.Rays.Vec3,
     octant: [3]bool,
     credit: *Credit,
     counts: *TestCounts,
@@ -187,7 +190,8 @@ fn together(
     if (!(ends.reach() < world.fused_reach)) {
         return alone(Kernel, query, world, groups, views, counts);
     }
-    var search: Search(Kernel, query) = .init(world, groups, views, octant, &ends, credit.*);
+    var search: Search(Kernel, query) =
+        .init(world, groups, views, shifts, octant, &ends, credit.*);
     _ = walk.walk(Kernel, tree, &search, counts);
     credit.balance = @min(search.credit.balance, Credit.balance_max);
     if (credit.lasts()) return;
@@ -251,6 +255,10 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
     return struct {
         groups: *[Kernel.block_groups]ray_file.Ray(Rays),
         views: *const [Kernel.block_groups]packet.GroupView(Rays),
+        /// What a bound times the inverse has added, as `single.Search.shift`.
+        shifts: *const [Kernel.block_groups]Rays.Vec3,
+        /// Whether the way is down, by axis.
+        octant: [3]bool,
         /// The first ray by itself: what it enters need not be tested against the others.
         guide: single.Search(Kernel, query, true),
         /// By axis.
@@ -316,6 +324,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             world: *const World,
             groups: *[Kernel.block_groups]ray_file.Ray(Rays),
             views: *const [Kernel.block_groups]packet.GroupView(Rays),
+            shifts: *const [Kernel.block_groups]Rays.Vec3,
             octant: [3]bool,
             ends: *const Ends,
             credit: Credit,
@@ -331,6 +340,8 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             return .{
                 .groups = groups,
                 .views = views,
+                .shifts = shifts,
+                .octant = octant,
                 .guide = guide,
                 .slabs = slabs,
                 .after_t = .splat(ends.after_t),
@@ -385,11 +396,40 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             child: usize,
             counts: *TestCounts,
         ) bool {
-            for (search.groups, search.views) |*group, *view| {
-                packet.countBoxes(Kernel, group, counts);
-                if (packet.enter(Kernel, group, &view.slabs, node, child)) |_| return true;
+            var near: [3]f32 = undefined;
+            var far: [3]f32 = undefined;
+            const rows: *const Rows = @ptrCast(&node.bounds);
+            for (&near, &far, 0..) |*first, *last, axis| {
+                first.* = rows[search.guide.near_row[axis]][child];
+                last.* = rows[search.guide.far_row[axis]][child];
+            }
+            for (0..Kernel.block_groups) |index| {
+                if (search.entering(index, near, far, counts).any()) return true;
             }
             return false;
+        }
+
+        /// Rays of a group that enter the box with these faces: by multiply-adds, and without asking
+        /// each ray for its signs, since all are of one octant.
+        inline fn entering(
+            search: *const Self,
+            index: usize,
+            near: [3]f32,
+            far: [3]f32,
+            counts: *TestCounts,
+        ) Rays.Mask {
+            const group = &search.groups[index];
+            packet.countBoxes(Kernel, group, counts);
+            const inverse = search.views[index].slabs.direction_inv;
+            const shift = &search.shifts[index];
+            var first: [3]Rays.F32 = undefined;
+            var last: [3]Rays.F32 = undefined;
+            inline for (&first, &last, near, far, .{ "x", "y", "z" }) |*a, *b, low, high, axis| {
+                a.* = Rays.F32.splat(low).mulAdd(@field(inverse, axis), @field(shift, axis));
+                b.* = Rays.F32.splat(high).mulAdd(@field(inverse, axis), @field(shift, axis));
+            }
+            const range = box.between(Rays, first, last, group.after.t, group.nearest.t);
+            return range.isMet().bitAnd(group.active);
         }
 
         inline fn within(search: *const Self, near: [3]F32, far: [3]F32) Range {
@@ -413,14 +453,12 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             if (met.lanes == 0) return false;
             const triangle_count = @popCount(met.lanes);
             var found = false;
-            for (search.groups, search.views) |*group, *view| {
+            for (search.groups, search.views, 0..) |*group, *view, index| {
                 if (group.active.none()) continue;
-                packet.countBoxes(Kernel, group, counts);
-                const entering = packet.entering(Kernel, group, &view.slabs, met.lower, met.upper)
-                    .mask.bits();
-                if (entering == 0) continue;
-                const hit = if (@popCount(entering) < triangle_count)
-                    search.intersectEach(group, view, entering, block, counts)
+                const rays = search.entering(index, met.near, met.far, counts).bits();
+                if (rays == 0) continue;
+                const hit = if (@popCount(rays) < triangle_count)
+                    search.intersectEach(group, view, rays, block, counts)
                 else
                     search.intersectAll(group, view, met.lanes, block, counts);
                 found = found or hit;
@@ -429,8 +467,8 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             return found;
         }
 
-        /// Triangles of a block, a bit each, and the box around them.
-        const Met = struct { lanes: u32, lower: [3]f32, upper: [3]f32 };
+        /// Triangles of a block, a bit each, and the near and far faces of the box around them.
+        const Met = struct { lanes: u32, near: [3]f32, far: [3]f32 };
 
         /// Triangles whose grown boxes the intervals meet.
         inline fn meetBoxes(
@@ -455,12 +493,14 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
             const there = primitive.gt(.splat(ray_file.no_primitive));
             const lanes = range.isMet().bitAnd(there);
-            var met: Met = .{ .lanes = lanes.bits(), .lower = undefined, .upper = undefined };
+            var met: Met = .{ .lanes = lanes.bits(), .near = undefined, .far = undefined };
             if (met.lanes == 0) return met;
             const inf: F32 = .splat(std.math.inf(f32));
-            inline for (&met.lower, &met.upper, lowers, uppers) |*lower, *upper, low, high| {
-                lower.* = F32.select(lanes, low, inf).reduceMin();
-                upper.* = F32.select(lanes, high, inf.neg()).reduceMax();
+            inline for (0..3) |axis| {
+                const lower = F32.select(lanes, lowers[axis], inf).reduceMin();
+                const upper = F32.select(lanes, uppers[axis], inf.neg()).reduceMax();
+                met.near[axis] = if (search.octant[axis]) upper else lower;
+                met.far[axis] = if (search.octant[axis]) lower else upper;
             }
             return met;
         }
@@ -470,14 +510,14 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             search: *Self,
             group: *ray_file.Ray(Rays),
             view: *const packet.GroupView(Rays),
-            entering: u32,
+            lanes: u32,
             block: *const world_file.TriangleBlock(Kernel.width),
             counts: *TestCounts,
         ) bool {
             var found: u32 = 0;
             var ts = group.nearest.t.toArray();
             var primitives = group.nearest.primitive.toArray();
-            var rest = entering;
+            var rest = lanes;
             while (rest != 0) : (rest &= rest - 1) {
                 const lane = @ctz(rest);
                 const axis = view.uniform orelse view.axis.ofLane(lane);

@@ -115,7 +115,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
 }
 
 /// The least t at which an active ray of the group enters a child, or null if none does.
-pub inline fn enter(
+inline fn enter(
     comptime Kernel: type,
     group: *const ray_file.Ray(Kernel.Rays),
     slabs: *const ray_file.Slabs(Kernel.Rays),
@@ -128,26 +128,13 @@ pub inline fn enter(
     const upper = [3]f32{
         node.bounds[1][0][child], node.bounds[1][1][child], node.bounds[1][2][child],
     };
-    const entered = entering(Kernel, group, slabs, lower, upper);
-    if (entered.mask.none()) return null;
-    const none: Kernel.Rays.F32 = .splat(std.math.inf(f32));
-    return Kernel.Rays.F32.select(entered.mask, entered.near, none).reduceMin();
-}
-
-/// Active rays that enter a box, and the least t at which each does.
-pub inline fn entering(
-    comptime Kernel: type,
-    group: *const ray_file.Ray(Kernel.Rays),
-    slabs: *const ray_file.Slabs(Kernel.Rays),
-    lower: [3]f32,
-    upper: [3]f32,
-) struct { mask: Kernel.Rays.Mask, near: Kernel.Rays.F32 } {
     const Rays = Kernel.Rays;
     const near = triangle.select3(Rays, slabs.negative, .splat(upper), .splat(lower));
     const far = triangle.select3(Rays, slabs.negative, .splat(lower), .splat(upper));
     const range = box.slab(Rays, near, far, slabs.origin, slabs.direction_inv);
-    const held = box.mayHold(Rays, range, group.after.t, group.nearest.t);
-    return .{ .mask = held.bitAnd(group.active), .near = range.near };
+    const held = box.mayHold(Rays, range, group.after.t, group.nearest.t).bitAnd(group.active);
+    if (held.none()) return null;
+    return Rays.F32.select(held, range.near, .splat(std.math.inf(f32))).reduceMin();
 }
 
 /// Counts the test of a box against a group.
