@@ -76,6 +76,7 @@ pub fn Tracer(comptime Kernel: type) type {
 
         /// Barycentric weights of the nearest hits, by the edge functions that decided them.
         fn weighHits(tracer: *const Self, batch: *Batch) void {
+            for (&batch.groups) |*group| tracer.prefetchCorners(group);
             for (&batch.groups, &batch.shares) |*group, *shares| {
                 const hit = group.active.andNot(group.nearest.primitive.lt(.zero()));
                 if (hit.none()) continue;
@@ -83,6 +84,16 @@ pub fn Tracer(comptime Kernel: type) type {
                 const weights = weigh(tracer.gather(primitive), group.line, hit);
                 const share = Lanes.F32.splat(1).div(weights.sum());
                 shares.* = .{ weights.b.mul(share), weights.c.mul(share) };
+            }
+        }
+
+        /// Corners are far apart in memory; so nobody waits for one after the other.
+        fn prefetchCorners(tracer: *const Self, group: *const ray_file.Ray(Lanes)) void {
+            const primitives = group.nearest.primitive.toArray();
+            var hits = group.active.andNot(group.nearest.primitive.lt(.zero())).bits();
+            while (hits != 0) : (hits &= hits - 1) {
+                const numbers = tracer.world.triangles[@intCast(primitives[@ctz(hits)])].corner;
+                inline for (numbers) |number| @prefetch(&tracer.world.positions[number], .{});
             }
         }
 
