@@ -54,6 +54,8 @@ What to read from it:
   floats is a library call a lane there, and the library does not use it.
 - The exact minimum (`a < b ? a : b`) is x86's `minps` to the letter. ARM needs a comparison and a
   bitwise select, so that box tests, which only cull, use `minFast`.
+- `minOrNegative` and its kin are one instruction as well, of integers: a cycle on x86-64, where
+  `minps` and `cmpps` take four. Who only culls what lies behind uses these.
 - ARMv7 divides and takes roots one lane at a time, in VFP: NEON has estimates only, and an
   estimate must not reach a pixel.
 - Masks are words of all ones or all zeros: on ARM they feed `bsl`, `bif` or `bit` and on x86

@@ -151,12 +151,15 @@ comptime {
         "gt",      "ge",        "select", "reduceMin", "reduceMax",
         "toI32",   "reduceSum",
     });
+    exportAll("F32", L.F32, &.{
+        "minOrNegative", "maxOrNegative", "isNegative", "leOrNegative",
+    });
     exportAll("F32", L.F32, &.{ "reciprocalEstimate", "reciprocalSqrtEstimate" });
     if (L.count > 1) exportAll("F32", L.F32, &.{ "interleaveLow", "interleaveHigh" });
     exportAll("I32", L.I32, &.{
-        "add",    "sub",    "mul",    "min", "max", "bitAnd",
-        "bitOr",  "bitXor", "bitNot", "eq",  "lt",  "gt",
-        "select", "toF32",
+        "add",   "sub",    "mul",    "min", "max", "bitAnd",
+        "bitOr", "bitXor", "bitNot", "eq",  "lt",  "le",
+        "gt",    "select", "toF32",
     });
     exportAll("I32", shifts, &.{ "shiftLeft", "shiftRightArithmetic", "shiftRightLogical" });
     exportAll("Mask", L.Mask, &.{

@@ -222,6 +222,36 @@ fn checkComparisons(comptime L: type) anyerror!void {
     }
 }
 
+/// What is told of operands that are not both positive is little, and nothing of zeros and NaN.
+fn checkOrNegative(comptime L: type) anyerror!void {
+    var first: usize = 0;
+    while (first < pair_count) : (first += L.count) {
+        const a, const b = operands(L.F32, f32, first);
+        const least = a.minOrNegative(b).toArray();
+        const greatest = a.maxOrNegative(b).toArray();
+        const negative = a.isNegative().toArray();
+        const in_order = a.leOrNegative(b).toArray();
+        for (a.toArray(), b.toArray(), 0..) |x, y, lane| {
+            const low = least[lane];
+            const high = greatest[lane];
+            if (!(@abs(x) >= float_min and @abs(y) >= float_min)) continue;
+            const low_fits = if (x < 0 or y < 0) low < 0 else low == @min(x, y);
+            const high_fits = if (x < 0 and y < 0) high < 0 else high == @max(x, y);
+            if (!low_fits) return disagree(L, "minOrNegative", .{ x, y }, low);
+            if (!high_fits) return disagree(L, "maxOrNegative", .{ x, y }, high);
+            const is_told = negative[lane];
+            if (is_told != (x < 0)) return disagree(L, "isNegative", .{x}, is_told);
+            const is_less = in_order[lane];
+            if ((x > 0 or y > 0) and is_less != (x <= y))
+                return disagree(L, "leOrNegative", .{ x, y }, is_less);
+        }
+    }
+}
+
+test "operations for what is not negative do as their names say" {
+    try forAll(checkOrNegative);
+}
+
 test "comparisons and selects agree with single values" {
     try forAll(checkComparisons);
 }

@@ -37,10 +37,11 @@ pub fn F32x(comptime lanes: comptime_int) type {
         pub const ge = floats.ge;
         pub const reduceSum = floats.reduceSum;
         pub const bitcast = floats.bitcast;
-        pub const minOrNegative = floats.minOrNegative;
-        pub const maxOrNegative = floats.maxOrNegative;
+        // One value has to leave the floats' registers to be an integer.
+        pub const minOrNegative = minFast;
+        pub const maxOrNegative = maxFast;
+        pub const leOrNegative = le;
         pub const isNegative = floats.isNegative;
-        pub const leOrNegative = floats.leOrNegative;
         pub const gather = floats.gather;
 
         /// a + b, exact.

@@ -409,8 +409,8 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             return false;
         }
 
-        /// Rays of a group that enter the box with these faces: by multiply-adds, and without asking
-        /// each ray for its signs, since all are of one octant.
+        /// Rays of a group that enter the box with these faces: by multiply-adds, and without
+        /// asking each for its signs, since all are of one octant.
         inline fn entering(
             search: *const Self,
             index: usize,
