@@ -2,8 +2,8 @@
 //!
 //! In: a comptime backend and lane count. Out: value types with equal surfaces in every backend,
 //! which a comptime check holds; the same bits from every exact operation, on every target, in
-//! threads that called `setFlushToZero`. Inexact ones (`mulAdd`, `minFast`, `maxFast`, the
-//! estimates) are for culling only, never for what reaches a pixel.
+//! threads that called `setFlushToZero`. Inexact ones (`mulAdd`, `minFast`, `maxFast`, those named
+//! `OrNegative`, `isNegative`, the estimates) are for culling only, never for what reaches a pixel.
 //!
 //! Every operation is inline and counts as one evaluated branch: a function with some hundreds of
 //! them starts with `@setEvalBranchQuota`.

@@ -14,9 +14,10 @@ pub const Entry = struct {
     near: f32,
 };
 
-/// Pushes the children in `met` so that the one with the least `near` is on top. Returns the new
-/// count. Each goes where the number of those that are farther puts it: an insertion would branch
-/// on the order, which nobody can foresee.
+/// Pushes the children in `met` so that the one with the least `near` is on top, give or take the
+/// last bits; negative ones come before all others, in no order. Returns the new count. Each goes
+/// where the number of those that are farther puts it: an insertion would branch on the order,
+/// which nobody can foresee.
 pub inline fn push(
     comptime Lanes: type,
     node: *const world_file.Node(Lanes.count),
