@@ -21,8 +21,12 @@ pub const kernel = @import("trace/kernel.zig");
 pub const ray = @import("trace/ray.zig");
 /// The exact triangle test.
 pub const triangle = @import("trace/triangle.zig");
-/// One ray through the tree.
+/// One ray in the lanes of a tree.
+pub const lone = @import("trace/lone.zig");
+/// One ray after the other through the tree.
 pub const single = @import("trace/single.zig");
+/// Rays that have little in common, as a set.
+pub const stream = @import("trace/stream.zig");
 /// A few rays that go much the same way.
 pub const interval = @import("trace/interval.zig");
 /// The way through the tree, and what rays want to know.
@@ -178,6 +182,8 @@ test {
     _ = ray;
     _ = triangle;
     _ = single;
+    _ = lone;
+    _ = stream;
     _ = packet;
     _ = query;
     _ = whitted;

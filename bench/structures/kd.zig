@@ -246,7 +246,8 @@ pub fn traceSingle(
     ray: *ray_file.Ray(Single),
 ) void {
     var counts: TestCounts = .{};
-    var search: raylane.trace.single.Search(Kernel, query, false) = .init(ray, world);
+    const view = packet.viewOf(Single, ray);
+    var lone: raylane.trace.lone.Lone(Kernel) = .of(Single, false, ray, &view, 0);
     const course: Course(Single) = .init(tree, ray);
     var stack: [depth_limit + 1]struct { node: u32, near: f32, far: f32 } = undefined;
     var stack_count: usize = 0;
@@ -280,15 +281,15 @@ pub fn traceSingle(
         if (near <= far) {
             var found = false;
             for (tree.blocks[at.first..][0..at.block_count]) |*block| {
-                found = search.intersect(block, &counts) or found;
+                found = lone.intersect(block, world.pad, &counts) or found;
             }
             if (query == .any and found) break;
         }
-        if (!popSingle(&stack, &stack_count, search.limit, &node, &near, &far)) break;
+        if (!popSingle(&stack, &stack_count, lone.limit, &node, &near, &far)) break;
     }
     ray.nearest = .{
-        .t = .splat(search.limit),
-        .primitive = .splat(search.probe.nearest_primitive),
+        .t = .splat(lone.limit),
+        .primitive = .splat(lone.nearest_primitive),
     };
 }
 

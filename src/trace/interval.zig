@@ -19,13 +19,14 @@ const TestCounts = @import("../statistics.zig").TestCounts;
 const ray_file = @import("ray.zig");
 const box = @import("box.zig");
 const packet = @import("packet.zig");
-const single = @import("single.zig");
+const lone = @import("lone.zig");
+const Stream = @import("stream.zig").Stream;
 const walk = @import("walk.zig");
 const Query = walk.Query;
 const World = world_file.World;
 
 /// Fewer rays go alone.
-const rays_min = 3;
+const rays_min = 4;
 /// How far apart the directions of rays are that go together, over their length, and the origins,
 /// over the size of the scene. Both are rough: what they let through costs little more than single
 /// rays, since a child is entered only where a ray is (`Search.meet`).
@@ -51,7 +52,7 @@ pub const Credit = struct {
     }
 
     inline fn spend(credit: *Credit) void {
-        credit.balance -= 1;
+        credit.balance -= 2;
     }
 };
 
@@ -61,24 +62,40 @@ pub fn trace(
     comptime Kernel: type,
     comptime query: Query,
     world: *const World,
-    groups: *[Kernel.block_groups]ray_file.Ray(Kernel.Rays),
+    bundle: *packet.Bundle(Kernel),
+    credit: *Credit,
+    counts: *TestCounts,
+) void {
+    var stream: Stream(Kernel, query) = undefined;
+    stream.init(world, bundle);
+    for (0..Kernel.block_count) |block| traceBlock(Kernel, query, &stream, block, credit, counts);
+    stream.finish(counts);
+}
+
+/// The rays of one block, or they are taken by the stream.
+fn traceBlock(
+    comptime Kernel: type,
+    comptime query: Query,
+    stream: *Stream(Kernel, query),
+    block: usize,
     credit: *Credit,
     counts: *TestCounts,
 ) void {
     const Rays = Kernel.Rays;
+    const first_group = block * Kernel.block_groups;
+    const groups = stream.bundle.groups[first_group..][0..Kernel.block_groups];
     var active: [Kernel.block_groups]Rays.Mask = undefined;
     var views: [Kernel.block_groups]packet.GroupView(Rays) = undefined;
-    var shifts: [Kernel.block_groups]Rays.Vec3 = undefined;
-    for (&active, &views, &shifts, groups) |*mask, *view, *shift, *group| {
+    for (&active, &views, groups) |*mask, *view, *group| {
         mask.* = group.active;
         view.* = packet.viewOf(Rays, group);
-        shift.* = group.line.origin.mul(view.slabs.direction_inv).neg();
     }
     var rest = active;
     while (credit.lasts()) {
         const first = firstOf(Rays, &rest) orelse break;
         const leader = &groups[first.group];
-        const company: Company(Rays) = .of(world, leader, &views[first.group], first.lane);
+        const company: Company(Rays) =
+            .of(stream.world, leader, &views[first.group], first.lane);
         var count: u32 = 0;
         for (&rest, &views, groups, 0..) |*left, *view, *group, index| {
             group.active = .splat(false);
@@ -90,14 +107,12 @@ pub fn trace(
             left.* = left.andNot(group.active);
             count += group.active.popCount();
         }
-        if (count < rays_min) {
-            alone(Kernel, query, world, groups, &views, counts);
-        } else {
-            together(Kernel, query, world, groups, &views, &shifts, company.octant, credit, counts);
-        }
+        const together = count >= rays_min and
+            goTogether(Kernel, query, stream.world, groups, &views, company.octant, credit, counts);
+        if (!together) stream.take(first_group, &views, counts);
     }
     for (groups, rest) |*group, left| group.active = left;
-    alone(Kernel, query, world, groups, &views, counts);
+    stream.take(first_group, &views, counts);
     for (groups, active) |*group, mask| group.active = mask;
 }
 
@@ -157,49 +172,31 @@ fn Company(comptime Rays: type) type {
     };
 }
 
-/// Active rays, one by one.
-inline fn alone(
+/// Active rays, all of one octant. Returns false where some are still to be traced, which then are
+/// the active ones.
+fn goTogether(
     comptime Kernel: type,
     comptime query: Query,
     world: *const World,
     groups: *[Kernel.block_groups]ray_file.Ray(Kernel.Rays),
     views: *const [Kernel.block_groups]packet.GroupView(Kernel.Rays),
-    counts: *TestCounts,
-) void {
-    for (groups, views) |*group, *view| {
-        if (group.active.none()) continue;
-        single.traceEach(Kernel, query, world, group, view, counts);
-    }
-}
-
-/// Active rays, all of one octant.
-fn together(
-    comptime Kernel: type,
-    comptime query: Query,
-    world: *const World,
-    groups: *[Kernel.block_groups]ray_file.Ray(Kernel.Rays),
-    views: *const [Kernel.block_groups]packet.GroupView(Kernel.Rays),
-    shifts: *const [Kernel.block_groups]Kernel.Rays.Vec3,
     octant: [3]bool,
     credit: *Credit,
     counts: *TestCounts,
-) void {
+) bool {
     @setEvalBranchQuota(4000); // For what is inlined here.
     const tree = world.tree.get(Kernel.width);
     const ends: Ends = .of(Kernel, groups, views);
-    if (!(ends.reach() < world.fused_reach)) {
-        return alone(Kernel, query, world, groups, views, counts);
-    }
-    var search: Search(Kernel, query) =
-        .init(world, groups, views, shifts, octant, &ends, credit.*);
-    _ = walk.walk(Kernel, tree, &search, counts);
+    if (!(ends.reach() < world.fused_reach)) return false;
+    var search: Search(Kernel, query) = .init(world, groups, views, octant, &ends, credit.*);
+    _ = walk.walk(Kernel, tree, .whole, &search, counts);
     credit.balance = @min(search.credit.balance, Credit.balance_max);
-    if (credit.lasts()) return;
+    if (credit.lasts()) return true;
     for (groups) |*group| {
         const found = group.nearest.primitive.gt(.splat(ray_file.no_primitive));
         group.active = group.active.andNot(found);
     }
-    alone(Kernel, query, world, groups, views, counts);
+    return false;
 }
 
 /// The least and the greatest of what rays have.
@@ -251,16 +248,15 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
     const Boxes = Kernel.Boxes;
     const Rays = Kernel.Rays;
     const F32 = Boxes.F32;
-    const Rows = [6][Kernel.width]f32;
+    const Lone = lone.Lone(Kernel);
     return struct {
         groups: *[Kernel.block_groups]ray_file.Ray(Rays),
         views: *const [Kernel.block_groups]packet.GroupView(Rays),
-        /// What a bound times the inverse has added, as `single.Search.shift`.
-        shifts: *const [Kernel.block_groups]Rays.Vec3,
         /// Whether the way is down, by axis.
         octant: [3]bool,
         /// The first ray by itself: what it enters need not be tested against the others.
-        guide: single.Search(Kernel, query, true),
+        guide: Lone.Slabs,
+        guide_limit: f32,
         /// By axis.
         slabs: [3]Slab,
         after_t: F32,
@@ -324,14 +320,13 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             world: *const World,
             groups: *[Kernel.block_groups]ray_file.Ray(Rays),
             views: *const [Kernel.block_groups]packet.GroupView(Rays),
-            shifts: *const [Kernel.block_groups]Rays.Vec3,
             octant: [3]bool,
             ends: *const Ends,
             credit: Credit,
         ) Self {
-            const guide: single.Search(Kernel, query, true) = for (groups, views) |*group, *view| {
+            const guide: Lone = for (groups, views) |*group, *view| {
                 const bits = group.active.bits();
-                if (bits != 0) break .of(Rays, world, group, view, @ctz(bits));
+                if (bits != 0) break .of(Rays, true, group, view, @ctz(bits));
             } else unreachable;
             var slabs: [3]Slab = undefined;
             for (&slabs, octant, ends.origin, ends.inverse) |*slab, down, from, inverse| {
@@ -340,9 +335,9 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             return .{
                 .groups = groups,
                 .views = views,
-                .shifts = shifts,
                 .octant = octant,
-                .guide = guide,
+                .guide = guide.slabsOf(),
+                .guide_limit = guide.limit,
                 .slabs = slabs,
                 .after_t = .splat(ends.after_t),
                 .limit = ends.nearest_t,
@@ -361,16 +356,15 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             counts: *TestCounts,
         ) Range {
             walk.countNode(Kernel, node, counts);
-            const rows: *const Rows = @ptrCast(&node.bounds);
             var near: [3]F32 = undefined;
             var far: [3]F32 = undefined;
             const guide = &search.guide;
             inline for (&near, &far, &search.slabs, 0..) |*first, *last, *slab, axis| {
-                first.* = slab.near(.load(&rows[guide.near_row[axis]]));
-                last.* = slab.far(.load(&rows[guide.far_row[axis]]));
+                first.* = slab.near(Lone.facesFrom(node, guide.near_at[axis]));
+                last.* = slab.far(Lone.facesFrom(node, guide.far_at[axis]));
             }
             var range = search.within(near, far);
-            const guided = guide.meet(node, counts);
+            const guided = guide.meet(true, node, search.guide_limit, counts);
             var met = range.isMet().andNot(guided.isMet()).bits();
             if (query == .any) search.credit.earn();
             if (met == 0) return range;
@@ -398,10 +392,11 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         ) bool {
             var near: [3]f32 = undefined;
             var far: [3]f32 = undefined;
-            const rows: *const Rows = @ptrCast(&node.bounds);
-            for (&near, &far, 0..) |*first, *last, axis| {
-                first.* = rows[search.guide.near_row[axis]][child];
-                last.* = rows[search.guide.far_row[axis]][child];
+            const bounds: *const [6 * Kernel.width]f32 = @ptrCast(&node.bounds);
+            const guide = &search.guide;
+            for (&near, &far, guide.near_at, guide.far_at) |*first, *last, near_at, far_at| {
+                first.* = bounds[near_at + child];
+                last.* = bounds[far_at + child];
             }
             for (0..Kernel.block_groups) |index| {
                 if (search.entering(index, near, far, counts).any()) return true;
@@ -421,7 +416,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             const group = &search.groups[index];
             packet.countBoxes(Kernel, group, counts);
             const inverse = search.views[index].slabs.direction_inv;
-            const shift = &search.shifts[index];
+            const shift = search.views[index].shift;
             var first: [3]Rays.F32 = undefined;
             var last: [3]Rays.F32 = undefined;
             inline for (&first, &last, near, far, .{ "x", "y", "z" }) |*a, *b, low, high, axis| {
@@ -520,13 +515,11 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             var rest = lanes;
             while (rest != 0) : (rest &= rest - 1) {
                 const lane = @ctz(rest);
-                const axis = view.uniform orelse view.axis.ofLane(lane);
-                const pad = search.pad;
-                var probe: single.Probe(Kernel) = .of(Rays, group, &view.view, axis, lane, pad);
-                if (!probe.intersect(block, counts)) continue;
+                var ray: Lone = .of(Rays, true, group, view, lane);
+                if (!ray.intersect(block, search.pad, counts)) continue;
                 found |= @as(u32, 1) << @intCast(lane);
-                ts[lane] = if (query == .any) -std.math.inf(f32) else probe.limit;
-                primitives[lane] = probe.nearest_primitive;
+                ts[lane] = if (query == .any) -std.math.inf(f32) else ray.limit;
+                primitives[lane] = ray.nearest_primitive;
             }
             if (found == 0) return false;
             group.nearest = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };

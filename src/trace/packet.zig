@@ -25,6 +25,9 @@ pub fn GroupView(comptime Lanes: type) type {
         pub const Rays = Lanes;
 
         slabs: ray_file.Slabs(Rays),
+        /// Origin times inverse, negated: what a bound times the inverse has added, where nodes are
+        /// tested by multiply-adds.
+        shift: Rays.Vec3,
         axis: ray_file.LongAxis(Rays),
         /// The one axis of all active rays, if there is one.
         uniform: ?u2,
@@ -36,8 +39,10 @@ pub fn GroupView(comptime Lanes: type) type {
 pub fn viewOf(comptime Rays: type, group: *const ray_file.Ray(Rays)) GroupView(Rays) {
     if (group.active.none()) return undefined;
     const axis: ray_file.LongAxis(Rays) = .of(group.line.direction);
+    const slabs: ray_file.Slabs(Rays) = .init(group.line);
     return .{
-        .slabs = .init(group.line),
+        .slabs = slabs,
+        .shift = slabs.origin.mul(slabs.direction_inv).neg(),
         .axis = axis,
         .uniform = axis.uniform(group.active),
         .view = .init(group.line, axis),
@@ -59,7 +64,7 @@ pub fn trace(
         .view = viewOf(Kernel.Rays, group),
         .pad = world.pad,
     };
-    _ = walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts);
+    _ = walk.walk(Kernel, world.tree.get(Kernel.width), .whole, &search, counts);
 }
 
 fn Search(comptime Kernel: type, comptime query: Query) type {

@@ -49,11 +49,7 @@ pub fn trace(
                 .unknown => {},
             }
             var credit: interval.Credit = .{};
-            for (0..Kernel.block_count) |block| {
-                const first = block * Kernel.block_groups;
-                const groups = bundle.groups[first..][0..Kernel.block_groups];
-                interval.trace(Kernel, query, world, groups, &credit, counts);
-            }
+            interval.trace(Kernel, query, world, bundle, &credit, counts);
         },
     }
 }

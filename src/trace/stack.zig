@@ -12,12 +12,35 @@ pub const Entry = struct {
     child: world_file.Child,
     /// A lower bound of what can be hit in it, in the unit of whoever pushed it.
     near: f32,
+
+    /// The whole tree.
+    pub const whole: Entry = .{ .child = .root, .near = 0 };
 };
 
-/// Pushes the children in `met` so that the one with the least `near` is on top, give or take the
-/// last bits; negative ones come before all others, in no order. Returns the new count. Each goes
-/// where the number of those that are farther puts it: an insertion would branch on the order,
-/// which nobody can foresee.
+/// The order of a node's children that are met: the least `near` comes last, give or take the last
+/// bits; negative ones come after all others, in no order. Each child has a rank, the number of
+/// those that are farther: an insertion would branch on the order, which nobody can foresee.
+pub fn Ranks(comptime Lanes: type) type {
+    return struct {
+        keys: Lanes.I32,
+        words: [Lanes.count]i32,
+
+        /// Of the children in `met`.
+        pub inline fn of(met: Lanes.Mask, near: Lanes.F32) @This() {
+            // No two alike: the last bits are the child's number.
+            const numbered = near.bitcast().bitAnd(.splat(-Lanes.count)).bitOr(.iota());
+            const keys: Lanes.I32 = .select(met, numbered, .splat(std.math.minInt(i32)));
+            return .{ .keys = keys, .words = keys.toArray() };
+        }
+
+        /// How many are farther than this one, which is met.
+        pub inline fn farther(ranks: *const @This(), child: usize) usize {
+            return ranks.keys.gt(.splat(ranks.words[child])).popCount();
+        }
+    };
+}
+
+/// Pushes the children in `met` in the order of `Ranks`. Returns the new count.
 pub inline fn push(
     comptime Lanes: type,
     node: *const world_file.Node(Lanes.count),
@@ -26,18 +49,13 @@ pub inline fn push(
     entries: []Entry,
     entry_count: usize,
 ) usize {
-    const I32 = Lanes.I32;
     const nears = near.toArray();
-    // No two alike: the last bits are the child's number.
-    const numbered = near.bitcast().bitAnd(.splat(-Lanes.count)).bitOr(.iota());
-    const keys: I32 = .select(met, numbered, .splat(std.math.minInt(i32)));
-    const words = keys.toArray();
+    const ranks: Ranks(Lanes) = .of(met, near);
     var rest = met.bits();
     const count = entry_count + @popCount(rest);
     while (rest != 0) : (rest &= rest - 1) {
         const child = @ctz(rest);
-        const farther = keys.gt(.splat(words[child])).popCount();
-        entries[entry_count + farther] = entryOf(node, child, &nears);
+        entries[entry_count + ranks.farther(child)] = entryOf(node, child, &nears);
     }
     return count;
 }

@@ -120,20 +120,17 @@ fn Search(comptime Kernel: type) type {
             }
         }
 
-        /// Rays of a set without a beam, block by block.
+        /// Rays of a set without a beam.
         fn apart(search: *Self, members: *const Members) void {
-            const count = Kernel.block_groups;
-            for (members, 0..) |block, index| {
-                if (block == 0) continue;
-                const groups = search.bundle.groups[index * count ..][0..count];
-                var active_before: [count]Mask = undefined;
-                for (&active_before, groups, index * count..) |*mask, *group, at| {
-                    mask.* = group.active;
-                    group.active = Points.groupOf(members, at);
-                }
-                interval.trace(Kernel, .any, search.world, groups, &search.credit, search.counts);
-                for (active_before, groups) |mask, *group| group.active = mask;
+            const groups = &search.bundle.groups;
+            var active_before: [Kernel.group_count]Mask = undefined;
+            for (&active_before, groups, 0..) |*mask, *group, at| {
+                mask.* = group.active;
+                group.active = Points.groupOf(members, at);
             }
+            const bundle = search.bundle;
+            interval.trace(Kernel, .any, search.world, bundle, &search.credit, search.counts);
+            for (active_before, groups) |mask, *group| group.active = mask;
         }
 
         fn travel(search: *Self, members: *const Members) void {

@@ -1,0 +1,195 @@
+//! One ray as the lanes of a tree meet it: against all boxes of a node, all triangles of a block.
+//!
+//! In: a ray of a group. Out: which children it enters; its nearest hit. It is kept as plain
+//! numbers: little is copied to make it, and a load puts a number into all lanes where a test wants
+//! it. Which hit wins does not depend on the order of the tests (ray.zig), nor does culling change
+//! it (box.zig; `World.fused_reach` for the rounding of multiply-adds).
+
+const world_file = @import("../world.zig");
+const TestCounts = @import("../statistics.zig").TestCounts;
+const ray_file = @import("ray.zig");
+const box = @import("box.zig");
+const packet = @import("packet.zig");
+const triangle = @import("triangle.zig");
+const walk = @import("walk.zig");
+
+/// A ray and the nearest hit so far.
+pub fn Lone(comptime Kernel: type) type {
+    const Boxes = Kernel.Boxes;
+    const F32 = Boxes.F32;
+    const width = Kernel.width;
+    return struct {
+        /// See `ray.Slabs.direction_inv`.
+        inverse: [3]f32,
+        /// What a bound has added after it is multiplied, or if not fused, subtracted before.
+        shift: [3]f32,
+        /// Where the rows of `Node.bounds` that are the near faces begin, and the far.
+        near_at: [3]u32,
+        far_at: [3]u32,
+        /// The longest axis; `View` for what is turned by it.
+        axis: u32,
+        turned_origin: [3]f32,
+        turned_inverse: [3]f32,
+        shear: [3]f32,
+        after_t: f32,
+        after_primitive: i32,
+        skip: i32,
+        /// t of the nearest hit so far, or what is the limit without any.
+        limit: f32,
+        nearest_primitive: i32,
+
+        const Self = @This();
+        const Node = world_file.Node(width);
+        const Block = world_file.TriangleBlock(width);
+
+        /// The ray in one lane of a group. With `fused`, nodes are tested by multiply-adds: it has
+        /// to start within `World.fused_reach`.
+        pub inline fn of(
+            comptime Rays: type,
+            comptime fused: bool,
+            group: *const ray_file.Ray(Rays),
+            view: *const packet.GroupView(Rays),
+            lane: usize,
+        ) Self {
+            const inverse = view.slabs.direction_inv.lane(lane);
+            var near_at: [3]u32 = undefined;
+            var far_at: [3]u32 = undefined;
+            for (&near_at, &far_at, inverse, 0..) |*near, *far, component, row| {
+                const down = (@as(u32, @bitCast(component)) >> 31) * (3 * width);
+                near.* = @as(u32, @intCast(row)) * width + down;
+                far.* = @as(u32, @intCast(row + 3)) * width - down;
+            }
+            return .{
+                .inverse = inverse,
+                .shift = (if (fused) view.shift else group.line.origin).lane(lane),
+                .near_at = near_at,
+                .far_at = far_at,
+                .axis = view.uniform orelse view.axis.ofLane(lane),
+                .turned_origin = view.view.origin.lane(lane),
+                .turned_inverse = view.view.direction_inv.lane(lane),
+                .shear = view.view.shear.lane(lane),
+                .after_t = group.after.t.lane(lane),
+                .after_primitive = group.after.primitive.lane(lane),
+                .skip = group.skip.lane(lane),
+                .limit = group.nearest.t.lane(lane),
+                .nearest_primitive = group.nearest.primitive.lane(lane),
+            };
+        }
+
+        /// What nodes are tested against, in lanes.
+        pub const Slabs = struct {
+            inverse: [3]F32,
+            shift: [3]F32,
+            near_at: [3]usize,
+            far_at: [3]usize,
+            after_t: F32,
+
+            /// Where the ray is within the children's boxes, up to `limit`: met where a child may
+            /// hold a hit. `fused` as in `of`.
+            pub inline fn meet(
+                slabs: *const Slabs,
+                comptime fused: bool,
+                node: *const Node,
+                limit: f32,
+                counts: *TestCounts,
+            ) box.Range(Boxes) {
+                walk.countNode(Kernel, node, counts);
+                var near: [3]F32 = undefined;
+                var far: [3]F32 = undefined;
+                inline for (0..3) |axis| {
+                    near[axis] = slabs.along(fused, axis, facesFrom(node, slabs.near_at[axis]));
+                    far[axis] = slabs.along(fused, axis, facesFrom(node, slabs.far_at[axis]));
+                }
+                return box.between(Boxes, near, far, slabs.after_t, .splat(limit));
+            }
+
+            inline fn along(
+                slabs: *const Slabs,
+                comptime fused: bool,
+                comptime axis: usize,
+                bound: F32,
+            ) F32 {
+                const inverse = slabs.inverse[axis];
+                const shift = slabs.shift[axis];
+                return if (fused) bound.mulAdd(inverse, shift) else bound.sub(shift).mul(inverse);
+            }
+        };
+
+        /// Puts into lanes what nodes are tested against.
+        pub inline fn slabsOf(ray: *const Self) Slabs {
+            var slabs: Slabs = undefined;
+            inline for (0..3) |axis| {
+                slabs.inverse[axis] = .splat(ray.inverse[axis]);
+                slabs.shift[axis] = .splat(ray.shift[axis]);
+                slabs.near_at[axis] = ray.near_at[axis];
+                slabs.far_at[axis] = ray.far_at[axis];
+            }
+            slabs.after_t = .splat(ray.after_t);
+            return slabs;
+        }
+
+        /// One row of `Node.bounds`; `at` is in `near_at` or `far_at`.
+        pub inline fn facesFrom(node: *const Node, at: usize) F32 {
+            const bounds: *const [6 * width]f32 = @ptrCast(&node.bounds);
+            return .load(bounds[at..][0..width]);
+        }
+
+        /// Tests the triangles of a block and keeps the nearest hit. Returns whether there was one.
+        pub inline fn intersect(ray: *Self, block: *const Block, pad: f32, counts: *TestCounts) bool {
+            @setEvalBranchQuota(4000); // For what is inlined here.
+            walk.countBlock(Kernel, block, counts);
+            const inverse: Boxes.Vec3 = .splat(ray.turned_inverse);
+            const zero: F32 = .zero();
+            const view: ray_file.View(Boxes) = .{
+                .origin = .splat(ray.turned_origin),
+                .direction_inv = inverse,
+                .negative = .{ inverse.x.lt(zero), inverse.y.lt(zero), inverse.z.lt(zero) },
+                .shear = .splat(ray.shear),
+            };
+            const corners = loadCorners(Boxes, block, @intCast(ray.axis));
+            const seen = triangle.project(Boxes, corners, &view);
+            var weights = triangle.weigh(Boxes, seen);
+            const primitive: Boxes.I32 = .load(@ptrCast(&block.primitive));
+            const there = primitive.gt(.splat(ray_file.no_primitive));
+            if (weights.mayAgree().bitAnd(there).none()) return false;
+            const agreeing = weights.agree().bitAnd(there);
+            const inside = triangle.settle(Boxes, seen, &weights, agreeing);
+            const hit = triangle.locate(Boxes, seen, weights, corners, &view, pad);
+            const after: ray_file.Hit(Boxes) =
+                .{ .t = .splat(ray.after_t), .primitive = .splat(ray.after_primitive) };
+            const nearest: ray_file.Hit(Boxes) =
+                .{ .t = .splat(ray.limit), .primitive = .splat(ray.nearest_primitive) };
+            const accepted = inside.bitAnd(hit.mask)
+                .bitAnd(after.isBefore(hit.t, primitive))
+                .bitAnd(nearest.isAfter(hit.t, primitive))
+                .andNot(primitive.eq(.splat(ray.skip)));
+            var bits = accepted.bits();
+            if (bits == 0) return false;
+            const ts = hit.t.toArray();
+            while (bits != 0) : (bits &= bits - 1) {
+                const lane = @ctz(bits);
+                const number: i32 = @bitCast(block.primitive[lane]);
+                const closer = ts[lane] < ray.limit or
+                    (ts[lane] == ray.limit and number < ray.nearest_primitive);
+                if (closer) {
+                    ray.limit = ts[lane];
+                    ray.nearest_primitive = number;
+                }
+            }
+            return true;
+        }
+    };
+}
+
+/// The corners of a block's triangles in lanes, turned so that `axis` is z.
+inline fn loadCorners(comptime Boxes: type, block: anytype, axis: u2) [3]Boxes.Vec3 {
+    var corners: [3]Boxes.Vec3 = undefined;
+    inline for (&corners, &block.corner) |*corner, *components| {
+        corner.* = .{
+            .x = .load(&components[ray_file.turnedIndex(axis, 0)]),
+            .y = .load(&components[ray_file.turnedIndex(axis, 1)]),
+            .z = .load(&components[axis]),
+        };
+    }
+    return corners;
+}

@@ -1,0 +1,224 @@
+//! Rays that have little in common through the tree together, as a set.
+//!
+//! In: rays of a bundle that found no company. Out: their hits, in the bundle. Each is tested by
+//! itself against all boxes of a node, one ray right after the other, and those that enter a child
+//! go on to it as a set. What a ray by itself waits for, a node from memory, the end of a chain of
+//! arithmetic, a branch on how many children it enters, all share. A set of one ray goes on as rays
+//! without company do (single.zig).
+//!
+//! J. Tsakok, "Faster Incoherent Rays: Multi-BVH Ray Stream Tracing" (2009), section 3, with sets
+//! as bits, not lists.
+
+const std = @import("std");
+const world_file = @import("../world.zig");
+const TestCounts = @import("../statistics.zig").TestCounts;
+const ray_file = @import("ray.zig");
+const lone = @import("lone.zig");
+const packet = @import("packet.zig");
+const single = @import("single.zig");
+const stack_file = @import("stack.zig");
+const walk = @import("walk.zig");
+const assert = std.debug.assert;
+const Query = walk.Query;
+const World = world_file.World;
+
+/// Rays of a set, a bit each.
+const Set = u64;
+const rays_max = @bitSizeOf(Set);
+/// A lane holds a word of a set.
+const word_bits = 32;
+const word_count = rays_max / word_bits;
+
+/// Collects the rays of a bundle.
+pub fn Stream(comptime Kernel: type, comptime query: Query) type {
+    const Boxes = Kernel.Boxes;
+    const Rays = Kernel.Rays;
+    const F32 = Boxes.F32;
+    const I32 = Boxes.I32;
+    const Lone = lone.Lone(Kernel);
+    return struct {
+        world: *const World,
+        bundle: *packet.Bundle(Kernel),
+        rays: [rays_max]Lone,
+        places: [rays_max]Place,
+        count: usize,
+        /// Those that have a hit.
+        found: Set,
+
+        const Self = @This();
+        const Node = world_file.Node(Kernel.width);
+        const Block = world_file.TriangleBlock(Kernel.width);
+        /// Where in the bundle a ray is.
+        const Place = struct { group: u32, lane: u32 };
+        /// A child still to be visited, and by whom.
+        const Entry = struct { child: world_file.Child, near: f32, set: Set };
+
+        /// For rays of this bundle. In place: it is too large to be handed around.
+        pub fn init(
+            stream: *Self,
+            world: *const World,
+            bundle: *packet.Bundle(Kernel),
+        ) void {
+            stream.world = world;
+            stream.bundle = bundle;
+            stream.count = 0;
+            stream.found = 0;
+        }
+
+        /// Takes the active rays of some groups, of which `views` are the views, from the given one
+        /// of the bundle on. Hits may be kept now or later; see `finish`.
+        pub fn take(
+            stream: *Self,
+            first_group: usize,
+            views: []const packet.GroupView(Rays),
+            counts: *TestCounts,
+        ) void {
+            const groups = stream.bundle.groups[first_group..][0..views.len];
+            for (groups, views, first_group..) |*group, *view, number| {
+                if (group.active.none()) continue;
+                const origin = group.line.origin.abs();
+                const reach = origin.x.max(origin.y).max(origin.z);
+                const near = group.active.bitAnd(reach.lt(.splat(stream.world.fused_reach)));
+                var bits = near.bits();
+                while (bits != 0) : (bits &= bits - 1) {
+                    if (stream.count == rays_max) stream.finish(counts);
+                    const lane = @ctz(bits);
+                    stream.rays[stream.count] = .of(Rays, true, group, view, lane);
+                    stream.places[stream.count] = .{ .group = @intCast(number), .lane = lane };
+                    stream.count += 1;
+                }
+                const far = group.active.andNot(near);
+                if (far.none()) continue;
+                group.active = far;
+                single.traceEach(Kernel, query, stream.world, group, view, counts);
+            }
+        }
+
+        /// Traces all rays that were taken and keeps their hits.
+        pub fn finish(stream: *Self, counts: *TestCounts) void {
+            if (stream.count == 0) return;
+            stream.travel(counts);
+            var rest = stream.found;
+            while (rest != 0) : (rest &= rest - 1) {
+                const ray = &stream.rays[@ctz(rest)];
+                const place = stream.places[@ctz(rest)];
+                const nearest = &stream.bundle.groups[place.group].nearest;
+                var ts = nearest.t.toArray();
+                var primitives = nearest.primitive.toArray();
+                ts[place.lane] = ray.limit;
+                primitives[place.lane] = ray.nearest_primitive;
+                nearest.* = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };
+            }
+            stream.count = 0;
+            stream.found = 0;
+        }
+
+        fn travel(stream: *Self, counts: *TestCounts) void {
+            const tree = stream.world.tree.get(Kernel.width);
+            var entries: [Kernel.stack_max]Entry = undefined;
+            entries[0] = .{
+                .child = .root,
+                .near = 0,
+                .set = @as(Set, std.math.maxInt(Set)) >> @intCast(rays_max - stream.count),
+            };
+            var entry_count: usize = 1;
+            while (entry_count > 0) {
+                entry_count -= 1;
+                const entry = &entries[entry_count];
+                const set = if (query == .any) entry.set & ~stream.found else entry.set;
+                if (set == 0) continue;
+                if (set & (set - 1) == 0) {
+                    const start: stack_file.Entry = .{ .child = entry.child, .near = entry.near };
+                    stream.goAlone(@ctz(set), start, counts);
+                } else if (entry.child.block_count > 0) {
+                    const first, const end = entry.child.blocks();
+                    stream.intersect(set, tree.blocks[first..end], counts);
+                } else {
+                    assert(entry_count + Kernel.width <= Kernel.stack_max);
+                    const node = &tree.nodes[entry.child.target];
+                    entry_count = stream.enter(set, node, &entries, entry_count, counts);
+                }
+            }
+        }
+
+        inline fn goAlone(
+            stream: *Self,
+            number: usize,
+            start: stack_file.Entry,
+            counts: *TestCounts,
+        ) void {
+            const ray = &stream.rays[number];
+            if (start.near > ray.limit) return;
+            const tree = stream.world.tree.get(Kernel.width);
+            var search: single.Search(Kernel, query, true) = .of(ray, stream.world.pad);
+            if (walk.walk(Kernel, tree, start, &search, counts)) stream.keep(number);
+        }
+
+        /// A ray of the set after the other against the triangles of a leaf.
+        inline fn intersect(
+            stream: *Self,
+            set: Set,
+            blocks: []const Block,
+            counts: *TestCounts,
+        ) void {
+            var rest = set;
+            while (rest != 0) : (rest &= rest - 1) {
+                const number = @ctz(rest);
+                const ray = &stream.rays[number];
+                for (blocks) |*block| {
+                    if (ray.intersect(block, stream.world.pad, counts)) stream.keep(number);
+                }
+            }
+        }
+
+        inline fn keep(stream: *Self, number: usize) void {
+            stream.found |= @as(Set, 1) << @intCast(number);
+        }
+
+        /// Pushes the children that rays of the set enter, the one that any of them enters first on
+        /// top. Returns the new count.
+        inline fn enter(
+            stream: *const Self,
+            set: Set,
+            node: *const Node,
+            entries: []Entry,
+            entry_count: usize,
+            counts: *TestCounts,
+        ) usize {
+            const inf: F32 = .splat(std.math.inf(f32));
+            var near = inf;
+            // By child, whose rays they are.
+            var words: [word_count]I32 = undefined;
+            inline for (&words, 0..) |*word, index| {
+                word.* = .zero();
+                var rest: u32 = @truncate(set >> index * word_bits);
+                while (rest != 0) : (rest &= rest - 1) {
+                    const ray = &stream.rays[index * word_bits + @ctz(rest)];
+                    const range = ray.slabsOf().meet(true, node, ray.limit, counts);
+                    const met = range.isMet();
+                    near = near.minFast(.select(met, range.near, inf));
+                    const bit: i32 = @bitCast(rest & (~rest + 1));
+                    word.* = word.bitOr(.select(met, .splat(bit), .zero()));
+                }
+            }
+            const met = near.lt(inf);
+            var sets: [word_count][Kernel.width]i32 = undefined;
+            for (&sets, words) |*array, word| array.* = word.toArray();
+            const nears = near.toArray();
+            const ranks: stack_file.Ranks(Boxes) = .of(met, near);
+            var rest = met.bits();
+            const count = entry_count + @popCount(rest);
+            while (rest != 0) : (rest &= rest - 1) {
+                const child = @ctz(rest);
+                var entered: Set = 0;
+                for (sets, 0..) |array, index| {
+                    const word: Set = @as(u32, @bitCast(array[child]));
+                    entered |= word << @intCast(index * word_bits);
+                }
+                entries[entry_count + ranks.farther(child)] =
+                    .{ .child = node.child[child], .near = nears[child], .set = entered };
+            }
+            return count;
+        }
+    };
+}
