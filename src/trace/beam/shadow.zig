@@ -27,11 +27,13 @@ const block_count = kernel_file.beam_blocks;
 
 /// Cuts of a beam at most, one after the other.
 const cut_depth_max = 1;
-/// Blocks of triangles that a beam may meet before its rays go on without it: so much work as the
-/// rays of a tile would have by themselves, of which a part does not depend on the lanes.
-fn meetingMax(comptime lanes: u32) u32 {
-    return 30 + 240 / lanes;
+/// What a beam may cost, in blocks of triangles, before its rays go on without it: as much as they
+/// would by themselves.
+inline fn costMax(comptime lanes: u32, ray_count: u32) u32 {
+    return 60 + 2 * lanes + ray_count / 3;
 }
+/// Blocks that a child on the stack stands for: how many wait tells early how wide a beam is.
+const waiting_cost = 8;
 /// Beams of fewer rays are not worth their set-up.
 const beam_rays_min = 8;
 /// With no more blocks than this, triangles are not tested against each of them first.
@@ -138,7 +140,8 @@ fn Search(comptime Kernel: type) type {
             var entries: [Kernel.stack_max]stack.Entry = undefined;
             entries[0] = .{ .child = .root, .near = -inf };
             var entry_count: usize = 1;
-            var meeting_count: u32 = 0;
+            var met_count: u32 = 0;
+            const cost_max = costMax(width, Points.rayCount(members));
             while (entry_count > 0 and search.points.live != 0) {
                 entry_count -= 1;
                 const child = entries[entry_count].child;
@@ -150,8 +153,8 @@ fn Search(comptime Kernel: type) type {
                         .pushChildren(node, search.points.bounds.depth, &entries, entry_count);
                     continue;
                 }
-                meeting_count += child.block_count;
-                if (meeting_count > meetingMax(width)) {
+                met_count += child.block_count;
+                if (met_count + waiting_cost * entry_count > cost_max) {
                     return search.apart(&search.points.left(members));
                 }
                 const first, const end = child.blocks();
