@@ -135,7 +135,12 @@ pub fn Lone(comptime Kernel: type) type {
         }
 
         /// Tests the triangles of a block and keeps the nearest hit. Returns whether there was one.
-        pub inline fn intersect(ray: *Self, block: *const Block, pad: f32, counts: *TestCounts) bool {
+        pub inline fn intersect(
+            ray: *Self,
+            block: *const Block,
+            pad: f32,
+            counts: *TestCounts,
+        ) bool {
             @setEvalBranchQuota(4000); // For what is inlined here.
             walk.countBlock(Kernel, block, counts);
             const inverse: Boxes.Vec3 = .splat(ray.turned_inverse);
