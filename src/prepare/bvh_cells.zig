@@ -28,7 +28,7 @@ pub const reference_count_min = 16_384;
 
 /// References to a cell of the whole grid, of which a scene of surfaces fills few.
 const references_per_cell = 32;
-const cell_bits_max = 14;
+const cell_bits_max = 16;
 
 /// Parts of the references that are counted apart.
 const chunk_count_max = 64;
