@@ -1,10 +1,11 @@
 //! A few rays through the tree as one: intervals that hold them all against boxes, then those that
 //! enter a leaf against the triangles that are left there.
 //!
-//! In: the rays of a block of 4x4 pixels, by whatever way they came there. Out: the nearest hit of
-//! each, or whether there is any. The first ray takes with it those that go much the same way from
-//! much the same place, in the same octant, since intervals of inverse directions of both signs say
-//! nothing; then the next that is left. Who finds little company goes alone.
+//! In: the rays of a bundle, by whatever way they came there. Out: the nearest hit of each, or
+//! whether there is any. Company is found within blocks of 4x4 pixels: the first ray takes with it
+//! those that go much the same way from much the same place, in the same octant, since intervals of
+//! inverse directions of both signs say nothing; then the next that is left. Who finds little
+//! company goes as one of a set (stream.zig).
 //!
 //! Every step of the slab test is monotone in origin, inverse and bound, rounding included. So from
 //! the ends of intervals come bounds of what the test gives for any ray between, and nothing is
@@ -25,7 +26,7 @@ const walk = @import("walk.zig");
 const Query = walk.Query;
 const World = world_file.World;
 
-/// Fewer rays go alone.
+/// Fewer rays are no company.
 const rays_min = 4;
 /// How far apart the directions of rays are that go together, over their length, and the origins,
 /// over the size of the scene. Both are rough: what they let through costs little more than single
@@ -35,8 +36,8 @@ const direction_apart_max = 0.06;
 const origin_apart_max = 0.01;
 
 /// Whether shadow rays do well in company: every node that a company visits earns a little, every
-/// child that its intervals meet though none of its rays enters it costs as much. Once all is
-/// spent, rays go alone. One for a bundle: its rays are much alike in this.
+/// child that its intervals meet though none of its rays enters it costs twice as much. Once all is
+/// spent, rays go without. One for a bundle: its rays are much alike in this.
 pub const Credit = struct {
     /// What is left; what there is at first lets a company see a few nodes.
     balance: i32 = 16,
