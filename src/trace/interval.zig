@@ -393,11 +393,10 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         ) bool {
             var near: [3]f32 = undefined;
             var far: [3]f32 = undefined;
-            const bounds: *const [6 * Kernel.width]f32 = @ptrCast(&node.bounds);
             const guide = &search.guide;
             for (&near, &far, guide.near_at, guide.far_at) |*first, *last, near_at, far_at| {
-                first.* = bounds[near_at + child];
-                last.* = bounds[far_at + child];
+                first.* = Lone.rowFrom(node, near_at)[child];
+                last.* = Lone.rowFrom(node, far_at)[child];
             }
             for (0..Kernel.block_groups) |index| {
                 if (search.entering(index, near, far, counts).any()) return true;

@@ -23,7 +23,7 @@ pub fn Lone(comptime Kernel: type) type {
         inverse: [3]f32,
         /// What a bound has added after it is multiplied, or if not fused, subtracted before.
         shift: [3]f32,
-        /// Where the rows of `Node.bounds` that are the near faces begin, and the far.
+        /// Where the rows of `Node.bounds` that are the near faces begin, and the far, in bytes.
         near_at: [3]u32,
         far_at: [3]u32,
         /// The longest axis; `View` for what is turned by it.
@@ -39,6 +39,7 @@ pub fn Lone(comptime Kernel: type) type {
         nearest_primitive: i32,
 
         const Self = @This();
+        const row_bytes = width * @sizeOf(f32);
         const Node = world_file.Node(width);
         const Block = world_file.TriangleBlock(width);
 
@@ -55,9 +56,9 @@ pub fn Lone(comptime Kernel: type) type {
             var near_at: [3]u32 = undefined;
             var far_at: [3]u32 = undefined;
             for (&near_at, &far_at, inverse, 0..) |*near, *far, component, row| {
-                const down = (@as(u32, @bitCast(component)) >> 31) * (3 * width);
-                near.* = @as(u32, @intCast(row)) * width + down;
-                far.* = @as(u32, @intCast(row + 3)) * width - down;
+                const down = (@as(u32, @bitCast(component)) >> 31) * (3 * row_bytes);
+                near.* = @as(u32, @intCast(row)) * row_bytes + down;
+                far.* = @as(u32, @intCast(row + 3)) * row_bytes - down;
             }
             return .{
                 .inverse = inverse,
@@ -130,8 +131,13 @@ pub fn Lone(comptime Kernel: type) type {
 
         /// One row of `Node.bounds`; `at` is in `near_at` or `far_at`.
         pub inline fn facesFrom(node: *const Node, at: usize) F32 {
-            const bounds: *const [6 * width]f32 = @ptrCast(&node.bounds);
-            return .load(bounds[at..][0..width]);
+            return .load(rowFrom(node, at));
+        }
+
+        /// The same by child.
+        pub inline fn rowFrom(node: *const Node, at: usize) *const [width]f32 {
+            const bounds: [*]const u8 = @ptrCast(&node.bounds);
+            return @ptrCast(@alignCast(bounds + at));
         }
 
         /// Tests the triangles of a block and keeps the nearest hit. Returns whether there was one.
