@@ -155,6 +155,9 @@ fn sameSurface(
             return B == @field(BackendOf(b_backend), lane_type)(4);
         }
     }
+    if (@typeInfo(A) == .pointer and @typeInfo(B) == .pointer) {
+        return sameSurface(a_backend, std.meta.Child(A), b_backend, std.meta.Child(B));
+    }
     if (@typeInfo(A) != .@"fn" or @typeInfo(B) != .@"fn") return false;
     const a_fn = @typeInfo(A).@"fn";
     const b_fn = @typeInfo(B).@"fn";

@@ -495,6 +495,7 @@ fn checkMoves(comptime L: type) anyerror!void {
     try expect(numbers.eq(.iota()).all());
     try expect(numbers.toI32().eq(.iota()).all());
     try expect(numbers.extract(n - 1) == n - 1 and numbers.lane(n - 1) == n - 1);
+    try expect(numbers.laneIn(n - 1) == n - 1 and numbers.laneIn(0) == 0);
     numbers.add(.splat(1)).storeAligned(floats[0..n]);
     try expect(floats[0] == 1 and floats[n - 1] == n and L.F32.zero().eq(.splat(-0.0)).all());
 

@@ -71,6 +71,14 @@ pub fn Moves(comptime Self: type, comptime Element: type, comptime lanes: compti
             return a.toArray()[index];
         }
 
+        /// The same of a value that lies in memory, of which nothing else is read.
+        pub inline fn laneIn(a: *const Self, index: usize) Element {
+            comptime assert(@sizeOf(Self) == lanes * @sizeOf(Element));
+            assert(index < lanes);
+            const elements: *const [lanes]Element = @ptrCast(a);
+            return elements[index];
+        }
+
         const ascending: [lanes]Element = numbers: {
             var array: [lanes]Element = undefined;
             for (&array, 0..) |*element, index| element.* = index;

@@ -33,6 +33,7 @@ pub fn F32x(comptime lanes: comptime_int) type {
         pub const storeAligned = moves.storeAligned;
         pub const extract = moves.extract;
         pub const lane = moves.lane;
+        pub const laneIn = moves.laneIn;
         pub const gt = floats.gt;
         pub const ge = floats.ge;
         pub const reduceSum = floats.reduceSum;
@@ -258,6 +259,7 @@ pub fn I32x(comptime lanes: comptime_int) type {
         pub const storeAligned = moves.storeAligned;
         pub const extract = moves.extract;
         pub const lane = moves.lane;
+        pub const laneIn = moves.laneIn;
         pub const gt = integers.gt;
         pub const bitcast = integers.bitcast;
         pub const gather = integers.gather;

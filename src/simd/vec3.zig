@@ -106,5 +106,10 @@ pub fn Vec3x(comptime F32: type, comptime Mask: type) type {
         pub inline fn lane(a: Self, lane_index: usize) [3]f32 {
             return .{ a.x.lane(lane_index), a.y.lane(lane_index), a.z.lane(lane_index) };
         }
+
+        /// The same of a vector that lies in memory, of which nothing else is read.
+        pub inline fn laneIn(a: *const Self, lane_index: usize) [3]f32 {
+            return .{ a.x.laneIn(lane_index), a.y.laneIn(lane_index), a.z.laneIn(lane_index) };
+        }
     };
 }

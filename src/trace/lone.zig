@@ -52,7 +52,7 @@ pub fn Lone(comptime Kernel: type) type {
             view: *const packet.GroupView(Rays),
             lane: usize,
         ) Self {
-            const inverse = view.slabs.direction_inv.lane(lane);
+            const inverse = view.slabs.direction_inv.laneIn(lane);
             var near_at: [3]u32 = undefined;
             var far_at: [3]u32 = undefined;
             for (&near_at, &far_at, inverse, 0..) |*near, *far, component, row| {
@@ -62,18 +62,18 @@ pub fn Lone(comptime Kernel: type) type {
             }
             return .{
                 .inverse = inverse,
-                .shift = (if (fused) view.shift else group.line.origin).lane(lane),
+                .shift = (if (fused) &view.shift else &group.line.origin).laneIn(lane),
                 .near_at = near_at,
                 .far_at = far_at,
                 .axis = view.uniform orelse view.axis.ofLane(lane),
-                .turned_origin = view.view.origin.lane(lane),
-                .turned_inverse = view.view.direction_inv.lane(lane),
-                .shear = view.view.shear.lane(lane),
-                .after_t = group.after.t.lane(lane),
-                .after_primitive = group.after.primitive.lane(lane),
-                .skip = group.skip.lane(lane),
-                .limit = group.nearest.t.lane(lane),
-                .nearest_primitive = group.nearest.primitive.lane(lane),
+                .turned_origin = view.view.origin.laneIn(lane),
+                .turned_inverse = view.view.direction_inv.laneIn(lane),
+                .shear = view.view.shear.laneIn(lane),
+                .after_t = group.after.t.laneIn(lane),
+                .after_primitive = group.after.primitive.laneIn(lane),
+                .skip = group.skip.laneIn(lane),
+                .limit = group.nearest.t.laneIn(lane),
+                .nearest_primitive = group.nearest.primitive.laneIn(lane),
             };
         }
 
