@@ -67,25 +67,23 @@ fn traceLane(
 ) ?Found {
     const start = group.line.origin.lane(lane);
     const reach = @max(@abs(start[0]), @abs(start[1]), @abs(start[2]));
-    return if (reach < world.fused_reach)
-        travel(Kernel, query, true, Rays, world, group, view, lane, counts)
-    else
-        travel(Kernel, query, false, Rays, world, group, view, lane, counts);
+    if (reach < world.fused_reach) {
+        var ray: lone.Lone(Kernel) = .of(Rays, true, group, view, lane);
+        return travel(Kernel, query, true, world, &ray, counts);
+    }
+    var ray: lone.Lone(Kernel) = .of(Rays, false, group, view, lane);
+    return travel(Kernel, query, false, world, &ray, counts);
 }
 
 inline fn travel(
     comptime Kernel: type,
     comptime query: Query,
     comptime fused: bool,
-    comptime Rays: type,
     world: *const World,
-    group: *const ray_file.Ray(Rays),
-    view: *const packet.GroupView(Rays),
-    lane: usize,
+    ray: *lone.Lone(Kernel),
     counts: *TestCounts,
 ) ?Found {
-    var ray: lone.Lone(Kernel) = .of(Rays, fused, group, view, lane);
-    var search: Search(Kernel, query, fused) = .of(&ray, world.pad);
+    var search: Search(Kernel, query, fused) = .of(ray, world.pad);
     if (!walk.walk(Kernel, world.tree.get(Kernel.width), .whole, &search, counts)) return null;
     return .{ .t = ray.limit, .primitive = ray.nearest_primitive };
 }
