@@ -1,4 +1,4 @@
-//! Many triangles -> a few thousand cells of a grid.
+//! Many triangles -> some thousand cells of a grid.
 //!
 //! In: triangles and the bounds of their middles. Out: the cells that hold some, each with its box,
 //! then references in whatever order of the cells the caller comes to, cell by cell. A tree over

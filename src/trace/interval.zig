@@ -87,10 +87,9 @@ fn traceBlock(
     const groups = stream.bundle.groups[first_group..][0..Kernel.block_groups];
     var active: [Kernel.block_groups]Rays.Mask = undefined;
     var views: [Kernel.block_groups]packet.GroupView(Rays) = undefined;
-    for (&active, &views, groups) |*mask, *view, *group| {
-        mask.* = group.active;
-        view.* = packet.viewOf(Rays, group);
-    }
+    for (&active, groups) |*mask, *group| mask.* = group.active;
+    if (firstOf(Rays, &active) == null) return;
+    for (&views, groups) |*view, *group| view.* = packet.viewOf(Rays, group);
     var rest = active;
     while (credit.lasts()) {
         const first = firstOf(Rays, &rest) orelse break;

@@ -66,7 +66,8 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
         }
 
         /// Takes the active rays of some groups, of which `views` are the views, from the given one
-        /// of the bundle on. Hits may be kept now or later; see `finish`.
+        /// of the bundle on. Hits may be kept now or later, see `finish`; which rays are active is
+        /// for the caller to set again.
         pub fn take(
             stream: *Self,
             first_group: usize,

@@ -4,8 +4,8 @@
 //! Out: which of them meet anything. A beam is a set of rays, which end in points on a plane
 //! (points.zig), and is cut in two where depth jumps. On the same plane triangles have footprints
 //! (footprint.zig), which are tested against blocks of 4x4 pixels, then against the points in them.
-//! A beam that meets too many blocks of triangles, or has few rays, leaves them to find company by
-//! block (interval.zig). In doubt, the exact test decides.
+//! A beam that is too wide, by the triangles it meets and has still to visit, or has few rays,
+//! leaves them to find company (interval.zig). In doubt, the exact test decides.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
