@@ -27,6 +27,7 @@ pub fn build(b: *std.Build) void {
         .run = b.step("run", "Render: zig build run -- SCENE [-o OUT]"),
         .@"test" = b.step("test", "Run all tests, here and under qemu, and count them"),
         .test_unit = b.step("test:unit", "Run the unit tests of this machine"),
+        .test_integration = b.step("test:integration", "Run its tests of rays and pictures"),
         .test_fmt = b.step("test:fmt", "Check the formatting"),
         .test_tidy = b.step("test:tidy", "Check the style of the source tree"),
         .test_report = b.step("test:report", "Test the report of the benchmark"),
@@ -78,7 +79,7 @@ pub fn build(b: *std.Build) void {
     };
     const targets = test_packages.targets(query);
     tests.addAll(steps.@"test", targets);
-    tests.addUnit(steps.test_unit, targets[0]);
+    tests.addHere(steps.test_unit, steps.test_integration, targets[0]);
     tests.addFormat(steps.test_fmt);
     tests.addTidy(steps.test_tidy);
     tests.addReport(steps.test_report);

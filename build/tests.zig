@@ -64,9 +64,16 @@ pub fn addAll(tests: Tests, step: *std.Build.Step, targets: []const Target) void
     tests.close(step, logs.items, .with_sources);
 }
 
-/// Makes `step` run the unit tests of `target`.
-pub fn addUnit(tests: Tests, step: *std.Build.Step, target: Target) void {
-    tests.close(step, &.{tests.unit(target)}, .with_sources);
+/// Makes the steps run the unit tests of `target`, and those of traversal against brute force and
+/// of whole pictures.
+pub fn addHere(
+    tests: Tests,
+    unit_step: *std.Build.Step,
+    integration_step: *std.Build.Step,
+    target: Target,
+) void {
+    tests.close(unit_step, &.{tests.unit(target)}, .with_sources);
+    tests.close(integration_step, &.{tests.integration(target)}, .logs_only);
 }
 
 /// Makes `step` check the formatting.

@@ -1,8 +1,8 @@
 //! Beams against brute force: their filter must never decide otherwise than the exact test.
 //!
 //! Tiles of primary rays that look at nasty triangles, from far, from near, within their planes;
-//! and shadow rays from what they see to a point light and along a directional one. Every hit is
-//! compared, to the bit.
+//! shadow rays from what they see to a point light and along a directional one; and rays that start
+//! on a plane between, as a mirror makes them. Every hit is compared, to the bit.
 
 const std = @import("std");
 const fixture = @import("fixture.zig");
@@ -71,6 +71,8 @@ fn bundleOf(
         var origin: [3][count]f32 = @splat(@splat(0));
         var direction: [3][count]f32 = @splat(@splat(0));
         var t_max: [count]f32 = @splat(0);
+        var after: [count]f32 = @splat(0);
+        var after_primitive: [count]i32 = @splat(0);
         var skip: [count]i32 = @splat(ray_file.no_primitive);
         var active: [count]bool = @splat(false);
         for (0..count) |lane| {
@@ -82,11 +84,13 @@ fn bundleOf(
                 direction[axis][lane] = query.direction[axis];
             }
             t_max[lane] = query.t_max;
+            after[lane] = query.after.t;
+            after_primitive[lane] = query.after.primitive;
             skip[lane] = query.skip;
         }
         group.* = .{
             .line = .init(vectors(Kernel, origin), vectors(Kernel, direction)),
-            .after = .start(),
+            .after = .{ .t = .fromArray(after), .primitive = .fromArray(after_primitive) },
             .nearest = .before(.fromArray(t_max)),
             .skip = .fromArray(skip),
             .active = .fromArray(active),
@@ -180,7 +184,8 @@ fn expectShadows(
     const expected = hitsOf(world, &queries);
     var bundle = bundleOf(Kernel, &queries);
     var counts: raylane.statistics.TestCounts = .{};
-    raylane.trace.query.trace(Kernel, .any, world, &bundle, .{ .light = &light }, &counts);
+    const all: raylane.trace.query.Part(Kernel) = @splat(.splat(true));
+    raylane.trace.query.any(Kernel, world, &bundle, &light, &all, &counts);
     for (&bundle.groups, 0..) |*group, index| for (0..Kernel.ray_count) |lane| {
         const x = Kernel.pixelX(index, lane);
         const y = Kernel.pixelY(index, lane);
@@ -189,6 +194,127 @@ fn expectShadows(
         const found = group.nearest.primitive.lane(lane) != ray_file.no_primitive;
         try std.testing.expectEqual(blocked, found);
     };
+}
+
+/// What a tile looks like from behind a plane that it meets before, and rays that it is made of.
+const Mirror = struct {
+    /// A point of the plane, and its normal.
+    point: [3]f32,
+    normal: [3]f32,
+    /// How far off starts are, in parts of their distance, and directions, in parts of a step.
+    jitter: f32,
+    kind: Kind,
+
+    const Kind = enum {
+        /// From the plane on; every third ray may meet the triangle that it starts on.
+        plane,
+        /// From the eye, behind what is hit first.
+        rest,
+        /// Two planes, one for each half of the tile, and directions of their own.
+        two,
+    };
+};
+
+fn expectMirror(
+    comptime Kernel: type,
+    world: *const World,
+    grid: *const Grid,
+    mirror: *const Mirror,
+    random: std.Random,
+) !u32 {
+    const vec3 = raylane.math.vec3;
+    const directions = directionsOf(grid);
+    var queries: [side][side]?Query = @splat(@splat(null));
+    for (&queries, directions, 0..) |*row, ways, y| for (row, ways, 0..) |*query, way, x| {
+        if (!isActive(x, y)) continue;
+        const first = soup_file.bruteForce(world, .{ .origin = grid.origin, .direction = way });
+        if (mirror.kind == .rest) {
+            query.* = .{ .origin = grid.origin, .direction = way, .after = first };
+            continue;
+        }
+        const second = mirror.kind == .two and x > side / 2;
+        const distance = vec3.dot(mirror.normal, vec3.sub(mirror.point, grid.origin));
+        const t = distance / vec3.dot(mirror.normal, way) * @as(f32, if (second) 0.5 else 1);
+        if (!(t > 0 and t < 4)) continue;
+        var origin = vec3.add(grid.origin, vec3.scale(way, t));
+        var direction = way;
+        const turned: f32 = if (second) -1 else 1;
+        for (&origin, &direction, 0..) |*from, *to, axis| {
+            from.* += random.floatNorm(f32) * mirror.jitter * t * @abs(to.*);
+            to.* += random.floatNorm(f32) * mirror.jitter * @abs(grid.right[axis]);
+            if (axis == 1) to.* *= turned;
+        }
+        query.* = .{ .origin = origin, .direction = direction };
+        if (x % 3 != 0 and @abs(first.t - t) < 1e-3 * t) query.*.?.skip = first.primitive;
+    };
+    const hits = hitsOf(world, &queries);
+    var bundle = bundleOf(Kernel, &queries);
+    var counts: raylane.statistics.TestCounts = .{};
+    const beams = raylane.trace.query.nearest(Kernel, world, &bundle, null, null, &counts);
+    var beam_count: u32 = 0;
+    for (&bundle.groups, beams, 0..) |*group, beam, index| for (0..Kernel.ray_count) |lane| {
+        const x = Kernel.pixelX(index, lane);
+        const y = Kernel.pixelY(index, lane);
+        try std.testing.expectEqual(queries[y][x] != null, group.active.lane(lane));
+        beam_count += @intFromBool(beam.lane(lane));
+        if (queries[y][x] == null) continue;
+        const t = group.nearest.t.lane(lane);
+        try soup_file.expectHit(hits[y][x], t, group.nearest.primitive.lane(lane));
+    };
+    return beam_count;
+}
+
+/// Mirrors of all kinds in one soup. Returns the share of rays that went as beams.
+fn expectMirrors(soup: soup_file.Soup, triangle_count: usize, tile_count: usize) !f32 {
+    const vec3 = raylane.math.vec3;
+    var generator = std.Random.DefaultPrng.init(@as(u64, 177) + @backingInt(soup));
+    const random = generator.random();
+    var corners: soup_file.Corners = .empty;
+    defer corners.deinit(gpa);
+    try soup_file.addTriangles(soup, &corners, random, triangle_count);
+    var scene = try soup_file.makeScene(corners.items);
+    defer scene.deinit();
+    const mode = raylane.simd.setFlushToZero();
+    defer raylane.simd.setFloatControl(mode);
+    const center: f32 = if (soup == .far_away) 1e5 else 0;
+    var beam_count: u32 = 0;
+    var ray_count: u32 = 0;
+    inline for (.{ 4, 8, 16 }) |lanes| {
+        if (comptime !soup_file.isCompiled(lanes)) continue;
+        var world = try fixture.prepare(&scene, lanes, .{});
+        defer world.deinit();
+        for (0..tile_count) |tile| {
+            const first = random.uintLessThan(usize, corners.items.len / 3) * 3;
+            const target = corners.items[random.uintLessThan(usize, corners.items.len)];
+            var origin: [3]f32 = undefined;
+            for (&origin) |*x| x.* = center + random.floatNorm(f32) * 4;
+            if (tile % 5 == 1) origin[2] = target[2];
+            const grid = aim(origin, target, if (tile % 2 == 0) 1e-3 else 8e-3, random);
+            // Every other mirror is in the plane of a triangle.
+            const edges = [2][3]f32{
+                vec3.sub(corners.items[first + 1], corners.items[first]),
+                vec3.sub(corners.items[first + 2], corners.items[first]),
+            };
+            var mirror: Mirror = .{
+                .point = corners.items[first],
+                .normal = vec3.cross(edges[0], edges[1]),
+                .jitter = ([_]f32{ 0, 0, 1e-7, 1e-5, 1e-3 })[tile % 5],
+                .kind = ([_]Mirror.Kind{ .plane, .plane, .rest, .plane, .two })[tile / 2 % 5],
+            };
+            if (tile % 2 == 0) {
+                for (&mirror.normal) |*x| x.* = random.floatNorm(f32);
+                mirror.point = vec3.add(origin, vec3.scale(vec3.sub(target, origin), 0.7));
+            }
+            inline for (raylane.variant.compiled) |variant| {
+                if (comptime variant.lanes == lanes and variant.traversal == .packet) {
+                    const Kernel = raylane.trace.kernel.Kernel(variant, false);
+                    beam_count += try expectMirror(Kernel, &world, &grid, &mirror, random);
+                    ray_count += side * side;
+                }
+            }
+        }
+    }
+    return @as(f32, @floatFromInt(beam_count)) / @as(f32, @floatFromInt(ray_count));
 }
 
 fn expectSoup(soup: soup_file.Soup, triangle_count: usize, tile_count: usize) !void {
@@ -233,6 +359,16 @@ test "beams find the hits and shadows of brute force in random and nasty soups" 
             std.debug.print("in the soup {t}\n", .{soup});
             return err;
         };
+    }
+}
+
+test "what a mirror sees is what brute force finds, and mostly a beam" {
+    for (std.enums.values(soup_file.Soup)) |soup| {
+        const share = expectMirrors(soup, 100, 20) catch |err| {
+            std.debug.print("in the soup {t}\n", .{soup});
+            return err;
+        };
+        try std.testing.expect(share > 0.4);
     }
 }
 

@@ -15,6 +15,9 @@ const gpa = std.testing.allocator;
 
 const inf = std.math.inf(f32);
 
+/// Of rays that have none in common.
+const no_light = std.mem.zeroes(raylane.world.Light);
+
 /// What a ray is asked, and its bounds.
 pub const Query = struct {
     origin: [3]f32,
@@ -114,8 +117,10 @@ fn expectBundles(
             raylane.trace.interval.trace(Kernel, .any, world, &poor, &credit, &counts);
             try expectBlocked(Kernel, &poor, expected[first..][0..part.len]);
         };
-        raylane.trace.query.trace(Kernel, .nearest, world, &bundle, .unknown, &counts);
-        raylane.trace.query.trace(Kernel, .any, world, &shadows, .unknown, &counts);
+        const together = raylane.trace.query
+            .nearest(Kernel, world, &bundle, null, null, &counts);
+        for (together) |mask| try std.testing.expect(mask.none());
+        raylane.trace.query.any(Kernel, world, &shadows, &no_light, &together, &counts);
         try expectBlocked(Kernel, &shadows, expected[first..][0..part.len]);
         for (0..part.len) |index| {
             if (!isActive(index)) continue;

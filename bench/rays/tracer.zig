@@ -10,7 +10,6 @@ const packet = raylane.trace.packet;
 const query_file = raylane.trace.query;
 const ray_file = raylane.trace.ray;
 const triangle = raylane.trace.triangle;
-const Company = query_file.Company;
 const Grid = raylane.trace.Grid;
 const Query = raylane.trace.walk.Query;
 const World = raylane.world.World;
@@ -24,73 +23,89 @@ pub fn Tracer(comptime Kernel: type) type {
         /// The benchmark's point light.
         light: raylane.world.Light,
         tests: raylane.statistics.TestCounts = .{},
+        /// Which rays of the last batch went as beams.
+        beams: Part = @splat(.splat(false)),
 
+        const Part = [Batch.group_count]Lanes.Mask;
         const Self = @This();
 
         /// Nearest hits of rays from the eye, one through each pixel of a tile, all active.
         pub fn primary(tracer: *Self, batch: *Batch, grid: *const Grid) void {
-            if (Kernel.variant.traversal == .packet) {
-                const world = tracer.world;
-                const tests = &tracer.tests;
-                const bundle = batch.bundle();
-                if (raylane.trace.primary.trace(Kernel, world, grid, bundle, &batch.shares, tests))
-                    return;
-            }
-            tracer.trace(.nearest, batch, .{ .pencil = grid });
-            tracer.weighHits(batch);
+            tracer.nearest(batch, grid);
         }
 
         /// Whether rays from the light hit anything on the way to their ends, which are what the
         /// eye sees or, after a bounce, anywhere.
         pub fn occluded(tracer: *Self, batch: *Batch, bounced: bool) void {
-            tracer.trace(.any, batch, if (bounced) .unknown else .{ .light = &tracer.light });
+            const world = tracer.world;
+            const tests = &tracer.tests;
+            const light = &tracer.light;
+            switch (Kernel.variant.traversal) {
+                .packet => {
+                    const all: Part = @splat(.splat(true));
+                    const together = if (bounced) &tracer.beams else &all;
+                    query_file.any(Kernel, world, batch.bundle(), light, together, tests);
+                },
+                .packet2x2, .single => tracer.traceEach(.any, batch),
+            }
         }
 
         /// Nearest hits of rays that have little in common.
         pub fn reflect(tracer: *Self, batch: *Batch) void {
-            tracer.trace(.nearest, batch, .unknown);
-            tracer.weighHits(batch);
+            tracer.nearest(batch, null);
         }
 
-        fn trace(
-            tracer: *Self,
-            comptime query: Query,
-            batch: *Batch,
-            company: Company,
-        ) void {
+        fn nearest(tracer: *Self, batch: *Batch, grid: ?*const Grid) void {
             const world = tracer.world;
             const tests = &tracer.tests;
             switch (Kernel.variant.traversal) {
-                .packet => query_file.trace(Kernel, query, world, batch.bundle(), company, tests),
-                .packet2x2 => for (&batch.groups) |*group| {
-                    var bundle: packet.Bundle(Kernel) = .{ .groups = .{group.*} };
-                    query_file.trace(Kernel, query, world, &bundle, company, tests);
-                    group.* = bundle.groups[0];
+                .packet => tracer.beams = query_file
+                    .nearest(Kernel, world, batch.bundle(), grid, &batch.shares, tests),
+                .packet2x2, .single => {
+                    tracer.traceEach(.nearest, batch);
+                    tracer.beams = @splat(.splat(false));
                 },
-                .single => for (&batch.groups) |*group| {
-                    const view = packet.viewOf(Lanes, group);
-                    raylane.trace.single.traceEach(Kernel, query, world, group, &view, tests);
-                },
+            }
+            tracer.weighHits(batch);
+        }
+
+        /// Group by group, each by itself.
+        fn traceEach(tracer: *Self, comptime query: Query, batch: *Batch) void {
+            for (&batch.groups) |*group| {
+                const view = packet.viewOf(Lanes, group);
+                switch (Kernel.variant.traversal) {
+                    .packet2x2 => packet
+                        .trace(Kernel, query, tracer.world, group, &tracer.tests),
+                    else => raylane.trace.single
+                        .traceEach(Kernel, query, tracer.world, group, &view, &tracer.tests),
+                }
             }
         }
 
-        /// Barycentric weights of the nearest hits, by the edge functions that decided them.
+        /// Barycentric weights of the nearest hits, by the edge functions that decided them; those
+        /// of beams are there already.
         fn weighHits(tracer: *const Self, batch: *Batch) void {
-            for (&batch.groups) |*group| tracer.prefetchCorners(group);
-            for (&batch.groups, &batch.shares) |*group, *shares| {
-                const hit = group.active.andNot(group.nearest.primitive.lt(.zero()));
+            var hits: Part = undefined;
+            for (&hits, &batch.groups, tracer.beams) |*hit, *group, beam| {
+                hit.* = group.active.andNot(beam).andNot(group.nearest.primitive.lt(.zero()));
+                if (hit.any()) tracer.prefetchCorners(group.nearest.primitive, hit.bits());
+            }
+            for (&batch.groups, &batch.shares, hits) |*group, *all, hit| {
                 if (hit.none()) continue;
                 const primitive: Lanes.I32 = .select(hit, group.nearest.primitive, .zero());
                 const weights = weigh(tracer.gather(primitive), group.line, hit);
                 const share = Lanes.F32.splat(1).div(weights.sum());
-                shares.* = .{ weights.b.mul(share), weights.c.mul(share) };
+                const both = [2]Lanes.F32{ weights.b.mul(share), weights.c.mul(share) };
+                for (all, both) |*to, value| {
+                    to.* = .select(hit, value, to.*);
+                }
             }
         }
 
         /// Corners are far apart in memory; so nobody waits for one after the other.
-        fn prefetchCorners(tracer: *const Self, group: *const ray_file.Ray(Lanes)) void {
-            const primitives = group.nearest.primitive.toArray();
-            var hits = group.active.andNot(group.nearest.primitive.lt(.zero())).bits();
+        fn prefetchCorners(tracer: *const Self, primitive: Lanes.I32, lanes: u32) void {
+            const primitives = primitive.toArray();
+            var hits = lanes;
             while (hits != 0) : (hits &= hits - 1) {
                 const numbers = tracer.world.triangles[@intCast(primitives[@ctz(hits)])].corner;
                 inline for (numbers) |number| @prefetch(&tracer.world.positions[number], .{});

@@ -212,12 +212,7 @@ pub fn Whitted(comptime Kernel: type) type {
         /// Traces rays, adds what they see, and pushes what has to be traced because of it.
         fn step(tracer: *Self, pending_before: Pending) void {
             var pending = pending_before;
-            const company: query.Company =
-                if (pending.depth == 0 and pending.layer == 0 and tracer.grid != null)
-                    .{ .pencil = &tracer.grid.? }
-                else
-                    .unknown;
-            query.trace(Kernel, .nearest, tracer.world, &pending.bundle, company, &tracer.tests);
+            const together = tracer.trace(&pending);
             var points: [group_count]Point = undefined;
             var any_seen = false;
             for (&points, 0..) |*point, group| {
@@ -225,14 +220,24 @@ pub fn Whitted(comptime Kernel: type) type {
                 tracer.find(&pending, group, point);
                 any_seen = any_seen or point.seen.any();
             }
-            if (any_seen) {
-                for (tracer.world.lights) |*light| tracer.addLight(light, &pending, &points);
-            }
+            if (any_seen) for (tracer.world.lights) |*light| {
+                tracer.addLight(light, &pending, &points, &together);
+            };
             // The last pushed is traced first: reflection, refraction, the ray's own rest.
             tracer.pushRest(&pending, &points);
             if (pending.depth == tracer.settings.depth_max or !any_seen) return;
             tracer.pushRefraction(&pending, &points);
             tracer.pushReflection(&pending, &points);
+        }
+
+        /// Finds what rays see. Returns those whose hits are near to each other.
+        fn trace(tracer: *Self, pending: *Pending) query.Part(Kernel) {
+            const first = pending.depth == 0 and pending.layer == 0;
+            const known = if (tracer.grid) |*grid| grid else null;
+            const grid = if (first) known else null;
+            const beams = query
+                .nearest(Kernel, tracer.world, &pending.bundle, grid, null, &tracer.tests);
+            return if (pending.depth == 0) @splat(.splat(true)) else beams;
         }
 
         /// Adds what rays see that left the scene.
@@ -313,12 +318,14 @@ pub fn Whitted(comptime Kernel: type) type {
                 .andNot(point.surface.material.unlit);
         }
 
-        /// Adds the light of one source, as far as it arrives.
+        /// Adds the light of one source, as far as it arrives. Points of the rays in `together` are
+        /// near to each other.
         fn addLight(
             tracer: *Self,
             light: *const world_file.Light,
             pending: *const Pending,
             points: *const [group_count]Point,
+            together: *const query.Part(Kernel),
         ) void {
             var bundle: packet.Bundle(Kernel) = undefined;
             var light_seen: [group_count]Vec3 = undefined;
@@ -346,14 +353,12 @@ pub fn Whitted(comptime Kernel: type) type {
                 any_lit = any_lit or arrives.any();
             }
             if (!any_lit) return;
-            const company: query.Company =
-                if (pending.depth == 0) .{ .light = light } else .unknown;
             var passing: [group_count]Vec3 = undefined;
             const active = activeMasks(&bundle);
             if (tracer.world.has_transparency or tracer.world.has_holes) {
-                tracer.filter(&bundle, company, &passing);
+                tracer.filter(&bundle, &passing);
             } else {
-                tracer.block(&bundle, company, &passing);
+                tracer.block(&bundle, light, together, &passing);
             }
             for (active, passing, light_seen, 0..) |arrives, share, seen, group| {
                 if (arrives.none()) continue;
@@ -372,10 +377,11 @@ pub fn Whitted(comptime Kernel: type) type {
         fn block(
             tracer: *Self,
             bundle: *packet.Bundle(Kernel),
-            company: query.Company,
+            light: *const world_file.Light,
+            together: *const query.Part(Kernel),
             passing: *[group_count]Vec3,
         ) void {
-            query.trace(Kernel, .any, tracer.world, bundle, company, &tracer.tests);
+            query.any(Kernel, tracer.world, bundle, light, together, &tracer.tests);
             for (&bundle.groups, passing) |*ray, *share| {
                 if (ray.active.none()) continue;
                 const free = ray.nearest.primitive.eq(.splat(ray_file.no_primitive));
@@ -387,7 +393,6 @@ pub fn Whitted(comptime Kernel: type) type {
         fn filter(
             tracer: *Self,
             bundle: *packet.Bundle(Kernel),
-            company: query.Company,
             passing: *[group_count]Vec3,
         ) void {
             passing.* = @splat(.splat(.{ 1, 1, 1 }));
@@ -395,7 +400,7 @@ pub fn Whitted(comptime Kernel: type) type {
             var limits: [group_count]ray_file.Hit(Rays) = undefined;
             for (&limits, &bundle.groups) |*limit, *ray| limit.* = ray.nearest;
             for (0..layer_max) |_| {
-                query.trace(Kernel, .nearest, tracer.world, bundle, company, &tracer.tests);
+                _ = query.nearest(Kernel, tracer.world, bundle, null, null, &tracer.tests);
                 var any_left = false;
                 for (&bundle.groups, passing, &weakened, limits) |*ray, *share, *count, limit| {
                     if (ray.active.none()) continue;

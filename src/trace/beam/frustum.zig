@@ -85,9 +85,9 @@ pub fn Frustum(comptime Lanes: type) type {
 
         const Self = @This();
 
-        /// Planes through `origin`. Depth is counted along `depth_normal` from there.
-        pub fn init(origin: [3]f32, normals: [4][3]f32, depth_normal: [3]f32, pad: f32) Self {
-            const slack = slack_pads * pad;
+        /// Planes that stand off `origin` by `slack` metres. Depth is counted along `depth_normal`
+        /// from there.
+        pub fn init(origin: [3]f32, normals: [4][3]f32, depth_normal: [3]f32, slack: f32) Self {
             var frustum: Self = .{
                 .sides = undefined,
                 .depth = .init(depth_normal, origin, -slack),
@@ -111,11 +111,12 @@ pub fn Frustum(comptime Lanes: type) type {
             return least.isNegative().bitNot();
         }
 
-        /// Pushes the children of a node that the beam may meet before `depth_max`, the nearest on
-        /// top. Returns the new count of the stack.
+        /// Pushes the children of a node that the beam may meet before `depth_max`, and behind
+        /// `front` if there is one, the nearest on top. Returns the new count of the stack.
         pub inline fn pushChildren(
             frustum: *const Self,
             node: *const world_file.Node(width),
+            front: ?*const Plane(width),
             depth_max: f32,
             entries: []stack.Entry,
             entry_count: usize,
@@ -125,6 +126,7 @@ pub fn Frustum(comptime Lanes: type) type {
                 least = least.minOrNegative(side.extreme(Lanes, node, 1));
             }
             const near = frustum.depth.extreme(Lanes, node, 0);
+            if (front) |plane| least = least.minOrNegative(plane.extreme(Lanes, node, 1));
             const met = near.le(.splat(depth_max)).andNot(least.isNegative());
             return stack.push(Lanes, node, met, near, entries, entry_count);
         }

@@ -6,6 +6,9 @@
 //! over the pixels of those that it touches and does not fill, in lanes (edges.zig, found.zig).
 //! What that leaves in doubt, an edge or a depth too close to tell, the exact test decides; the
 //! winner's t is always its.
+//!
+//! Rays may also start behind that origin, as those do that a plane mirror sends back, seen from
+//! the mirrored eye (starts.zig): then triangles before a ray's start do not count.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -20,7 +23,8 @@ const edges_file = @import("edges.zig");
 const exact = @import("exact.zig");
 const found_file = @import("found.zig");
 const resolve = @import("resolve.zig");
-const Frustum = @import("frustum.zig").Frustum;
+const frustum_file = @import("frustum.zig");
+const Starts = @import("starts.zig").Starts;
 const assert = std.debug.assert;
 
 const side = kernel_file.beam_side;
@@ -39,6 +43,34 @@ pub const Grid = struct {
     down: [3]f32,
     /// Bound of what every ray's direction differs from that, in units of 2^-24.
     deviation_roundings: f32,
+
+    /// The direction of a pixel, rounded.
+    pub fn direction(grid: *const Grid, x: f32, y: f32) [3]f32 {
+        return vec3.add(grid.corner, vec3.add(vec3.scale(grid.right, x), vec3.scale(grid.down, y)));
+    }
+};
+
+/// Pixels that have rays: the first and the last column and row.
+pub const Area = struct {
+    x: [2]f32 = .{ 0, last },
+    y: [2]f32 = .{ 0, last },
+
+    /// Around the pixels of blocks, a bit each; there is at least one.
+    pub fn of(blocks: u32) Area {
+        const across = side / block_side;
+        var columns: u32 = 0;
+        for (0..across) |row| columns |= blocks >> @intCast(row * across) & ((1 << across) - 1);
+        return .{
+            .x = span(@ctz(columns), 31 - @clz(columns)),
+            .y = span(@ctz(blocks) / across, (31 - @clz(blocks)) / across),
+        };
+    }
+
+    fn span(first_block: u32, last_block: u32) [2]f32 {
+        const first: f32 = @floatFromInt(first_block * block_side);
+        const final: f32 = @floatFromInt(last_block * block_side);
+        return .{ first, final + block_last };
+    }
 };
 
 /// Finds the nearest hits of a bundle's rays, which have none yet, start at `grid.origin` and
@@ -52,11 +84,39 @@ pub fn trace(
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
 ) bool {
+    return run(Kernel, false, world, grid, {}, bundle, shares, counts);
+}
+
+/// The same of rays that start where `starts` says, and may leave out what comes before and their
+/// own triangles. Their starts are within what `World.pad` allows for.
+pub fn traceBehind(
+    comptime Kernel: type,
+    world: *const world_file.World,
+    grid: *const Grid,
+    starts: *const Starts(Kernel),
+    bundle: *packet.Bundle(Kernel),
+    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
+    counts: *TestCounts,
+) bool {
+    return run(Kernel, true, world, grid, starts, bundle, shares, counts);
+}
+
+fn run(
+    comptime Kernel: type,
+    comptime behind: bool,
+    world: *const world_file.World,
+    grid: *const Grid,
+    starts: if (behind) *const Starts(Kernel) else void,
+    bundle: *packet.Bundle(Kernel),
+    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
+    counts: *TestCounts,
+) bool {
     // In place: it is too large to be handed around.
-    var search: Search(Kernel) = undefined;
+    var search: Search(Kernel, behind) = undefined;
+    search.starts = starts;
     if (!search.init(world, grid, bundle, counts)) return false;
     search.travel();
-    resolve.resolve(Kernel, world, grid, &search.found, bundle, shares);
+    resolve.resolve(Kernel, behind, world, grid, &search.found, bundle, shares);
     return true;
 }
 
@@ -78,6 +138,8 @@ const Coverage = struct {
     last_x: u32,
     last_y: u32,
     slot: exact.Slot,
+    /// Its number, if some ray leaves it out; else `no_primitive`.
+    skipped: i32,
 
     /// The blocks of these columns and rows, a bit each.
     inline fn blocks(coverage: *const Coverage) u32 {
@@ -114,7 +176,8 @@ const Dual = struct {
     }
 };
 
-fn Search(comptime Kernel: type) type {
+/// With rays that start behind the grid's origin, or at it.
+fn Search(comptime Kernel: type, comptime behind: bool) type {
     const Boxes = Kernel.Boxes;
     const Rays = Kernel.Rays;
     const width = Kernel.width;
@@ -125,18 +188,27 @@ fn Search(comptime Kernel: type) type {
         grid: *const Grid,
         bundle: *packet.Bundle(Kernel),
         counts: *TestCounts,
-        frustum: Frustum(Boxes),
+        starts: if (behind) *const Starts(Kernel) else void,
+        frustum: Frustum,
+        /// All rays start behind it.
+        front: if (behind) frustum_file.Plane(width) else void,
         /// Longest direction times roundings, for edge functions and for 1/t.
         edge_scale: f32,
         inverse_scale: f32,
+        /// By how much lines that miss the origin move an edge function, over its edge's length.
+        edge_apart: if (behind) f32 else void,
         /// See `edges.reachMax`.
         reach_max: f32,
         /// From a point relative to the origin to column and row times t, and t; see `Dual`.
         dual: Dual,
+        /// By how much lines that miss the origin, and directions off the grid, move a corner's
+        /// place: the former times 1/t.
+        window_apart: if (behind) [2]f32 else void,
         found: Found,
 
         const Self = @This();
         const Found = found_file.Found(Kernel);
+        const Frustum = frustum_file.Frustum(Boxes);
         const F32 = Rays.F32;
 
         fn init(
@@ -155,16 +227,49 @@ fn Search(comptime Kernel: type) type {
             search.grid = grid;
             search.bundle = bundle;
             search.counts = counts;
-            search.frustum = frustumOf(Boxes, grid, world.pad) orelse return false;
+            var standoff = frustum_file.slack_pads * world.pad;
+            if (behind) standoff += search.driftMax(longest);
+            const area: Area = if (behind) search.starts.area else .{};
+            const sides = sidesOf(grid, area) orelse return false;
+            const along = depthNormal(grid) orelse return false;
+            search.frustum = .init(grid.origin, sides, along, standoff);
+            if (behind) {
+                search.front = .init(along, grid.origin, standoff);
+                search.front.offset -= search.starts.t_min;
+            }
             // A direction off by d moves an edge function by 2 R L d, 1/t by L^2 / |det| d.
             search.edge_scale = unit * (edges_file.edge_roundings * longest +
                 edges_file.step_roundings * spread + 2 * roundings);
             search.inverse_scale = unit *
                 (edges_file.inverse_roundings * longest + 2 * roundings);
-            search.reach_max = edges_file.reachMax(world.pad);
+            // Starts are within reach, the grid's origin need not be.
+            search.reach_max = if (behind)
+                edges_file.reach_limit
+            else
+                edges_file.reachMax(world.pad);
+            if (behind) search.edge_apart = 2 * search.starts.spread.apart * longest;
             search.dual = .of(grid);
+            if (behind) search.window_apart = .{
+                search.starts.spread.apart * search.dual.gain,
+                unit * roundings * search.dual.gain,
+            };
             search.found.clear(bundle);
             return true;
+        }
+
+        inline fn spreadOf(search: *const Self) ?edges_file.Spread {
+            return if (behind) search.starts.spread else null;
+        }
+
+        /// How far, in metres, a point of a ray may be from where the grid has it, or a plane
+        /// through the grid's origin off, beyond what `frustum.slack_pads` allows for.
+        fn driftMax(search: *const Self, longest: f32) f32 {
+            const grid = search.grid;
+            const reach = edges_file.reachMax(search.world.pad) + search.starts.spread.distance;
+            const size = reach + length1(grid.origin);
+            const roundings = 32 + grid.deviation_roundings / longest;
+            return 2 * search.starts.spread.apart +
+                2 * edges_file.unit_roundoff * roundings * size;
         }
 
         fn travel(search: *Self) void {
@@ -180,8 +285,13 @@ fn Search(comptime Kernel: type) type {
                     assert(entry_count + width <= Kernel.stack_max);
                     const node = &search.tree.nodes[entry.child.target];
                     walk.countNode(Kernel, node, search.counts);
-                    entry_count = search.frustum
-                        .pushChildren(node, depth_max, &entries, entry_count);
+                    entry_count = search.frustum.pushChildren(
+                        node,
+                        if (behind) &search.front else null,
+                        depth_max,
+                        &entries,
+                        entry_count,
+                    );
                 } else {
                     const first, const end = entry.child.blocks();
                     for (first..end) |block| {
@@ -211,12 +321,13 @@ fn Search(comptime Kernel: type) type {
             if (there.none()) return;
             const grid = search.grid;
             const edges: edges_file.Edges(Boxes) =
-                .init(corners, .splat(grid.origin), search.reach_max);
+                .init(corners, .splat(grid.origin), search.reach_max, search.spreadOf());
             const zero: Boxes.F32 = .zero();
             var base: [4]Boxes.F32 = undefined;
             var right: [4]Boxes.F32 = undefined;
             var down: [4]Boxes.F32 = undefined;
-            const slack = edges.slack.mul(.splat(search.edge_scale));
+            var slack = edges.slack.mul(.splat(search.edge_scale));
+            if (behind) slack = edges.facet.length.mulAdd(.splat(search.edge_apart), slack);
             var least: Boxes.F32 = .splat(std.math.inf(f32));
             inline for (edges.normal, 0..) |normal, index| {
                 base[index] = edges_file.dot(Boxes, normal, .splat(grid.corner)).add(slack);
@@ -227,7 +338,7 @@ fn Search(comptime Kernel: type) type {
             }
             there = there.andNot(edges.facet.turned.bitAnd(least.isNegative()));
             if (there.none()) return;
-            const inverse = edges.facet.inverse();
+            const inverse = edges.facet.inverse(search.spreadOf());
             const absolute = inverse.absolute.mul(.splat(search.inverse_scale));
             const one: Boxes.F32 = .splat(1);
             const growth = one.add(inverse.relative);
@@ -237,6 +348,14 @@ fn Search(comptime Kernel: type) type {
             down[3] = edges_file.dot(Boxes, inverse.vector, .splat(grid.down)).mul(growth);
             const most = right[3].maxFast(zero).add(down[3].maxFast(zero))
                 .mulAdd(.splat(last), base[3]);
+            const shrink = one.sub(inverse.relative).div(growth);
+            const drop = absolute.add(absolute);
+            if (behind) {
+                const nearest = right[3].minFast(zero).add(down[3].minFast(zero))
+                    .mulAdd(.splat(last), base[3]).mul(shrink).sub(drop);
+                there = there.andNot(inverse.decisive
+                    .bitAnd(nearest.ge(.splat(search.starts.tile_upper))));
+            }
             const open = there.andNot(inverse.decisive);
             var undecided: u32 = 0;
             if (open.any()) undecided = open.bitAnd(mayTouch(&base, &right, &down, slack)).bits();
@@ -265,10 +384,15 @@ fn Search(comptime Kernel: type) type {
                 down[index].store(&table.down[index]);
             }
             slack.add(slack).store(&table.slack);
-            one.sub(inverse.relative).div(growth).store(&table.shrink);
-            absolute.add(absolute).store(&table.drop);
+            shrink.store(&table.shrink);
+            drop.store(&table.drop);
+            const skipped: u32 = if (behind) search.starts.skipped(Boxes, primitive) else 0;
             while (rest != 0) : (rest &= rest - 1) {
-                search.cover(&table.at(@ctz(rest), first));
+                const lane = @ctz(rest);
+                var coverage = table.at(lane, first);
+                if (behind and skipped >> @intCast(lane) & 1 != 0)
+                    coverage.skipped = @bitCast(block.primitive[lane]);
+                search.cover(&coverage);
             }
             while (undecided != 0) : (undecided &= undecided - 1) {
                 search.coverUndecided(&table.at(@ctz(undecided), first));
@@ -318,8 +442,10 @@ fn Search(comptime Kernel: type) type {
                 least_t = least_t.minFast(t);
                 greatest_inverse = greatest_inverse.maxFast(inverse.abs());
             }
-            const margin = reach.mul(greatest_inverse)
+            var margin = reach.mul(greatest_inverse)
                 .mul(.splat(16 * edges_file.unit_roundoff * dual.gain));
+            if (behind) margin = greatest_inverse
+                .mulAdd(.splat(search.window_apart[0]), margin).add(.splat(search.window_apart[1]));
             // Also where |t| is so small that rounding may have turned its sign.
             const bounded = least_t.gt(.zero()).bitAnd(margin.lt(.splat(side)));
             const zero: B = .zero();
@@ -390,6 +516,7 @@ fn Search(comptime Kernel: type) type {
                     .last_x = @intCast(table.last_x[lane]),
                     .last_y = @intCast(table.last_y[lane]),
                     .slot = first + @as(exact.Slot, lane),
+                    .skipped = ray_file.no_primitive,
                 };
                 inline for (0..4) |index| {
                     coverage.base[index] = table.base[index][lane];
@@ -435,7 +562,14 @@ fn Search(comptime Kernel: type) type {
                 var seen = most[3].gt(known).andNot(outside);
                 const least = most[0].sub(span[0]).minOrNegative(most[1].sub(span[1]))
                     .minOrNegative(most[2].sub(span[2]));
-                const covered = seen.bitAnd(least.gt(.splat(coverage.slack)));
+                var covered = seen.bitAnd(least.gt(.splat(coverage.slack)));
+                if (behind) {
+                    const lowest = most[3].sub(span[3])
+                        .mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
+                    seen = seen.andNot(lowest.ge(search.starts.of("block_upper", first)));
+                    covered = covered.bitAnd(most[3].lt(search.starts.of("block_lower", first)));
+                    if (coverage.skipped != ray_file.no_primitive) covered = .splat(false);
+                }
                 if (covered.any()) {
                     const depth = .{ most[3].sub(span[3]), most[3] };
                     seen = seen.andNot(search.fill(coverage, first, covered, depth));
@@ -496,13 +630,21 @@ fn Search(comptime Kernel: type) type {
                 const lower = search.found.of("lower", group);
                 const least = value[0].minOrNegative(value[1]).minOrNegative(value[2]);
                 const known: F32 = .loadAligned(lower);
-                const possible = value[3].gt(known).andNot(least.isNegative());
+                var possible = value[3].gt(known).andNot(least.isNegative());
+                const surely = value[3].mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
+                const pixel = group * lanes;
+                if (behind) {
+                    possible = possible.andNot(surely.ge(search.starts.of("upper", pixel)));
+                    if (coverage.skipped != ray_file.no_primitive) possible = possible
+                        .andNot(search.bundle.groups[group].skip.eq(.splat(coverage.skipped)));
+                }
                 if (possible.any()) {
                     const upper = search.found.of("upper", group);
                     const slots = search.found.of("slot", group);
-                    const surely = value[3].mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
-                    const certain = least.gt(.splat(coverage.slack))
+                    var certain = least.gt(.splat(coverage.slack))
                         .bitAnd(surely.gt(.loadAligned(upper)));
+                    if (behind) certain = certain.bitAnd(possible)
+                        .bitAnd(value[3].lt(search.starts.of("lower", pixel)));
                     F32.select(certain, surely, known).storeAligned(lower);
                     F32.select(certain, value[3], .loadAligned(upper)).storeAligned(upper);
                     Rays.I32.select(certain, .splat(coverage.slot), .loadAligned(slots))
@@ -534,7 +676,13 @@ fn Search(comptime Kernel: type) type {
             const ray = &search.bundle.groups[group];
             const pad = search.world.pad;
             const hit = exact.meet(Kernel, search.tree, pad, ray, slot);
-            const met = hit.mask.bitAnd(doubtful);
+            var met = hit.mask.bitAnd(doubtful);
+            var t = hit.t;
+            if (behind) {
+                const number: Rays.I32 = .splat(exact.primitiveAt(width, search.tree, slot));
+                met = met.bitAnd(Starts(Kernel).counted(ray, hit.t, number));
+                t = t.add(search.starts.t[group]);
+            }
             const known_lower = search.found.of("lower", group);
             const known_upper = search.found.of("upper", group);
             const slots = search.found.of("slot", group);
@@ -542,7 +690,7 @@ fn Search(comptime Kernel: type) type {
             const unclear = met.bitAnd(hit.t.gt(.zero())).andNot(nearer);
             const first = exact
                 .comeFirst(Kernel, search.tree, pad, ray, unclear, hit.t, slot, slots);
-            const inverse = F32.splat(1).div(hit.t);
+            const inverse = F32.splat(1).div(t);
             const below = inverse.mul(.splat(1 - 4 * edges_file.unit_roundoff));
             const above = inverse.mul(.splat(1 + 4 * edges_file.unit_roundoff));
             F32.select(nearer, lower, .select(first, below, .loadAligned(known_lower)))
@@ -586,24 +734,31 @@ fn length1(vector: [3]f32) f32 {
     return @abs(vector[0]) + @abs(vector[1]) + @abs(vector[2]);
 }
 
-/// The pyramid around a beam's rays, or null where they are too far apart for one.
-fn frustumOf(comptime Boxes: type, grid: *const Grid, pad: f32) ?Frustum(Boxes) {
+/// Inward normals of the pyramid around the rays of an area, or null where the beam's rays are too
+/// far apart for one.
+fn sidesOf(grid: *const Grid, area: Area) ?[4][3]f32 {
     const spread = last * (length1(grid.right) + length1(grid.down));
     if (!(spread <= 0.5 * length1(grid.corner))) return null;
-    const to_right = vec3.add(grid.corner, vec3.scale(grid.right, last));
-    const down = vec3.scale(grid.down, last);
     const corners = [4][3]f32{
-        grid.corner, to_right, vec3.add(to_right, down), vec3.add(grid.corner, down),
+        grid.direction(area.x[0], area.y[0]), grid.direction(area.x[1], area.y[0]),
+        grid.direction(area.x[1], area.y[1]), grid.direction(area.x[0], area.y[1]),
     };
+    const facing = vec3.dot(vec3.cross(grid.right, grid.down), grid.corner);
     var normals: [4][3]f32 = undefined;
-    for (&normals, 0..) |*normal, index| {
-        // By the step, not by the next corner: two corners are nearly parallel.
-        const across = vec3.cross(corners[index], if (index % 2 == 0) grid.right else grid.down);
-        const inward = vec3.dot(across, corners[(index + 2) % 4]) >= 0;
+    for (&normals, corners, 0..) |*normal, corner, index| {
+        // By the step, not by the next corner: two corners are nearly parallel, or the same.
+        const across = vec3.cross(corner, if (index % 2 == 0) grid.right else grid.down);
+        const inward = (facing > 0) == (index < 2);
         normal.* = vec3.scale(across, if (inward) 1 else -1);
     }
+    return normals;
+}
+
+/// The vector whose product with every direction of the grid is 1, or null where they are too
+/// oblique.
+fn depthNormal(grid: *const Grid) ?[3]f32 {
     const facing = vec3.cross(grid.right, grid.down);
     const share = vec3.dot(facing, grid.corner);
     if (!(@abs(share) > 0.1 * length1(facing) * length1(grid.corner))) return null;
-    return .init(grid.origin, normals, vec3.scale(facing, 1 / share), pad);
+    return vec3.scale(facing, 1 / share);
 }

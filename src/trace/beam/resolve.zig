@@ -1,8 +1,8 @@
-//! What a beam of primary rays has found, exactly: t and barycentric weights of every hit.
+//! What a beam of rays has found, exactly: t and barycentric weights of every hit.
 //!
 //! In: a triangle's slot for each ray. Out: hits in the bundle, by the expressions of triangle.zig,
 //! bit for bit. Rays of a beam mostly have the same longest axis and the same signs, and neighbours
-//! hit the same triangle: then what depends on the triangle and the common origin alone is computed
+//! hit the same triangle: then what depends on the triangle and a common origin alone is computed
 //! once, and what is left for each ray are its slopes, three edge functions and one division.
 
 const std = @import("std");
@@ -19,9 +19,10 @@ const Grid = @import("primary.zig").Grid;
 const assert = std.debug.assert;
 
 /// Puts the hits of the triangles found into the bundle, and weights of the second and third corner
-/// into `shares`, if given.
+/// into `shares`, if given. Rays start behind the grid's origin, each at its own, or at it.
 pub fn resolve(
     comptime Kernel: type,
+    comptime behind: bool,
     world: *const world_file.World,
     grid: *const Grid,
     found: *Found(Kernel),
@@ -32,7 +33,7 @@ pub fn resolve(
     switch (course.axis orelse 3) {
         inline 0...2 => |axis| {
             const tree = world.tree.get(Kernel.width);
-            Together(Kernel, axis).run(world, tree, &course, grid, found, bundle, shares);
+            Together(Kernel, behind, axis).run(world, tree, &course, grid, found, bundle, shares);
         },
         else => apart(Kernel, world, found, bundle, shares),
     }
@@ -92,7 +93,7 @@ fn apart(
         const gathered = exact.gather(Kernel, tree, own);
         const hit = triangle.intersect(Rays, gathered.corners, group.line, world.pad);
         assert(there.andNot(hit.mask).none());
-        if (shares) |all| all[index] = hit.shares();
+        if (shares) |all| keepShares(Rays, &all[index], there, hit.shares());
         group.nearest = .{
             .t = .select(there, hit.t, group.nearest.t),
             .primitive = .select(there, gathered.primitive, group.nearest.primitive),
@@ -100,13 +101,23 @@ fn apart(
     }
 }
 
+/// Weights of the rays that hit something: others may be another beam's.
+inline fn keepShares(
+    comptime Rays: type,
+    kept: *[2]Rays.F32,
+    there: Rays.Mask,
+    shares: [2]Rays.F32,
+) void {
+    for (kept, shares) |*to, share| to.* = .select(there, share, to.*);
+}
+
 /// All groups alike.
-fn Together(comptime Kernel: type, comptime axis: u2) type {
+fn Together(comptime Kernel: type, comptime behind: bool, comptime axis: u2) type {
     const Rays = Kernel.Rays;
     const F32 = Rays.F32;
     const Vec3 = Rays.Vec3;
     return struct {
-        /// A triangle seen from the rays' origin, in lanes or the same in all of them.
+        /// A triangle as it is or seen from the rays' origin, in lanes or the same in all of them.
         fn Placed(comptime Value: type) type {
             return struct {
                 /// Turned corners from the origin.
@@ -114,6 +125,14 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
                 /// Corners of its grown box from there.
                 lower: Value,
                 upper: Value,
+
+                inline fn seenFrom(placed: *const @This(), origin: Vec3) @This() {
+                    var seen = placed.*;
+                    for (&seen.offsets) |*offset| offset.* = offset.sub(origin);
+                    seen.lower = seen.lower.sub(origin);
+                    seen.upper = seen.upper.sub(origin);
+                    return seen;
+                }
             };
         }
 
@@ -126,7 +145,8 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
             bundle: *packet.Bundle(Kernel),
             shares: ?*[Kernel.group_count][2]F32,
         ) void {
-            const origin = turned(grid.origin);
+            // Of what starts behind it nothing is subtracted before the ray's own start is.
+            const common: ?[3]f32 = if (behind) null else turned(grid.origin);
             const down = turned(course.negative);
             var last: Last = .{};
             for (0..Kernel.block_count) |block| {
@@ -135,6 +155,8 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
                 if (whole and block_slot == exact.no_slot) continue;
                 for (block * Kernel.block_groups..(block + 1) * Kernel.block_groups) |index| {
                     const group = &bundle.groups[index];
+                    const from: Vec3 =
+                        if (common) |origin| .splat(origin) else turn(group.line.origin);
                     const own = found.of("slot", index);
                     const lanes: Rays.I32 = .loadAligned(own);
                     if (whole or lanes.eq(.splat(own[0])).all()) {
@@ -142,20 +164,21 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
                         if (slot == exact.no_slot) continue;
                         if (slot != last.slot) last = .{
                             .slot = slot,
-                            .placed = inLanes(&placeOne(tree, world.pad, origin, slot)),
+                            .placed = inLanes(&placeOne(tree, world.pad, common, slot)),
                             .primitive = .splat(exact.primitiveAt(Kernel.width, tree, slot)),
                         };
-                        const hit = intersect(group, &last.placed, down, .splat(true));
+                        const placed = if (behind) last.placed.seenFrom(from) else last.placed;
+                        const hit = intersect(group, &placed, down, .splat(true));
                         if (shares) |all| all[index] = hit.shares();
                         group.nearest = .{ .t = hit.t, .primitive = last.primitive };
                         continue;
                     }
                     const there = lanes.gt(.splat(exact.no_slot));
                     const gathered = exact.gather(Kernel, tree, own);
-                    const each = placeEach(world.pad, origin, gathered.corners);
+                    const each = placeEach(world.pad, gathered.corners).seenFrom(from);
                     const hit = intersect(group, &each, down, there);
                     assert(there.andNot(hit.mask).none());
-                    if (shares) |all| all[index] = hit.shares();
+                    if (shares) |all| keepShares(Rays, &all[index], there, hit.shares());
                     group.nearest = .{
                         .t = .select(there, hit.t, group.nearest.t),
                         .primitive = .select(there, gathered.primitive, group.nearest.primitive),
@@ -179,11 +202,12 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
             };
         }
 
-        /// One triangle. Minima and maxima are those of `triangle.locate`.
+        /// One triangle, seen from `origin` if there is one. Minima and maxima are those of
+        /// `triangle.locate`.
         fn placeOne(
             tree: *const world_file.Tree(Kernel.width),
             pad: f32,
-            origin: [3]f32,
+            origin: ?[3]f32,
             slot: exact.Slot,
         ) Placed([3]f32) {
             var corners: [3][3]f32 = undefined;
@@ -197,12 +221,15 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
                 const c = corners[2][component];
                 const low = if (b < a) b else a;
                 const high = if (b > a) b else a;
-                const from = origin[component];
-                placed.lower[component] = (if (c < low) c else low) - pad - from;
-                placed.upper[component] = (if (c > high) c else high) + pad - from;
+                placed.lower[component] = (if (c < low) c else low) - pad;
+                placed.upper[component] = (if (c > high) c else high) + pad;
                 for (&placed.offsets, corners) |*offset, corner| {
-                    offset[component] = corner[component] - from;
+                    offset[component] = corner[component];
                 }
+                const from = (origin orelse continue)[component];
+                placed.lower[component] -= from;
+                placed.upper[component] -= from;
+                for (&placed.offsets) |*offset| offset[component] -= from;
             }
             return placed;
         }
@@ -220,20 +247,15 @@ fn Together(comptime Kernel: type, comptime axis: u2) type {
         }
 
         /// A triangle in each lane.
-        inline fn placeEach(
-            pad: f32,
-            origin: [3]f32,
-            corners: [3]Vec3,
-        ) Placed(Vec3) {
-            const from: Vec3 = .splat(origin);
+        inline fn placeEach(pad: f32, corners: [3]Vec3) Placed(Vec3) {
             const grow: Vec3 = .splat(@splat(pad));
             const a = turn(corners[0]);
             const b = turn(corners[1]);
             const c = turn(corners[2]);
             return .{
-                .offsets = .{ a.sub(from), b.sub(from), c.sub(from) },
-                .lower = c.min(b.min(a)).sub(grow).sub(from),
-                .upper = c.max(b.max(a)).add(grow).sub(from),
+                .offsets = .{ a, b, c },
+                .lower = c.min(b.min(a)).sub(grow),
+                .upper = c.max(b.max(a)).add(grow),
             };
         }
 

@@ -149,8 +149,9 @@ fn Search(comptime Kernel: type) type {
                     assert(entry_count + width <= Kernel.stack_max);
                     const node = &search.tree.nodes[child.target];
                     walk.countNode(Kernel, node, search.counts);
+                    const depth_max = search.points.bounds.depth;
                     entry_count = frustum
-                        .pushChildren(node, search.points.bounds.depth, &entries, entry_count);
+                        .pushChildren(node, null, depth_max, &entries, entry_count);
                     continue;
                 }
                 met_count += child.block_count;
