@@ -486,8 +486,11 @@ pub fn Whitted(comptime Kernel: type) type {
             for (&next.bundle.groups, masks, points, 0..) |*ray, mask, *point, group| {
                 if (mask.none()) continue;
                 const away = point.surface.normal_geometric;
-                const direction = shade.reflect(Rays, &point.surface);
-                tracer.leave(ray, point, away, direction, pending.bundle.groups[group].nearest);
+                const before = &pending.bundle.groups[group];
+                // As long as before: what a plane mirror sends back stays linear in the pixel.
+                const length = before.line.direction.length();
+                const direction = shade.reflect(Rays, &point.surface).scale(length);
+                tracer.leave(ray, point, away, direction, before.nearest);
                 next.weight[group] = point.weight.mul(point.lobe.reflected);
                 next.absorption[group] = pending.absorption[group];
             }
