@@ -24,9 +24,9 @@ pub fn Tracer(comptime Kernel: type) type {
         light: raylane.world.Light,
         tests: raylane.statistics.TestCounts = .{},
         /// Which rays of the last batch went as beams.
-        beams: Part = @splat(.splat(false)),
+        together: Together = .none,
 
-        const Part = [Batch.group_count]Lanes.Mask;
+        const Together = query_file.Together(Kernel);
         const Self = @This();
 
         /// Nearest hits of rays from the eye, one through each pixel of a tile, all active.
@@ -42,8 +42,8 @@ pub fn Tracer(comptime Kernel: type) type {
             const light = &tracer.light;
             switch (Kernel.variant.traversal) {
                 .packet => {
-                    const all: Part = @splat(.splat(true));
-                    const together = if (bounced) &tracer.beams else &all;
+                    const together: *const Together =
+                        if (bounced) &tracer.together else &.all;
                     query_file.any(Kernel, world, batch.bundle(), light, together, tests);
                 },
                 .packet2x2, .single => tracer.traceEach(.any, batch),
@@ -59,14 +59,11 @@ pub fn Tracer(comptime Kernel: type) type {
             const world = tracer.world;
             const tests = &tracer.tests;
             switch (Kernel.variant.traversal) {
-                .packet => tracer.beams = query_file
+                .packet => tracer.together = query_file
                     .nearest(Kernel, world, batch.bundle(), grid, &batch.shares, tests),
-                .packet2x2, .single => {
-                    tracer.traceEach(.nearest, batch);
-                    tracer.beams = @splat(.splat(false));
-                },
+                .packet2x2, .single => tracer.traceEach(.nearest, batch),
             }
-            tracer.weighHits(batch);
+            if (tracer.together != .all) tracer.weighHits(batch);
         }
 
         /// Group by group, each by itself.
@@ -85,9 +82,10 @@ pub fn Tracer(comptime Kernel: type) type {
         /// Barycentric weights of the nearest hits, by the edge functions that decided them; those
         /// of beams are there already.
         fn weighHits(tracer: *const Self, batch: *Batch) void {
-            var hits: Part = undefined;
-            for (&hits, &batch.groups, tracer.beams) |*hit, *group, beam| {
-                hit.* = group.active.andNot(beam).andNot(group.nearest.primitive.lt(.zero()));
+            var hits: [Batch.group_count]Lanes.Mask = undefined;
+            for (&hits, &batch.groups, 0..) |*hit, *group, index| {
+                hit.* = group.active.andNot(group.nearest.primitive.lt(.zero()));
+                if (tracer.together == .some) hit.* = hit.andNot(tracer.together.some[index]);
                 if (hit.any()) tracer.prefetchCorners(group.nearest.primitive, hit.bits());
             }
             for (&batch.groups, &batch.shares, hits) |*group, *all, hit| {

@@ -14,15 +14,15 @@ const primary = @import("beam/primary.zig");
 const shadow = @import("beam/shadow.zig");
 const Query = @import("walk.zig").Query;
 
-/// Some of a bundle's rays, by group.
-pub fn Part(comptime Kernel: type) type {
-    return [Kernel.group_count]Kernel.Rays.Mask;
+/// Which rays of a bundle hit what is near to each other, as those of a beam do.
+pub fn Together(comptime Kernel: type) type {
+    return union(enum) { none, all, some: packet.Part(Kernel) };
 }
 
 /// Finds the nearest hits of all active rays. With a grid, rays start at its origin along its
 /// directions, leave nothing out and have no limit; else nothing is known of them. Returns those
-/// that went as beams: what they have hit is near to each other. `shares` is null, or where the
-/// barycentric weights of these go: of the second and the third corner, by group.
+/// that went as beams. `shares` is null, or where the barycentric weights of these go: of the
+/// second and the third corner, by group.
 pub fn nearest(
     comptime Kernel: type,
     world: *const world_file.World,
@@ -30,65 +30,59 @@ pub fn nearest(
     grid: ?*const primary.Grid,
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
-) Part(Kernel) {
+) Together(Kernel) {
     if (Kernel.variant.traversal != .packet) {
         bySelf(Kernel, .nearest, world, bundle, counts);
-        return @splat(.splat(false));
+        return .none;
     }
-    const active = activeOf(Kernel, bundle);
     if (grid) |known| {
-        if (primary.trace(Kernel, world, known, bundle, shares, counts)) return active;
+        if (primary.trace(Kernel, world, known, bundle, shares, counts)) return .all;
     }
-    const together = pencil.trace(Kernel, world, bundle, shares, counts);
-    var credit: interval.Credit = .{};
-    if (narrow(Kernel, bundle, &active, &together, false))
-        interval.trace(Kernel, .nearest, world, bundle, &credit, counts);
-    for (&bundle.groups, active) |*group, mask| group.active = mask;
-    return together;
+    const beams = pencil.trace(Kernel, world, bundle, shares, counts);
+    byInterval(Kernel, .nearest, world, bundle, if (beams) |*some| some else null, counts);
+    return if (beams) |some| .{ .some = some } else .none;
 }
 
 /// Finds whether all active rays, of this light, have any hit; `interval.trace` says what is left
-/// in the bundle. Those in `together` end near to each other, or start there if the light is a
+/// in the bundle. Those together end near to each other, or start there if the light is a
 /// directional one.
 pub fn any(
     comptime Kernel: type,
     world: *const world_file.World,
     bundle: *packet.Bundle(Kernel),
     light: *const world_file.Light,
-    together: *const Part(Kernel),
+    together: *const Together(Kernel),
     counts: *TestCounts,
 ) void {
     if (Kernel.variant.traversal != .packet)
         return bySelf(Kernel, .any, world, bundle, counts);
-    const active = activeOf(Kernel, bundle);
-    if (narrow(Kernel, bundle, &active, together, true))
-        shadow.trace(Kernel, world, light, bundle, counts);
-    var credit: interval.Credit = .{};
-    if (narrow(Kernel, bundle, &active, together, false))
-        interval.trace(Kernel, .any, world, bundle, &credit, counts);
-    for (&bundle.groups, active) |*group, mask| group.active = mask;
-}
-
-fn activeOf(comptime Kernel: type, bundle: *const packet.Bundle(Kernel)) Part(Kernel) {
-    var active: Part(Kernel) = undefined;
-    for (&active, &bundle.groups) |*mask, *group| mask.* = group.active;
-    return active;
-}
-
-/// Leaves those rays active that are in a part, or those that are not. Returns whether any is left.
-fn narrow(
-    comptime Kernel: type,
-    bundle: *packet.Bundle(Kernel),
-    active: *const Part(Kernel),
-    part: *const Part(Kernel),
-    within: bool,
-) bool {
-    var some: Kernel.Rays.Mask = .splat(false);
-    for (&bundle.groups, active, part) |*group, all, chosen| {
-        group.active = if (within) all.bitAnd(chosen) else all.andNot(chosen);
-        some = some.bitOr(group.active);
+    switch (together.*) {
+        .none => byInterval(Kernel, .any, world, bundle, null, counts),
+        .all => shadow.trace(Kernel, world, light, bundle, counts),
+        .some => |*some| {
+            const active = packet.narrow(Kernel, bundle, some, true);
+            shadow.trace(Kernel, world, light, bundle, counts);
+            packet.restore(Kernel, bundle, &active);
+            byInterval(Kernel, .any, world, bundle, some, counts);
+        },
     }
-    return some.any();
+}
+
+/// All rays but those that are `done`, each in what company it finds.
+fn byInterval(
+    comptime Kernel: type,
+    comptime query: Query,
+    world: *const world_file.World,
+    bundle: *packet.Bundle(Kernel),
+    done: ?*const packet.Part(Kernel),
+    counts: *TestCounts,
+) void {
+    var credit: interval.Credit = .{};
+    const part = done orelse
+        return interval.trace(Kernel, query, world, bundle, &credit, counts);
+    const active = packet.narrow(Kernel, bundle, part, false);
+    interval.trace(Kernel, query, world, bundle, &credit, counts);
+    packet.restore(Kernel, bundle, &active);
 }
 
 /// One group without beams.

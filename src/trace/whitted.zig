@@ -231,13 +231,13 @@ pub fn Whitted(comptime Kernel: type) type {
         }
 
         /// Finds what rays see. Returns those whose hits are near to each other.
-        fn trace(tracer: *Self, pending: *Pending) query.Part(Kernel) {
+        fn trace(tracer: *Self, pending: *Pending) query.Together(Kernel) {
             const first = pending.depth == 0 and pending.layer == 0;
             const known = if (tracer.grid) |*grid| grid else null;
             const grid = if (first) known else null;
             const beams = query
                 .nearest(Kernel, tracer.world, &pending.bundle, grid, null, &tracer.tests);
-            return if (pending.depth == 0) @splat(.splat(true)) else beams;
+            return if (pending.depth == 0) .all else beams;
         }
 
         /// Adds what rays see that left the scene.
@@ -325,7 +325,7 @@ pub fn Whitted(comptime Kernel: type) type {
             light: *const world_file.Light,
             pending: *const Pending,
             points: *const [group_count]Point,
-            together: *const query.Part(Kernel),
+            together: *const query.Together(Kernel),
         ) void {
             var bundle: packet.Bundle(Kernel) = undefined;
             var light_seen: [group_count]Vec3 = undefined;
@@ -378,7 +378,7 @@ pub fn Whitted(comptime Kernel: type) type {
             tracer: *Self,
             bundle: *packet.Bundle(Kernel),
             light: *const world_file.Light,
-            together: *const query.Part(Kernel),
+            together: *const query.Together(Kernel),
             passing: *[group_count]Vec3,
         ) void {
             query.any(Kernel, tracer.world, bundle, light, together, &tracer.tests);

@@ -15,7 +15,6 @@ const packet = @import("../packet.zig");
 const edges_file = @import("edges.zig");
 const found_file = @import("found.zig");
 const primary = @import("primary.zig");
-const vec3 = @import("../../math.zig").vec3;
 const Starts = @import("starts.zig").Starts;
 const Grid = primary.Grid;
 
@@ -29,68 +28,64 @@ const guess_max = 4;
 const apart_max = 0.02;
 /// How far a ray may be off anyway, in roundings of its direction, and of places in the scene.
 const roundings_max = 16;
+/// Directions shorter or longer are left out: their squares might leave the range of floats.
+const length_range = [2]f64{ 1e-6, 1e6 };
 
-/// Finds nearest hits of beams, and returns which rays these have; of the others nothing changes.
-/// `shares` is null, or where barycentric weights of hits go, as in `primary.trace`.
+/// Finds nearest hits of beams, and returns which rays these have, if there are any; of the others
+/// nothing changes. `shares` is null, or where barycentric weights go, as in `primary.trace`.
 pub fn trace(
     comptime Kernel: type,
     world: *const world_file.World,
     bundle: *packet.Bundle(Kernel),
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
-) [Kernel.group_count]Kernel.Rays.Mask {
-    const Rays = Kernel.Rays;
-    const groups = &bundle.groups;
-    var active: [Kernel.group_count]Rays.Mask = undefined;
-    var left: [Kernel.group_count]Rays.Mask = undefined;
-    for (&active, &left, groups) |*mask, *rest, *group| {
-        mask.* = group.active;
-        // Beams know no limits.
-        rest.* = group.active.bitAnd(group.nearest.t.eq(.splat(std.math.inf(f32))));
-    }
-    var beams: [Kernel.group_count]Rays.Mask = @splat(.splat(false));
-    var guess_count: u32 = 0;
+) ?packet.Part(Kernel) {
     // In place: it is too large to be handed around.
     var measured: Measured(Kernel) = undefined;
+    var beams: ?packet.Part(Kernel) = null;
+    var guess_count: u32 = 0;
     for (0..Kernel.block_count) |block| {
-        if (!isFull(Kernel, &left, block)) continue;
-        const guess = Guess.of(Kernel, world, bundle, block) orelse continue;
-        measured.measure(world, &guess, bundle, &left);
-        guess_count += 1;
+        const guess = Guess.of(Kernel, world, bundle, block, &beams) orelse continue;
+        measured.measure(&guess, bundle, &beams);
         if (measured.ray_count >= rays_min and measured.isWithinReach(world)) {
-            for (groups, measured.members) |*group, members| group.active = members;
+            const active = packet.narrow(Kernel, bundle, &measured.members, true);
             measured.starts.bound(bundle);
             const starts = &measured.starts;
             const grid = &measured.grid;
             if (primary.traceBehind(Kernel, world, grid, starts, bundle, shares, counts)) {
-                for (&left, &beams, measured.members) |*rest, *beam, members| {
-                    rest.* = rest.andNot(members);
-                    beam.* = beam.bitOr(members);
+                if (beams) |*all| {
+                    for (all, measured.members) |*beam, members| beam.* = beam.bitOr(members);
+                } else {
+                    beams = measured.members;
                 }
             }
+            packet.restore(Kernel, bundle, &active);
         }
+        guess_count += 1;
         if (guess_count == guess_max) break;
     }
-    for (groups, active) |*group, mask| group.active = mask;
     return beams;
 }
 
-fn isFull(
+/// Rays of a group that are in no beam and may be in one: beams know no limits.
+inline fn leftOf(
     comptime Kernel: type,
-    left: *const [Kernel.group_count]Kernel.Rays.Mask,
-    block: usize,
-) bool {
-    const groups = left[block * Kernel.block_groups ..][0..Kernel.block_groups];
-    var all = groups[0];
-    inline for (groups[1..]) |mask| all = all.bitAnd(mask);
-    return all.all();
+    bundle: *const packet.Bundle(Kernel),
+    beams: *const ?packet.Part(Kernel),
+    index: usize,
+) Kernel.Rays.Mask {
+    const group = &bundle.groups[index];
+    const endless = group.active.bitAnd(group.nearest.t.eq(.splat(std.math.inf(f32))));
+    return if (beams.*) |*part| endless.andNot(part[index]) else endless;
 }
 
 /// A point and a grid of directions.
 const Guess = struct {
     grid: Grid,
-    /// The shorter step of the two.
-    step: f32,
+    /// By how much a ray's direction may be off.
+    turn_max: f32,
+    /// By how much its line may miss the point, in metres: this times t of its start, and this.
+    miss_max: [2]f32,
 
     const Wide = @Vector(3, f64);
 
@@ -100,7 +95,14 @@ const Guess = struct {
         world: *const world_file.World,
         bundle: *const packet.Bundle(Kernel),
         block: usize,
+        beams: *const ?packet.Part(Kernel),
     ) ?Guess {
+        var full: Kernel.Rays.Mask = .splat(true);
+        inline for (0..Kernel.block_groups) |row| {
+            const index = block * Kernel.block_groups + row;
+            full = full.bitAnd(leftOf(Kernel, bundle, beams, index));
+        }
+        if (!full.all()) return null;
         const across = block_side - 1;
         const places = [4]usize{ 0, across, across * block_side, across * block_side + across };
         var origins: [4]Wide = undefined;
@@ -115,20 +117,21 @@ const Guess = struct {
         const right = (directions[1] - directions[0]) * third;
         const down = (directions[2] - directions[0]) * third;
         const bend = directions[3] - directions[2] - directions[1] + directions[0];
-        const step = @sqrt(@min(dot(right, right), dot(down, down)));
+        const step = apart_max * @sqrt(@min(dot(right, right), dot(down, down)));
         const length = @sqrt(dot(directions[0], directions[0]));
-        const unit: f64 = edges_file.unit_roundoff;
-        const bend_max = across * apart_max * step + roundings_max * unit * length;
-        if (!(dot(bend, bend) <= bend_max * bend_max)) return null;
+        if (!(length > length_range[0] and length < length_range[1])) return null;
+        const anyway = roundings_max * @as(f64, edges_file.unit_roundoff);
+        const turn_max = step + anyway * length;
+        if (!(dot(bend, bend) <= across * across * turn_max * turn_max)) return null;
         const origin = meet(origins[0], directions[0], origins[3], directions[3]) orelse
             return null;
         // A third line must come near to where the two do.
         const offset = origins[1] - origin;
         const t = dot(offset, directions[1]) / dot(directions[1], directions[1]);
         const miss = offset - @as(Wide, @splat(t)) * directions[1];
-        const reach = edges_file.reachMax(world.pad);
-        const miss_max = apart_max * step * @abs(t) + roundings_max * unit * reach;
-        if (!(dot(miss, miss) <= miss_max * miss_max)) return null;
+        const miss_max = [2]f64{ step, anyway * edges_file.reachMax(world.pad) };
+        const miss_most = miss_max[0] * @abs(t) + miss_max[1];
+        if (!(dot(miss, miss) <= miss_most * miss_most)) return null;
         const column: f64 = @floatFromInt(block % (side / block_side) * block_side);
         const row: f64 = @floatFromInt(block / (side / block_side) * block_side);
         const first = directions[0] - right * @as(Wide, @splat(column)) -
@@ -141,7 +144,8 @@ const Guess = struct {
                 .down = narrow(down),
                 .deviation_roundings = undefined,
             },
-            .step = @floatCast(step),
+            .turn_max = @floatCast(turn_max),
+            .miss_max = .{ @floatCast(miss_max[0]), @floatCast(miss_max[1]) },
         };
     }
 
@@ -187,49 +191,42 @@ fn Measured(comptime Kernel: type) type {
         const Self = @This();
         const Found = found_file.Found(Kernel);
 
-        /// Measures the rays in `left`. A ray's own point is its start less t times its direction,
-        /// for the t that is computed here, whatever its rounding.
+        /// Measures the rays that are left. A ray's own point is its start less t times its
+        /// direction, for the t that is computed here, whatever its rounding.
         fn measure(
             measured: *Self,
-            world: *const world_file.World,
             guess: *const Guess,
             bundle: *const packet.Bundle(Kernel),
-            left: *const [Kernel.group_count]Rays.Mask,
+            beams: *const ?packet.Part(Kernel),
         ) void {
             const grid = &guess.grid;
-            const unit = edges_file.unit_roundoff;
             const origin: Vec3 = .splat(grid.origin);
             const right: Vec3 = .splat(grid.right);
             const down: Vec3 = .splat(grid.down);
-            const step: F32 = .splat(apart_max * guess.step);
-            const anyway: F32 =
-                .splat(roundings_max * unit * edges_file.reachMax(world.pad));
-            const length = @sqrt(vec3.dot(grid.corner, grid.corner));
-            const deviation_max: F32 =
-                .splat(apart_max * guess.step + roundings_max * unit * length);
-            const deviation_limit = deviation_max.mul(deviation_max);
+            const turn_max: F32 = .splat(guess.turn_max * guess.turn_max);
             const inf = std.math.inf(f32);
-            var deviation: F32 = .zero();
-            var apart: F32 = .zero();
+            var turned: F32 = .zero();
+            var missed: F32 = .zero();
             var t_least: F32 = .splat(inf);
             var t_greatest: F32 = .zero();
             measured.ray_count = 0;
             var blocks: u32 = 0;
-            for (&measured.members, &bundle.groups, left, 0..) |*members, *group, rest, index| {
+            for (&measured.members, &bundle.groups, 0..) |*members, *group, index| {
                 const direction = group.line.direction;
                 const x = F32.fromArray(Found.lane_x)
                     .add(.splat(@floatFromInt(Kernel.pixelX(index, 0))));
                 const y = F32.fromArray(Found.lane_y)
                     .add(.splat(@floatFromInt(Kernel.pixelY(index, 0))));
                 const expected = Vec3.splat(grid.corner).add(right.scale(x)).add(down.scale(y));
-                const off = direction.sub(expected);
-                const off_squared = off.dot(off);
+                const turn = direction.sub(expected);
+                const turn_squared = turn.dot(turn);
                 const offset = group.line.origin.sub(origin);
                 const t = offset.dot(direction).div(direction.dot(direction)).maxFast(.zero());
                 const miss = offset.sub(direction.scale(t));
                 const miss_squared = miss.dot(miss);
-                const miss_max = step.mul(t).add(anyway);
-                const fits = rest.bitAnd(off_squared.le(deviation_limit))
+                const miss_max = t.mul(.splat(guess.miss_max[0])).add(.splat(guess.miss_max[1]));
+                const fits = leftOf(Kernel, bundle, beams, index)
+                    .bitAnd(turn_squared.le(turn_max))
                     .bitAnd(miss_squared.le(miss_max.mul(miss_max)));
                 members.* = fits;
                 measured.starts.t[index] = t;
@@ -237,27 +234,34 @@ fn Measured(comptime Kernel: type) type {
                 measured.ray_count += @popCount(bits);
                 const block: u5 = @intCast(index / Kernel.block_groups);
                 blocks |= @as(u32, @intFromBool(bits != 0)) << block;
-                deviation = deviation.maxFast(.select(fits, off_squared, .zero()));
-                apart = apart.maxFast(.select(fits, miss_squared, .zero()));
+                turned = turned.maxFast(.select(fits, turn_squared, .zero()));
+                missed = missed.maxFast(.select(fits, miss_squared, .zero()));
                 t_least = t_least.minFast(.select(fits, t, .splat(inf)));
                 t_greatest = t_greatest.maxFast(.select(fits, t, .zero()));
             }
             if (blocks == 0) return;
-            measured.grid = grid.*;
-            var size: f32 = 0;
-            for (grid.corner ++ grid.right ++ grid.down) |component| size += @abs(component);
-            // What is expected rounds twice a product and a sum.
-            measured.grid.deviation_roundings =
-                1.01 * @sqrt(deviation.reduceMax()) / unit + 4 * size;
+            measured.starts.area = .of(blocks);
             measured.starts.t_min = t_least.reduceMin();
             measured.t_max = t_greatest.reduceMax();
-            const missed = 1.01 * @sqrt(apart.reduceMax());
-            const distance = 1.01 * measured.t_max * size + missed;
+            measured.bound(grid, @sqrt(turned.reduceMax()), @sqrt(missed.reduceMax()));
+        }
+
+        /// Bounds by how far directions are turned at most and lines miss the point, as computed.
+        fn bound(measured: *Self, grid: *const Grid, turn: f32, miss: f32) void {
+            const unit = edges_file.unit_roundoff;
+            // Of squares, sums and roots.
+            const rounded = 1 + 16 * unit;
+            var size: f32 = 0;
+            for (grid.corner ++ grid.right ++ grid.down) |component| size += @abs(component);
+            measured.grid = grid.*;
+            // What is expected rounds twice a product and a sum.
+            measured.grid.deviation_roundings = rounded * turn / unit + 4 * size;
+            const distance = rounded * (measured.t_max * (grid.longest() + turn) + miss);
             measured.starts.spread = .{
-                .apart = missed + 4 * unit * distance,
+                // The start from the origin, and t times its direction, are rounded.
+                .apart = rounded * miss + 4 * unit * distance,
                 .distance = distance,
             };
-            measured.starts.area = .of(blocks);
         }
 
         /// Whether no corner of the scene is farther from a start than `World.pad` allows for.

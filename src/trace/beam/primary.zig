@@ -44,6 +44,16 @@ pub const Grid = struct {
     /// Bound of what every ray's direction differs from that, in units of 2^-24.
     deviation_roundings: f32,
 
+    /// A bound of how much directions differ.
+    fn spread(grid: *const Grid) f32 {
+        return last * (length1(grid.right) + length1(grid.down));
+    }
+
+    /// A bound of their lengths.
+    pub fn longest(grid: *const Grid) f32 {
+        return @sqrt(vec3.dot(grid.corner, grid.corner)) + grid.spread();
+    }
+
     /// The direction of a pixel, rounded.
     pub fn direction(grid: *const Grid, x: f32, y: f32) [3]f32 {
         return vec3.add(grid.corner, vec3.add(vec3.scale(grid.right, x), vec3.scale(grid.down, y)));
@@ -218,8 +228,8 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             bundle: *packet.Bundle(Kernel),
             counts: *TestCounts,
         ) bool {
-            const spread = last * (length1(grid.right) + length1(grid.down));
-            const longest = @sqrt(vec3.dot(grid.corner, grid.corner)) + spread;
+            const longest = grid.longest();
+            const spread = grid.spread();
             const roundings = grid.deviation_roundings;
             const unit = edges_file.unit_roundoff;
             search.world = world;
@@ -737,8 +747,7 @@ fn length1(vector: [3]f32) f32 {
 /// Inward normals of the pyramid around the rays of an area, or null where the beam's rays are too
 /// far apart for one.
 fn sidesOf(grid: *const Grid, area: Area) ?[4][3]f32 {
-    const spread = last * (length1(grid.right) + length1(grid.down));
-    if (!(spread <= 0.5 * length1(grid.corner))) return null;
+    if (!(grid.spread() <= 0.5 * length1(grid.corner))) return null;
     const corners = [4][3]f32{
         grid.direction(area.x[0], area.y[0]), grid.direction(area.x[1], area.y[0]),
         grid.direction(area.x[1], area.y[1]), grid.direction(area.x[0], area.y[1]),

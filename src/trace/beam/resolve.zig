@@ -155,8 +155,10 @@ fn Together(comptime Kernel: type, comptime behind: bool, comptime axis: u2) typ
                 if (whole and block_slot == exact.no_slot) continue;
                 for (block * Kernel.block_groups..(block + 1) * Kernel.block_groups) |index| {
                     const group = &bundle.groups[index];
-                    const from: Vec3 =
-                        if (common) |origin| .splat(origin) else turn(group.line.origin);
+                    const from: Vec3 = if (behind)
+                        turn(group.line.origin)
+                    else
+                        .splat(common.?);
                     const own = found.of("slot", index);
                     const lanes: Rays.I32 = .loadAligned(own);
                     if (whole or lanes.eq(.splat(own[0])).all()) {
@@ -167,8 +169,10 @@ fn Together(comptime Kernel: type, comptime behind: bool, comptime axis: u2) typ
                             .placed = inLanes(&placeOne(tree, world.pad, common, slot)),
                             .primitive = .splat(exact.primitiveAt(Kernel.width, tree, slot)),
                         };
-                        const placed = if (behind) last.placed.seenFrom(from) else last.placed;
-                        const hit = intersect(group, &placed, down, .splat(true));
+                        const hit = if (behind)
+                            intersect(group, &last.placed.seenFrom(from), down, .splat(true))
+                        else
+                            intersect(group, &last.placed, down, .splat(true));
                         if (shares) |all| all[index] = hit.shares();
                         group.nearest = .{ .t = hit.t, .primitive = last.primitive };
                         continue;
