@@ -15,8 +15,8 @@ const Golden = struct { scene: []const u8, width: u32, height: u32, hash: u64 };
 const goldens = [_]Golden{
     .{ .scene = "builtin:cornell", .width = 61, .height = 47, .hash = 0x786fc2c79a965f00 },
     .{ .scene = "builtin:atrium", .width = 53, .height = 40, .hash = 0xc71228fd03d18869 },
-    .{ .scene = "builtin:nave", .width = 53, .height = 40, .hash = 0x25e1ba635974da17 },
-    .{ .scene = "builtin:handles", .width = 40, .height = 53, .hash = 0x70805ca579f3d438 },
+    .{ .scene = "builtin:nave", .width = 53, .height = 40, .hash = 0xb3f44d630da93019 },
+    .{ .scene = "builtin:handles", .width = 40, .height = 53, .hash = 0xd1f7064ed445c955 },
 };
 
 fn parse(name: []const u8) !raylane.scene.Scene {
