@@ -36,7 +36,7 @@ pub const packet = @import("trace/packet.zig");
 /// Primary rays as a beam.
 pub const primary = @import("trace/beam/primary.zig");
 /// What primary rays have in common.
-pub const Grid = primary.Grid;
+pub const Grid = @import("trace/beam/grid.zig").Grid;
 /// A bundle in the variant's own way.
 pub const query = @import("trace/query.zig");
 
@@ -189,6 +189,7 @@ test {
     _ = whitted;
     _ = Tiles;
     _ = @import("trace/beam/found.zig");
+    _ = @import("trace/beam/grid.zig");
     _ = @import("trace/camera.zig");
     _ = @import("trace/exponential.zig");
     _ = @import("trace/offset.zig");

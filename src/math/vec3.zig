@@ -52,6 +52,11 @@ pub inline fn length(a: Vec3) f32 {
     return @sqrt(dot(a, a));
 }
 
+/// The sum of the components' sizes: at least the Euclidean length, at most 1.74 times as much.
+pub inline fn length1(a: Vec3) f32 {
+    return @abs(a[0]) + @abs(a[1]) + @abs(a[2]);
+}
+
 /// `a` scaled to length 1, or null where that has no meaning (zero, tiny, huge, not a number).
 /// Scaled by the largest component first, so that neither squares nor their sum leave the range.
 pub fn normalize(a: Vec3) ?Vec3 {

@@ -7,7 +7,7 @@ const std = @import("std");
 const world_file = @import("../world.zig");
 const vec3 = @import("../math.zig").vec3;
 const ray_file = @import("ray.zig");
-const primary = @import("beam/primary.zig");
+const Grid = @import("beam/grid.zig").Grid;
 const assert = std.debug.assert;
 
 /// A sample's place in its pixel, 0..1 from the upper left corner.
@@ -60,7 +60,7 @@ pub inline fn generate(
 
 /// The directions of the rays around the one through (x, y), pixel by pixel; null where rays do not
 /// share an origin.
-pub fn grid(world: *const world_file.World, x: f32, y: f32) ?primary.Grid {
+pub fn grid(world: *const world_file.World, x: f32, y: f32) ?Grid {
     const camera = &world.camera;
     if (camera.orthographic) return null;
     const width: f32 = @floatFromInt(world.width);

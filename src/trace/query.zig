@@ -11,6 +11,7 @@ const single = @import("single.zig");
 const packet = @import("packet.zig");
 const pencil = @import("beam/pencil.zig");
 const primary = @import("beam/primary.zig");
+const Grid = @import("beam/grid.zig").Grid;
 const shadow = @import("beam/shadow.zig");
 const Query = @import("walk.zig").Query;
 
@@ -27,7 +28,7 @@ pub fn nearest(
     comptime Kernel: type,
     world: *const world_file.World,
     bundle: *packet.Bundle(Kernel),
-    grid: ?*const primary.Grid,
+    grid: ?*const Grid,
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
 ) Together(Kernel) {

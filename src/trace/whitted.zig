@@ -16,7 +16,7 @@ const surface_file = @import("surface.zig");
 const shade = @import("shade.zig");
 const light_file = @import("light.zig");
 const exponential = @import("exponential.zig");
-const Grid = @import("beam/primary.zig").Grid;
+const Grid = @import("beam/grid.zig").Grid;
 const assert = std.debug.assert;
 const World = world_file.World;
 

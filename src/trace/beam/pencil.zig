@@ -15,8 +15,8 @@ const packet = @import("../packet.zig");
 const edges_file = @import("edges.zig");
 const found_file = @import("found.zig");
 const primary = @import("primary.zig");
+const Grid = @import("grid.zig").Grid;
 const Starts = @import("starts.zig").Starts;
-const Grid = primary.Grid;
 
 const side = kernel_file.beam_side;
 const block_side = kernel_file.block_side;

@@ -21,10 +21,13 @@ const walk = @import("../walk.zig");
 const vec3 = @import("../../math.zig").vec3;
 const edges_file = @import("edges.zig");
 const exact = @import("exact.zig");
+const grid_file = @import("grid.zig");
 const found_file = @import("found.zig");
 const resolve = @import("resolve.zig");
 const frustum_file = @import("frustum.zig");
 const Starts = @import("starts.zig").Starts;
+const Area = grid_file.Area;
+const Grid = grid_file.Grid;
 const assert = std.debug.assert;
 
 const side = kernel_file.beam_side;
@@ -34,54 +37,6 @@ const block_count = kernel_file.beam_blocks;
 const few_blocks = 2;
 const last: f32 = side - 1;
 const block_last: f32 = block_side - 1;
-
-/// Directions of a beam's rays: corner + x right + y down for the pixel in column x, row y.
-pub const Grid = struct {
-    origin: [3]f32,
-    corner: [3]f32,
-    right: [3]f32,
-    down: [3]f32,
-    /// Bound of what every ray's direction differs from that, in units of 2^-24.
-    deviation_roundings: f32,
-
-    /// A bound of how much directions differ.
-    fn spread(grid: *const Grid) f32 {
-        return last * (length1(grid.right) + length1(grid.down));
-    }
-
-    /// A bound of their lengths.
-    pub fn longest(grid: *const Grid) f32 {
-        return @sqrt(vec3.dot(grid.corner, grid.corner)) + grid.spread();
-    }
-
-    /// The direction of a pixel, rounded.
-    pub fn direction(grid: *const Grid, x: f32, y: f32) [3]f32 {
-        return vec3.add(grid.corner, vec3.add(vec3.scale(grid.right, x), vec3.scale(grid.down, y)));
-    }
-};
-
-/// Pixels that have rays: the first and the last column and row.
-pub const Area = struct {
-    x: [2]f32 = .{ 0, last },
-    y: [2]f32 = .{ 0, last },
-
-    /// Around the pixels of blocks, a bit each; there is at least one.
-    pub fn of(blocks: u32) Area {
-        const across = side / block_side;
-        var columns: u32 = 0;
-        for (0..across) |row| columns |= blocks >> @intCast(row * across) & ((1 << across) - 1);
-        return .{
-            .x = span(@ctz(columns), 31 - @clz(columns)),
-            .y = span(@ctz(blocks) / across, (31 - @clz(blocks)) / across),
-        };
-    }
-
-    fn span(first_block: u32, last_block: u32) [2]f32 {
-        const first: f32 = @floatFromInt(first_block * block_side);
-        const final: f32 = @floatFromInt(last_block * block_side);
-        return .{ first, final + block_last };
-    }
-};
 
 /// Finds the nearest hits of a bundle's rays, which have none yet, start at `grid.origin` and
 /// leave nothing out. Returns false, having done nothing, where the rays are too far apart.
@@ -181,7 +136,8 @@ const Dual = struct {
             .depth = vec3.scale(facing, scale),
             .gain = undefined,
         };
-        dual.gain = length1(dual.column) + length1(dual.row) + side * length1(dual.depth);
+        dual.gain = vec3.length1(dual.column) + vec3.length1(dual.row) +
+            side * vec3.length1(dual.depth);
         return dual;
     }
 };
@@ -240,8 +196,8 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             var standoff = frustum_file.slack_pads * world.pad;
             if (behind) standoff += search.driftMax(longest);
             const area: Area = if (behind) search.starts.area else .{};
-            const sides = sidesOf(grid, area) orelse return false;
-            const along = depthNormal(grid) orelse return false;
+            const sides = grid.sides(area) orelse return false;
+            const along = grid.depthNormal() orelse return false;
             search.frustum = .init(grid.origin, sides, along, standoff);
             if (behind) {
                 search.front = .init(along, grid.origin, standoff);
@@ -276,7 +232,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
         fn driftMax(search: *const Self, longest: f32) f32 {
             const grid = search.grid;
             const reach = edges_file.reachMax(search.world.pad) + search.starts.spread.distance;
-            const size = reach + length1(grid.origin);
+            const size = reach + vec3.length1(grid.origin);
             const roundings = 32 + grid.deviation_roundings / longest;
             return 2 * search.starts.spread.apart +
                 2 * edges_file.unit_roundoff * roundings * size;
@@ -738,36 +694,4 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             for (0..block_count) |block| search.found.boundBlock(block);
         }
     };
-}
-
-fn length1(vector: [3]f32) f32 {
-    return @abs(vector[0]) + @abs(vector[1]) + @abs(vector[2]);
-}
-
-/// Inward normals of the pyramid around the rays of an area, or null where the beam's rays are too
-/// far apart for one.
-fn sidesOf(grid: *const Grid, area: Area) ?[4][3]f32 {
-    if (!(grid.spread() <= 0.5 * length1(grid.corner))) return null;
-    const corners = [4][3]f32{
-        grid.direction(area.x[0], area.y[0]), grid.direction(area.x[1], area.y[0]),
-        grid.direction(area.x[1], area.y[1]), grid.direction(area.x[0], area.y[1]),
-    };
-    const facing = vec3.dot(vec3.cross(grid.right, grid.down), grid.corner);
-    var normals: [4][3]f32 = undefined;
-    for (&normals, corners, 0..) |*normal, corner, index| {
-        // By the step, not by the next corner: two corners are nearly parallel, or the same.
-        const across = vec3.cross(corner, if (index % 2 == 0) grid.right else grid.down);
-        const inward = (facing > 0) == (index < 2);
-        normal.* = vec3.scale(across, if (inward) 1 else -1);
-    }
-    return normals;
-}
-
-/// The vector whose product with every direction of the grid is 1, or null where they are too
-/// oblique.
-fn depthNormal(grid: *const Grid) ?[3]f32 {
-    const facing = vec3.cross(grid.right, grid.down);
-    const share = vec3.dot(facing, grid.corner);
-    if (!(@abs(share) > 0.1 * length1(facing) * length1(grid.corner))) return null;
-    return vec3.scale(facing, 1 / share);
 }

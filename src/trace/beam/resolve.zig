@@ -15,7 +15,7 @@ const kernel_file = @import("../kernel.zig");
 const edges_file = @import("edges.zig");
 const exact = @import("exact.zig");
 const Found = @import("found.zig").Found;
-const Grid = @import("primary.zig").Grid;
+const Grid = @import("grid.zig").Grid;
 const assert = std.debug.assert;
 
 /// Puts the hits of the triangles found into the bundle, and weights of the second and third corner

@@ -10,7 +10,7 @@ const kernel_file = @import("../kernel.zig");
 const ray_file = @import("../ray.zig");
 const packet = @import("../packet.zig");
 const edges_file = @import("edges.zig");
-const Area = @import("primary.zig").Area;
+const Area = @import("grid.zig").Area;
 
 const block_count = kernel_file.beam_blocks;
 const pixel_count = kernel_file.beam_pixels;
