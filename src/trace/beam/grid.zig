@@ -56,9 +56,11 @@ pub const Grid = struct {
     }
 
     /// The vector whose product with every direction of the grid is 1, or null where they are too
-    /// oblique.
+    /// oblique, or one step much like the other, so that rounding would be all there is of it.
     pub fn depthNormal(grid: *const Grid) ?[3]f32 {
         const facing = vec3.cross(grid.right, grid.down);
+        const area_max = vec3.length1(grid.right) * vec3.length1(grid.down);
+        if (!(vec3.length1(facing) > 0.01 * area_max)) return null;
         const share = vec3.dot(facing, grid.corner);
         if (!(@abs(share) > 0.1 * vec3.length1(facing) * vec3.length1(grid.corner))) return null;
         return vec3.scale(facing, 1 / share);
@@ -134,6 +136,8 @@ test "directions too far apart, or along the picture, have no pyramid" {
     grid.down = .{ 0, 0, 0.001 };
     try std.testing.expectEqual(null, grid.depthNormal());
     grid.down = .{ 0, 0, 0 };
+    try std.testing.expectEqual(null, grid.depthNormal());
+    grid.down = .{ 0.002, 0.000001, 0 };
     try std.testing.expectEqual(null, grid.depthNormal());
     grid.corner = @splat(std.math.nan(f32));
     try std.testing.expectEqual(null, grid.sides(.{}));

@@ -17,6 +17,7 @@ const found_file = @import("found.zig");
 const primary = @import("primary.zig");
 const Grid = @import("grid.zig").Grid;
 const Starts = @import("starts.zig").Starts;
+const vec3 = @import("../../math.zig").vec3;
 
 const side = kernel_file.beam_side;
 const block_side = kernel_file.block_side;
@@ -251,8 +252,7 @@ fn Measured(comptime Kernel: type) type {
             const unit = edges_file.unit_roundoff;
             // Of squares, sums and roots.
             const rounded = 1 + 16 * unit;
-            var size: f32 = 0;
-            for (grid.corner ++ grid.right ++ grid.down) |component| size += @abs(component);
+            const size = vec3.length1(grid.corner) + grid.spread();
             measured.grid = grid.*;
             // What is expected rounds twice a product and a sum.
             measured.grid.deviation_roundings = rounded * turn / unit + 4 * size;
@@ -269,6 +269,8 @@ fn Measured(comptime Kernel: type) type {
             const root = &world.tree.get(Kernel.width).nodes[0];
             const grid = &measured.grid;
             const last: f32 = side - 1;
+            const turned =
+                measured.t_max * grid.deviation_roundings * edges_file.unit_roundoff;
             var farthest_squared: f32 = 0;
             for (0..3) |axis| {
                 const lower = @reduce(.Min, @as(@Vector(Kernel.width, f32), root.bounds[0][axis]));
@@ -283,7 +285,7 @@ fn Measured(comptime Kernel: type) type {
                     const at = grid.origin[axis] + t * direction;
                     farthest = @max(farthest, upper - at, at - lower);
                 }
-                farthest += 2 * measured.starts.spread.apart;
+                farthest += 2 * measured.starts.spread.apart + turned;
                 farthest_squared += farthest * farthest;
             }
             const reach = edges_file.reachMax(world.pad);

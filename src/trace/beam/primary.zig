@@ -193,11 +193,11 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             search.grid = grid;
             search.bundle = bundle;
             search.counts = counts;
-            var standoff = frustum_file.slack_pads * world.pad;
-            if (behind) standoff += search.driftMax(longest);
             const area: Area = if (behind) search.starts.area else .{};
             const sides = grid.sides(area) orelse return false;
             const along = grid.depthNormal() orelse return false;
+            var standoff = frustum_file.slack_pads * world.pad;
+            if (behind) standoff += search.driftMax(along);
             search.frustum = .init(grid.origin, sides, along, standoff);
             if (behind) {
                 search.front = .init(along, grid.origin, standoff);
@@ -229,13 +229,15 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
 
         /// How far, in metres, a point of a ray may be from where the grid has it, or a plane
         /// through the grid's origin off, beyond what `frustum.slack_pads` allows for.
-        fn driftMax(search: *const Self, longest: f32) f32 {
+        fn driftMax(search: *const Self, along: [3]f32) f32 {
             const grid = search.grid;
+            const unit = edges_file.unit_roundoff;
             const reach = edges_file.reachMax(search.world.pad) + search.starts.spread.distance;
-            const size = reach + vec3.length1(grid.origin);
-            const roundings = 32 + grid.deviation_roundings / longest;
+            // No direction is shorter than 1 / |along|.
+            const t_max = reach * vec3.length(along);
             return 2 * search.starts.spread.apart +
-                2 * edges_file.unit_roundoff * roundings * size;
+                2 * unit * grid.deviation_roundings * t_max +
+                64 * unit * (reach + vec3.length1(grid.origin));
         }
 
         fn travel(search: *Self) void {
