@@ -33,9 +33,9 @@ pub const interval = @import("trace/interval.zig");
 pub const walk = @import("trace/walk.zig");
 /// A bundle of rays through the tree.
 pub const packet = @import("trace/packet.zig");
-/// Primary rays as a beam.
+/// Rays from one point, or behind it, as a beam.
 pub const primary = @import("trace/beam/primary.zig");
-/// What primary rays have in common.
+/// The directions of a beam's rays.
 pub const Grid = @import("trace/beam/grid.zig").Grid;
 /// A bundle in the variant's own way.
 pub const query = @import("trace/query.zig");

@@ -263,19 +263,50 @@ fn expectMirror(
     return beam_count;
 }
 
+/// A soup, and where to look at it from.
+const Stage = struct {
+    generator: std.Random.DefaultPrng,
+    corners: soup_file.Corners = .empty,
+    center: f32,
+
+    fn init(soup: soup_file.Soup, seed: u64, triangle_count: usize) !Stage {
+        var stage: Stage = .{
+            .generator = .init(seed + @backingInt(soup)),
+            .center = if (soup == .far_away) 1e5 else 0,
+        };
+        const random = stage.generator.random();
+        try soup_file.addTriangles(soup, &stage.corners, random, triangle_count);
+        return stage;
+    }
+
+    fn deinit(stage: *Stage) void {
+        stage.corners.deinit(gpa);
+    }
+
+    /// A corner of some triangle.
+    fn target(stage: *Stage) [3]f32 {
+        const corners = stage.corners.items;
+        return corners[stage.generator.random().uintLessThan(usize, corners.len)];
+    }
+
+    /// Somewhere about the soup's middle.
+    fn place(stage: *Stage, distance: f32) [3]f32 {
+        var at: [3]f32 = undefined;
+        for (&at) |*x| x.* = stage.center + stage.generator.random().floatNorm(f32) * distance;
+        return at;
+    }
+};
+
 /// Mirrors of all kinds in one soup. Returns the share of rays that went as beams.
 fn expectMirrors(soup: soup_file.Soup, triangle_count: usize, tile_count: usize) !f32 {
     const vec3 = raylane.math.vec3;
-    var generator = std.Random.DefaultPrng.init(@as(u64, 177) + @backingInt(soup));
-    const random = generator.random();
-    var corners: soup_file.Corners = .empty;
-    defer corners.deinit(gpa);
-    try soup_file.addTriangles(soup, &corners, random, triangle_count);
-    var scene = try soup_file.makeScene(corners.items);
+    var stage: Stage = try .init(soup, 177, triangle_count);
+    defer stage.deinit();
+    const random = stage.generator.random();
+    var scene = try soup_file.makeScene(stage.corners.items);
     defer scene.deinit();
     const mode = raylane.simd.setFlushToZero();
     defer raylane.simd.setFloatControl(mode);
-    const center: f32 = if (soup == .far_away) 1e5 else 0;
     var beam_count: u32 = 0;
     var ray_count: u32 = 0;
     inline for (.{ 4, 8, 16 }) |lanes| {
@@ -283,19 +314,19 @@ fn expectMirrors(soup: soup_file.Soup, triangle_count: usize, tile_count: usize)
         var world = try fixture.prepare(&scene, lanes, .{});
         defer world.deinit();
         for (0..tile_count) |tile| {
-            const first = random.uintLessThan(usize, corners.items.len / 3) * 3;
-            const target = corners.items[random.uintLessThan(usize, corners.items.len)];
-            var origin: [3]f32 = undefined;
-            for (&origin) |*x| x.* = center + random.floatNorm(f32) * 4;
+            const first = random.uintLessThan(usize, stage.corners.items.len / 3) * 3;
+            const corners = stage.corners.items[first..][0..3];
+            const target = stage.target();
+            var origin = stage.place(4);
             if (tile % 5 == 1) origin[2] = target[2];
             const grid = aim(origin, target, if (tile % 2 == 0) 1e-3 else 8e-3, random);
             // Every other mirror is in the plane of a triangle.
             const edges = [2][3]f32{
-                vec3.sub(corners.items[first + 1], corners.items[first]),
-                vec3.sub(corners.items[first + 2], corners.items[first]),
+                vec3.sub(corners[1], corners[0]),
+                vec3.sub(corners[2], corners[0]),
             };
             var mirror: Mirror = .{
-                .point = corners.items[first],
+                .point = corners[0],
                 .normal = vec3.cross(edges[0], edges[1]),
                 .jitter = ([_]f32{ 0, 0, 1e-7, 1e-5, 1e-3 })[tile % 5],
                 .kind = ([_]Mirror.Kind{ .plane, .plane, .rest, .plane, .two })[tile / 2 % 5],
@@ -317,28 +348,23 @@ fn expectMirrors(soup: soup_file.Soup, triangle_count: usize, tile_count: usize)
 }
 
 fn expectSoup(soup: soup_file.Soup, triangle_count: usize, tile_count: usize) !void {
-    var generator = std.Random.DefaultPrng.init(@as(u64, 77) + @backingInt(soup));
-    const random = generator.random();
-    var corners: soup_file.Corners = .empty;
-    defer corners.deinit(gpa);
-    try soup_file.addTriangles(soup, &corners, random, triangle_count);
-    var scene = try soup_file.makeScene(corners.items);
+    var stage: Stage = try .init(soup, 77, triangle_count);
+    defer stage.deinit();
+    const random = stage.generator.random();
+    var scene = try soup_file.makeScene(stage.corners.items);
     defer scene.deinit();
     const mode = raylane.simd.setFlushToZero();
     defer raylane.simd.setFloatControl(mode);
-    const center: f32 = if (soup == .far_away) 1e5 else 0;
     inline for (.{ 4, 8, 16 }) |lanes| {
         if (comptime !soup_file.isCompiled(lanes)) continue;
         var world = try fixture.prepare(&scene, lanes, .{});
         defer world.deinit();
         for (0..tile_count) |tile| {
-            const target = corners.items[random.uintLessThan(usize, corners.items.len)];
-            var origin: [3]f32 = undefined;
-            for (&origin) |*x| x.* = center + random.floatNorm(f32) * 4;
+            const target = stage.target();
+            var origin = stage.place(4);
             // Within a plane of coplanar triangles and faces of boxes, and aiming along it.
             if (tile % 3 == 1) origin[2] = target[2];
-            var light: [3]f32 = undefined;
-            for (&light) |*x| x.* = center + random.floatNorm(f32) * 5;
+            var light = stage.place(5);
             if (tile % 4 == 2) light[2] = target[2];
             const step: f32 = if (tile % 2 == 0) 1e-3 else 8e-3;
             const grid = aim(origin, target, step, random);

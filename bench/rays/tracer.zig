@@ -50,7 +50,7 @@ pub fn Tracer(comptime Kernel: type) type {
             }
         }
 
-        /// Nearest hits of rays that have little in common.
+        /// Nearest hits of rays of which nothing is known.
         pub fn reflect(tracer: *Self, batch: *Batch) void {
             tracer.nearest(batch, null);
         }
@@ -68,14 +68,15 @@ pub fn Tracer(comptime Kernel: type) type {
 
         /// Group by group, each by itself.
         fn traceEach(tracer: *Self, comptime query: Query, batch: *Batch) void {
+            const world = tracer.world;
+            const tests = &tracer.tests;
             for (&batch.groups) |*group| {
-                const view = packet.viewOf(Lanes, group);
-                switch (Kernel.variant.traversal) {
-                    .packet2x2 => packet
-                        .trace(Kernel, query, tracer.world, group, &tracer.tests),
-                    else => raylane.trace.single
-                        .traceEach(Kernel, query, tracer.world, group, &view, &tracer.tests),
+                if (Kernel.variant.traversal == .packet2x2) {
+                    packet.trace(Kernel, query, world, group, tests);
+                    continue;
                 }
+                const view = packet.viewOf(Lanes, group);
+                raylane.trace.single.traceEach(Kernel, query, world, group, &view, tests);
             }
         }
 

@@ -87,8 +87,8 @@ pub fn Edges(comptime Lanes: type) type {
         const Self = @This();
 
         /// Sets up the triangles of a block. Bounds do not hold for those with a corner farther
-        /// away than `reach_max`. Without a spread rays start at the origin. Of one with, `slack`
-        /// does not tell of the lines that miss it.
+        /// away than `reach_max`. Rays start at the origin unless they have a spread; what lines
+        /// that miss the origin add to `slack`, 2 E L |D|, is left to the caller.
         pub inline fn init(
             corners: [3]Vec3,
             origin: Vec3,
