@@ -86,7 +86,8 @@ pub fn Tracer(comptime Kernel: type) type {
             var hits: [Batch.group_count]Lanes.Mask = undefined;
             for (&hits, &batch.groups, 0..) |*hit, *group, index| {
                 hit.* = group.active.andNot(group.nearest.primitive.lt(.zero()));
-                if (tracer.together == .some) hit.* = hit.andNot(tracer.together.some[index]);
+                if (Kernel.variant.traversal == .packet and tracer.together == .some)
+                    hit.* = hit.andNot(tracer.together.some[index]);
                 if (hit.any()) tracer.prefetchCorners(group.nearest.primitive, hit.bits());
             }
             for (&batch.groups, &batch.shares, hits) |*group, *all, hit| {
