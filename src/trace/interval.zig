@@ -5,7 +5,7 @@
 //! whether there is any. Company is found within blocks of 4x4 pixels: the first ray takes with it
 //! those that go much the same way from much the same place, in the same octant, since intervals of
 //! inverse directions of both signs say nothing; then the next that is left. Who finds little
-//! company goes as one of a set (stream.zig).
+//! company goes as one of a set (stream.zig), and once a few did, all that are left of the block.
 //!
 //! Every step of the slab test is monotone in origin, inverse and bound, rounding included. So from
 //! the ends of intervals come bounds of what the test gives for any ray between, and nothing is
@@ -28,6 +28,9 @@ const World = world_file.World;
 
 /// Fewer rays are no company.
 const rays_min = 4;
+/// Once so many rays of a block found no company, nobody looks for that of the others: most are as
+/// lonely, and each look goes over the whole block.
+const alone_max = 2;
 /// How far apart the directions of rays are that go together, over their length, and the origins,
 /// over the size of the scene. Both are rough: what they let through costs little more than single
 /// rays, since a child is entered only where a ray is (`Search.meet`).
@@ -91,7 +94,9 @@ fn traceBlock(
     if (firstOf(Rays, &active) == null) return;
     for (&views, groups) |*view, *group| view.* = packet.viewOf(Rays, group);
     var rest = active;
-    while (credit.lasts()) {
+    var alone: [Kernel.block_groups]Rays.Mask = @splat(.splat(false));
+    var alone_count: u32 = 0;
+    while (credit.lasts() and alone_count < alone_max) {
         const first = firstOf(Rays, &rest) orelse break;
         const leader = &groups[first.group];
         const company: Company(Rays) =
@@ -107,11 +112,16 @@ fn traceBlock(
             left.* = left.andNot(group.active);
             count += group.active.popCount();
         }
-        const together = count >= rays_min and
-            goTogether(Kernel, query, stream.world, groups, &views, company.octant, credit, counts);
-        if (!together) stream.take(first_group, &views, counts);
+        if (count < rays_min) {
+            alone_count += count;
+        } else {
+            const world = stream.world;
+            const octant = company.octant;
+            if (goTogether(Kernel, query, world, groups, &views, octant, credit, counts)) continue;
+        }
+        for (&alone, groups) |*mask, *group| mask.* = mask.bitOr(group.active);
     }
-    for (groups, rest) |*group, left| group.active = left;
+    for (groups, rest, alone) |*group, left, mask| group.active = left.bitOr(mask);
     stream.take(first_group, &views, counts);
     for (groups, active) |*group, mask| group.active = mask;
 }
