@@ -117,6 +117,17 @@ pub fn Tree(comptime width: comptime_int) type {
     return struct {
         nodes: []align(cache_line_bytes) const Node(width),
         blocks: []align(cache_line_bytes) const TriangleBlock(width),
+
+        /// Asks memory for a child's node or first block, to be there when somebody comes to it.
+        pub inline fn prefetch(tree: *const @This(), child: Child) void {
+            const start: [*]const u8 = if (child.block_count == 0)
+                @ptrCast(&tree.nodes[child.target])
+            else
+                @ptrCast(&tree.blocks[child.target]);
+            const bytes = @max(@sizeOf(Node(width)), @sizeOf(TriangleBlock(width)));
+            comptime var at = 0;
+            inline while (at < bytes) : (at += cache_line_bytes) @prefetch(start + at, .{});
+        }
     };
 }
 

@@ -26,8 +26,9 @@ const walk = @import("walk.zig");
 const Query = walk.Query;
 const World = world_file.World;
 
-/// Fewer rays are no company.
-const rays_min = 4;
+/// Fewer rays are no company. Both as measured (docs/performance.md): a set does so well with rays
+/// that look for any hit that few of them gain by going together.
+const rays_min = std.EnumArray(Query, u32).init(.{ .nearest = 4, .any = 6 });
 /// Once so many rays of a block found no company, nobody looks for that of the others: most are as
 /// lonely, and each look goes over the whole block.
 const alone_max = 2;
@@ -39,13 +40,13 @@ const direction_apart_max = 0.06;
 const origin_apart_max = 0.01;
 
 /// Whether shadow rays do well in company: every node that a company visits earns a little, every
-/// child that its intervals meet though none of its rays enters it costs twice as much. Once all is
+/// child that its intervals meet though none of its rays enters it costs much more. Once all is
 /// spent, rays go without. One for a bundle: its rays are much alike in this.
 pub const Credit = struct {
     /// What is left; what there is at first lets a company see a few nodes.
-    balance: i32 = 16,
+    balance: i32 = 4,
 
-    const balance_max = 48;
+    const balance_max = 12;
 
     inline fn lasts(credit: *const Credit) bool {
         return credit.balance > 0;
@@ -56,7 +57,7 @@ pub const Credit = struct {
     }
 
     inline fn spend(credit: *Credit) void {
-        credit.balance -= 2;
+        credit.balance -= 6;
     }
 };
 
@@ -112,7 +113,7 @@ fn traceBlock(
             left.* = left.andNot(group.active);
             count += group.active.popCount();
         }
-        if (count < rays_min) {
+        if (count < rays_min.get(query)) {
             alone_count += count;
         } else {
             const world = stream.world;
@@ -199,7 +200,7 @@ fn goTogether(
     const ends: Ends = .of(Kernel, groups, views);
     if (!(ends.reach() < world.fused_reach)) return false;
     var search: Search(Kernel, query) = .init(world, groups, views, octant, &ends, credit.*);
-    _ = walk.walk(Kernel, tree, .whole, &search, counts);
+    _ = walk.walk(Kernel, tree, &search, counts);
     credit.balance = @min(search.credit.balance, Credit.balance_max);
     if (credit.lasts()) return true;
     for (groups) |*group| {

@@ -93,7 +93,7 @@ pub fn trace(
         .view = viewOf(Kernel.Rays, group),
         .pad = world.pad,
     };
-    _ = walk.walk(Kernel, world.tree.get(Kernel.width), .whole, &search, counts);
+    _ = walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts);
 }
 
 fn Search(comptime Kernel: type, comptime query: Query) type {

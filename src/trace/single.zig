@@ -84,7 +84,7 @@ inline fn travel(
     counts: *TestCounts,
 ) ?Found {
     var search: Search(Kernel, query, fused) = .of(ray, world.pad);
-    if (!walk.walk(Kernel, world.tree.get(Kernel.width), .whole, &search, counts)) return null;
+    if (!walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts)) return null;
     return .{ .t = ray.limit, .primitive = ray.nearest_primitive };
 }
 

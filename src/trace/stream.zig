@@ -17,9 +17,8 @@ const lone = @import("lone.zig");
 const packet = @import("packet.zig");
 const single = @import("single.zig");
 const stack_file = @import("stack.zig");
-const walk = @import("walk.zig");
 const assert = std.debug.assert;
-const Query = walk.Query;
+const Query = @import("walk.zig").Query;
 const World = world_file.World;
 
 /// Rays of a set, a bit each.
@@ -51,7 +50,10 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
         /// Where in the bundle a ray is.
         const Place = struct { group: u32, lane: u32 };
         /// A child still to be visited, and by whom.
-        const Entry = struct { child: world_file.Child, near: f32, set: Set };
+        const Entry = struct { child: world_file.Child, set: Set };
+        /// Entries at most: with one more on its way there are two ways down the tree at a time,
+        /// of which each leaves no more behind than one by itself.
+        const entries_max = 2 * Kernel.stack_max + Kernel.width;
 
         /// For rays of this bundle. In place: it is too large to be handed around.
         pub fn init(
@@ -116,43 +118,40 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
 
         fn travel(stream: *Self, counts: *TestCounts) void {
             const tree = stream.world.tree.get(Kernel.width);
-            var entries: [Kernel.stack_max]Entry = undefined;
-            entries[0] = .{
-                .child = .root,
-                .near = 0,
-                .set = @as(Set, std.math.maxInt(Set)) >> @intCast(rays_max - stream.count),
-            };
-            var entry_count: usize = 1;
-            while (entry_count > 0) {
-                entry_count -= 1;
-                const entry = &entries[entry_count];
-                const set = if (query == .any) entry.set & ~stream.found else entry.set;
-                if (set == 0) continue;
-                if (set & (set - 1) == 0) {
-                    const start: stack_file.Entry = .{ .child = entry.child, .near = entry.near };
-                    stream.goAlone(@ctz(set), start, counts);
-                } else if (entry.child.block_count > 0) {
+            var entries: [entries_max]Entry = undefined;
+            var entry_count: usize = 0;
+            const all = @as(Set, std.math.maxInt(Set)) >> @intCast(rays_max - stream.count);
+            var entry: Entry = .{ .child = .root, .set = all };
+            while (true) {
+                const next = stream.pop(&entries, &entry_count);
+                const set = stream.looking(entry.set);
+                if (entry.child.block_count > 0) {
                     const first, const end = entry.child.blocks();
                     stream.intersect(set, tree.blocks[first..end], counts);
-                } else {
-                    assert(entry_count + Kernel.width <= Kernel.stack_max);
+                } else if (set != 0) {
+                    assert(entry_count + Kernel.width <= entries_max);
                     const node = &tree.nodes[entry.child.target];
                     entry_count = stream.enter(set, node, &entries, entry_count, counts);
                 }
+                entry = next orelse stream.pop(&entries, &entry_count) orelse return;
             }
         }
 
-        inline fn goAlone(
-            stream: *Self,
-            number: usize,
-            start: stack_file.Entry,
-            counts: *TestCounts,
-        ) void {
-            const ray = &stream.rays[number];
-            if (start.near > ray.limit) return;
-            const tree = stream.world.tree.get(Kernel.width);
-            var search: single.Search(Kernel, query, true) = .of(ray, stream.world.pad);
-            if (walk.walk(Kernel, tree, start, &search, counts)) stream.keep(number);
+        /// The next child that any ray still has to visit, on its way here from memory.
+        inline fn pop(stream: *const Self, entries: []const Entry, entry_count: *usize) ?Entry {
+            while (entry_count.* > 0) {
+                entry_count.* -= 1;
+                const entry = entries[entry_count.*];
+                if (stream.looking(entry.set) == 0) continue;
+                stream.world.tree.get(Kernel.width).prefetch(entry.child);
+                return entry;
+            }
+            return null;
+        }
+
+        /// Those of a set that have not yet found what they look for.
+        inline fn looking(stream: *const Self, set: Set) Set {
+            return if (query == .any) set & ~stream.found else set;
         }
 
         /// A ray of the set after the other against the triangles of a leaf.
@@ -167,13 +166,10 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                 const number = @ctz(rest);
                 const ray = &stream.rays[number];
                 for (blocks) |*block| {
-                    if (ray.intersect(block, stream.world.pad, counts)) stream.keep(number);
+                    if (!ray.intersect(block, stream.world.pad, counts)) continue;
+                    stream.found |= @as(Set, 1) << @intCast(number);
                 }
             }
-        }
-
-        inline fn keep(stream: *Self, number: usize) void {
-            stream.found |= @as(Set, 1) << @intCast(number);
         }
 
         /// Pushes the children that rays of the set enter, the one that any of them enters first on
@@ -205,7 +201,6 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
             const met = near.lt(inf);
             var sets: [word_count][Kernel.width]i32 = undefined;
             for (&sets, words) |*array, word| array.* = word.toArray();
-            const nears = near.toArray();
             const ranks: stack_file.Ranks(Boxes) = .of(met, near);
             var rest = met.bits();
             const count = entry_count + @popCount(rest);
@@ -217,7 +212,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                     entered |= word << @intCast(index * word_bits);
                 }
                 entries[entry_count + ranks.farther(child)] =
-                    .{ .child = node.child[child], .near = nears[child], .set = entered };
+                    .{ .child = node.child[child], .set = entered };
             }
             return count;
         }

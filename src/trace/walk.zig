@@ -18,7 +18,7 @@ pub const Query = enum {
     any,
 };
 
-/// Searches what is below `start`, or until `search.isDone()`. Of a search it needs
+/// Searches the whole tree, or until `search.isDone()`. Of a search it needs
 ///
 ///     limit: f32                nothing that is farther matters; it may shrink
 ///     meet(node, counts)        box.Range in lanes of children, `isMet` where one may matter
@@ -27,14 +27,13 @@ pub const Query = enum {
 pub inline fn walk(
     comptime Kernel: type,
     tree: *const world_file.Tree(Kernel.width),
-    start: Entry,
     search: anytype,
     counts: *TestCounts,
 ) bool {
     var stack: [Kernel.stack_max]Entry = undefined;
     var stack_count: usize = 0;
     var found = false;
-    var entry = start;
+    var entry: Entry = .whole;
     while (true) {
         if (entry.child.block_count == 0) {
             assert(stack_count + Kernel.width <= Kernel.stack_max);
