@@ -2,9 +2,9 @@
 //!
 //! In: rays of a bundle that found no company. Out: their hits, in the bundle. Each is tested by
 //! itself against all boxes of a node, one ray right after the other, and those that enter a child
-//! go on to it as a set. What a ray by itself waits for, a node from memory, the end of a chain of
-//! arithmetic, a branch on how many children it enters, all share. A set of one ray goes on as rays
-//! without company do (single.zig).
+//! go on to it as a set, of one at last. What a ray by itself waits for, the end of a chain of
+//! arithmetic, a branch on how many children it enters, all share. While a node or a leaf is
+//! visited, the next that waits is on its way from memory.
 //!
 //! J. Tsakok, "Faster Incoherent Rays: Multi-BVH Ray Stream Tracing" (2009), section 3, with sets
 //! as bits, not lists.
@@ -51,8 +51,8 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
         const Place = struct { group: u32, lane: u32 };
         /// A child still to be visited, and by whom.
         const Entry = struct { child: world_file.Child, set: Set };
-        /// Entries at most: with one more on its way there are two ways down the tree at a time,
-        /// of which each leaves no more behind than one by itself.
+        /// Entries at most: that the next leaves the stack before children of the present one come
+        /// onto it makes two ways down the tree at a time, each of which leaves siblings behind.
         const entries_max = 2 * Kernel.stack_max + Kernel.width;
 
         /// For rays of this bundle. In place: it is too large to be handed around.
