@@ -194,4 +194,5 @@ test {
     _ = @import("trace/exponential.zig");
     _ = @import("trace/offset.zig");
     _ = @import("trace/shade.zig");
+    _ = @import("trace/surface.zig");
 }

@@ -60,6 +60,19 @@ pub fn Kernel(comptime chosen: Variant, comptime counting: bool) type {
         /// Groups of a bundle.
         pub const group_count = block_count * block_groups;
 
+        /// Columns of a group's pixels, from that of its first.
+        pub const lane_x = lanePlaces(false);
+        /// The same for rows.
+        pub const lane_y = lanePlaces(true);
+
+        fn lanePlaces(comptime rows: bool) [ray_count]f32 {
+            var places: [ray_count]f32 = undefined;
+            for (&places, 0..) |*to, lane| {
+                to.* = @floatFromInt(if (rows) lane / group_width else lane % group_width);
+            }
+            return places;
+        }
+
         /// Column of a pixel in its bundle.
         pub fn pixelX(group: usize, lane: usize) u32 {
             const block = group / block_groups;

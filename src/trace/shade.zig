@@ -50,22 +50,13 @@ pub fn lobes(comptime Lanes: type, surface: *const Surface(Lanes)) Lobes(Lanes) 
     const f0 = clear_f0.add(base.scale(material.metallic));
     const cos_view = surface.normal.dot(surface.view).max(.splat(1e-4)).min(one);
 
-    // Snell's law at the boundary of a volume, from the side of the view.
-    const eta = F32.select(surface.back, material.ior, one.div(material.ior));
-    const sin_squared = one.sub(cos_view.mul(cos_view));
-    const cos_squared = one.sub(eta.mul(eta).mul(sin_squared));
-    const total = material.volume.bitAnd(cos_squared.lt(.zero()));
-    const cos_inside = cos_squared.max(.zero()).sqrt();
-    const along = surface.view.neg();
-    const bent = along.scale(eta).add(surface.normal.scale(eta.mul(cos_view).sub(cos_inside)));
-    // A shading normal far from the triangle's can bend light back to the same side.
-    const through = bent.dot(surface.normal_geometric).lt(.zero());
-    const refraction: Vec3 = .select(material.volume.bitAnd(through), bent, along);
-
-    // Schlick's approximation counts from the side of lower density.
-    const leaving = material.volume.bitAnd(surface.back);
-    const cos_fresnel = F32.select(leaving, cos_inside, cos_view);
-    const fresnel = schlick(Lanes, f0, material.roughness, cos_fresnel);
+    const boundary: Boundary(Lanes) = if (material.volume.any()) .of(surface, cos_view) else .{
+        .total = .splat(false),
+        .cos_fresnel = cos_view,
+        .refraction = surface.view.neg(),
+    };
+    const total = boundary.total;
+    const fresnel = schlick(Lanes, f0, material.roughness, boundary.cos_fresnel);
     const reflected: Vec3 = .select(total, .splat(.{ 1, 1, 1 }), fresnel);
     const passing = base.scale(dielectric.mul(material.transmission));
     const rough = material.roughness.max(.splat(highlight_roughness_least));
@@ -77,8 +68,42 @@ pub fn lobes(comptime Lanes: type, surface: *const Surface(Lanes)) Lobes(Lanes) 
         .cos_view = cos_view,
         .reflected = reflected,
         .transmitted = passing.mul(splat3(Lanes, one).sub(reflected)),
-        .refraction = refraction,
+        .refraction = boundary.refraction,
         .total = total,
+    };
+}
+
+/// What the boundary of a volume does to light; elsewhere it goes straight on.
+fn Boundary(comptime Lanes: type) type {
+    return struct {
+        /// See `Lobes`.
+        total: Lanes.Mask,
+        /// Cosine on the side of lower density, from which Schlick's approximation counts.
+        cos_fresnel: Lanes.F32,
+        /// See `Lobes`.
+        refraction: Lanes.Vec3,
+
+        /// Snell's law, from the side of the view.
+        fn of(surface: *const Surface(Lanes), cos_view: Lanes.F32) @This() {
+            const F32 = Lanes.F32;
+            const one: F32 = .splat(1);
+            const material = &surface.material;
+            const eta = F32.select(surface.back, material.ior, one.div(material.ior));
+            const sin_squared = one.sub(cos_view.mul(cos_view));
+            const cos_squared = one.sub(eta.mul(eta).mul(sin_squared));
+            const cos_inside = cos_squared.max(.zero()).sqrt();
+            const along = surface.view.neg();
+            const turned = surface.normal.scale(eta.mul(cos_view).sub(cos_inside));
+            const bent = along.scale(eta).add(turned);
+            // A shading normal far from the triangle's can bend light back to the same side.
+            const through = bent.dot(surface.normal_geometric).lt(.zero());
+            const leaving = material.volume.bitAnd(surface.back);
+            return .{
+                .total = material.volume.bitAnd(cos_squared.lt(.zero())),
+                .cos_fresnel = F32.select(leaving, cos_inside, cos_view),
+                .refraction = .select(material.volume.bitAnd(through), bent, along),
+            };
+        }
     };
 }
 

@@ -69,42 +69,74 @@ pub fn Surface(comptime Lanes: type) type {
     };
 }
 
-/// Corner data of the primitives in lanes, [corner][component][lane].
-fn Gathered(comptime ray_count: comptime_int) type {
+/// The different numbers in some lanes.
+fn Distinct(comptime Lanes: type) type {
     return struct {
-        position: [3][3][ray_count]f32,
-        normal: [3][3][ray_count]f32,
-        color: [3][4][ray_count]f32,
-        material: [ray_count]u32,
+        numbers: [Lanes.count]u32,
+        /// By number, the lanes that have it; of the first, all that are not asked for, too.
+        lanes: [Lanes.count]Lanes.Mask,
+        count: usize,
+
+        /// Those of the lanes asked for, of which there is one at least; none is negative there.
+        inline fn of(values: Lanes.I32, asked: Lanes.Mask) @This() {
+            var distinct: @This() = undefined;
+            const array = values.toArray();
+            var left = asked;
+            distinct.count = 0;
+            while (left.any()) : (distinct.count += 1) {
+                const number = array[@ctz(left.bits())];
+                const same = values.eq(.splat(number));
+                const first = distinct.count == 0;
+                distinct.numbers[distinct.count] = @intCast(number);
+                distinct.lanes[distinct.count] = if (first) same.bitOr(asked.bitNot()) else same;
+                left = left.andNot(same);
+            }
+            return distinct;
+        }
     };
 }
 
-fn gather(comptime Lanes: type, world: *const World, primitives: Lanes.I32) Gathered(Lanes.count) {
-    var gathered: Gathered(Lanes.count) = undefined;
-    for (primitives.toArray(), 0..) |primitive, lane| {
-        // A lane without a hit takes any triangle; its results are masked out.
-        const number: usize = if (primitive >= 0) @intCast(primitive) else 0;
-        const corners = world.triangles[number];
-        gathered.material[lane] = corners.material;
-        for (corners.corner, 0..) |vertex, corner| {
-            for (0..3) |axis| {
-                gathered.position[corner][axis][lane] = world.positions[vertex][axis];
-                gathered.normal[corner][axis][lane] = world.normals[vertex][axis];
-            }
-            if (world.colors.len == 0) continue;
-            for (0..4) |channel| {
-                gathered.color[corner][channel][lane] = world.colors[vertex][channel];
-            }
-        }
-    }
-    return gathered;
-}
+/// What the corners of triangles have, in lanes.
+fn Corners(comptime Lanes: type) type {
+    return struct {
+        position: [3]Lanes.Vec3,
+        normal: [3]Lanes.Vec3,
+        /// Undefined where the scene has none.
+        color: [3][4]Lanes.F32,
+        material: Lanes.I32,
 
-inline fn vec3(comptime Lanes: type, arrays: [3][Lanes.count]f32) Lanes.Vec3 {
-    return .{
-        .x = .fromArray(arrays[0]),
-        .y = .fromArray(arrays[1]),
-        .z = .fromArray(arrays[2]),
+        const Self = @This();
+
+        /// A triangle at a time: neighbours mostly see the same. A lane that is not asked for has
+        /// one that another does.
+        inline fn of(world: *const World, primitive: Lanes.I32, asked: Lanes.Mask) Self {
+            const triangles: Distinct(Lanes) = .of(primitive, asked);
+            var corners: Self = undefined;
+            for (0..triangles.count) |index| {
+                corners.put(world, triangles.numbers[index], triangles.lanes[index]);
+            }
+            return corners;
+        }
+
+        inline fn put(corners: *Self, world: *const World, number: u32, lanes: Lanes.Mask) void {
+            const triangle_ = &world.triangles[number];
+            inline for (0..3) |corner| {
+                const vertex = triangle_.corner[corner];
+                corners.position[corner] =
+                    .select(lanes, .splat(world.positions[vertex]), corners.position[corner]);
+                corners.normal[corner] =
+                    .select(lanes, .splat(world.normals[vertex]), corners.normal[corner]);
+                if (world.colors.len > 0) {
+                    const channels = &corners.color[corner];
+                    inline for (channels, 0..) |*channel, index| {
+                        const value = world.colors[vertex][index];
+                        channel.* = .select(lanes, .splat(value), channel.*);
+                    }
+                }
+            }
+            const material: Lanes.I32 = .splat(@intCast(triangle_.material));
+            corners.material = .select(lanes, material, corners.material);
+        }
     };
 }
 
@@ -118,12 +150,8 @@ pub fn resolve(
     const missed = ray.nearest.primitive.eq(.splat(ray_file.no_primitive));
     const hit = ray.active.andNot(missed);
     assert(hit.any());
-    const gathered = gather(Lanes, world, Lanes.I32.select(hit, ray.nearest.primitive, .splat(0)));
-    const corners: [3]Lanes.Vec3 = .{
-        vec3(Lanes, gathered.position[0]),
-        vec3(Lanes, gathered.position[1]),
-        vec3(Lanes, gathered.position[2]),
-    };
+    const all: Corners(Lanes) = .of(world, ray.nearest.primitive, hit);
+    const corners = all.position;
     const share = shares(Lanes, weigh(Lanes, corners, ray));
     const edges = [2]Lanes.Vec3{ corners[1].sub(corners[0]), corners[2].sub(corners[0]) };
     const position = corners[0].add(edges[0].scale(share[1]).add(edges[1].scale(share[2])));
@@ -131,17 +159,17 @@ pub fn resolve(
     const face = unit(Lanes, plane);
     const back = face.dot(ray.line.direction).gt(.zero());
     const normal_geometric: Lanes.Vec3 = .select(back, face.neg(), face);
-    const smooth = mix(Lanes, share, .{
-        vec3(Lanes, gathered.normal[0]),
-        vec3(Lanes, gathered.normal[1]),
-        vec3(Lanes, gathered.normal[2]),
-    });
+    const smooth = mix(Lanes, share, all.normal);
     const direction_length = ray.line.direction.length();
     const distance = ray.nearest.t.mul(direction_length);
     const view = ray.line.direction.neg().scale(F32.splat(1).div(direction_length));
-    const color = vertexColor(Lanes, world, &gathered, share);
-    const material = loadMaterial(Lanes, world.materials, &gathered.material, color.rgb);
-    const sides = loadSides(Lanes, world.materials, &gathered.material, color.alpha);
+    const color = vertexColor(Lanes, world, &all.color, share);
+    const materials: Materials(Lanes) = .{
+        .all = world.materials,
+        .used = .of(all.material, hit),
+    };
+    const material = loadMaterial(Lanes, &materials, color.rgb);
+    const sides = loadSides(Lanes, &materials, color.alpha);
     return .{
         .hit = hit,
         .position = position,
@@ -219,15 +247,15 @@ fn Color(comptime Lanes: type) type {
 fn vertexColor(
     comptime Lanes: type,
     world: *const World,
-    gathered: *const Gathered(Lanes.count),
+    colors: *const [3][4]Lanes.F32,
     share: [3]Lanes.F32,
 ) Color(Lanes) {
     if (world.colors.len == 0) return .{ .rgb = .splat(.{ 1, 1, 1 }), .alpha = .splat(1) };
     var channels: [4]Lanes.F32 = undefined;
     inline for (&channels, 0..) |*channel, index| {
-        const a = Lanes.F32.fromArray(gathered.color[0][index]).mul(share[0]);
-        const b = Lanes.F32.fromArray(gathered.color[1][index]).mul(share[1]);
-        const c = Lanes.F32.fromArray(gathered.color[2][index]).mul(share[2]);
+        const a = colors[0][index].mul(share[0]);
+        const b = colors[1][index].mul(share[1]);
+        const c = colors[2][index].mul(share[2]);
         channel.* = a.add(b).add(c);
     }
     return .{
@@ -236,51 +264,71 @@ fn vertexColor(
     };
 }
 
-/// One field of the lanes' materials.
-inline fn field(
-    comptime Lanes: type,
-    materials: []const world_file.Material,
-    indices: *const [Lanes.count]u32,
-    comptime name: []const u8,
-) Lanes.F32 {
-    var values: [Lanes.count]f32 = undefined;
-    for (indices, &values) |index, *value| value.* = @field(materials[index], name);
-    return .fromArray(values);
-}
+/// Materials in lanes, one at a time: mostly there is one for all.
+fn Materials(comptime Lanes: type) type {
+    return struct {
+        all: []const world_file.Material,
+        used: Distinct(Lanes),
 
-/// One field of three floats of the lanes' materials.
-inline fn field3(
-    comptime Lanes: type,
-    materials: []const world_file.Material,
-    indices: *const [Lanes.count]u32,
-    comptime name: []const u8,
-) Lanes.Vec3 {
-    var values: [3][Lanes.count]f32 = undefined;
-    for (indices, 0..) |index, lane| {
-        const value = @field(materials[index], name);
-        inline for (0..3) |component| values[component][lane] = value[component];
-    }
-    return vec3(Lanes, values);
+        const Self = @This();
+
+        /// A field of one float.
+        inline fn float(materials: *const Self, comptime name: []const u8) Lanes.F32 {
+            return materials.pick(name, null);
+        }
+
+        /// A field of three floats, or the first three of more.
+        inline fn color(materials: *const Self, comptime name: []const u8) Lanes.Vec3 {
+            return .{
+                .x = materials.pick(name, 0),
+                .y = materials.pick(name, 1),
+                .z = materials.pick(name, 2),
+            };
+        }
+
+        /// A field, or a component of one.
+        inline fn pick(
+            materials: *const Self,
+            comptime name: []const u8,
+            comptime component: ?usize,
+        ) Lanes.F32 {
+            const used = &materials.used;
+            var value: Lanes.F32 = .splat(materials.one(used.numbers[0], name, component));
+            for (used.numbers[1..used.count], used.lanes[1..used.count]) |number, lanes| {
+                value = .select(lanes, .splat(materials.one(number, name, component)), value);
+            }
+            return value;
+        }
+
+        inline fn one(
+            materials: *const Self,
+            number: u32,
+            comptime name: []const u8,
+            comptime component: ?usize,
+        ) f32 {
+            const value = &@field(materials.all[number], name);
+            return if (component) |index| value[index] else value.*;
+        }
+    };
 }
 
 fn loadMaterial(
     comptime Lanes: type,
-    materials: []const world_file.Material,
-    indices: *const [Lanes.count]u32,
+    materials: *const Materials(Lanes),
     vertex_color: Lanes.Vec3,
 ) Material(Lanes) {
     const zero: Lanes.F32 = .zero();
     return .{
-        .base_color = field3(Lanes, materials, indices, "base_color").mul(vertex_color),
-        .emissive = field3(Lanes, materials, indices, "emissive"),
-        .metallic = field(Lanes, materials, indices, "metallic"),
-        .roughness = field(Lanes, materials, indices, "roughness"),
-        .dielectric_f0 = field(Lanes, materials, indices, "dielectric_f0"),
-        .ior = field(Lanes, materials, indices, "ior"),
-        .transmission = field(Lanes, materials, indices, "transmission"),
-        .absorption = field3(Lanes, materials, indices, "absorption"),
-        .unlit = field(Lanes, materials, indices, "unlit").gt(zero),
-        .volume = field(Lanes, materials, indices, "volume").gt(zero),
+        .base_color = materials.color("base_color").mul(vertex_color),
+        .emissive = materials.color("emissive"),
+        .metallic = materials.float("metallic"),
+        .roughness = materials.float("roughness"),
+        .dielectric_f0 = materials.float("dielectric_f0"),
+        .ior = materials.float("ior"),
+        .transmission = materials.float("transmission"),
+        .absorption = materials.color("absorption"),
+        .unlit = materials.float("unlit").gt(zero),
+        .volume = materials.float("volume").gt(zero),
     };
 }
 
@@ -291,20 +339,31 @@ fn Sides(comptime Lanes: type) type {
 /// What alpha and the sides of the material do to a ray.
 fn loadSides(
     comptime Lanes: type,
-    materials: []const world_file.Material,
-    indices: *const [Lanes.count]u32,
+    materials: *const Materials(Lanes),
     vertex_alpha: Lanes.F32,
 ) Sides(Lanes) {
     const F32 = Lanes.F32;
-    var base_alpha: [Lanes.count]f32 = undefined;
-    for (indices, &base_alpha) |index, *value| value.* = materials[index].base_color[3];
-    const alpha = F32.fromArray(base_alpha).mul(vertex_alpha);
-    const blends = field(Lanes, materials, indices, "blend").gt(.zero());
-    const hole = alpha.lt(field(Lanes, materials, indices, "alpha_cutoff"));
+    const alpha = materials.pick("base_color", 3).mul(vertex_alpha);
+    const blends = materials.float("blend").gt(.zero());
+    const hole = alpha.lt(materials.float("alpha_cutoff"));
     const clamped = alpha.max(.zero()).min(.splat(1));
     const solid = F32.select(hole, .zero(), .splat(1));
     return .{
-        .shows_back = field(Lanes, materials, indices, "double_sided").gt(.zero()),
+        .shows_back = materials.float("double_sided").gt(.zero()),
         .coverage = F32.select(blends, clamped, solid),
     };
+}
+
+test "each number that is asked for once, with its lanes; others go with the first" {
+    const Lanes = @import("../simd.zig").Lanes(.vector, 4);
+    const values: Lanes.I32 = .fromArray(.{ -1, 7, 3, 7 });
+    const distinct: Distinct(Lanes) = .of(values, .fromBits(0b1110));
+    try std.testing.expectEqual(2, distinct.count);
+    try std.testing.expectEqualSlices(u32, &.{ 7, 3 }, distinct.numbers[0..2]);
+    try std.testing.expectEqual(0b1011, distinct.lanes[0].bits());
+    try std.testing.expectEqual(0b0100, distinct.lanes[1].bits());
+    const one: Distinct(Lanes) = .of(values, .fromBits(0b0100));
+    try std.testing.expectEqual(1, one.count);
+    try std.testing.expectEqual(3, one.numbers[0]);
+    try std.testing.expectEqual(0b1111, one.lanes[0].bits());
 }

@@ -112,8 +112,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 while (tracer.pending_count > 0) {
                     tracer.pending_count -= 1;
                     // A copy: what the step pushes takes its place.
-                    const pending = tracer.pending[tracer.pending_count];
-                    tracer.step(pending);
+                    var pending = tracer.pending[tracer.pending_count];
+                    tracer.step(&pending);
                 }
                 for (&sums, &clear, tracer.radiance, tracer.escaped) |*sum, *c, radiance, escaped| {
                     sum.* = sum.add(bound(radiance));
@@ -173,30 +173,32 @@ pub fn Whitted(comptime Kernel: type) type {
                 @as(f32, @floatFromInt(rectangle.y0)) + offset.y,
             );
             assert(tracer.pending_count == 0);
+            const end_column: F32 = .splat(@floatFromInt(rectangle.x1));
+            const end_row: F32 = .splat(@floatFromInt(rectangle.y1));
             const pending = tracer.push(0, 0);
             for (&pending.bundle.groups, 0..) |*ray, group| {
-                var x: [Kernel.ray_count]f32 = undefined;
-                var y: [Kernel.ray_count]f32 = undefined;
-                var inside: [Kernel.ray_count]bool = undefined;
-                for (0..Kernel.ray_count) |lane| {
-                    const column = rectangle.x0 + Kernel.pixelX(group, lane);
-                    const row = rectangle.y0 + Kernel.pixelY(group, lane);
-                    inside[lane] = column < rectangle.x1 and row < rectangle.y1;
-                    x[lane] = @as(f32, @floatFromInt(column)) + offset.x;
-                    y[lane] = @as(f32, @floatFromInt(row)) + offset.y;
-                }
-                const start = camera.generate(Rays, tracer.world, .fromArray(x), .fromArray(y));
+                const column = place(rectangle.x0 + Kernel.pixelX(group, 0), &Kernel.lane_x);
+                const row = place(rectangle.y0 + Kernel.pixelY(group, 0), &Kernel.lane_y);
+                const inside = column.lt(end_column).bitAnd(row.lt(end_row));
+                const x = column.add(.splat(offset.x));
+                const y = row.add(.splat(offset.y));
+                const start = camera.generate(Rays, tracer.world, x, y);
                 ray.* = .{
                     .line = .init(start.origin, start.direction),
                     .after = .start(),
                     .nearest = .before(.splat(std.math.inf(f32))),
                     .skip = .splat(ray_file.no_primitive),
-                    .active = .fromArray(inside),
+                    .active = inside,
                 };
                 pending.weight[group] = .splat(.{ 1, 1, 1 });
                 pending.absorption[group] = .splat(.{ 0, 0, 0 });
                 tracer.rays.primary += ray.active.popCount();
             }
+        }
+
+        /// Columns or rows of a group's pixels; as integers floats hold them exactly.
+        inline fn place(first: u32, steps: *const [Kernel.ray_count]f32) F32 {
+            return F32.fromArray(steps.*).add(.splat(@floatFromInt(first)));
         }
 
         /// Room for rays of the given depth; the caller fills in bundle, weight and absorption.
@@ -210,24 +212,23 @@ pub fn Whitted(comptime Kernel: type) type {
         }
 
         /// Traces rays, adds what they see, and pushes what has to be traced because of it.
-        fn step(tracer: *Self, pending_before: Pending) void {
-            var pending = pending_before;
-            const together = tracer.trace(&pending);
+        fn step(tracer: *Self, pending: *Pending) void {
+            const together = tracer.trace(pending);
             var points: [group_count]Point = undefined;
             var any_seen = false;
             for (&points, 0..) |*point, group| {
-                tracer.addEscaped(&pending, group);
-                tracer.find(&pending, group, point);
+                tracer.addEscaped(pending, group);
+                tracer.find(pending, group, point);
                 any_seen = any_seen or point.seen.any();
             }
             if (any_seen) for (tracer.world.lights) |*light| {
-                tracer.addLight(light, &pending, &points, &together);
+                tracer.addLight(light, pending, &points, &together);
             };
             // The last pushed is traced first: reflection, refraction, the ray's own rest.
-            tracer.pushRest(&pending, &points);
+            tracer.pushRest(pending, &points);
             if (pending.depth == tracer.settings.depth_max or !any_seen) return;
-            tracer.pushRefraction(&pending, &points);
-            tracer.pushReflection(&pending, &points);
+            tracer.pushRefraction(pending, &points);
+            tracer.pushReflection(pending, &points);
         }
 
         /// Finds what rays see. Returns those whose hits are near to each other.
@@ -356,7 +357,7 @@ pub fn Whitted(comptime Kernel: type) type {
             var passing: [group_count]Vec3 = undefined;
             const active = activeMasks(&bundle);
             if (tracer.world.has_transparency or tracer.world.has_holes) {
-                tracer.filter(&bundle, &passing);
+                tracer.filter(&bundle, light, together, &passing);
             } else {
                 tracer.block(&bundle, light, together, &passing);
             }
@@ -393,12 +394,16 @@ pub fn Whitted(comptime Kernel: type) type {
         fn filter(
             tracer: *Self,
             bundle: *packet.Bundle(Kernel),
+            light: *const world_file.Light,
+            together: *const query.Together(Kernel),
             passing: *[group_count]Vec3,
         ) void {
             passing.* = @splat(.splat(.{ 1, 1, 1 }));
             var weakened: [group_count]F32 = @splat(.zero());
             var limits: [group_count]ray_file.Hit(Rays) = undefined;
             for (&limits, &bundle.groups) |*limit, *ray| limit.* = ray.nearest;
+            tracer.dropFree(bundle, light, together);
+            for (&bundle.groups, limits) |*ray, limit| ray.nearest = limit;
             for (0..layer_max) |_| {
                 _ = query.nearest(Kernel, tracer.world, bundle, null, null, &tracer.tests);
                 var any_left = false;
@@ -412,6 +417,27 @@ pub fn Whitted(comptime Kernel: type) type {
             }
             for (&bundle.groups, passing) |*ray, *share| {
                 share.* = .select(ray.active, .splat(.{ 0, 0, 0 }), share.*);
+            }
+        }
+
+        /// Leaves those shadow rays active that may meet something. A beam tells quickly which of
+        /// its rays do not; rays by themselves would take as long as to find what they meet.
+        fn dropFree(
+            tracer: *Self,
+            bundle: *packet.Bundle(Kernel),
+            light: *const world_file.Light,
+            together: *const query.Together(Kernel),
+        ) void {
+            const before = switch (together.*) {
+                .none => return,
+                .all => activeMasks(bundle),
+                .some => |*part| packet.narrow(Kernel, bundle, part, true),
+            };
+            query.any(Kernel, tracer.world, bundle, light, &.all, &tracer.tests);
+            for (&bundle.groups, before) |*ray, active| {
+                if (active.none()) continue;
+                const free = ray.nearest.primitive.eq(.splat(ray_file.no_primitive));
+                ray.active = active.andNot(free.bitAnd(ray.active));
             }
         }
 

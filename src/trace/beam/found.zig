@@ -61,9 +61,6 @@ pub fn Found(comptime Kernel: type) type {
         /// Columns and rows of the blocks' first pixels.
         pub const block_x = blockPlaces(false);
         pub const block_y = blockPlaces(true);
-        /// Columns and rows of a group's pixels within it.
-        pub const lane_x = lanePlaces(false);
-        pub const lane_y = lanePlaces(true);
 
         fn blockPlaces(comptime rows: bool) [block_count]f32 {
             var places: [block_count]f32 = undefined;
@@ -71,15 +68,6 @@ pub fn Found(comptime Kernel: type) type {
                 const across = side / block_side;
                 to.* = @floatFromInt(block_side * (if (rows) block / across else block % across));
             }
-            return places;
-        }
-
-        fn lanePlaces(comptime rows: bool) [lanes]f32 {
-            var places: [lanes]f32 = undefined;
-            for (&places, 0..) |*to, lane| to.* = @floatFromInt(if (rows)
-                lane / Kernel.group_width
-            else
-                lane % Kernel.group_width);
             return places;
         }
 
@@ -166,8 +154,8 @@ pub fn Found(comptime Kernel: type) type {
             const base = depth.base + block_x[block] * depth.right + block_y[block] * depth.down;
             var value: F32 = .splat(base);
             if (Kernel.group_height > 1)
-                value = F32.fromArray(lane_y).mulAdd(.splat(depth.down), value);
-            value = F32.fromArray(lane_x).mulAdd(.splat(depth.right), value);
+                value = F32.fromArray(Kernel.lane_y).mulAdd(.splat(depth.down), value);
+            value = F32.fromArray(Kernel.lane_x).mulAdd(.splat(depth.right), value);
             const slot: I32 = .splat(found.block_slot[block]);
             inline for (0..block_groups) |row| {
                 const group = block * block_groups + row;

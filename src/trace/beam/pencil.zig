@@ -214,9 +214,9 @@ fn Measured(comptime Kernel: type) type {
             var blocks: u32 = 0;
             for (&measured.members, &bundle.groups, 0..) |*members, *group, index| {
                 const direction = group.line.direction;
-                const x = F32.fromArray(Found.lane_x)
+                const x = F32.fromArray(Kernel.lane_x)
                     .add(.splat(@floatFromInt(Kernel.pixelX(index, 0))));
-                const y = F32.fromArray(Found.lane_y)
+                const y = F32.fromArray(Kernel.lane_y)
                     .add(.splat(@floatFromInt(Kernel.pixelY(index, 0))));
                 const expected = Vec3.splat(grid.corner).add(right.scale(x)).add(down.scale(y));
                 const turn = direction.sub(expected);

@@ -572,8 +572,8 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
         /// Steps a triangle over the pixels of a block.
         inline fn coverBlock(search: *Self, coverage: *const Coverage, block: u32) void {
             if (search.found.isWhole(block)) search.found.spread(block);
-            const x: F32 = .fromArray(Found.lane_x);
-            const y: F32 = .fromArray(Found.lane_y);
+            const x: F32 = .fromArray(Kernel.lane_x);
+            const y: F32 = .fromArray(Kernel.lane_y);
             const top = block / (side / block_side) * block_side;
             const row_first = (@max(coverage.first_y, top) - top) / Kernel.group_height;
             const row_last = (@min(coverage.last_y, top + block_side - 1) - top) /
@@ -674,8 +674,8 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
         fn coverUndecided(search: *Self, coverage: *const Coverage) void {
             @branchHint(.unlikely);
             const slack: F32 = .splat(coverage.slack);
-            const x: F32 = .fromArray(Found.lane_x);
-            const y: F32 = .fromArray(Found.lane_y);
+            const x: F32 = .fromArray(Kernel.lane_x);
+            const y: F32 = .fromArray(Kernel.lane_y);
             search.found.spreadAll();
             for (&search.bundle.groups, 0..) |*ray, group| {
                 const first_x: F32 = .splat(@floatFromInt(Kernel.pixelX(group, 0)));
