@@ -428,6 +428,7 @@ pub fn Whitted(comptime Kernel: type) type {
             light: *const world_file.Light,
             together: *const query.Together(Kernel),
         ) void {
+            if (Kernel.variant.traversal != .packet) return;
             const before = switch (together.*) {
                 .none => return,
                 .all => activeMasks(bundle),
