@@ -183,6 +183,12 @@ pub const Material = struct {
     unlit: f32,
     /// 1: bounds a volume, rays bend; 0: thin, they go straight on.
     volume: f32,
+
+    /// Whether no light passes, wherever a surface of it is hit.
+    pub fn stopsLight(material: *const Material) bool {
+        const clear = material.transmission * (1 - material.metallic);
+        return clear == 0 and material.blend == 0 and material.alpha_cutoff < 0;
+    }
 };
 
 /// A light source in world space.

@@ -84,6 +84,17 @@ test "alpha counts only where the mode says so" {
     try std.testing.expect(isTransparent(&convert(&blend)));
 }
 
+test "light is stopped where nothing blends, has holes or lets it through" {
+    const Case = struct { scene.Material, bool };
+    for ([_]Case{
+        .{ .{}, true },
+        .{ .{ .transmission = 0.5, .metallic = 0 }, false },
+        .{ .{ .transmission = 1, .metallic = 1 }, true },
+        .{ .{ .alpha_mode = .blend }, false },
+        .{ .{ .alpha_mode = .mask, .alpha_cutoff = 0 }, false },
+    }) |case| try std.testing.expectEqual(case[1], convert(&case[0]).stopsLight());
+}
+
 test "reflectance of glass and of nothing" {
     try std.testing.expectApproxEqRel(@as(f32, 0.04), convert(&.{}).dielectric_f0, 1e-6);
     try std.testing.expectEqual(0, convert(&.{ .ior = 1 }).dielectric_f0);

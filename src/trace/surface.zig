@@ -77,7 +77,7 @@ fn Distinct(comptime Lanes: type) type {
         lanes: [Lanes.count]Lanes.Mask,
         count: usize,
 
-        /// Those of the lanes asked for, of which there is one at least; none is negative there.
+        /// Those of the lanes asked for; none is negative there.
         inline fn of(values: Lanes.I32, asked: Lanes.Mask) @This() {
             var distinct: @This() = undefined;
             const array = values.toArray();
@@ -183,6 +183,22 @@ pub fn resolve(
         .roundings = offset.roundings(Lanes, corners, position, face, plane, distance),
         .material = material,
     };
+}
+
+/// Those of the rays asked for, all of which hit something, that hit what lets no light pass.
+pub fn stopped(
+    comptime Lanes: type,
+    world: *const World,
+    primitive: Lanes.I32,
+    asked: Lanes.Mask,
+) Lanes.Mask {
+    var found: Lanes.Mask = .splat(false);
+    const triangles: Distinct(Lanes) = .of(primitive, asked);
+    for (triangles.numbers[0..triangles.count], 0..) |number, index| {
+        const material = &world.materials[world.triangles[number].material];
+        if (material.stopsLight()) found = found.bitOr(triangles.lanes[index]);
+    }
+    return found.bitAnd(asked);
 }
 
 /// The edge functions that decided the hit.
@@ -345,7 +361,8 @@ fn loadSides(
     const F32 = Lanes.F32;
     const alpha = materials.pick("base_color", 3).mul(vertex_alpha);
     const blends = materials.float("blend").gt(.zero());
-    const hole = alpha.lt(materials.float("alpha_cutoff"));
+    const cutoff = materials.float("alpha_cutoff");
+    const hole = alpha.lt(cutoff).bitAnd(cutoff.ge(.zero()));
     const clamped = alpha.max(.zero()).min(.splat(1));
     const solid = F32.select(hole, .zero(), .splat(1));
     return .{

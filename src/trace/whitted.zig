@@ -402,7 +402,7 @@ pub fn Whitted(comptime Kernel: type) type {
             var weakened: [group_count]F32 = @splat(.zero());
             var limits: [group_count]ray_file.Hit(Rays) = undefined;
             for (&limits, &bundle.groups) |*limit, *ray| limit.* = ray.nearest;
-            tracer.dropFree(bundle, light, together);
+            tracer.settle(bundle, light, together, passing);
             for (&bundle.groups, limits) |*ray, limit| ray.nearest = limit;
             for (0..layer_max) |_| {
                 _ = query.nearest(Kernel, tracer.world, bundle, null, null, &tracer.tests);
@@ -420,13 +420,15 @@ pub fn Whitted(comptime Kernel: type) type {
             }
         }
 
-        /// Leaves those shadow rays active that may meet something. A beam tells quickly which of
-        /// its rays do not; rays by themselves would take as long as to find what they meet.
-        fn dropFree(
+        /// Settles the shadow rays that meet nothing, or first of all something that no light
+        /// passes; others stay active. A beam tells quickly; rays by themselves would take as long
+        /// as to find what they meet.
+        fn settle(
             tracer: *Self,
             bundle: *packet.Bundle(Kernel),
             light: *const world_file.Light,
             together: *const query.Together(Kernel),
+            passing: *[group_count]Vec3,
         ) void {
             if (Kernel.variant.traversal != .packet) return;
             const before = switch (together.*) {
@@ -435,10 +437,14 @@ pub fn Whitted(comptime Kernel: type) type {
                 .some => |*part| packet.narrow(Kernel, bundle, part, true),
             };
             query.any(Kernel, tracer.world, bundle, light, &.all, &tracer.tests);
-            for (&bundle.groups, before) |*ray, active| {
+            for (&bundle.groups, before, passing) |*ray, active, *share| {
                 if (active.none()) continue;
-                const free = ray.nearest.primitive.eq(.splat(ray_file.no_primitive));
-                ray.active = active.andNot(free.bitAnd(ray.active));
+                const primitive = ray.nearest.primitive;
+                const free = ray.active.bitAnd(primitive.eq(.splat(ray_file.no_primitive)));
+                const met = ray.active.andNot(free);
+                const stopped = surface_file.stopped(Rays, tracer.world, primitive, met);
+                share.* = .select(stopped, .splat(.{ 0, 0, 0 }), share.*);
+                ray.active = active.andNot(free).andNot(stopped);
             }
         }
 

@@ -39,8 +39,8 @@ const beam_rays_min = 8;
 /// With no more blocks than this, triangles are not tested against each of them first.
 const few_blocks = 3;
 
-/// Finds which rays meet anything; `nearest.primitive` of those becomes a number. Asserts that
-/// all active rays start at the light's place, or go against its direction.
+/// Finds which rays meet anything; `nearest.primitive` of those becomes one that they meet. Asserts
+/// that all active rays start at the light's place, or go against its direction.
 pub fn trace(
     comptime Kernel: type,
     world: *const world_file.World,
@@ -495,7 +495,8 @@ fn Search(comptime Kernel: type) type {
             F32.select(met, .splat(inf), near)
                 .storeAligned(@alignCast(search.points.nearness[first..][0..lanes]));
             const ray = &search.bundle.groups[group];
-            ray.nearest.primitive = .select(met, .zero(), ray.nearest.primitive);
+            const primitive: Rays.I32 = .splat(exact.primitiveAt(width, search.tree, slot));
+            ray.nearest.primitive = .select(met, primitive, ray.nearest.primitive);
             return true;
         }
 
