@@ -188,6 +188,7 @@ test {
     _ = query;
     _ = whitted;
     _ = Tiles;
+    _ = @import("trace/beam/cost.zig");
     _ = @import("trace/beam/found.zig");
     _ = @import("trace/beam/grid.zig");
     _ = @import("trace/camera.zig");

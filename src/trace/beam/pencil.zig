@@ -48,21 +48,22 @@ pub fn trace(
     for (0..Kernel.block_count) |block| {
         const guess = Guess.of(Kernel, world, bundle, block, &beams) orelse continue;
         measured.measure(&guess, bundle, &beams);
-        if (measured.ray_count >= rays_min and measured.isWithinReach(world)) {
+        guess_count += 1;
+        if (measured.starts.ray_count >= rays_min and measured.isWithinReach(world)) {
             const active = packet.narrow(Kernel, bundle, &measured.members, true);
             measured.starts.bound(bundle);
             const starts = &measured.starts;
             const grid = &measured.grid;
-            if (primary.traceBehind(Kernel, world, grid, starts, bundle, shares, counts)) {
-                if (beams) |*all| {
-                    for (all, measured.members) |*beam, members| beam.* = beam.bitOr(members);
-                } else {
-                    beams = measured.members;
-                }
-            }
+            const went = primary.traceBehind(Kernel, world, grid, starts, bundle, shares, counts);
             packet.restore(Kernel, bundle, &active);
+            // Others of the bundle would hardly do better.
+            if (!went) break;
+            if (beams) |*all| {
+                for (all, measured.members) |*beam, members| beam.* = beam.bitOr(members);
+            } else {
+                beams = measured.members;
+            }
         }
-        guess_count += 1;
         if (guess_count == guess_max) break;
     }
     return beams;
@@ -187,7 +188,6 @@ fn Measured(comptime Kernel: type) type {
         t_max: f32,
         /// Rays that are near enough.
         members: [Kernel.group_count]Rays.Mask,
-        ray_count: u32,
 
         const Self = @This();
         const Found = found_file.Found(Kernel);
@@ -210,7 +210,7 @@ fn Measured(comptime Kernel: type) type {
             var missed: F32 = .zero();
             var t_least: F32 = .splat(inf);
             var t_greatest: F32 = .zero();
-            measured.ray_count = 0;
+            measured.starts.ray_count = 0;
             var blocks: u32 = 0;
             for (&measured.members, &bundle.groups, 0..) |*members, *group, index| {
                 const direction = group.line.direction;
@@ -232,7 +232,7 @@ fn Measured(comptime Kernel: type) type {
                 members.* = fits;
                 measured.starts.t[index] = t;
                 const bits = fits.bits();
-                measured.ray_count += @popCount(bits);
+                measured.starts.ray_count += @popCount(bits);
                 const block: u5 = @intCast(index / Kernel.block_groups);
                 blocks |= @as(u32, @intFromBool(bits != 0)) << block;
                 turned = turned.maxFast(.select(fits, turn_squared, .zero()));

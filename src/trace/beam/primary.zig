@@ -25,6 +25,7 @@ const grid_file = @import("grid.zig");
 const found_file = @import("found.zig");
 const resolve = @import("resolve.zig");
 const frustum_file = @import("frustum.zig");
+const Cost = @import("cost.zig").Cost;
 const Starts = @import("starts.zig").Starts;
 const Area = grid_file.Area;
 const Grid = grid_file.Grid;
@@ -53,7 +54,8 @@ pub fn trace(
 }
 
 /// The same of rays that start where `starts` says, and may leave out what comes before and their
-/// own triangles. Their starts are within what `World.pad` allows for.
+/// own triangles. Their starts are within what `World.pad` allows for. Returns false, too, where
+/// the beam meets so much that it does not pay.
 pub fn traceBehind(
     comptime Kernel: type,
     world: *const world_file.World,
@@ -80,7 +82,7 @@ fn run(
     var search: Search(Kernel, behind) = undefined;
     search.starts = starts;
     if (!search.init(world, grid, bundle, counts)) return false;
-    search.travel();
+    if (!search.travel()) return false;
     resolve.resolve(Kernel, behind, world, grid, &search.found, bundle, shares);
     return true;
 }
@@ -240,7 +242,11 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
                 64 * unit * (reach + vec3.length1(grid.origin));
         }
 
-        fn travel(search: *Self) void {
+        /// Returns whether it came to an end. Beams from the eye always do: in all but the densest
+        /// tiles they take less time than their rays in any other way.
+        fn travel(search: *Self) bool {
+            var cost: Cost =
+                .of(width, if (behind) search.starts.ray_count else kernel_file.beam_pixels);
             var entries: [Kernel.stack_max]stack.Entry = undefined;
             entries[0] = .{ .child = .root, .near = -std.math.inf(f32) };
             var entry_count: usize = 1;
@@ -261,6 +267,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
                         entry_count,
                     );
                 } else {
+                    if (behind and !cost.pays(entry.child.block_count, entry_count)) return false;
                     const first, const end = entry.child.blocks();
                     for (first..end) |block| {
                         search.meetBlock(@intCast(block));
@@ -268,6 +275,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
                     depth_max = search.found.depthMax();
                 }
             }
+            return true;
         }
 
         /// Sets up the triangles of a block and goes on with those that the beam may see.

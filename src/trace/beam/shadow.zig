@@ -21,19 +21,13 @@ const exact = @import("exact.zig");
 const footprint_file = @import("footprint.zig");
 const frustum_file = @import("frustum.zig");
 const points_file = @import("points.zig");
+const Cost = @import("cost.zig").Cost;
 const assert = std.debug.assert;
 const Members = points_file.Members;
 const block_count = kernel_file.beam_blocks;
 
 /// Cuts of a beam at most, one after the other.
 const cut_depth_max = 1;
-/// What a beam may cost, in blocks of triangles, before its rays go on without it: as much as they
-/// would by themselves.
-inline fn costMax(comptime lanes: u32, ray_count: u32) u32 {
-    return 60 + 2 * lanes + ray_count / 3;
-}
-/// Blocks that a child on the stack stands for: how many wait tells early how wide a beam is.
-const waiting_cost = 8;
 /// Beams of fewer rays are not worth their set-up.
 const beam_rays_min = 8;
 /// With no more blocks than this, triangles are not tested against each of them first.
@@ -140,8 +134,7 @@ fn Search(comptime Kernel: type) type {
             var entries: [Kernel.stack_max]stack.Entry = undefined;
             entries[0] = .{ .child = .root, .near = -inf };
             var entry_count: usize = 1;
-            var met_count: u32 = 0;
-            const cost_max = costMax(width, Points.rayCount(members));
+            var cost: Cost = .of(width, Points.rayCount(members));
             while (entry_count > 0 and search.points.live != 0) {
                 entry_count -= 1;
                 const child = entries[entry_count].child;
@@ -154,8 +147,7 @@ fn Search(comptime Kernel: type) type {
                         .pushChildren(node, null, depth_max, &entries, entry_count);
                     continue;
                 }
-                met_count += child.block_count;
-                if (met_count + waiting_cost * entry_count > cost_max) {
+                if (!cost.pays(child.block_count, entry_count)) {
                     return search.apart(&search.points.left(members));
                 }
                 const first, const end = child.blocks();

@@ -15,12 +15,14 @@ const Area = @import("grid.zig").Area;
 const block_count = kernel_file.beam_blocks;
 const pixel_count = kernel_file.beam_pixels;
 
-/// The caller fills in `t`, `spread`, `t_min` and `area`, `bound` the rest.
+/// The caller fills in `ray_count`, `t`, `spread`, `t_min` and `area`, `bound` the rest.
 pub fn Starts(comptime Kernel: type) type {
     const Rays = Kernel.Rays;
     const F32 = Rays.F32;
     const lanes = Kernel.ray_count;
     return struct {
+        /// Active rays.
+        ray_count: u32,
         /// By group: a ray's start is t times its direction from a point no farther than
         /// `spread.apart` from the grid's origin. Not negative.
         t: [Kernel.group_count]F32,
