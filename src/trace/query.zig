@@ -38,6 +38,8 @@ pub fn nearest(
     }
     if (grid) |known| {
         if (primary.trace(Kernel, world, known, bundle, shares, counts)) return .all;
+        byInterval(Kernel, .nearest, world, bundle, null, counts);
+        return .none;
     }
     const beams = pencil.trace(Kernel, world, bundle, shares, counts);
     byInterval(Kernel, .nearest, world, bundle, if (beams) |*some| some else null, counts);

@@ -4,6 +4,8 @@
 //! for its scene shows early in how many children wait on the stack, before their blocks are met.
 //! All numbers are as measured (docs/performance.md).
 
+const kernel_file = @import("../kernel.zig");
+
 /// Blocks of triangles that a child on the stack stands for.
 const waiting_cost = 8;
 
@@ -15,6 +17,12 @@ pub const Cost = struct {
     /// Of a beam of so many rays; a block is `lanes` triangles.
     pub fn of(comptime lanes: u32, ray_count: u32) Cost {
         return .{ .max = 60 + 2 * lanes + ray_count / 3 };
+    }
+
+    /// Of a beam from the eye: it pays for longer, as most of it comes to an end all the same.
+    pub fn ofEye(comptime lanes: u32) Cost {
+        const each: Cost = .of(lanes, kernel_file.beam_pixels);
+        return .{ .max = 3 * each.max };
     }
 
     /// Counts blocks that are met while so many children wait. Returns whether the beam still pays.

@@ -40,7 +40,8 @@ const last: f32 = side - 1;
 const block_last: f32 = block_side - 1;
 
 /// Finds the nearest hits of a bundle's rays, which have none yet, start at `grid.origin` and
-/// leave nothing out. Returns false, having done nothing, where the rays are too far apart.
+/// leave nothing out. Returns false, having done nothing, where the rays are too far apart or the
+/// beam meets so much that it does not pay.
 /// `shares` is null, or where barycentric weights go: of the second and the third corner, by group.
 pub fn trace(
     comptime Kernel: type,
@@ -54,8 +55,7 @@ pub fn trace(
 }
 
 /// The same of rays that start where `starts` says, and may leave out what comes before and their
-/// own triangles. Their starts are within what `World.pad` allows for. Returns false, too, where
-/// the beam meets so much that it does not pay.
+/// own triangles. Their starts are within what `World.pad` allows for.
 pub fn traceBehind(
     comptime Kernel: type,
     world: *const world_file.World,
@@ -242,11 +242,12 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
                 64 * unit * (reach + vec3.length1(grid.origin));
         }
 
-        /// Returns whether it came to an end. Beams from the eye always do: in all but the densest
-        /// tiles they take less time than their rays in any other way.
+        /// Returns whether it came to an end.
         fn travel(search: *Self) bool {
-            var cost: Cost =
-                .of(width, if (behind) search.starts.ray_count else kernel_file.beam_pixels);
+            var cost: Cost = if (behind)
+                .of(width, search.starts.ray_count)
+            else
+                .ofEye(width);
             var entries: [Kernel.stack_max]stack.Entry = undefined;
             entries[0] = .{ .child = .root, .near = -std.math.inf(f32) };
             var entry_count: usize = 1;
@@ -267,7 +268,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
                         entry_count,
                     );
                 } else {
-                    if (behind and !cost.pays(entry.child.block_count, entry_count)) return false;
+                    if (!cost.pays(entry.child.block_count, entry_count)) return false;
                     const first, const end = entry.child.blocks();
                     for (first..end) |block| {
                         search.meetBlock(@intCast(block));
