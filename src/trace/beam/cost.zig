@@ -4,10 +4,13 @@
 //! for its scene shows early in how many children wait on the stack, before their blocks are met.
 //! All numbers are as measured (docs/performance.md).
 
-const kernel_file = @import("../kernel.zig");
-
 /// Blocks of triangles that a child on the stack stands for.
 const waiting_cost = 8;
+/// A beam from the eye may meet so many triangles while so many children wait. With fewer, tiles
+/// give up that were almost done.
+const eye_triangles = 4000;
+/// See `eye_triangles`.
+const eye_waiting = 30;
 
 /// What a beam has cost so far, and may cost, in blocks of triangles.
 pub const Cost = struct {
@@ -19,10 +22,9 @@ pub const Cost = struct {
         return .{ .max = 60 + 2 * lanes + ray_count / 3 };
     }
 
-    /// Of a beam from the eye. Three times as much: with less, tiles give up that were almost done.
+    /// Of a beam from the eye.
     pub fn ofEye(comptime lanes: u32) Cost {
-        const each: Cost = .of(lanes, kernel_file.beam_pixels);
-        return .{ .max = 3 * each.max };
+        return .{ .max = eye_triangles / lanes + waiting_cost * eye_waiting };
     }
 
     /// Counts blocks that are met while so many children wait. Returns whether the beam still pays.
