@@ -420,9 +420,9 @@ pub fn Whitted(comptime Kernel: type) type {
             }
         }
 
-        /// Settles the shadow rays that meet nothing, or first of all something that no light
-        /// passes; others stay active. A beam tells quickly; rays by themselves would take as long
-        /// as to find what they meet.
+        /// Settles the shadow rays that meet nothing, and those that a search for any hit finds to
+        /// meet what no light passes; others stay active. A beam tells quickly; rays by themselves
+        /// would take as long as to find what they meet.
         fn settle(
             tracer: *Self,
             bundle: *packet.Bundle(Kernel),
