@@ -265,6 +265,21 @@ test "open furnace: in ambient light of radiance 1 whatever absorbs nothing cann
     }
 }
 
+test "vertex alpha makes no hole in what is opaque" {
+    var builder: Builder = try .init();
+    try builder.addQuad(fixture.flat(.{ 1, 1, 1 }), .{ 0, 0, -2 }, .{ 9, 0, 0 }, .{ 0, 9, 0 });
+    try builder.addCamera(.{ 0, 0, 0 }, 1);
+    var scene = builder.finish();
+    defer scene.deinit();
+    const colors: [6][4]f32 = @splat(.{ 1, 1, 1, -2 });
+    var meshes = [_]raylane.scene.Mesh{scene.meshes[0]};
+    meshes[0].colors = colors[0..meshes[0].positions.len];
+    scene.meshes = &meshes;
+    var image = try fixture.render(&scene, .{ .background = .{ 0, 0, 0 } });
+    defer image.deinit(gpa);
+    for (image.pixels) |pixel| try expectClose(1, pixel[0], 1e-6);
+}
+
 test "a hole shows what is behind it, a culled back too, and transparency leaves alpha" {
     var hole = fixture.flat(.{ 1, 0, 0 });
     hole.alpha_mode = .mask;
