@@ -46,7 +46,7 @@ pub fn build(b: *std.Build) void {
     const options: Package.Options = .{
         .backend = b.option(Package.Backend, "backend", "Arithmetic of the default variant") orelse
             .vector,
-        .traversal = b.option(Package.Traversal, "traversal", "Its bundles of rays") orelse .packet,
+        .traversal = b.option(Package.Traversal, "traversal", "Its bundles of rays") orelse .beam,
         .lanes = b.option(u8, "lanes", "Its SIMD width: 4, 8 or 16 (default: the target's)"),
         .variants = b.option(Package.Variants, "variants", "Hold that variant only, or all") orelse
             .all,

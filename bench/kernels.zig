@@ -17,8 +17,8 @@ const Kernel = raylane.trace.kernel.Kernel(.{
 }, false);
 const Boxes = Kernel.Boxes;
 const Node = world.Node(Kernel.width);
-const Block = world.TriangleBlock(Kernel.width);
-const Search = raylane.trace.single.Search(Kernel, .nearest, true);
+const Block = world.TrianglePack(Kernel.width);
+const Search = raylane.trace.single.Search(Kernel, .closest_hit, true);
 const View = raylane.trace.ray.View(Boxes);
 
 const Ranges = extern struct { near: [Kernel.width]f32, far: [Kernel.width]f32 };
@@ -48,7 +48,7 @@ inline fn cornersOf(block: *const Block) [3]Boxes.Vec3 {
 
 /// Whether any triangle of a block may be hit: where most blocks are left.
 fn triangleCull(view: *const View, block: *const Block) callconv(.c) bool {
-    return triangle.weigh(Boxes, seenBy(view, block)).mayAgree().none();
+    return triangle.edgeFunctions(Boxes, seenBy(view, block)).mayAgree().none();
 }
 
 /// Where the triangles of a block are hit, a bit each; without the rare exact settling of zeros.
@@ -59,7 +59,7 @@ fn triangleHit(
     t: *[Kernel.width]f32,
 ) callconv(.c) u32 {
     const seen = seenBy(view, block);
-    const weights = triangle.weigh(Boxes, seen);
+    const weights = triangle.edgeFunctions(Boxes, seen);
     const hit = triangle.locate(Boxes, seen, weights, cornersOf(block), view, pad);
     t.* = hit.t.toArray();
     return weights.agree().bitAnd(hit.mask).bits();

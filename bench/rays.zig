@@ -236,7 +236,7 @@ const Bench = struct {
             .sah_cost = facts.sah_cost,
             .nodes = facts.node_count,
             .blocks = switch (tree.world.tree) {
-                inline else => |*wide| wide.blocks.len,
+                inline else => |*wide| wide.packs.len,
             },
         };
     }

@@ -63,7 +63,7 @@ fn Tracer(comptime structure: Structure, comptime traversal: Traversal) type {
                     _ = raylane.trace.single.trace(SingleKernel, query, world, group, &counts);
                 },
                 .packet => {
-                    raylane.trace.packet.trace(PacketKernel, query, world, group, &counts);
+                    raylane.trace.bundle.trace(PacketKernel, query, world, group, &counts);
                 },
             }
         }
@@ -218,8 +218,8 @@ fn buildAll(gpa: Allocator, arena: Allocator, options: Options, worlds: *Worlds)
 
     const wide = &worlds.wide.tree.w4;
     return arena.dupe(Build, &.{
-        buildOf("bvh2", tags[0], narrow.nodes, narrow.blocks),
-        buildOf("bvh4", tags[1], wide.nodes, wide.blocks),
+        buildOf("bvh2", tags[0], narrow.nodes, narrow.packs),
+        buildOf("bvh4", tags[1], wide.nodes, wide.packs),
         buildOf("kd", tags[2], worlds.kd.nodes, worlds.kd.blocks),
     });
 }

@@ -21,7 +21,7 @@ raylane: *Module,
 /// How four floats are added; `src/variant.zig` says what each means.
 pub const Backend = enum { scalar, vector, intrinsics };
 /// How rays are bundled; `src/variant.zig` says what each means.
-pub const Traversal = enum { single, packet2x2, packet };
+pub const Traversal = enum { single, packet2x2, beam };
 /// Whether the program holds the default variant only.
 pub const Variants = enum { one, all };
 

@@ -13,7 +13,7 @@ const settings_file = @import("parse/settings.zig");
 const Allocator = std.mem.Allocator;
 
 /// Scenes that need no file.
-pub const builtin = @import("parse/builtin.zig");
+pub const builtin = @import("builtin.zig");
 
 /// `InputOutput`: a file is missing or cannot be read. `InvalidInput`: it is read, but it is not
 /// what it should be, or it needs what is not supported.

@@ -13,9 +13,9 @@ const simd = @import("simd.zig");
 const statistics = @import("statistics.zig");
 const world = @import("world.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
-const bvh_input = @import("prepare/bvh_input.zig");
-const bvh_wide = @import("prepare/bvh_wide.zig");
-const check = @import("prepare/check.zig");
+const bvh_input = @import("prepare/bvh/input.zig");
+const bvh_wide = @import("prepare/bvh/wide.zig");
+const check = @import("prepare/bvh/check.zig");
 const flatten = @import("prepare/flatten.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
@@ -247,7 +247,7 @@ fn testThreads(from: *const Scene, lanes: u8, quality: TreeQuality) !usize {
                 const a = reference.tree.get(width);
                 const b = other.tree.get(width);
                 try expectSameBytes(a.nodes, b.nodes);
-                try expectSameBytes(a.blocks, b.blocks);
+                try expectSameBytes(a.packs, b.packs);
             },
             else => unreachable,
         }
@@ -286,7 +286,7 @@ test "one triangle is a root with one leaf" {
     try std.testing.expectEqual(1, result.tree_statistics.depth);
     try std.testing.expectEqual(2, result.tree_statistics.sah_cost);
     try std.testing.expectEqual(128 + 160, result.tree_statistics.bytes);
-    try std.testing.expectEqual(@as(u32, 0), result.tree.w4.blocks[0].primitive[0]);
+    try std.testing.expectEqual(@as(u32, 0), result.tree.w4.packs[0].primitive[0]);
 }
 
 test "random soups of all sizes, in all widths, by any number of threads" {
@@ -584,9 +584,9 @@ test {
     _ = pose;
     _ = view;
     _ = @import("prepare/framing.zig");
-    _ = @import("prepare/bvh_split.zig");
+    _ = @import("prepare/bvh/split.zig");
     _ = bvh_input;
-    _ = @import("prepare/bvh_build.zig");
-    _ = @import("prepare/bvh_cells.zig");
-    _ = @import("prepare/bvh_reinsert.zig");
+    _ = @import("prepare/bvh/build.zig");
+    _ = @import("prepare/bvh/cells.zig");
+    _ = @import("prepare/bvh/reinsert.zig");
 }

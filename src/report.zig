@@ -229,7 +229,7 @@ const report_for_test: Report = .{
     .sample_count = 1,
     .depth = 6,
     .thread_count = 4,
-    .variant = "vector-packet-4",
+    .variant = "vector-beam-4",
     .times = .{
         .parse_ns = 1_500_000,
         .prepare_ns = 1,
@@ -262,7 +262,7 @@ test "the text, with and without tests counted" {
     const head =
         \\scene        a "b"??.glb, 34 triangles
         \\image        a.png, 1024 x 768, 1 sample a pixel, depth 6
-        \\tracer       vector-packet-4, 4 threads
+        \\tracer       vector-beam-4, 4 threads
         \\
         \\parse            1.500 ms
         \\prepare          0.000 ms

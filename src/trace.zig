@@ -10,35 +10,35 @@ const statistics = @import("statistics.zig");
 const parallel = @import("parallel.zig");
 const variant_file = @import("variant.zig");
 const Image = @import("image.zig").Image;
-const whitted = @import("trace/whitted.zig");
-const Tiles = @import("trace/tiles.zig");
+const whitted = @import("trace/integrate/whitted.zig");
+const Tiles = @import("trace/integrate/tiles.zig");
 const assert = std.debug.assert;
 const World = world_file.World;
 
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
-pub const kernel = @import("trace/kernel.zig");
+pub const kernel = @import("trace/traverse/kernel.zig");
 /// Rays in lanes.
-pub const ray = @import("trace/ray.zig");
+pub const ray = @import("trace/traverse/ray.zig");
 /// The exact triangle test.
-pub const triangle = @import("trace/triangle.zig");
+pub const triangle = @import("trace/traverse/triangle.zig");
 /// One ray in the lanes of a tree.
-pub const lone = @import("trace/lone.zig");
+pub const traversal_ray = @import("trace/traverse/traversal_ray.zig");
 /// One ray after the other through the tree.
-pub const single = @import("trace/single.zig");
+pub const single = @import("trace/traverse/single.zig");
 /// Rays that have little in common, as a set.
-pub const stream = @import("trace/stream.zig");
+pub const stream = @import("trace/traverse/stream.zig");
 /// A few rays that go much the same way.
-pub const interval = @import("trace/interval.zig");
+pub const interval_packet = @import("trace/traverse/interval_packet.zig");
 /// The way through the tree, and what rays want to know.
-pub const walk = @import("trace/walk.zig");
+pub const walk = @import("trace/traverse/walk.zig");
 /// A bundle of rays through the tree.
-pub const packet = @import("trace/packet.zig");
+pub const bundle = @import("trace/traverse/bundle.zig");
 /// Rays from one point, or behind it, as a beam.
-pub const primary = @import("trace/beam/primary.zig");
+pub const primary = @import("trace/traverse/beam/primary.zig");
 /// The directions of a beam's rays.
-pub const Grid = @import("trace/beam/grid.zig").Grid;
+pub const Grid = @import("trace/traverse/beam/grid.zig").Grid;
 /// A bundle in the variant's own way.
-pub const query = @import("trace/query.zig");
+pub const dispatch = @import("trace/traverse/dispatch.zig");
 
 /// Bounces at most.
 pub const depth_limit = whitted.depth_limit;
@@ -75,7 +75,7 @@ pub fn trace(
     image: *Image,
     settings: Settings,
 ) Statistics {
-    return dispatch(false, variant_index, world, image, settings);
+    return run(false, variant_index, world, image, settings);
 }
 
 /// The same with boxes and triangles counted, which takes longer: for a second pass, untimed.
@@ -85,10 +85,10 @@ pub fn traceCounting(
     image: *Image,
     settings: Settings,
 ) Statistics {
-    return dispatch(true, variant_index, world, image, settings);
+    return run(true, variant_index, world, image, settings);
 }
 
-fn dispatch(
+fn run(
     comptime counting: bool,
     variant_index: usize,
     world: *const World,
@@ -182,18 +182,18 @@ test {
     _ = ray;
     _ = triangle;
     _ = single;
-    _ = lone;
+    _ = traversal_ray;
     _ = stream;
-    _ = packet;
-    _ = query;
+    _ = bundle;
+    _ = dispatch;
     _ = whitted;
     _ = Tiles;
-    _ = @import("trace/beam/cost.zig");
-    _ = @import("trace/beam/found.zig");
-    _ = @import("trace/beam/grid.zig");
-    _ = @import("trace/camera.zig");
-    _ = @import("trace/exponential.zig");
-    _ = @import("trace/offset.zig");
-    _ = @import("trace/shade.zig");
-    _ = @import("trace/surface.zig");
+    _ = @import("trace/traverse/beam/budget.zig");
+    _ = @import("trace/traverse/beam/tile_depth_buffer.zig");
+    _ = @import("trace/traverse/beam/grid.zig");
+    _ = @import("trace/integrate/camera.zig");
+    _ = @import("trace/shade/exponential.zig");
+    _ = @import("trace/shade/offset.zig");
+    _ = @import("trace/shade/bsdf.zig");
+    _ = @import("trace/shade/interaction.zig");
 }

@@ -12,8 +12,9 @@ const assert = std.debug.assert;
 /// How four floats are added: loops over arrays, Zig's `@Vector`, or C intrinsics.
 pub const Backend = enum { scalar, vector, intrinsics };
 
-/// How rays travel: alone, as the thesis's 2x2 packets, or in the widest bundle we have.
-pub const Traversal = enum { single, packet2x2, packet };
+/// How rays travel: single, as the thesis's 2x2 packets, or as beams, then interval packets, then
+/// streams.
+pub const Traversal = enum { single, packet2x2, beam };
 
 /// One way to build the tracer; all of them give the same picture, bit for bit.
 pub const Variant = struct {
@@ -93,15 +94,42 @@ pub const names: []const []const u8 = list: {
 /// Index into `compiled` of the variant with this name, or null.
 pub fn indexOf(name: []const u8) ?usize {
     for (names, 0..) |candidate, index| {
-        if (std.mem.eql(u8, candidate, name)) return index;
+        if (isNamed(candidate, name)) return index;
     }
     return null;
+}
+
+/// Whether `text` is the name of a variant, or its older name, which said `packet` for `beam`.
+pub fn isNamed(name: []const u8, text: []const u8) bool {
+    return isAlike(name, text, std.mem.eql);
+}
+
+/// Whether `text` is a part of the name of a variant, or of its older name.
+pub fn isPartlyNamed(name: []const u8, text: []const u8) bool {
+    return isAlike(name, text, struct {
+        fn contains(comptime T: type, haystack: []const T, needle: []const T) bool {
+            return std.mem.find(T, haystack, needle) != null;
+        }
+    }.contains);
+}
+
+fn isAlike(name: []const u8, text: []const u8, comptime match: anytype) bool {
+    if (match(u8, name, text)) return true;
+    const at = std.mem.find(u8, name, "beam") orelse return false;
+    var older: [64]u8 = undefined;
+    const parts = .{ name[0..at], name[at + "beam".len ..] };
+    const written = std.fmt.bufPrint(&older, "{s}packet{s}", parts) catch return false;
+    return match(u8, written, text);
 }
 
 test "the default comes first and every name is found once" {
     try std.testing.expect(std.meta.eql(compiled[0], default));
     for (names, 0..) |name, index| try std.testing.expectEqual(index, indexOf(name).?);
     try std.testing.expectEqual(null, indexOf("vector-single-5"));
+    try std.testing.expect(isNamed("vector-beam-8", "vector-packet-8"));
+    try std.testing.expect(!isNamed("vector-packet2x2-4", "vector-packet-4"));
+    try std.testing.expect(isPartlyNamed("vector-beam-8", "vector-packet"));
+    try std.testing.expect(!isPartlyNamed("vector-single-8", "packet"));
     try std.testing.expectEqual(null, indexOf(""));
 }
 
@@ -110,5 +138,5 @@ test "4 lanes only where the hardware's registers say so" {
     try std.testing.expect(!wide.isSupported());
     const odd: Variant = .{ .backend = .vector, .traversal = .single, .lanes = 5 };
     try std.testing.expect(!odd.isSupported());
-    assert((Variant{ .backend = .vector, .traversal = .packet, .lanes = 16 }).isSupported());
+    assert((Variant{ .backend = .vector, .traversal = .beam, .lanes = 16 }).isSupported());
 }

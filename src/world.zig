@@ -27,23 +27,23 @@ pub const none: u32 = std.math.maxInt(u32);
 /// Levels of a tree at most; the builder keeps to it, traversal stacks are sized by it.
 pub const tree_depth_max = 64;
 
-/// Bytes that nodes and triangle blocks are aligned to: a cache line.
+/// Bytes that nodes and triangle packs are aligned to: a cache line.
 pub const cache_line_bytes = 64;
 
 /// A child of a node. One word, since stacks write and read it as a whole: two stores that one load
 /// reads back make processors wait.
 pub const Child = packed struct(u64) {
-    /// Number of a node, or of the first triangle block; `none` if there is no child.
+    /// Number of a node, or of the first triangle pack; `none` if there is no child.
     target: u32,
-    /// 0: a node; else that many blocks.
-    block_count: u32,
+    /// 0: a node; else that many packs.
+    pack_count: u32,
 
-    pub const missing: Child = .{ .target = none, .block_count = 0 };
-    pub const root: Child = .{ .target = 0, .block_count = 0 };
+    pub const missing: Child = .{ .target = none, .pack_count = 0 };
+    pub const root: Child = .{ .target = 0, .pack_count = 0 };
 
-    /// The numbers of its blocks, from the first to before the last; equal for a node.
-    pub inline fn blocks(child: Child) [2]usize {
-        return .{ child.target, @as(usize, child.target) + child.block_count };
+    /// The numbers of its packs, from the first to before the last; equal for a node.
+    pub inline fn packs(child: Child) [2]usize {
+        return .{ child.target, @as(usize, child.target) + child.pack_count };
     }
 };
 
@@ -93,14 +93,14 @@ pub fn Node(comptime width: comptime_int) type {
 ///
 /// Padding lanes have `primitive = none` and three corners at the origin, which no ray hits: but
 /// every test of edges is in doubt about them, so that they are left out first.
-pub fn TriangleBlock(comptime width: comptime_int) type {
+pub fn TrianglePack(comptime width: comptime_int) type {
     return extern struct {
         /// [corner][axis][lane].
         corner: [3][3][width]f32 align(16),
         /// Index into `World.triangles`.
         primitive: [width]u32,
 
-        /// A block without triangles.
+        /// A pack without triangles.
         pub const empty: @This() = .{
             .corner = @splat(@splat(@splat(0))),
             .primitive = @splat(none),
@@ -116,15 +116,15 @@ pub fn TriangleBlock(comptime width: comptime_int) type {
 pub fn Tree(comptime width: comptime_int) type {
     return struct {
         nodes: []align(cache_line_bytes) const Node(width),
-        blocks: []align(cache_line_bytes) const TriangleBlock(width),
+        packs: []align(cache_line_bytes) const TrianglePack(width),
 
-        /// Asks memory for a child's node or first block, to be there when somebody comes to it.
+        /// Asks memory for a child's node or first pack, to be there when somebody comes to it.
         pub inline fn prefetch(tree: *const @This(), child: Child) void {
-            const start: [*]const u8 = if (child.block_count == 0)
+            const start: [*]const u8 = if (child.pack_count == 0)
                 @ptrCast(&tree.nodes[child.target])
             else
-                @ptrCast(&tree.blocks[child.target]);
-            const bytes = @max(@sizeOf(Node(width)), @sizeOf(TriangleBlock(width)));
+                @ptrCast(&tree.packs[child.target]);
+            const bytes = @max(@sizeOf(Node(width)), @sizeOf(TrianglePack(width)));
             comptime var at = 0;
             inline while (at < bytes) : (at += cache_line_bytes) @prefetch(start + at, .{});
         }
@@ -236,10 +236,10 @@ pub const TreeStatistics = struct {
     node_count: u32,
     /// Levels of nodes, 1 for a root alone, 0 without triangles.
     depth: u32,
-    /// Expected cost of a random ray: node visits plus blocks tested, weighted by area over
+    /// Expected cost of a random ray: node visits plus packs tested, weighted by area over
     /// the root's.
     sah_cost: f64,
-    /// Nodes and triangle blocks.
+    /// Nodes and triangle packs.
     bytes: u64,
 };
 

@@ -64,15 +64,15 @@ fn directionsOf(grid: *const Grid) Directions {
 fn bundleOf(
     comptime Kernel: type,
     queries: *const [side][side]?Query,
-) raylane.trace.packet.Bundle(Kernel) {
+) raylane.trace.bundle.Bundle(Kernel) {
     const count = Kernel.ray_count;
-    var bundle: raylane.trace.packet.Bundle(Kernel) = undefined;
+    var bundle: raylane.trace.bundle.Bundle(Kernel) = undefined;
     for (&bundle.groups, 0..) |*group, index| {
         var origin: [3][count]f32 = @splat(@splat(0));
         var direction: [3][count]f32 = @splat(@splat(0));
         var t_max: [count]f32 = @splat(0);
-        var after: [count]f32 = @splat(0);
-        var after_primitive: [count]i32 = @splat(0);
+        var tnear: [count]f32 = @splat(0);
+        var tnear_primitive: [count]i32 = @splat(0);
         var skip: [count]i32 = @splat(ray_file.no_primitive);
         var active: [count]bool = @splat(false);
         for (0..count) |lane| {
@@ -84,14 +84,14 @@ fn bundleOf(
                 direction[axis][lane] = query.direction[axis];
             }
             t_max[lane] = query.t_max;
-            after[lane] = query.after.t;
-            after_primitive[lane] = query.after.primitive;
+            tnear[lane] = query.tnear.t;
+            tnear_primitive[lane] = query.tnear.primitive;
             skip[lane] = query.skip;
         }
         group.* = .{
             .line = .init(vectors(Kernel, origin), vectors(Kernel, direction)),
-            .after = .{ .t = .fromArray(after), .primitive = .fromArray(after_primitive) },
-            .nearest = .before(.fromArray(t_max)),
+            .tnear = .{ .t = .fromArray(tnear), .primitive = .fromArray(tnear_primitive) },
+            .closest = .before(.fromArray(t_max)),
             .skip = .fromArray(skip),
             .active = .fromArray(active),
         };
@@ -132,8 +132,8 @@ fn expectTile(
         const x = Kernel.pixelX(index, lane);
         const y = Kernel.pixelY(index, lane);
         if (queries[y][x] == null) continue;
-        const t = group.nearest.t.lane(lane);
-        try soup_file.expectHit(hits[y][x], t, group.nearest.primitive.lane(lane));
+        const t = group.closest.t.lane(lane);
+        try soup_file.expectHit(hits[y][x], t, group.closest.primitive.lane(lane));
     };
     for ([_]Light.Kind{ .point, .directional }) |kind| {
         try expectShadows(Kernel, world, grid, &directions, &hits, kind, light);
@@ -184,13 +184,13 @@ fn expectShadows(
     const expected = hitsOf(world, &queries);
     var bundle = bundleOf(Kernel, &queries);
     var counts: raylane.statistics.TestCounts = .{};
-    raylane.trace.query.any(Kernel, world, &bundle, &light, &.all, &counts);
+    raylane.trace.dispatch.anyHit(Kernel, world, &bundle, &light, &.all, &counts);
     for (&bundle.groups, 0..) |*group, index| for (0..Kernel.ray_count) |lane| {
         const x = Kernel.pixelX(index, lane);
         const y = Kernel.pixelY(index, lane);
         if (queries[y][x] == null) continue;
         const blocked = expected[y][x].primitive != ray_file.no_primitive;
-        const found = group.nearest.primitive.lane(lane) != ray_file.no_primitive;
+        const found = group.closest.primitive.lane(lane) != ray_file.no_primitive;
         try std.testing.expectEqual(blocked, found);
     };
 }
@@ -228,7 +228,7 @@ fn expectMirror(
         if (!isActive(x, y)) continue;
         const first = soup_file.bruteForce(world, .{ .origin = grid.origin, .direction = way });
         if (mirror.kind == .rest) {
-            query.* = .{ .origin = grid.origin, .direction = way, .after = first };
+            query.* = .{ .origin = grid.origin, .direction = way, .tnear = first };
             continue;
         }
         const second = mirror.kind == .two and x > side / 2;
@@ -249,7 +249,7 @@ fn expectMirror(
     const hits = hitsOf(world, &queries);
     var bundle = bundleOf(Kernel, &queries);
     var counts: raylane.statistics.TestCounts = .{};
-    const beams = raylane.trace.query.nearest(Kernel, world, &bundle, null, null, &counts);
+    const beams = raylane.trace.dispatch.closestHit(Kernel, world, &bundle, null, null, &counts);
     var beam_count: u32 = 0;
     for (&bundle.groups, 0..) |*group, index| for (0..Kernel.ray_count) |lane| {
         const x = Kernel.pixelX(index, lane);
@@ -257,8 +257,8 @@ fn expectMirror(
         try std.testing.expectEqual(queries[y][x] != null, group.active.lane(lane));
         if (beams == .some) beam_count += @intFromBool(beams.some[index].lane(lane));
         if (queries[y][x] == null) continue;
-        const t = group.nearest.t.lane(lane);
-        try soup_file.expectHit(hits[y][x], t, group.nearest.primitive.lane(lane));
+        const t = group.closest.t.lane(lane);
+        try soup_file.expectHit(hits[y][x], t, group.closest.primitive.lane(lane));
     };
     return beam_count;
 }
@@ -336,7 +336,7 @@ fn expectMirrors(soup: soup_file.Soup, triangle_count: usize, tile_count: usize)
                 mirror.point = vec3.add(origin, vec3.scale(vec3.sub(target, origin), 0.7));
             }
             inline for (raylane.variant.compiled) |variant| {
-                if (comptime variant.lanes == lanes and variant.traversal == .packet) {
+                if (comptime variant.lanes == lanes and variant.traversal == .beam) {
                     const Kernel = raylane.trace.kernel.Kernel(variant, false);
                     beam_count += try expectMirror(Kernel, &world, &grid, &mirror, random);
                     ray_count += side * side;
@@ -369,7 +369,7 @@ fn expectSoup(soup: soup_file.Soup, triangle_count: usize, tile_count: usize) !v
             const step: f32 = if (tile % 2 == 0) 1e-3 else 8e-3;
             const grid = aim(origin, target, step, random);
             inline for (raylane.variant.compiled) |variant| {
-                if (comptime variant.lanes == lanes and variant.traversal == .packet) {
+                if (comptime variant.lanes == lanes and variant.traversal == .beam) {
                     const Kernel = raylane.trace.kernel.Kernel(variant, false);
                     try expectTile(Kernel, &world, &grid, light);
                 }
@@ -405,12 +405,12 @@ test "a tile too wide for a beam is declined" {
     var scene = try soup_file.makeScene(corners.items);
     defer scene.deinit();
     inline for (raylane.variant.compiled) |variant| {
-        if (comptime variant.traversal != .packet) continue;
+        if (comptime variant.traversal != .beam) continue;
         const Kernel = raylane.trace.kernel.Kernel(variant, false);
         var world = try fixture.prepare(&scene, variant.lanes, .{});
         defer world.deinit();
         const grid = aim(.{ 0, 0, 7 }, .{ 0, 0, 0 }, 0.1, generator.random());
-        var bundle: raylane.trace.packet.Bundle(Kernel) = undefined;
+        var bundle: raylane.trace.bundle.Bundle(Kernel) = undefined;
         var counts: raylane.statistics.TestCounts = .{};
         const traced = raylane.trace.primary.trace(Kernel, &world, &grid, &bundle, null, &counts);
         try std.testing.expect(!traced);

@@ -22,15 +22,15 @@ const no_light = std.mem.zeroes(raylane.world.Light);
 pub const Query = struct {
     origin: [3]f32,
     direction: [3]f32,
-    after: Hit = .{ .t = 0, .primitive = std.math.maxInt(i32) },
+    tnear: Hit = .{ .t = 0, .primitive = std.math.maxInt(i32) },
     t_max: f32 = inf,
     skip: i32 = ray_file.no_primitive,
 
     fn ray(query: Query) ray_file.Ray(Single) {
         return .{
             .line = .init(.splat(query.origin), .splat(query.direction)),
-            .after = .{ .t = .splat(query.after.t), .primitive = .splat(query.after.primitive) },
-            .nearest = .before(.splat(query.t_max)),
+            .tnear = .{ .t = .splat(query.tnear.t), .primitive = .splat(query.tnear.primitive) },
+            .closest = .before(.splat(query.t_max)),
             .skip = .splat(query.skip),
             .active = .splat(true),
         };
@@ -53,12 +53,12 @@ pub fn bruteForce(world: *const World, query: Query) Hit {
         const hit = triangle.intersect(Single, p, ray.line, world.pad);
         const primitive: Single.I32 = .splat(@intCast(number));
         const accepted = hit.mask
-            .bitAnd(ray.after.isBefore(hit.t, primitive))
-            .bitAnd(ray.nearest.isAfter(hit.t, primitive))
+            .bitAnd(ray.tnear.isBefore(hit.t, primitive))
+            .bitAnd(ray.closest.isAfter(hit.t, primitive))
             .andNot(primitive.eq(ray.skip));
-        if (accepted.lane(0)) ray.nearest = .{ .t = hit.t, .primitive = primitive };
+        if (accepted.lane(0)) ray.closest = .{ .t = hit.t, .primitive = primitive };
     }
-    return .{ .t = ray.nearest.t.lane(0), .primitive = ray.nearest.primitive.lane(0) };
+    return .{ .t = ray.closest.t.lane(0), .primitive = ray.closest.primitive.lane(0) };
 }
 
 /// Fails unless the same triangle was found, at the same t to the bit.
@@ -83,15 +83,15 @@ fn expectVariant(
         var ray = query.ray();
         const found = raylane.trace.single.trace(
             Kernel,
-            .nearest,
+            .closest_hit,
             world,
             &ray,
             &counts,
         );
-        try expectHit(hit, ray.nearest.t.lane(0), ray.nearest.primitive.lane(0));
+        try expectHit(hit, ray.closest.t.lane(0), ray.closest.primitive.lane(0));
         try std.testing.expectEqual(hit.primitive != ray_file.no_primitive, found);
         var shadow = query.ray();
-        const blocked = raylane.trace.single.trace(Kernel, .any, world, &shadow, &counts);
+        const blocked = raylane.trace.single.trace(Kernel, .any_hit, world, &shadow, &counts);
         try std.testing.expectEqual(found, blocked);
     }
     if (Kernel.ray_count > 1) try expectBundles(Kernel, world, queries, expected);
@@ -110,24 +110,24 @@ fn expectBundles(
         const part = queries[first..@min(first + size, queries.len)];
         var bundle = makeBundle(Kernel, part);
         var shadows = bundle;
-        if (Kernel.variant.traversal == .packet) for ([_]i32{ 0, 1, 3, 12 }) |balance| {
-            // Without credit all go as sets; with little, companies run out of it on their way.
+        if (Kernel.variant.traversal == .beam) for ([_]i32{ 0, 1, 3, 12 }) |balance| {
+            // Without budget all go as sets; with little, companies run out of it on their way.
             var poor = bundle;
-            var credit: raylane.trace.interval.Credit = .{ .balance = balance };
-            raylane.trace.interval.trace(Kernel, .any, world, &poor, &credit, &counts);
+            var budget: raylane.trace.interval_packet.PacketBudget = .{ .balance = balance };
+            raylane.trace.interval_packet.trace(Kernel, .any_hit, world, &poor, &budget, &counts);
             try expectBlocked(Kernel, &poor, expected[first..][0..part.len]);
         };
-        const together = raylane.trace.query
-            .nearest(Kernel, world, &bundle, null, null, &counts);
-        try std.testing.expect(together == .none);
-        raylane.trace.query.any(Kernel, world, &shadows, &no_light, &together, &counts);
+        const coherence = raylane.trace.dispatch
+            .closestHit(Kernel, world, &bundle, null, null, &counts);
+        try std.testing.expect(coherence == .none);
+        raylane.trace.dispatch.anyHit(Kernel, world, &shadows, &no_light, &coherence, &counts);
         try expectBlocked(Kernel, &shadows, expected[first..][0..part.len]);
         for (0..part.len) |index| {
             if (!isActive(index)) continue;
             const hit = expected[first + index];
             const group = &bundle.groups[index / Kernel.ray_count];
             const lane = index % Kernel.ray_count;
-            try expectHit(hit, group.nearest.t.lane(lane), group.nearest.primitive.lane(lane));
+            try expectHit(hit, group.closest.t.lane(lane), group.closest.primitive.lane(lane));
         }
     }
 }
@@ -135,13 +135,13 @@ fn expectBundles(
 /// Fails unless those rays found anything that have a hit.
 fn expectBlocked(
     comptime Kernel: type,
-    bundle: *const raylane.trace.packet.Bundle(Kernel),
+    bundle: *const raylane.trace.bundle.Bundle(Kernel),
     expected: []const Hit,
 ) !void {
     for (expected, 0..) |hit, index| {
         if (!isActive(index)) continue;
         const group = &bundle.groups[index / Kernel.ray_count];
-        const found = group.nearest.primitive.lane(index % Kernel.ray_count);
+        const found = group.closest.primitive.lane(index % Kernel.ray_count);
         const blocked = found != ray_file.no_primitive;
         try std.testing.expectEqual(hit.primitive != ray_file.no_primitive, blocked);
     }
@@ -152,15 +152,15 @@ fn isActive(index: usize) bool {
     return index % 7 != 3;
 }
 
-fn makeBundle(comptime Kernel: type, queries: []const Query) raylane.trace.packet.Bundle(Kernel) {
+fn makeBundle(comptime Kernel: type, queries: []const Query) raylane.trace.bundle.Bundle(Kernel) {
     const Rays = Kernel.Rays;
     const count = Kernel.ray_count;
-    var bundle: raylane.trace.packet.Bundle(Kernel) = undefined;
+    var bundle: raylane.trace.bundle.Bundle(Kernel) = undefined;
     for (&bundle.groups, 0..) |*group, group_index| {
         var origin: [3][count]f32 = @splat(@splat(0));
         var direction: [3][count]f32 = @splat(@splat(0));
         var t_max: [count]f32 = @splat(0);
-        var after_t: [count]f32 = @splat(0);
+        var tnear_t: [count]f32 = @splat(0);
         var ints: [2][count]i32 = @splat(@splat(0));
         var active: [count]bool = @splat(false);
         for (0..count) |lane| {
@@ -173,14 +173,14 @@ fn makeBundle(comptime Kernel: type, queries: []const Query) raylane.trace.packe
                 direction[axis][lane] = query.direction[axis];
             }
             t_max[lane] = query.t_max;
-            after_t[lane] = query.after.t;
-            ints[0][lane] = query.after.primitive;
+            tnear_t[lane] = query.tnear.t;
+            ints[0][lane] = query.tnear.primitive;
             ints[1][lane] = query.skip;
         }
         group.* = .{
             .line = .init(inLanes(Rays, origin), inLanes(Rays, direction)),
-            .after = .{ .t = .fromArray(after_t), .primitive = .fromArray(ints[0]) },
-            .nearest = .before(.fromArray(t_max)),
+            .tnear = .{ .t = .fromArray(tnear_t), .primitive = .fromArray(ints[0]) },
+            .closest = .before(.fromArray(t_max)),
             .skip = .fromArray(ints[1]),
             .active = .fromArray(active),
         };
@@ -291,10 +291,10 @@ fn expectSoup(soup: Soup, triangle_count: usize, query_count: usize) !void {
         defer world.deinit();
         // Layers behind one another: the second half of the shared rays starts behind a hit.
         for (queries, expected, 0..) |*query, *hit, index| {
-            query.after = .{ .t = 0, .primitive = std.math.maxInt(i32) };
+            query.tnear = .{ .t = 0, .primitive = std.math.maxInt(i32) };
             hit.* = bruteForce(&world, query.*);
             if (index % 3 != 0 or hit.primitive == ray_file.no_primitive) continue;
-            query.after = hit.*;
+            query.tnear = hit.*;
             hit.* = bruteForce(&world, query.*);
         }
         inline for (raylane.variant.compiled) |variant| {
@@ -400,7 +400,7 @@ test "a closed surface stops every ray that aims at its edges and corners, near 
             const Kernel = raylane.trace.kernel.Kernel(raylane.variant.compiled[0], false);
             const hit = raylane.trace.single.trace(
                 Kernel,
-                .nearest,
+                .closest_hit,
                 &world,
                 &ray,
                 &counts,

@@ -26,7 +26,7 @@ pub fn Batch(comptime Kernel: type) type {
         pub const Lanes = Kernel.Boxes;
         pub const group_count = ray_count / Lanes.count;
         const Self = @This();
-        const Bundle = raylane.trace.packet.Bundle(Kernel);
+        const Bundle = raylane.trace.bundle.Bundle(Kernel);
 
         /// As a bundle of the traversal `packet`.
         pub fn bundle(batch: *Self) *Bundle {
@@ -39,9 +39,9 @@ pub fn Batch(comptime Kernel: type) type {
             const index = order[row][column];
             const group = &batch.groups[index / Lanes.count];
             const lane = index % Lanes.count;
-            const primitive = group.nearest.primitive.lane(lane);
+            const primitive = group.closest.primitive.lane(lane);
             if (!group.active.lane(lane) or primitive == none) return null;
-            return .{ @intCast(primitive), group.nearest.t.lane(lane) };
+            return .{ @intCast(primitive), group.closest.t.lane(lane) };
         }
 
         /// Whether a pixel has a ray.
@@ -66,7 +66,7 @@ pub fn Batch(comptime Kernel: type) type {
 
         const BeamKernel = raylane.trace.kernel.Kernel(.{
             .backend = Kernel.variant.backend,
-            .traversal = .packet,
+            .traversal = .beam,
             .lanes = Kernel.variant.lanes,
         }, false);
 

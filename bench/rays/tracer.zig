@@ -6,8 +6,8 @@
 const std = @import("std");
 const raylane = @import("raylane");
 const batch_file = @import("batch.zig");
-const packet = raylane.trace.packet;
-const query_file = raylane.trace.query;
+const bundle_file = raylane.trace.bundle;
+const dispatch = raylane.trace.dispatch;
 const ray_file = raylane.trace.ray;
 const triangle = raylane.trace.triangle;
 const Grid = raylane.trace.Grid;
@@ -24,9 +24,9 @@ pub fn Tracer(comptime Kernel: type) type {
         light: raylane.world.Light,
         tests: raylane.statistics.TestCounts = .{},
         /// Which rays of the last batch went as beams.
-        together: Together = .none,
+        coherence: Coherence = .none,
 
-        const Together = query_file.Together(Kernel);
+        const Coherence = dispatch.Coherence(Kernel);
         const Self = @This();
 
         /// Nearest hits of rays from the eye, one through each pixel of a tile, all active.
@@ -41,12 +41,12 @@ pub fn Tracer(comptime Kernel: type) type {
             const tests = &tracer.tests;
             const light = &tracer.light;
             switch (Kernel.variant.traversal) {
-                .packet => {
-                    const together: *const Together =
-                        if (bounced) &tracer.together else &.all;
-                    query_file.any(Kernel, world, batch.bundle(), light, together, tests);
+                .beam => {
+                    const coherence: *const Coherence =
+                        if (bounced) &tracer.coherence else &.all;
+                    dispatch.anyHit(Kernel, world, batch.bundle(), light, coherence, tests);
                 },
-                .packet2x2, .single => tracer.traceEach(.any, batch),
+                .packet2x2, .single => tracer.traceEach(.any_hit, batch),
             }
         }
 
@@ -59,11 +59,11 @@ pub fn Tracer(comptime Kernel: type) type {
             const world = tracer.world;
             const tests = &tracer.tests;
             switch (Kernel.variant.traversal) {
-                .packet => tracer.together = query_file
-                    .nearest(Kernel, world, batch.bundle(), grid, &batch.shares, tests),
-                .packet2x2, .single => tracer.traceEach(.nearest, batch),
+                .beam => tracer.coherence = dispatch
+                    .closestHit(Kernel, world, batch.bundle(), grid, &batch.shares, tests),
+                .packet2x2, .single => tracer.traceEach(.closest_hit, batch),
             }
-            if (tracer.together != .all) tracer.weighHits(batch);
+            if (tracer.coherence != .all) tracer.weighHits(batch);
         }
 
         /// Group by group, each by itself.
@@ -72,10 +72,10 @@ pub fn Tracer(comptime Kernel: type) type {
             const tests = &tracer.tests;
             for (&batch.groups) |*group| {
                 if (Kernel.variant.traversal == .packet2x2) {
-                    packet.trace(Kernel, query, world, group, tests);
+                    bundle_file.trace(Kernel, query, world, group, tests);
                     continue;
                 }
-                const view = packet.viewOf(Lanes, group);
+                const view = bundle_file.viewOf(Lanes, group);
                 raylane.trace.single.traceEach(Kernel, query, world, group, &view, tests);
             }
         }
@@ -85,15 +85,15 @@ pub fn Tracer(comptime Kernel: type) type {
         fn weighHits(tracer: *const Self, batch: *Batch) void {
             var hits: [Batch.group_count]Lanes.Mask = undefined;
             for (&hits, &batch.groups, 0..) |*hit, *group, index| {
-                hit.* = group.active.andNot(group.nearest.primitive.lt(.zero()));
-                if (Kernel.variant.traversal == .packet and tracer.together == .some)
-                    hit.* = hit.andNot(tracer.together.some[index]);
-                if (hit.any()) tracer.prefetchCorners(group.nearest.primitive, hit.bits());
+                hit.* = group.active.andNot(group.closest.primitive.lt(.zero()));
+                if (Kernel.variant.traversal == .beam and tracer.coherence == .some)
+                    hit.* = hit.andNot(tracer.coherence.some[index]);
+                if (hit.any()) tracer.prefetchCorners(group.closest.primitive, hit.bits());
             }
             for (&batch.groups, &batch.shares, hits) |*group, *all, hit| {
                 if (hit.none()) continue;
-                const primitive: Lanes.I32 = .select(hit, group.nearest.primitive, .zero());
-                const weights = weigh(tracer.gather(primitive), group.line, hit);
+                const primitive: Lanes.I32 = .select(hit, group.closest.primitive, .zero());
+                const weights = edgeFunctions(tracer.gather(primitive), group.line, hit);
                 const share = Lanes.F32.splat(1).div(weights.sum());
                 const both = [2]Lanes.F32{ weights.b.mul(share), weights.c.mul(share) };
                 for (all, both) |*to, value| {
@@ -128,19 +128,19 @@ pub fn Tracer(comptime Kernel: type) type {
             return corners;
         }
 
-        inline fn weigh(
+        inline fn edgeFunctions(
             corners: [3]Lanes.Vec3,
             line: ray_file.Line(Lanes),
             hit: Lanes.Mask,
-        ) triangle.Weights(Lanes) {
+        ) triangle.EdgeFunctions(Lanes) {
             const axis: ray_file.LongAxis(Lanes) = .of(line.direction);
-            const view: ray_file.View(Lanes) = .init(line, axis);
+            const view: ray_file.ShearedRay(Lanes) = .init(line, axis);
             const turned: [3]Lanes.Vec3 = .{
                 axis.turn(corners[0]), axis.turn(corners[1]), axis.turn(corners[2]),
             };
             const seen = triangle.project(Lanes, turned, &view);
-            var weights = triangle.weigh(Lanes, seen);
-            _ = triangle.settle(Lanes, seen, &weights, hit);
+            var weights = triangle.edgeFunctions(Lanes, seen);
+            _ = triangle.resolveTies(Lanes, seen, &weights, hit);
             return weights;
         }
     };

@@ -161,7 +161,7 @@ pub fn Workload(comptime Kernel: type) type {
             fn prepare(worker: *Worker) void {
                 const setup = worker.shared.setup;
                 for (&worker.rays.groups, &worker.shadows.groups) |*ray, *shadow| {
-                    ray.after = .start();
+                    ray.tnear = .start();
                     ray.skip = .splat(batch_file.none);
                     ray.line.origin = .splat(setup.eye);
                     shadow.* = ray.*;
@@ -215,7 +215,7 @@ pub fn Workload(comptime Kernel: type) type {
                     const spread = across.scale(.load(&places[0]))
                         .add(down.scale(.load(&places[1])));
                     ray.line.direction = Vec3x.splat(first).add(spread);
-                    ray.nearest = .before(.splat(std.math.inf(f32)));
+                    ray.closest = .before(.splat(std.math.inf(f32)));
                     ray.active = .splat(true);
                     if (bounces) ray.line.origin = .splat(setup.eye);
                     worker.color[index] = .zero();
@@ -267,9 +267,9 @@ pub fn Workload(comptime Kernel: type) type {
                 const ray = &worker.rays.groups[group];
                 const shadow = &worker.shadows.groups[group];
                 const direction = ray.line.direction;
-                const hit = ray.active.andNot(ray.nearest.primitive.lt(.zero()));
-                const t = F32.select(hit, ray.nearest.t, .zero());
-                const outward = normalsOf(setup.normals, ray.nearest.primitive);
+                const hit = ray.active.andNot(ray.closest.primitive.lt(.zero()));
+                const t = F32.select(hit, ray.closest.t, .zero());
+                const outward = normalsOf(setup.normals, ray.closest.primitive);
                 const sign = F32.splat(1).copySign(outward.dot(direction).neg());
                 const normal = outward.scale(sign);
                 const point = ray.line.origin.add(direction.scale(t))
@@ -280,13 +280,13 @@ pub fn Workload(comptime Kernel: type) type {
 
                 worker.brightness[group] = .select(hit, brightness, .zero());
                 shadow.line.direction = from_light;
-                shadow.nearest = .before(.splat(shadow_end));
+                shadow.closest = .before(.splat(shadow_end));
                 shadow.active = hit;
                 if (last) return hit;
 
                 const along = normal.dot(direction).mul(.splat(2));
                 ray.line = .init(point, direction.sub(normal.scale(along)));
-                ray.nearest = .before(.splat(std.math.inf(f32)));
+                ray.closest = .before(.splat(std.math.inf(f32)));
                 ray.active = hit;
                 return hit;
             }
@@ -322,7 +322,7 @@ pub fn Workload(comptime Kernel: type) type {
             fn addLight(worker: *Worker) void {
                 const lit: F32 = .splat(1);
                 for (&worker.shadows.groups, worker.brightness, &worker.color) |*s, b, *color| {
-                    const free = s.nearest.primitive.lt(.zero());
+                    const free = s.closest.primitive.lt(.zero());
                     color.* = color.add(b.mul(.select(free, lit, .splat(shadow_share))));
                 }
             }

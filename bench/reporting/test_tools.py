@@ -117,13 +117,13 @@ class Instructions(unittest.TestCase):
         kinds = {"primary": 100, "shadow": 50, "secondary": None}
         scene = {"scene": "builtin:cornell", "triangles": 9, "hash": "0",
                  "build_per_triangle": {"4": 1234.4},
-                 "variants": {"vector-packet-4": {**kinds, "pixel": 50},
+                 "variants": {"vector-beam-4": {**kinds, "pixel": 50},
                               "scalar-single-4": {**kinds, "pixel": 200}}}
         page = self.tool.markdown([{"machine": "aarch64", "repeat_difference": 0,
                                     "scenes": [scene]}], 256)
-        self.assertIn("| `vector-packet-4` | 4.00 | 4.00 |", page)
+        self.assertIn("| `vector-beam-4` | 4.00 | 4.00 |", page)
         self.assertIn("| `scalar-single-4` | 100 | 50 | - |", page)
-        self.assertLess(page.index("`scalar-single-4`"), page.index("`vector-packet-4`"))
+        self.assertLess(page.index("`scalar-single-4`"), page.index("`vector-beam-4`"))
         self.assertIn("| 4 | 1234 |", page)
         self.assertIn("the same to the last digit", page)
 

@@ -28,7 +28,7 @@ pub fn build(
     @memcpy(nodes, builder.nodes.items);
     const blocks = try arena.alignedAlloc(cost.Block, .fromByteUnits(64), builder.blocks.items.len);
     @memcpy(blocks, builder.blocks.items);
-    return .{ .nodes = nodes, .blocks = blocks };
+    return .{ .nodes = nodes, .packs = blocks };
 }
 
 const Builder = struct {
@@ -50,14 +50,14 @@ const Builder = struct {
         for (parts, 0..) |part, child| {
             const is_leaf = middle == 0 or split(part, depth + 1) == 0;
             const first: u32 = @intCast(builder.blocks.items.len);
-            const block_count = if (is_leaf)
+            const pack_count = if (is_leaf)
                 try cost.appendBlocks(builder.arena, &builder.blocks, builder.world, part)
             else
                 0;
             const target = if (is_leaf) first else try builder.addNode(part, depth + 1);
-            if (is_leaf and block_count == 0) continue;
+            if (is_leaf and pack_count == 0) continue;
             const node = &builder.nodes.items[index];
-            node.child[child] = .{ .target = target, .block_count = block_count };
+            node.child[child] = .{ .target = target, .pack_count = pack_count };
             const box = cost.boundsOf(part);
             for (0..3) |axis| {
                 node.bounds[0][axis][child] = box.lower[axis];

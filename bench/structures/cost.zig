@@ -11,7 +11,7 @@ const World = raylane.world.World;
 
 /// Lanes of all trees here.
 pub const width = 4;
-pub const Block = raylane.world.TriangleBlock(width);
+pub const Block = raylane.world.TrianglePack(width);
 
 /// Cost of going on from a node to a child, and of testing a block of triangles: as instructions
 /// on NEON have it, about one to two.
@@ -42,8 +42,8 @@ pub fn boundsOf(list: []const Reference) Box3 {
 
 /// Cost of testing so many triangles.
 pub fn leafCost(count: usize) f32 {
-    const block_count: f32 = @floatFromInt((count + width - 1) / width);
-    return block_cost * block_count;
+    const pack_count: f32 = @floatFromInt((count + width - 1) / width);
+    return block_cost * pack_count;
 }
 
 /// Appends the triangles of references as blocks; returns how many.

@@ -8,7 +8,7 @@ const std = @import("std");
 const raylane = @import("raylane");
 const cost = @import("cost.zig");
 const ray_file = raylane.trace.ray;
-const packet = raylane.trace.packet;
+const bundle_file = raylane.trace.bundle;
 const Allocator = std.mem.Allocator;
 const Box3 = raylane.math.Box3;
 const Query = raylane.trace.walk.Query;
@@ -32,7 +32,7 @@ pub const Node = extern struct {
     /// 0 to 2, or `leaf`.
     axis: u32,
     first: u32,
-    block_count: u32,
+    pack_count: u32,
 
     pub const leaf = 3;
 };
@@ -93,7 +93,7 @@ const Builder = struct {
                 .position = 0,
                 .axis = Node.leaf,
                 .first = first,
-                .block_count = try cost.appendBlocks(
+                .pack_count = try cost.appendBlocks(
                     builder.arena,
                     &builder.blocks,
                     builder.world,
@@ -108,7 +108,7 @@ const Builder = struct {
             .position = chosen.position,
             .axis = chosen.axis,
             .first = first,
-            .block_count = 0,
+            .pack_count = 0,
         };
         for (0..2) |child| {
             const part = try builder.side(list, chosen, child == 1);
@@ -208,7 +208,7 @@ fn Course(comptime Lanes: type) type {
 
         /// From where rays enter the tree to where they leave it or end.
         inline fn init(tree: *const Tree, ray: *const ray_file.Ray(Lanes)) @This() {
-            const slabs: ray_file.Slabs(Lanes) = .init(ray.line);
+            const slabs: ray_file.RayInverse(Lanes) = .init(ray.line);
             var course: @This() = .{
                 .origin = .{ slabs.origin.x, slabs.origin.y, slabs.origin.z },
                 .inverse = .{
@@ -216,7 +216,7 @@ fn Course(comptime Lanes: type) type {
                 },
                 .slack = undefined,
                 .near = .zero(),
-                .far = ray.nearest.t,
+                .far = ray.closest.t,
             };
             inline for (0..3) |axis| {
                 const reach = course.origin[axis].abs().max(.splat(tree.reach));
@@ -246,8 +246,9 @@ pub fn traceSingle(
     ray: *ray_file.Ray(Single),
 ) void {
     var counts: TestCounts = .{};
-    const view = packet.viewOf(Single, ray);
-    var lone: raylane.trace.lone.Lone(Kernel) = .of(Single, false, ray, &view, 0);
+    const view = bundle_file.viewOf(Single, ray);
+    const TraversalRay = raylane.trace.traversal_ray.TraversalRay(Kernel);
+    var traversal_ray: TraversalRay = .of(Single, false, ray, &view, 0);
     const course: Course(Single) = .init(tree, ray);
     var stack: [depth_limit + 1]struct { node: u32, near: f32, far: f32 } = undefined;
     var stack_count: usize = 0;
@@ -280,16 +281,16 @@ pub fn traceSingle(
         }
         if (near <= far) {
             var found = false;
-            for (tree.blocks[at.first..][0..at.block_count]) |*block| {
-                found = lone.intersect(block, world.pad, &counts) or found;
+            for (tree.blocks[at.first..][0..at.pack_count]) |*block| {
+                found = traversal_ray.intersect(block, world.pad, &counts) or found;
             }
-            if (query == .any and found) break;
+            if (query == .any_hit and found) break;
         }
-        if (!popSingle(&stack, &stack_count, lone.limit, &node, &near, &far)) break;
+        if (!popSingle(&stack, &stack_count, traversal_ray.limit, &node, &near, &far)) break;
     }
-    ray.nearest = .{
-        .t = .splat(lone.limit),
-        .primitive = .splat(lone.nearest_primitive),
+    ray.closest = .{
+        .t = .splat(traversal_ray.limit),
+        .primitive = .splat(traversal_ray.closest_primitive),
     };
 }
 
@@ -325,7 +326,7 @@ pub fn tracePacket(
 ) void {
     const Rays = Kernel.Rays;
     if (group.active.none()) return;
-    const view = packet.viewOf(Rays, group);
+    const view = bundle_file.viewOf(Rays, group);
     var is_down: [3]bool = undefined;
     for (&is_down, view.slabs.negative) |*down, negative| {
         down.* = negative.bitAnd(group.active).any();
@@ -362,22 +363,22 @@ pub fn tracePacket(
             continue;
         }
         if (alive.any()) {
-            for (tree.blocks[at.first..][0..at.block_count]) |*block| {
+            for (tree.blocks[at.first..][0..at.pack_count]) |*block| {
                 intersectBlock(Kernel, query, world, group, &view, block, &counts);
             }
-            if (query == .any and isFound(Rays, group)) return;
+            if (query == .any_hit and isFound(Rays, group)) return;
         }
         entry = while (stack_count > 0) {
             stack_count -= 1;
             const top = stack[stack_count];
-            if (top.near.le(group.nearest.t).bitAnd(group.active).any()) break top;
+            if (top.near.le(group.closest.t).bitAnd(group.active).any()) break top;
         } else return;
     }
 }
 
 inline fn isFound(comptime Rays: type, group: *const ray_file.Ray(Rays)) bool {
     const none: Rays.I32 = .splat(ray_file.no_primitive);
-    return group.nearest.primitive.eq(none).bitAnd(group.active).none();
+    return group.closest.primitive.eq(none).bitAnd(group.active).none();
 }
 
 inline fn intersectBlock(
@@ -385,13 +386,13 @@ inline fn intersectBlock(
     comptime query: Query,
     world: *const World,
     group: *ray_file.Ray(Kernel.Rays),
-    view: *const packet.GroupView(Kernel.Rays),
+    view: *const bundle_file.Precalculations(Kernel.Rays),
     block: *const cost.Block,
     counts: *TestCounts,
 ) void {
     for (0..cost.width) |lane| {
         if (block.primitive[lane] == raylane.world.none) break;
-        _ = packet.intersectLane(Kernel, query, group, view, block, .{
+        _ = bundle_file.intersectLane(Kernel, query, group, view, block, .{
             .lane = lane,
             .pad = world.pad,
         }, counts);
@@ -406,15 +407,15 @@ fn traceApart(
     world: *const World,
     group: *ray_file.Ray(Rays),
 ) void {
-    var ts = group.nearest.t.toArray();
-    var primitives = group.nearest.primitive.toArray();
+    var ts = group.closest.t.toArray();
+    var primitives = group.closest.primitive.toArray();
     var bits = group.active.bits();
     while (bits != 0) : (bits &= bits - 1) {
         const lane = @ctz(bits);
         var ray = group.extract(lane);
         traceSingle(SingleKernel, query, tree, world, &ray);
-        ts[lane] = ray.nearest.t.lane(0);
-        primitives[lane] = ray.nearest.primitive.lane(0);
+        ts[lane] = ray.closest.t.lane(0);
+        primitives[lane] = ray.closest.primitive.lane(0);
     }
-    group.nearest = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };
+    group.closest = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };
 }

@@ -63,7 +63,7 @@ fn runTile(
     var hits: [ray_count]Hit = undefined;
     for (&courses, 0..) |*course, index| course.* = primaryCourse(setup, corner, index);
     counts.primary += ray_count;
-    traceAll(Lanes, .nearest, tracer, &courses, &hits, marks, .primary);
+    traceAll(Lanes, .closest_hit, tracer, &courses, &hits, marks, .primary);
 
     var shadows: [ray_count]?Course = undefined;
     var mirrors: [ray_count]?Course = undefined;
@@ -75,13 +75,13 @@ fn runTile(
             bounce(setup, course.?, hit);
         counts.hits += @intFromBool(shadow.* != null);
     }
-    traceAll(Lanes, .any, tracer, &shadows, &hits, marks, .shadow);
+    traceAll(Lanes, .any_hit, tracer, &shadows, &hits, marks, .shadow);
     for (&shadows, &hits) |shadow, hit| {
         const is_dark = shadow != null and hit.primitive != ray_file.no_primitive;
         counts.occluded += @intFromBool(is_dark);
         hasher.update(if (is_dark) "1" else "0");
     }
-    traceAll(Lanes, .nearest, tracer, &mirrors, &hits, marks, .bounce);
+    traceAll(Lanes, .closest_hit, tracer, &mirrors, &hits, marks, .bounce);
     for (&mirrors, &hits) |mirror, hit| if (mirror != null) {
         hasher.update(std.mem.asBytes(&hit));
         counts.reflection_hits += @intFromBool(hit.primitive != ray_file.no_primitive);
@@ -142,8 +142,8 @@ fn traceAll(
     marks.to(.shading);
     for (&groups, 0..) |*group, index| for (0..Lanes.count) |lane| {
         hits[index * Lanes.count + lane] = .{
-            .t = group.nearest.t.lane(lane),
-            .primitive = group.nearest.primitive.lane(lane),
+            .t = group.closest.t.lane(lane),
+            .primitive = group.closest.primitive.lane(lane),
         };
     };
 }
@@ -166,8 +166,8 @@ fn gather(comptime Lanes: type, courses: *const [Lanes.count]?Course) ray_file.R
     }
     return .{
         .line = .init(vectors(Lanes, &origins), vectors(Lanes, &directions)),
-        .after = .start(),
-        .nearest = .before(.fromArray(limits)),
+        .tnear = .start(),
+        .closest = .before(.fromArray(limits)),
         .skip = .fromArray(skips),
         .active = .fromBits(active),
     };

@@ -289,9 +289,9 @@ const variant_for_test: Variant = .{
     },
 };
 
-/// Expects these cells, in this order, in the row of vector-packet-4 below a title.
+/// Expects these cells, in this order, in the row of vector-beam-4 below a title.
 fn expectRow(text: []const u8, title: []const u8, cells: []const []const u8) !void {
-    const name = if (std.mem.eql(u8, title, "Scaling")) "v " else "vector-packet-4";
+    const name = if (std.mem.eql(u8, title, "Scaling")) "v " else "vector-beam-4";
     const at = std.mem.find(u8, text, title) orelse return error.NoTable;
     const row_at = std.mem.findPos(u8, text, at, name) orelse return error.NoRow;
     var row = std.mem.sliceTo(text[row_at + name.len ..], '\n');
@@ -304,7 +304,7 @@ fn expectRow(text: []const u8, title: []const u8, cells: []const []const u8) !vo
 
 test "ratios, rates and joules come out as they should" {
     var quick = variant_for_test;
-    quick.name = "vector-packet-4";
+    quick.name = "vector-beam-4";
     quick.trace_ms = &.{ 4, 4 };
     quick.tests = .{ .box_issued = 2000, .triangle_issued = 1000 };
     quick.energy.?.trace_j = &.{ 0.5, 0.5 };

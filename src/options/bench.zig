@@ -2,6 +2,7 @@
 
 const std = @import("std");
 const options = @import("../options.zig");
+const variant = @import("../variant.zig");
 const Arguments = @import("arguments.zig").Arguments;
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Flag = @import("arguments.zig").Flag;
@@ -41,7 +42,7 @@ pub const Bench = struct {
     /// Whether a variant is to be measured.
     pub fn wants(bench: *const Bench, name: []const u8) bool {
         var parts = std.mem.splitScalar(u8, bench.variants orelse return true, ',');
-        while (parts.next()) |part| if (std.mem.find(u8, name, part) != null) return true;
+        while (parts.next()) |part| if (variant.isPartlyNamed(name, part)) return true;
         return false;
     }
 };
@@ -98,7 +99,7 @@ pub const help: []const u8 = "raylane " ++ options.version ++
     \\  -t, --threads N          threads (default: as many as CPUs)
     \\      --bvh QUALITY        fast, default or high
     \\      --variants PARTS     only variants whose names contain one of these, for
-    \\                           example scalar-single,vector-packet (default: all)
+    \\                           example scalar-single,vector-beam (default: all)
     \\
     \\Measurement
     \\      --rounds N           so many rounds, no less and no more, unless the time
@@ -226,8 +227,8 @@ test "scenes, flags and filters" {
     try testing.expectEqual([2]u32{ 8, 4 }, bench.resolution);
     try testing.expectEqual(5, bench.round_count.?);
     try testing.expectEqualStrings("-", bench.json.?);
-    try testing.expect(bench.wants("scalar-single-4") and bench.wants("vector-packet-8"));
-    try testing.expect(!bench.wants("vector-packet-4"));
+    try testing.expect(bench.wants("scalar-single-4") and bench.wants("vector-beam-8"));
+    try testing.expect(!bench.wants("vector-beam-4"));
 }
 
 test "mistakes name the option" {

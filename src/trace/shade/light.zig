@@ -1,0 +1,77 @@
+//! Light that arrives at points in lanes, before anything stands in its way.
+//!
+//! In: a light source, points. Out: the direction to it and the irradiance across that direction
+//! (KHR_lights_punctual: inverse square, range window, cone), and the shadow ray that asks
+//! whether it arrives. Shadow rays of point and spot lights run from the light, so that all of
+//! them share an origin.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const ray_file = @import("../traverse/ray.zig");
+const Surface = @import("interaction.zig").Surface;
+const Light = world_file.Light;
+
+/// Light at points.
+pub fn Arrival(comptime Lanes: type) type {
+    return struct {
+        /// Unit vector.
+        to_light: Lanes.Vec3,
+        /// On a plane across `to_light`, in lux; linear RGB.
+        irradiance: Lanes.Vec3,
+        /// To the light in metres, 0 if its rays are parallel.
+        distance: Lanes.F32,
+    };
+}
+
+/// What arrives at the surfaces.
+pub fn arrive(
+    comptime Lanes: type,
+    light: *const Light,
+    surface: *const Surface(Lanes),
+) Arrival(Lanes) {
+    const F32 = Lanes.F32;
+    const one: F32 = .splat(1);
+    if (light.kind == .directional) return .{
+        .to_light = Lanes.Vec3.splat(light.direction).neg(),
+        .irradiance = .splat(light.intensity),
+        .distance = .zero(),
+    };
+    const way = Lanes.Vec3.splat(light.position).sub(surface.position);
+    const distance_squared = way.dot(way).max(.splat(1e-20));
+    const distance = distance_squared.sqrt();
+    const to_light = way.scale(one.div(distance));
+    const reach = distance_squared.mul(.splat(light.range_inv_squared));
+    const window = one.sub(reach.mul(reach)).max(.zero());
+    const cosine = Lanes.Vec3.splat(light.direction).dot(to_light).neg();
+    const cone = cosine.mul(.splat(light.cone_scale)).add(.splat(light.cone_offset))
+        .max(.zero()).min(one);
+    const factor = window.mul(cone.mul(cone)).div(distance_squared);
+    return .{
+        .to_light = to_light,
+        .irradiance = Lanes.Vec3.splat(light.intensity).scale(factor),
+        .distance = distance,
+    };
+}
+
+/// The shadow rays of points off surfaces (`Surface.off`), which never hit the triangle whose
+/// surface it is.
+pub fn shadowRay(
+    comptime Lanes: type,
+    light: *const Light,
+    point: Lanes.Vec3,
+    primitive: Lanes.I32,
+    active: Lanes.Mask,
+) ray_file.Ray(Lanes) {
+    const directional = light.kind == .directional;
+    const source: Lanes.Vec3 = .splat(light.position);
+    return .{
+        .line = if (directional)
+            .init(point, Lanes.Vec3.splat(light.direction).neg())
+        else
+            .init(source, point.sub(source)),
+        .tnear = .start(),
+        .closest = .before(.splat(if (directional) std.math.inf(f32) else 1)),
+        .skip = primitive,
+        .active = active,
+    };
+}

@@ -1,0 +1,134 @@
+//! What encloses a beam: four planes through the rays' origin, and how deep it has to look.
+//!
+//! In: normals that point inward. Out: which children of a node the beam may meet, and the least
+//! depth at which. Conservative: planes stand off by `slack_pads` times `World.pad`, which covers
+//! the rounding of boxes, of ray directions and of the planes themselves. Of a box only the corner
+//! farthest along a plane's normal counts (Assarsson and Moeller 2000, "Optimized View Frustum
+//! Culling Algorithms for Bounding Boxes", the p-vertex).
+
+const std = @import("std");
+const world_file = @import("../../../world.zig");
+const stack = @import("../stack.zig");
+const assert = std.debug.assert;
+
+/// `World.pad` is at least 32 u R and 4 u X for distances R and coordinates X (`pad.zig`). A
+/// fused plane equation in coordinates of the scene is off by at most 6 u (2 X + R) of the length
+/// of its normal; directions that are linear in the pixel up to 24 u put a ray off by 24 u R.
+pub const slack_pads = 8.0;
+
+/// Components of a normal are at least this long, so that infinite corners of empty boxes never
+/// meet a zero.
+const component_min = 1e-30;
+
+/// A half space: where normal . x + offset >= 0. Asked about nodes of this width.
+pub fn Plane(comptime width: u32) type {
+    return struct {
+        normal: [3]f32,
+        offset: f32,
+        /// Of the least and the greatest value in a box: by axis, the first place in a node's
+        /// bounds of the side that it is on. In floats, so that addresses cost nothing in the loop.
+        place: [2][3]usize,
+
+        const Self = @This();
+        const Bounds = [6 * width]f32;
+
+        /// The plane through `point`, `slack` metres behind it. A normal of any length.
+        pub fn init(normal: [3]f32, point: [3]f32, slack: f32) Self {
+            var plane: Self = .{ .normal = undefined, .offset = 0, .place = undefined };
+            var length: f32 = 0;
+            for (&plane.normal, normal, point, 0..) |*to, component, at, axis| {
+                const sign = std.math.copysign(@as(f32, component_min), component);
+                to.* = if (@abs(component) < component_min) sign else component;
+                const rises = @intFromBool(to.* > 0);
+                plane.place[rises][axis] = (3 + axis) * width;
+                plane.place[1 - rises][axis] = axis * width;
+                plane.offset -= to.* * at;
+                length += @abs(to.*);
+            }
+            plane.offset += slack * length;
+            return plane;
+        }
+
+        /// Value at points.
+        inline fn valueAtPoint(plane: *const Self, comptime Lanes: type, at: Lanes.Vec3) Lanes.F32 {
+            var sum: Lanes.F32 = .splat(plane.offset);
+            inline for (.{ at.x, at.y, at.z }, 0..) |component, axis| {
+                sum = component.mulAdd(.splat(plane.normal[axis]), sum);
+            }
+            return sum;
+        }
+
+        /// The least (0) or the greatest (1) value in each of a node's boxes.
+        inline fn extreme(
+            plane: *const Self,
+            comptime Lanes: type,
+            node: *const world_file.Node(width),
+            comptime end: u1,
+        ) Lanes.F32 {
+            const bounds: *const Bounds = @ptrCast(&node.bounds);
+            var sum: Lanes.F32 = .splat(plane.offset);
+            inline for (plane.place[end], plane.normal) |place, component| {
+                const bound: Lanes.F32 = .load(bounds[place..][0..width]);
+                sum = bound.mulAdd(.splat(component), sum);
+            }
+            return sum;
+        }
+    };
+}
+
+/// A pyramid from the rays' origin and the direction in which it counts depth.
+pub fn Frustum(comptime Lanes: type) type {
+    const width = Lanes.count;
+    return struct {
+        sides: [4]Plane(width),
+        depth: Plane(width),
+
+        const Self = @This();
+
+        /// Planes that stand off `origin` by `slack` metres. Depth is counted along `depth_normal`
+        /// from there.
+        pub fn init(origin: [3]f32, normals: [4][3]f32, depth_normal: [3]f32, slack: f32) Self {
+            var frustum: Self = .{
+                .sides = undefined,
+                .depth = .init(depth_normal, origin, -slack),
+            };
+            for (&frustum.sides, normals) |*side, normal| side.* = .init(normal, origin, slack);
+            return frustum;
+        }
+
+        /// Triangles that are not wholly on the outer side of a plane.
+        pub inline fn mayMeet(
+            frustum: *const Self,
+            corners: [3]Lanes.Vec3,
+        ) Lanes.Mask {
+            var least: Lanes.F32 = undefined;
+            inline for (&frustum.sides, 0..) |*side, index| {
+                const most = side.valueAtPoint(Lanes, corners[0])
+                    .maxOrNegative(side.valueAtPoint(Lanes, corners[1]))
+                    .maxOrNegative(side.valueAtPoint(Lanes, corners[2]));
+                least = if (index == 0) most else least.minOrNegative(most);
+            }
+            return least.isNegative().bitNot();
+        }
+
+        /// Pushes the children of a node that the beam may meet before `depth_max`, and behind
+        /// `front` if there is one, the nearest on top. Returns the new count of the stack.
+        pub inline fn pushChildren(
+            frustum: *const Self,
+            node: *const world_file.Node(width),
+            front: ?*const Plane(width),
+            depth_max: f32,
+            entries: []stack.Entry,
+            entry_count: usize,
+        ) usize {
+            var least = frustum.sides[0].extreme(Lanes, node, 1);
+            inline for (frustum.sides[1..]) |*side| {
+                least = least.minOrNegative(side.extreme(Lanes, node, 1));
+            }
+            const near = frustum.depth.extreme(Lanes, node, 0);
+            if (front) |plane| least = least.minOrNegative(plane.extreme(Lanes, node, 1));
+            const met = near.le(.splat(depth_max)).andNot(least.isNegative());
+            return stack.push(Lanes, node, met, near, entries, entry_count);
+        }
+    };
+}

@@ -1,0 +1,321 @@
+//! What a beam of rays has found, exactly: t and barycentric weights of every hit.
+//!
+//! In: a triangle's slot for each ray. Out: hits in the bundle, by the expressions of triangle.zig,
+//! bit for bit. Rays of a beam mostly have the same longest axis and the same signs, and neighbours
+//! hit the same triangle: then what depends on the triangle and a common origin alone is computed
+//! once, and what is left for each ray are its slopes, three edge functions and one division.
+
+const std = @import("std");
+const world_file = @import("../../../world.zig");
+const ray_file = @import("../ray.zig");
+const bundle_file = @import("../bundle.zig");
+const box = @import("../box.zig");
+const triangle = @import("../triangle.zig");
+const kernel_file = @import("../kernel.zig");
+const edges_file = @import("edges.zig");
+const exact = @import("exact.zig");
+const Found = @import("tile_depth_buffer.zig").Found;
+const Grid = @import("grid.zig").Grid;
+const assert = std.debug.assert;
+
+/// Puts the hits of the triangles found into the bundle, and weights of the second and third corner
+/// into `shares`, if given. Rays start behind the grid's origin, each at its own, or at it.
+pub fn resolve(
+    comptime Kernel: type,
+    comptime behind: bool,
+    world: *const world_file.World,
+    grid: *const Grid,
+    found: *Found(Kernel),
+    bundle: *bundle_file.Bundle(Kernel),
+    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
+) void {
+    const course = Course.of(grid);
+    switch (course.axis orelse 3) {
+        inline 0...2 => |axis| {
+            const tree = world.tree.get(Kernel.width);
+            const Octant = UniformOctant(Kernel, behind, axis);
+            Octant.run(world, tree, &course, grid, found, bundle, shares);
+        },
+        else => apart(Kernel, world, found, bundle, shares),
+    }
+}
+
+/// What the rays of a beam have in common.
+const Course = struct {
+    /// The longest axis of all, or null; then signs mean nothing.
+    axis: ?u2,
+    /// By axis, whether all directions point down it.
+    negative: [3]bool,
+
+    /// Directions are linear over the pixels, so that the corners tell.
+    fn of(grid: *const Grid) Course {
+        const last: f32 = kernel_file.beam_side - 1;
+        var course: Course = .{ .axis = null, .negative = @splat(false) };
+        const margin = 2 * edges_file.unit_roundoff * grid.deviation_roundings + 1e-20;
+        for (0..4) |index| {
+            var direction: [3]f32 = undefined;
+            var longest: u2 = 0;
+            for (&direction, grid.corner, grid.right, grid.down, 0..) |*to, d, right, down, axis| {
+                to.* = d + (if (index & 1 == 0) 0 else last * right) +
+                    (if (index & 2 == 0) 0 else last * down);
+                if (@abs(to.*) > @abs(direction[longest])) longest = @intCast(axis);
+            }
+            if (index > 0 and course.axis != longest)
+                return .{ .axis = null, .negative = undefined };
+            course.axis = longest;
+            for (direction, &course.negative, 0..) |component, *negative, axis| {
+                const length = @abs(component);
+                const shorter = axis == longest or length + margin < @abs(direction[longest]);
+                const same = index == 0 or negative.* == (component < 0);
+                if (!shorter or !same or !(length > margin))
+                    return .{ .axis = null, .negative = undefined };
+                negative.* = component < 0;
+            }
+        }
+        return course;
+    }
+};
+
+/// Every group with its own longest axes and signs.
+fn apart(
+    comptime Kernel: type,
+    world: *const world_file.World,
+    found: *Found(Kernel),
+    bundle: *bundle_file.Bundle(Kernel),
+    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
+) void {
+    const Rays = Kernel.Rays;
+    found.spreadAll();
+    for (&bundle.groups, 0..) |*group, index| {
+        const own = found.of("slot", index);
+        const there = Rays.I32.loadAligned(own).gt(.splat(exact.no_slot));
+        if (there.none()) continue;
+        const tree = world.tree.get(Kernel.width);
+        const gathered = exact.gather(Kernel, tree, own);
+        const hit = triangle.intersect(Rays, gathered.corners, group.line, world.pad);
+        assert(there.andNot(hit.mask).none());
+        if (shares) |all| keepShares(Rays, &all[index], there, hit.shares());
+        group.closest = .{
+            .t = .select(there, hit.t, group.closest.t),
+            .primitive = .select(there, gathered.primitive, group.closest.primitive),
+        };
+    }
+}
+
+/// EdgeFunctions of the rays that hit something: others may be another beam's.
+inline fn keepShares(
+    comptime Rays: type,
+    kept: *[2]Rays.F32,
+    there: Rays.Mask,
+    shares: [2]Rays.F32,
+) void {
+    for (kept, shares) |*to, share| to.* = .select(there, share, to.*);
+}
+
+/// All groups alike.
+fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2) type {
+    const Rays = Kernel.Rays;
+    const F32 = Rays.F32;
+    const Vec3 = Rays.Vec3;
+    return struct {
+        /// A triangle as it is or seen from the rays' origin, in lanes or the same in all of them.
+        fn Placed(comptime Value: type) type {
+            return struct {
+                /// Turned corners from the origin.
+                offsets: [3]Value,
+                /// Corners of its grown box from there.
+                lower: Value,
+                upper: Value,
+
+                inline fn seenFrom(placed: *const @This(), origin: Vec3) @This() {
+                    var seen = placed.*;
+                    for (&seen.offsets) |*offset| offset.* = offset.sub(origin);
+                    seen.lower = seen.lower.sub(origin);
+                    seen.upper = seen.upper.sub(origin);
+                    return seen;
+                }
+            };
+        }
+
+        fn run(
+            world: *const world_file.World,
+            tree: *const world_file.Tree(Kernel.width),
+            course: *const Course,
+            grid: *const Grid,
+            found: *Found(Kernel),
+            bundle: *bundle_file.Bundle(Kernel),
+            shares: ?*[Kernel.group_count][2]F32,
+        ) void {
+            // Of what starts behind it nothing is subtracted before the ray's own start is.
+            const common: ?[3]f32 = if (behind) null else turned(grid.origin);
+            const down = turned(course.negative);
+            var last: Last = .{};
+            for (0..Kernel.subtile_count) |block| {
+                const whole = found.isWhole(block);
+                const block_slot = found.block_slot[block];
+                if (whole and block_slot == exact.no_slot) continue;
+                for (block * Kernel.subtile_groups..(block + 1) * Kernel.subtile_groups) |index| {
+                    const group = &bundle.groups[index];
+                    const from: Vec3 = if (behind)
+                        turn(group.line.origin)
+                    else
+                        .splat(common.?);
+                    const own = found.of("slot", index);
+                    const lanes: Rays.I32 = .loadAligned(own);
+                    if (whole or lanes.eq(.splat(own[0])).all()) {
+                        const slot = if (whole) block_slot else own[0];
+                        if (slot == exact.no_slot) continue;
+                        if (slot != last.slot) last = .{
+                            .slot = slot,
+                            .placed = inLanes(&placeOne(tree, world.pad, common, slot)),
+                            .primitive = .splat(exact.primitiveAt(Kernel.width, tree, slot)),
+                        };
+                        const hit = if (behind)
+                            intersect(group, &last.placed.seenFrom(from), down, .splat(true))
+                        else
+                            intersect(group, &last.placed, down, .splat(true));
+                        if (shares) |all| all[index] = hit.shares();
+                        group.closest = .{ .t = hit.t, .primitive = last.primitive };
+                        continue;
+                    }
+                    const there = lanes.gt(.splat(exact.no_slot));
+                    const gathered = exact.gather(Kernel, tree, own);
+                    const each = placeEach(world.pad, gathered.corners).seenFrom(from);
+                    const hit = intersect(group, &each, down, there);
+                    assert(there.andNot(hit.mask).none());
+                    if (shares) |all| keepShares(Rays, &all[index], there, hit.shares());
+                    group.closest = .{
+                        .t = .select(there, hit.t, group.closest.t),
+                        .primitive = .select(there, gathered.primitive, group.closest.primitive),
+                    };
+                }
+            }
+        }
+
+        /// The triangle that was met last, in all lanes: mostly the next rays meet it, too.
+        const Last = struct {
+            slot: exact.Slot = exact.no_slot,
+            placed: Placed(Vec3) = undefined,
+            primitive: Rays.I32 = undefined,
+        };
+
+        fn turned(values: anytype) @TypeOf(values) {
+            return .{
+                values[ray_file.turnedIndex(axis, 0)],
+                values[ray_file.turnedIndex(axis, 1)],
+                values[axis],
+            };
+        }
+
+        /// One triangle, seen from `origin` if there is one. Minima and maxima are those of
+        /// `triangle.locate`.
+        fn placeOne(
+            tree: *const world_file.Tree(Kernel.width),
+            pad: f32,
+            origin: ?[3]f32,
+            slot: exact.Slot,
+        ) Placed([3]f32) {
+            var corners: [3][3]f32 = undefined;
+            for (&corners, 0..) |*corner, index| {
+                corner.* = turned(exact.cornerAt(Kernel.width, tree, slot, index));
+            }
+            var placed: Placed([3]f32) = undefined;
+            for (0..3) |component| {
+                const a = corners[0][component];
+                const b = corners[1][component];
+                const c = corners[2][component];
+                const low = if (b < a) b else a;
+                const high = if (b > a) b else a;
+                placed.lower[component] = (if (c < low) c else low) - pad;
+                placed.upper[component] = (if (c > high) c else high) + pad;
+                for (&placed.offsets, corners) |*offset, corner| {
+                    offset[component] = corner[component];
+                }
+                const from = (origin orelse continue)[component];
+                placed.lower[component] -= from;
+                placed.upper[component] -= from;
+                for (&placed.offsets) |*offset| offset[component] -= from;
+            }
+            return placed;
+        }
+
+        inline fn inLanes(placed: *const Placed([3]f32)) Placed(Vec3) {
+            return .{
+                .offsets = .{
+                    .splat(placed.offsets[0]),
+                    .splat(placed.offsets[1]),
+                    .splat(placed.offsets[2]),
+                },
+                .lower = .splat(placed.lower),
+                .upper = .splat(placed.upper),
+            };
+        }
+
+        /// A triangle in each lane.
+        inline fn placeEach(pad: f32, corners: [3]Vec3) Placed(Vec3) {
+            const grow: Vec3 = .splat(@splat(pad));
+            const a = turn(corners[0]);
+            const b = turn(corners[1]);
+            const c = turn(corners[2]);
+            return .{
+                .offsets = .{ a, b, c },
+                .lower = c.min(b.min(a)).sub(grow),
+                .upper = c.max(b.max(a)).add(grow),
+            };
+        }
+
+        inline fn turn(vector: Vec3) Vec3 {
+            const components = turned([3]F32{ vector.x, vector.y, vector.z });
+            return .{ .x = components[0], .y = components[1], .z = components[2] };
+        }
+
+        /// The hits of the rays in `found`.
+        inline fn intersect(
+            group: *const ray_file.Ray(Rays),
+            placed: *const Placed(Vec3),
+            down: [3]bool,
+            found: Rays.Mask,
+        ) triangle.WeightedIntersection(Rays) {
+            const direction = turn(group.line.direction);
+            const one: F32 = .splat(1);
+            const depth_inv = one.div(direction.z);
+            const seen = triangle.projectOffsets(Rays, placed.offsets, .{
+                .x = direction.x.div(direction.z),
+                .y = direction.y.div(direction.z),
+                .z = depth_inv,
+            });
+            var weights = triangle.edgeFunctions(Rays, seen);
+            const inside = triangle.resolveTies(Rays, seen, &weights, group.active);
+            const plane = triangle.locatePlane(Rays, seen, weights);
+            const point = direction.scale(plane.t);
+            if (found.andNot(isWithin(point, placed)).none()) return .{
+                .mask = inside.bitAnd(plane.mask),
+                .t = plane.t,
+                .weights = weights,
+            };
+            const negative = [3]Rays.Mask{ .splat(down[0]), .splat(down[1]), .splat(down[2]) };
+            const near = triangle.select3(Rays, negative, placed.upper, placed.lower);
+            const far = triangle.select3(Rays, negative, placed.lower, placed.upper);
+            const range = box.slabOffsets(Rays, near, far, .{
+                .x = one.div(direction.x),
+                .y = one.div(direction.y),
+                .z = depth_inv,
+            });
+            const hit = triangle.locateWithin(Rays, seen, weights, range);
+            return .{ .mask = inside.bitAnd(hit.mask), .t = hit.t, .weights = weights };
+        }
+
+        /// Points so far within the box that t is surely within the range that the slab test gives:
+        /// that is off by 3 u of a face's distance, the point by 1 u, and no component is longer
+        /// than the last. Spares two divisions.
+        inline fn isWithin(point: Vec3, placed: *const Placed(Vec3)) Rays.Mask {
+            const above = point.sub(placed.lower);
+            const below = placed.upper.sub(point);
+            const least = above.x.minOrNegative(above.y).minOrNegative(above.z)
+                .minOrNegative(below.x.minOrNegative(below.y).minOrNegative(below.z));
+            const margin = point.z.abs()
+                .mulAdd(.splat(16 * edges_file.unit_roundoff), .splat(1e-36));
+            return least.gt(margin);
+        }
+    };
+}

@@ -1,0 +1,250 @@
+//! Packet traversal (Wald et al. 2001): a box or a triangle against all rays of a group at once.
+//!
+//! In: a group, such as the thesis's packet of 2x2 pixels. Out: the nearest hit of every ray, or
+//! whether there is any. A child is visited when some ray enters it. Holds also what a bundle is,
+//! and the tests of a group that other traversals share.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const TestCounts = @import("../../statistics.zig").TestCounts;
+const ray_file = @import("ray.zig");
+const box = @import("box.zig");
+const triangle = @import("triangle.zig");
+const walk = @import("walk.zig");
+const Query = walk.Query;
+
+/// Groups of rays that travel together.
+pub fn Bundle(comptime Kernel: type) type {
+    return struct { groups: [Kernel.group_count]ray_file.Ray(Kernel.Rays) };
+}
+
+/// Some of a bundle's rays, by group.
+pub fn Part(comptime Kernel: type) type {
+    return [Kernel.group_count]Kernel.Rays.Mask;
+}
+
+/// Leaves those rays active that are in a part, or those that are not. Returns which were active.
+pub fn narrow(
+    comptime Kernel: type,
+    bundle: *Bundle(Kernel),
+    part: *const Part(Kernel),
+    within: bool,
+) Part(Kernel) {
+    var active: Part(Kernel) = undefined;
+    for (&active, &bundle.groups, part) |*before, *group, chosen| {
+        before.* = group.active;
+        group.active = if (within) before.bitAnd(chosen) else before.andNot(chosen);
+    }
+    return active;
+}
+
+/// Makes these rays active.
+pub fn restore(
+    comptime Kernel: type,
+    bundle: *Bundle(Kernel),
+    active: *const Part(Kernel),
+) void {
+    for (&bundle.groups, active) |*group, mask| group.active = mask;
+}
+
+/// How boxes and triangles look to a group.
+pub fn Precalculations(comptime Lanes: type) type {
+    return struct {
+        /// The lanes that hold the rays.
+        pub const Rays = Lanes;
+
+        slabs: ray_file.RayInverse(Rays),
+        /// Origin times inverse, negated: what a bound times the inverse has added, where nodes are
+        /// tested by multiply-adds.
+        shift: Rays.Vec3,
+        axis: ray_file.LongAxis(Rays),
+        /// The one axis of all active rays, if there is one.
+        uniform: ?u2,
+        view: ray_file.ShearedRay(Rays),
+    };
+}
+
+/// Views of the active rays of a group.
+pub fn viewOf(comptime Rays: type, group: *const ray_file.Ray(Rays)) Precalculations(Rays) {
+    if (group.active.none()) return undefined;
+    const axis: ray_file.LongAxis(Rays) = .of(group.line.direction);
+    const slabs: ray_file.RayInverse(Rays) = .init(group.line);
+    return .{
+        .slabs = slabs,
+        .shift = slabs.origin.mul(slabs.direction_inv).neg(),
+        .axis = axis,
+        .uniform = axis.uniform(group.active),
+        .view = .init(group.line, axis),
+    };
+}
+
+/// Looks for hits of the active rays and keeps them in `closest`. With `Query.any_hit` a ray that
+/// found one is out of the search; its `closest.primitive` tells.
+pub fn trace(
+    comptime Kernel: type,
+    comptime query: Query,
+    world: *const world_file.World,
+    group: *ray_file.Ray(Kernel.Rays),
+    counts: *TestCounts,
+) void {
+    if (group.active.none()) return;
+    var search: Search(Kernel, query) = .{
+        .group = group,
+        .view = viewOf(Kernel.Rays, group),
+        .pad = world.pad,
+    };
+    _ = walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts);
+}
+
+fn Search(comptime Kernel: type, comptime query: Query) type {
+    const Boxes = Kernel.Boxes;
+    const inf = std.math.inf(f32);
+    return struct {
+        group: *ray_file.Ray(Kernel.Rays),
+        view: Precalculations(Kernel.Rays),
+        pad: f32,
+        /// Every ray has its own.
+        limit: f32 = inf,
+
+        const Self = @This();
+
+        /// Where the first ray enters each child.
+        pub inline fn meet(
+            search: *const Self,
+            node: *const world_file.Node(Kernel.width),
+            counts: *TestCounts,
+        ) box.Range(Boxes) {
+            var nears: [Kernel.width]f32 = @splat(inf);
+            for (&nears, node.child, 0..) |*near, child, at| {
+                if (child == world_file.Child.missing) continue;
+                countBoxes(Kernel, search.group, counts);
+                near.* = enter(Kernel, search.group, &search.view.slabs, node, at) orelse continue;
+            }
+            return .{ .near = .fromArray(nears), .far = .splat(std.math.floatMax(f32)) };
+        }
+
+        /// Tests the triangles of a pack.
+        pub inline fn intersect(
+            search: *Self,
+            pack: *const world_file.TrianglePack(Kernel.width),
+            counts: *TestCounts,
+        ) bool {
+            var found = false;
+            for (0..Kernel.width) |lane| {
+                if (pack.primitive[lane] == world_file.none) break;
+                found = intersectLane(Kernel, query, search.group, &search.view, pack, .{
+                    .lane = lane,
+                    .pad = search.pad,
+                }, counts) or found;
+            }
+            return found;
+        }
+
+        pub inline fn isDone(search: *const Self, _: bool) bool {
+            if (query != .any_hit) return false;
+            const none: Kernel.Rays.I32 = .splat(ray_file.no_primitive);
+            return search.group.closest.primitive.eq(none).bitAnd(search.group.active).none();
+        }
+    };
+}
+
+/// The least t at which an active ray of the group enters a child, or null if none does.
+inline fn enter(
+    comptime Kernel: type,
+    group: *const ray_file.Ray(Kernel.Rays),
+    slabs: *const ray_file.RayInverse(Kernel.Rays),
+    node: *const world_file.Node(Kernel.width),
+    child: usize,
+) ?f32 {
+    const lower = [3]f32{
+        node.bounds[0][0][child], node.bounds[0][1][child], node.bounds[0][2][child],
+    };
+    const upper = [3]f32{
+        node.bounds[1][0][child], node.bounds[1][1][child], node.bounds[1][2][child],
+    };
+    const Rays = Kernel.Rays;
+    const near = triangle.select3(Rays, slabs.negative, .splat(upper), .splat(lower));
+    const far = triangle.select3(Rays, slabs.negative, .splat(lower), .splat(upper));
+    const range = box.slab(Rays, near, far, slabs.origin, slabs.direction_inv);
+    const held = box.mayHold(Rays, range, group.tnear.t, group.closest.t).bitAnd(group.active);
+    if (held.none()) return null;
+    return Rays.F32.select(held, range.near, .splat(std.math.inf(f32))).reduceMin();
+}
+
+/// Counts the test of a box against a group.
+pub fn countBoxes(comptime Kernel: type, group: anytype, counts: *TestCounts) void {
+    if (!Kernel.counts_tests) return;
+    counts.box_issued += Kernel.ray_count;
+    counts.box_useful += group.active.popCount();
+}
+
+/// Which triangle of a pack, and `World.pad`.
+const At = struct { lane: usize, pad: f32 };
+
+/// Tests one triangle of a pack against the active rays of one group. Returns whether any took
+/// the hit.
+pub inline fn intersectLane(
+    comptime Kernel: type,
+    comptime query: Query,
+    group: *ray_file.Ray(Kernel.Rays),
+    view: *const Precalculations(Kernel.Rays),
+    pack: *const world_file.TrianglePack(Kernel.width),
+    at: At,
+    counts: *TestCounts,
+) bool {
+    if (Kernel.counts_tests) {
+        counts.triangle_issued += Kernel.ray_count;
+        counts.triangle_useful += group.active.popCount();
+    }
+    const primitive: i32 = @bitCast(pack.primitive[at.lane]);
+    const corners = turnedCorners(Kernel.Rays, pack, at.lane, view);
+    return intersect(Kernel, query, group, &view.view, corners, primitive, at.pad);
+}
+
+inline fn intersect(
+    comptime Kernel: type,
+    comptime query: Query,
+    group: *ray_file.Ray(Kernel.Rays),
+    view: *const ray_file.ShearedRay(Kernel.Rays),
+    corners: [3]Kernel.Rays.Vec3,
+    primitive_number: i32,
+    pad: f32,
+) bool {
+    const Rays = Kernel.Rays;
+    const seen = triangle.project(Rays, corners, view);
+    var weights = triangle.edgeFunctions(Rays, seen);
+    if (weights.mayAgree().bitAnd(group.active).none()) return false;
+    const agreeing = weights.agree().bitAnd(group.active);
+    const inside = triangle.resolveTies(Rays, seen, &weights, agreeing);
+    const hit = triangle.locate(Rays, seen, weights, corners, view, pad);
+    const primitive: Rays.I32 = .splat(primitive_number);
+    const accepted = inside.bitAnd(hit.mask)
+        .bitAnd(group.tnear.isBefore(hit.t, primitive))
+        .bitAnd(group.closest.isAfter(hit.t, primitive))
+        .andNot(primitive.eq(group.skip));
+    // A ray that found any hit accepts no other: nothing comes before t = -inf.
+    const t: Rays.F32 = if (query == .any_hit) .splat(-std.math.inf(f32)) else hit.t;
+    group.closest.t = Rays.F32.select(accepted, t, group.closest.t);
+    group.closest.primitive = Rays.I32.select(accepted, primitive, group.closest.primitive);
+    return accepted.any();
+}
+
+/// One triangle for all rays of a group, turned as each ray wants it.
+inline fn turnedCorners(
+    comptime Rays: type,
+    pack: anytype,
+    lane: usize,
+    view: *const Precalculations(Rays),
+) [3]Rays.Vec3 {
+    var corners: [3]Rays.Vec3 = undefined;
+    const axis = view.uniform orelse 2;
+    inline for (&corners, &pack.corner) |*corner, *components| {
+        corner.* = .splat(.{
+            components[ray_file.turnedIndex(axis, 0)][lane],
+            components[ray_file.turnedIndex(axis, 1)][lane],
+            components[axis][lane],
+        });
+        if (view.uniform == null) corner.* = view.axis.turn(corner.*);
+    }
+    return corners;
+}

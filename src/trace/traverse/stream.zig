@@ -1,0 +1,220 @@
+//! Ray stream traversal (Tsakok 2009) of incoherent rays, with active masks of 64 bits.
+//!
+//! In: rays of a bundle that are in no packet. Out: their hits, in the bundle. Each is tested by
+//! itself against all boxes of a node, one ray right after the other, and those that enter a child
+//! go on to it as a set, of one at last. What a ray by itself waits for, the end of a chain of
+//! arithmetic, a branch on how many children it enters, all share. While a node or a leaf is
+//! visited, the next that waits is on its way from memory.
+//!
+//! J. Tsakok, "Faster Incoherent Rays: Multi-BVH Ray Stream Tracing" (2009), section 3, with sets
+//! as bits, not lists.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const TestCounts = @import("../../statistics.zig").TestCounts;
+const ray_file = @import("ray.zig");
+const traversal_ray = @import("traversal_ray.zig");
+const bundle_file = @import("bundle.zig");
+const single = @import("single.zig");
+const stack_file = @import("stack.zig");
+const assert = std.debug.assert;
+const Query = @import("walk.zig").Query;
+const World = world_file.World;
+
+/// Rays of a set, a bit each.
+const Set = u64;
+const rays_max = @bitSizeOf(Set);
+/// A lane holds a word of a set.
+const word_bits = 32;
+const word_count = rays_max / word_bits;
+
+/// Collects the rays of a bundle.
+pub fn Stream(comptime Kernel: type, comptime query: Query) type {
+    const Boxes = Kernel.Boxes;
+    const Rays = Kernel.Rays;
+    const F32 = Boxes.F32;
+    const I32 = Boxes.I32;
+    const TraversalRay = traversal_ray.TraversalRay(Kernel);
+    return struct {
+        world: *const World,
+        bundle: *bundle_file.Bundle(Kernel),
+        rays: [rays_max]TraversalRay,
+        places: [rays_max]Place,
+        count: usize,
+        /// Those that have a hit.
+        found: Set,
+
+        const Self = @This();
+        const Node = world_file.Node(Kernel.width);
+        const Pack = world_file.TrianglePack(Kernel.width);
+        /// Where in the bundle a ray is.
+        const Place = struct { group: u32, lane: u32 };
+        /// A child still to be visited, and by whom.
+        const Entry = struct { child: world_file.Child, set: Set };
+        /// Entries at most: that the next leaves the stack before children of the present one come
+        /// onto it makes two ways down the tree at a time, each of which leaves siblings behind.
+        const entries_max = 2 * Kernel.stack_max + Kernel.width;
+
+        /// For rays of this bundle. In place: it is too large to be handed around.
+        pub fn init(
+            stream: *Self,
+            world: *const World,
+            bundle: *bundle_file.Bundle(Kernel),
+        ) void {
+            stream.world = world;
+            stream.bundle = bundle;
+            stream.count = 0;
+            stream.found = 0;
+        }
+
+        /// Takes the active rays of some groups, of which `views` are the views, from the given one
+        /// of the bundle on. Hits may be kept now or later, see `finish`; which rays are active is
+        /// for the caller to set again.
+        pub fn take(
+            stream: *Self,
+            first_group: usize,
+            views: []const bundle_file.Precalculations(Rays),
+            counts: *TestCounts,
+        ) void {
+            const groups = stream.bundle.groups[first_group..][0..views.len];
+            for (groups, views, first_group..) |*group, *view, number| {
+                if (group.active.none()) continue;
+                const origin = group.line.origin.abs();
+                const reach = origin.x.max(origin.y).max(origin.z);
+                const near = group.active.bitAnd(reach.lt(.splat(stream.world.fused_reach)));
+                var bits = near.bits();
+                while (bits != 0) : (bits &= bits - 1) {
+                    if (stream.count == rays_max) stream.finish(counts);
+                    const lane = @ctz(bits);
+                    stream.rays[stream.count] = .of(Rays, true, group, view, lane);
+                    stream.places[stream.count] = .{ .group = @intCast(number), .lane = lane };
+                    stream.count += 1;
+                }
+                const far = group.active.andNot(near);
+                if (far.none()) continue;
+                group.active = far;
+                single.traceEach(Kernel, query, stream.world, group, view, counts);
+            }
+        }
+
+        /// Traces all rays that were taken and keeps their hits.
+        pub fn finish(stream: *Self, counts: *TestCounts) void {
+            if (stream.count == 0) return;
+            stream.travel(counts);
+            var rest = stream.found;
+            while (rest != 0) : (rest &= rest - 1) {
+                const ray = &stream.rays[@ctz(rest)];
+                const place = stream.places[@ctz(rest)];
+                const closest = &stream.bundle.groups[place.group].closest;
+                var ts = closest.t.toArray();
+                var primitives = closest.primitive.toArray();
+                ts[place.lane] = ray.limit;
+                primitives[place.lane] = ray.closest_primitive;
+                closest.* = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };
+            }
+            stream.count = 0;
+            stream.found = 0;
+        }
+
+        fn travel(stream: *Self, counts: *TestCounts) void {
+            const tree = stream.world.tree.get(Kernel.width);
+            var entries: [entries_max]Entry = undefined;
+            var entry_count: usize = 0;
+            const all = @as(Set, std.math.maxInt(Set)) >> @intCast(rays_max - stream.count);
+            var entry: Entry = .{ .child = .root, .set = all };
+            while (true) {
+                const next = stream.pop(&entries, &entry_count);
+                const set = stream.looking(entry.set);
+                if (entry.child.pack_count > 0) {
+                    const first, const end = entry.child.packs();
+                    stream.intersect(set, tree.packs[first..end], counts);
+                } else if (set != 0) {
+                    assert(entry_count + Kernel.width <= entries_max);
+                    const node = &tree.nodes[entry.child.target];
+                    entry_count = stream.enter(set, node, &entries, entry_count, counts);
+                }
+                entry = next orelse stream.pop(&entries, &entry_count) orelse return;
+            }
+        }
+
+        /// The next child that any ray still has to visit, on its way here from memory.
+        inline fn pop(stream: *const Self, entries: []const Entry, entry_count: *usize) ?Entry {
+            while (entry_count.* > 0) {
+                entry_count.* -= 1;
+                const entry = entries[entry_count.*];
+                if (stream.looking(entry.set) == 0) continue;
+                stream.world.tree.get(Kernel.width).prefetch(entry.child);
+                return entry;
+            }
+            return null;
+        }
+
+        /// Those of a set that have not yet found what they look for.
+        inline fn looking(stream: *const Self, set: Set) Set {
+            return if (query == .any_hit) set & ~stream.found else set;
+        }
+
+        /// A ray of the set after the other against the triangles of a leaf.
+        inline fn intersect(
+            stream: *Self,
+            set: Set,
+            packs: []const Pack,
+            counts: *TestCounts,
+        ) void {
+            var rest = set;
+            while (rest != 0) : (rest &= rest - 1) {
+                const number = @ctz(rest);
+                const ray = &stream.rays[number];
+                for (packs) |*pack| {
+                    if (!ray.intersect(pack, stream.world.pad, counts)) continue;
+                    stream.found |= @as(Set, 1) << @intCast(number);
+                }
+            }
+        }
+
+        /// Pushes the children that rays of the set enter, the one that any of them enters first on
+        /// top. Returns the new count.
+        inline fn enter(
+            stream: *const Self,
+            set: Set,
+            node: *const Node,
+            entries: []Entry,
+            entry_count: usize,
+            counts: *TestCounts,
+        ) usize {
+            const inf: F32 = .splat(std.math.inf(f32));
+            var near = inf;
+            // By child, whose rays they are.
+            var words: [word_count]I32 = undefined;
+            inline for (&words, 0..) |*word, index| {
+                word.* = .zero();
+                var rest: u32 = @truncate(set >> index * word_bits);
+                while (rest != 0) : (rest &= rest - 1) {
+                    const ray = &stream.rays[index * word_bits + @ctz(rest)];
+                    const range = ray.slabsOf().meet(true, node, ray.limit, counts);
+                    const met = range.isMet();
+                    near = near.minFast(.select(met, range.near, inf));
+                    const bit: i32 = @bitCast(rest & (~rest + 1));
+                    word.* = word.bitOr(.select(met, .splat(bit), .zero()));
+                }
+            }
+            const met = near.lt(inf);
+            var sets: [word_count][Kernel.width]i32 = undefined;
+            for (&sets, words) |*array, word| array.* = word.toArray();
+            const ranks: stack_file.Ranks(Boxes) = .of(met, near);
+            var rest = met.bits();
+            const count = entry_count + @popCount(rest);
+            while (rest != 0) : (rest &= rest - 1) {
+                const child = @ctz(rest);
+                var entered: Set = 0;
+                for (sets, 0..) |array, index| {
+                    const word: Set = @as(u32, @bitCast(array[child]));
+                    entered |= word << @intCast(index * word_bits);
+                }
+                entries[entry_count + ranks.farther(child)] =
+                    .{ .child = node.child[child], .set = entered };
+            }
+            return count;
+        }
+    };
+}

@@ -1,0 +1,77 @@
+//! Depth-first, front-to-back traversal of the wide BVH, generic over what is searched for.
+//!
+//! In: a search, which knows what it looks for (a ray: single.zig; rays in lanes: bundle.zig; a
+//! packet: interval_packet.zig). Out: whether it found anything. The hits are the search's own.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const TestCounts = @import("../../statistics.zig").TestCounts;
+const stack_file = @import("stack.zig");
+const assert = std.debug.assert;
+const Entry = stack_file.Entry;
+
+/// What rays want to know.
+pub const Query = enum {
+    /// The first hit in the order of `ray.Hit`.
+    closest_hit,
+    /// Whether there is a hit; which one is found depends on the tree.
+    any_hit,
+};
+
+/// Searches the whole tree, or until `search.isDone()`. Of a search it needs
+///
+///     limit: f32                nothing that is farther matters; it may shrink
+///     meet(node, counts)        box.Range in lanes of children, `isMet` where one may matter
+///     intersect(pack, counts)  tests a pack of triangles, returns whether one was hit
+///     isDone(found)             asked after every leaf
+pub inline fn walk(
+    comptime Kernel: type,
+    tree: *const world_file.Tree(Kernel.width),
+    search: anytype,
+    counts: *TestCounts,
+) bool {
+    var stack: [Kernel.stack_max]Entry = undefined;
+    var stack_count: usize = 0;
+    var found = false;
+    var entry: Entry = .whole;
+    while (true) {
+        if (entry.child.pack_count == 0) {
+            assert(stack_count + Kernel.width <= Kernel.stack_max);
+            const node = &tree.nodes[entry.child.target];
+            const range = search.meet(node, counts);
+            const met = range.isMet().bits();
+            if (met != 0) {
+                entry = stack_file.descend(Kernel.Boxes, node, range, met, &stack, &stack_count);
+                continue;
+            }
+        } else {
+            const first, const end = entry.child.packs();
+            for (tree.packs[first..end]) |*pack| {
+                found = search.intersect(pack, counts) or found;
+            }
+            if (search.isDone(found)) break;
+        }
+        entry = while (stack_count > 0) {
+            stack_count -= 1;
+            const top = stack[stack_count];
+            if (top.near <= search.limit) break top;
+        } else break;
+    }
+    return found;
+}
+
+/// Counts the test of a ray against the children of a node.
+pub fn countNode(comptime Kernel: type, node: anytype, counts: *TestCounts) void {
+    if (!Kernel.counts_tests) return;
+    counts.box_issued += Kernel.width;
+    for (node.child) |child| counts.box_useful += @intFromBool(child != world_file.Child.missing);
+}
+
+/// Counts the test of a ray against the triangles of a pack.
+pub fn countPack(comptime Kernel: type, pack: anytype, counts: *TestCounts) void {
+    if (!Kernel.counts_tests) return;
+    counts.triangle_issued += Kernel.width;
+    for (pack.primitive) |primitive| {
+        counts.triangle_useful += @intFromBool(primitive != world_file.none);
+    }
+}
