@@ -123,7 +123,7 @@ const Bench = struct {
         if (options.image) |path| try bench.writeImage(path);
         try bench.print(&.{
             .scene = std.fs.path.basename(options.scene),
-            .triangles = base.triangles.len,
+            .triangles = base.geometry.triangles.len,
             .size = options.size,
             .depth = options.depth,
             .threads = options.thread_count,
@@ -224,8 +224,8 @@ const Bench = struct {
     fn reportOfTree(bench: *Bench, tree: *TimedTree) report_file.Build {
         const options = bench.options;
         const spread: Spread = .of(tree.times_ms[0..options.repetition_count]);
-        const facts = &tree.world.tree_statistics;
-        const triangle_count: f64 = @floatFromInt(tree.world.triangles.len);
+        const facts = &tree.world.facts.tree;
+        const triangle_count: f64 = @floatFromInt(tree.world.geometry.triangles.len);
         return .{
             .bvh = tree.quality,
             .lanes = tree.lanes,
@@ -235,7 +235,7 @@ const Bench = struct {
             .bytes_per_triangle = @as(f64, @floatFromInt(facts.bytes)) / triangle_count,
             .sah_cost = facts.sah_cost,
             .nodes = facts.node_count,
-            .blocks = switch (tree.world.tree) {
+            .blocks = switch (tree.world.geometry.tree) {
                 inline else => |*wide| wide.packs.len,
             },
         };

@@ -310,11 +310,12 @@ const Job = struct {
         job.sayWarnings();
         job.sayFacts(&world);
 
-        var image: Image = try .init(gpa, world.width, world.height);
+        var image: Image = try .init(gpa, world.view.width, world.view.height);
         defer image.deinit(gpa);
         const trace_start = Io.Clock.awake.now(io);
+        const frame = world.frame();
         const settings = job.traceSettings();
-        const traced = raylane.trace.trace(variant_index, &world, &image, settings);
+        const traced = raylane.trace.trace(variant_index, &frame, &image, settings);
         times.trace_ns = since(io, trace_start);
         if (traced.non_finite_count > 0) job.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
@@ -331,7 +332,7 @@ const Job = struct {
         report.times = times;
         report.rays = traced.rays;
         if (job.options.count_tests) {
-            const counted = raylane.trace.traceCounting(variant_index, &world, &image, settings);
+            const counted = raylane.trace.traceCounting(variant_index, &frame, &image, settings);
             report.tests = counted.tests;
         }
         return report;
@@ -354,10 +355,10 @@ const Job = struct {
             .rays = .{},
             .tests = null,
             .bvh = .{
-                .node_count = world.tree_statistics.node_count,
-                .depth = world.tree_statistics.depth,
-                .sah_cost = world.tree_statistics.sah_cost,
-                .bytes = world.tree_statistics.bytes,
+                .node_count = world.facts.tree.node_count,
+                .depth = world.facts.tree.depth,
+                .sah_cost = world.facts.tree.sah_cost,
+                .bytes = world.facts.tree.bytes,
             },
             .memory_peak_bytes = raylane.report.memoryPeakBytes(),
             .image_hash = image.hash(),
@@ -447,18 +448,18 @@ const Job = struct {
     /// With `--verbose`: what was chosen where the user did not.
     fn sayFacts(job: *Job, world: *const World) void {
         if (!job.options.verbose) return;
-        if (world.camera_is_default) job.sayOfScene("view: framed on all there is", .{});
-        if (world.lights_are_default) {
+        if (world.facts.camera_is_default) job.sayOfScene("view: framed on all there is", .{});
+        if (world.facts.lights_are_default) {
             job.sayOfScene("lights: three directional ones fixed to the camera", .{});
         } else {
             job.sayOfScene("lights: {d}", .{world.lights.len});
         }
-        job.sayOfScene("ambient radiance: {d}", .{world.surroundings.ambient});
+        job.sayOfScene("ambient radiance: {d}", .{world.environment.ambient});
         job.sayOfScene("tracer: {s}, {d} threads", .{
             raylane.variant.names[job.options.variant_index], job.threadCount(),
         });
-        if (world.degenerate_count > 0) {
-            job.sayOfScene("{d} triangles without area left out", .{world.degenerate_count});
+        if (world.facts.degenerate_count > 0) {
+            job.sayOfScene("{d} triangles without area left out", .{world.facts.degenerate_count});
         }
     }
 

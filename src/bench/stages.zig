@@ -99,8 +99,9 @@ pub const Stages = struct {
     /// Traces the image by a variant for whose width the tree was built.
     pub fn trace(stages: *Stages, variant: usize, thread_count: usize) rounds.Traced {
         const start_ns = stages.now();
+        const frame = stages.world.?.frame();
         const settings = stages.traceSettings(thread_count);
-        const traced = trace_file.trace(variant, &stages.world.?, &stages.image, settings);
+        const traced = trace_file.trace(variant, &frame, &stages.image, settings);
         return .{ .trace_ns = stages.now() - start_ns, .rays = traced.rays };
     }
 
@@ -112,8 +113,9 @@ pub const Stages = struct {
             if (other.lanes != compiled[variant].lanes) continue;
             if (counted) |tests| return tests;
         }
+        const frame = stages.world.?.frame();
         const settings = stages.traceSettings(stages.settings.thread_count);
-        const traced = trace_file.traceCounting(variant, &stages.world.?, &stages.image, settings);
+        const traced = trace_file.traceCounting(variant, &frame, &stages.image, settings);
         stages.counts[variant] = traced.tests;
         return traced.tests.?;
     }
