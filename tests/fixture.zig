@@ -36,7 +36,7 @@ pub const Builder = struct {
     /// A root node.
     pub fn addNode(builder: *Builder, local: Affine) !u32 {
         const parent = raylane.scene.none;
-        try builder.nodes.append(builder.arena(), .{ .parent = parent, .local = local });
+        try builder.nodes.append(builder.arena(), .{ .parent = parent, .local = .of(local) });
         return @intCast(builder.nodes.items.len - 1);
     }
 

@@ -75,14 +75,19 @@ pub fn parseBytes(
     const parts = try container.open(bytes, diagnostic);
     const simplified = try escapes.simplifyEscapes(gpa, parts.json);
     defer if (simplified) |copy| gpa.free(copy);
-    var document = try parseDocument(gpa, simplified orelse parts.json, diagnostic);
+    const text = simplified orelse parts.json;
+    const checked = try json.check(text, &schema.document, diagnostic);
+    var document = try parseDocument(gpa, text, checked.lengths, diagnostic);
     defer document.deinit();
+    const doubles = try json.readDoubles(gpa, text, &schema.document, &checked);
+    defer gpa.free(doubles);
     var scene: Scene = .init(gpa);
     errdefer scene.deinit();
     var source: Source = .{
         .gpa = gpa,
         .arena = scene.arena.allocator(),
         .data = document.data,
+        .doubles = doubles,
         .diagnostic = diagnostic,
     };
     defer source.deinit();
@@ -104,9 +109,13 @@ pub fn parseBytes(
     return scene;
 }
 
-/// Checks the JSON text and has cgltf parse it.
-fn parseDocument(gpa: Allocator, text: []const u8, diagnostic: *Diagnostic) Error!Document {
-    const lengths = try json.check(text, &schema.document, diagnostic);
+/// Has cgltf parse a JSON text that has been checked.
+fn parseDocument(
+    gpa: Allocator,
+    text: []const u8,
+    lengths: json.Lengths,
+    diagnostic: *Diagnostic,
+) Error!Document {
     return Document.parse(gpa, text) catch |err| switch (err) {
         error.OutOfMemory => error.OutOfMemory,
         error.TooLarge => diagnostic.fail(
