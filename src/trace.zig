@@ -33,7 +33,7 @@ pub const interval_packet = @import("trace/traverse/interval_packet.zig");
 pub const walk = @import("trace/traverse/walk.zig");
 /// A bundle of rays through the tree.
 pub const bundle = @import("trace/traverse/bundle.zig");
-/// Rays from one point, or behind it, as a beam.
+/// Rays from one point as a beam.
 pub const primary = @import("trace/traverse/beam/primary.zig");
 /// The directions of a beam's rays.
 pub const Grid = @import("trace/traverse/beam/grid.zig").Grid;

@@ -111,12 +111,11 @@ pub fn Frustum(comptime Lanes: type) type {
             return least.isNegative().bitNot();
         }
 
-        /// Pushes the children of a node that the beam may meet before `depth_max`, and behind
-        /// `front` if there is one, the nearest on top. Returns the new count of the stack.
+        /// Pushes the children of a node that the beam may meet before `depth_max`, the nearest on
+        /// top. Returns the new count of the stack.
         pub inline fn pushChildren(
             frustum: *const Self,
             node: *const world_file.Node(width),
-            front: ?*const Plane(width),
             depth_max: f32,
             entries: []stack.Entry,
             entry_count: usize,
@@ -126,7 +125,6 @@ pub fn Frustum(comptime Lanes: type) type {
                 least = least.minOrNegative(side.extreme(Lanes, node, 1));
             }
             const near = frustum.depth.extreme(Lanes, node, 0);
-            if (front) |plane| least = least.minOrNegative(plane.extreme(Lanes, node, 1));
             const met = near.le(.splat(depth_max)).andNot(least.isNegative());
             return stack.push(Lanes, node, met, near, entries, entry_count);
         }

@@ -6,9 +6,6 @@
 //! over the pixels of those that it touches and does not fill, in lanes (edges.zig, found.zig).
 //! What that leaves in doubt, an edge or a depth too close to tell, the exact test decides; the
 //! winner's t is always its.
-//!
-//! Rays may also start behind that origin, as those do that a plane mirror sends back, seen from
-//! the mirrored eye (starts.zig): then triangles before a ray's start do not count.
 
 const std = @import("std");
 const world_file = @import("../../../world.zig");
@@ -26,8 +23,6 @@ const found_file = @import("tile_depth_buffer.zig");
 const resolve = @import("resolve.zig");
 const frustum_file = @import("frustum.zig");
 const Cost = @import("budget.zig").Cost;
-const Starts = @import("starts.zig").Starts;
-const Area = grid_file.Area;
 const Grid = grid_file.Grid;
 const assert = std.debug.assert;
 
@@ -42,48 +37,18 @@ const block_last: f32 = subtile_side - 1;
 /// Finds the nearest hits of a bundle's rays, which have none yet, start at `grid.origin` and
 /// leave nothing out. Returns false, having done nothing, where the rays are too far apart or the
 /// beam meets so much that it does not pay.
-/// `shares` is null, or where barycentric weights go: of the second and the third corner, by group.
 pub fn trace(
     comptime Kernel: type,
     geometry: *const world_file.Geometry,
     grid: *const Grid,
     bundle: *bundle_file.Bundle(Kernel),
-    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
-    counts: *TestCounts,
-) bool {
-    return run(Kernel, false, geometry, grid, {}, bundle, shares, counts);
-}
-
-/// The same of rays that start where `starts` says, and may leave out what comes before and their
-/// own triangles. Their starts are within what `Geometry.pad` allows for.
-pub fn traceBehind(
-    comptime Kernel: type,
-    geometry: *const world_file.Geometry,
-    grid: *const Grid,
-    starts: *const Starts(Kernel),
-    bundle: *bundle_file.Bundle(Kernel),
-    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
-    counts: *TestCounts,
-) bool {
-    return run(Kernel, true, geometry, grid, starts, bundle, shares, counts);
-}
-
-fn run(
-    comptime Kernel: type,
-    comptime behind: bool,
-    geometry: *const world_file.Geometry,
-    grid: *const Grid,
-    starts: if (behind) *const Starts(Kernel) else void,
-    bundle: *bundle_file.Bundle(Kernel),
-    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
 ) bool {
     // In place: it is too large to be handed around.
-    var search: Search(Kernel, behind) = undefined;
-    search.starts = starts;
+    var search: Search(Kernel) = undefined;
     if (!search.init(geometry, grid, bundle, counts)) return false;
     if (!search.travel()) return false;
-    resolve.resolve(Kernel, behind, geometry, grid, &search.found, bundle, shares);
+    resolve.resolve(Kernel, geometry, grid, &search.found, bundle);
     return true;
 }
 
@@ -105,8 +70,6 @@ const Coverage = struct {
     last_x: u32,
     last_y: u32,
     slot: exact.Slot,
-    /// Its number, if some ray leaves it out; else `no_primitive`.
-    skipped: i32,
 
     /// The blocks of these columns and rows, a bit each.
     inline fn subtiles(coverage: *const Coverage) u32 {
@@ -144,8 +107,7 @@ const Dual = struct {
     }
 };
 
-/// With rays that start behind the grid's origin, or at it.
-fn Search(comptime Kernel: type, comptime behind: bool) type {
+fn Search(comptime Kernel: type) type {
     const Boxes = Kernel.Boxes;
     const Rays = Kernel.Rays;
     const width = Kernel.width;
@@ -156,22 +118,14 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
         grid: *const Grid,
         bundle: *bundle_file.Bundle(Kernel),
         counts: *TestCounts,
-        starts: if (behind) *const Starts(Kernel) else void,
         frustum: Frustum,
-        /// All rays start behind it.
-        front: if (behind) frustum_file.Plane(width) else void,
         /// Longest direction times roundings, for edge functions and for 1/t.
         edge_scale: f32,
         inverse_scale: f32,
-        /// By how much lines that miss the origin move an edge function, over its edge's length.
-        edge_apart: if (behind) f32 else void,
         /// See `edges.reachMax`.
         reach_max: f32,
         /// From a point relative to the origin to column and row times t, and t; see `Dual`.
         dual: Dual,
-        /// By how much lines that miss the origin, and directions off the grid, move a corner's
-        /// place: the former times 1/t.
-        window_apart: if (behind) [2]f32 else void,
         found: Found,
 
         const Self = @This();
@@ -195,59 +149,24 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             search.grid = grid;
             search.bundle = bundle;
             search.counts = counts;
-            const area: Area = if (behind) search.starts.area else .{};
-            const sides = grid.sides(area) orelse return false;
+            const sides = grid.sides() orelse return false;
             const along = grid.depthNormal() orelse return false;
-            var standoff = frustum_file.slack_pads * geometry.pad;
-            if (behind) standoff += search.driftMax(along);
+            const standoff = frustum_file.slack_pads * geometry.pad;
             search.frustum = .init(grid.origin, sides, along, standoff);
-            if (behind) {
-                search.front = .init(along, grid.origin, standoff);
-                search.front.offset -= search.starts.t_min;
-            }
             // A direction off by d moves an edge function by 2 R L d, 1/t by L^2 / |det| d.
             search.edge_scale = unit * (edges_file.edge_roundings * longest +
                 edges_file.step_roundings * spread + 2 * roundings);
             search.inverse_scale = unit *
                 (edges_file.inverse_roundings * longest + 2 * roundings);
-            // Starts are within reach, the grid's origin need not be.
-            search.reach_max = if (behind)
-                edges_file.reach_limit
-            else
-                edges_file.reachMax(geometry.pad);
-            if (behind) search.edge_apart = 2 * search.starts.spread.apart * longest;
+            search.reach_max = edges_file.reachMax(geometry.pad);
             search.dual = .of(grid);
-            if (behind) search.window_apart = .{
-                search.starts.spread.apart * search.dual.gain,
-                unit * roundings * search.dual.gain,
-            };
             search.found.clear(bundle);
             return true;
         }
 
-        inline fn spreadOf(search: *const Self) ?edges_file.Spread {
-            return if (behind) search.starts.spread else null;
-        }
-
-        /// How far, in metres, a point of a ray may be from where the grid has it, or a plane
-        /// through the grid's origin off, beyond what `frustum.slack_pads` allows for.
-        fn driftMax(search: *const Self, along: [3]f32) f32 {
-            const grid = search.grid;
-            const unit = edges_file.unit_roundoff;
-            const reach = edges_file.reachMax(search.geometry.pad) + search.starts.spread.distance;
-            // No direction is shorter than 1 / |along|.
-            const t_max = reach * vec3.length(along);
-            return 2 * search.starts.spread.apart +
-                2 * unit * grid.deviation_roundings * t_max +
-                64 * unit * (reach + vec3.length1(grid.origin));
-        }
-
         /// Returns whether it came to an end.
         fn travel(search: *Self) bool {
-            var cost: Cost = if (behind)
-                .of(width, search.starts.ray_count)
-            else
-                .ofEye(width);
+            var cost: Cost = .ofEye(width);
             var entries: [Kernel.stack_max]stack.Entry = undefined;
             entries[0] = .{ .child = .root, .near = -std.math.inf(f32) };
             var entry_count: usize = 1;
@@ -262,7 +181,6 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
                     walk.countNode(Kernel, node, search.counts);
                     entry_count = search.frustum.pushChildren(
                         node,
-                        if (behind) &search.front else null,
                         depth_max,
                         &entries,
                         entry_count,
@@ -298,13 +216,12 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             if (there.none()) return;
             const grid = search.grid;
             const edges: edges_file.Edges(Boxes) =
-                .init(corners, .splat(grid.origin), search.reach_max, search.spreadOf());
+                .init(corners, .splat(grid.origin), search.reach_max);
             const zero: Boxes.F32 = .zero();
             var base: [4]Boxes.F32 = undefined;
             var right: [4]Boxes.F32 = undefined;
             var down: [4]Boxes.F32 = undefined;
-            var slack = edges.slack.mul(.splat(search.edge_scale));
-            if (behind) slack = edges.facet.length.mulAdd(.splat(search.edge_apart), slack);
+            const slack = edges.slack.mul(.splat(search.edge_scale));
             var least: Boxes.F32 = .splat(std.math.inf(f32));
             inline for (edges.normal, 0..) |normal, index| {
                 base[index] = edges_file.dot(Boxes, normal, .splat(grid.corner)).add(slack);
@@ -315,7 +232,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             }
             there = there.andNot(edges.facet.turned.bitAnd(least.isNegative()));
             if (there.none()) return;
-            const inverse = edges.facet.inverse(search.spreadOf());
+            const inverse = edges.facet.inverse();
             const absolute = inverse.absolute.mul(.splat(search.inverse_scale));
             const one: Boxes.F32 = .splat(1);
             const growth = one.add(inverse.relative);
@@ -327,12 +244,6 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
                 .mulAdd(.splat(last), base[3]);
             const shrink = one.sub(inverse.relative).div(growth);
             const drop = absolute.add(absolute);
-            if (behind) {
-                const closest = right[3].minFast(zero).add(down[3].minFast(zero))
-                    .mulAdd(.splat(last), base[3]).mul(shrink).sub(drop);
-                there = there.andNot(inverse.decisive
-                    .bitAnd(closest.ge(.splat(search.starts.tile_upper))));
-            }
             const open = there.andNot(inverse.decisive);
             var undecided: u32 = 0;
             if (open.any()) undecided = open.bitAnd(mayTouch(&base, &right, &down, slack)).bits();
@@ -363,13 +274,8 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             slack.add(slack).store(&table.slack);
             shrink.store(&table.shrink);
             drop.store(&table.drop);
-            const skipped: u32 = if (behind) search.starts.skipped(Boxes, primitive) else 0;
             while (rest != 0) : (rest &= rest - 1) {
-                const lane = @ctz(rest);
-                var coverage = table.at(lane, first);
-                if (behind and skipped >> @intCast(lane) & 1 != 0)
-                    coverage.skipped = @bitCast(block.primitive[lane]);
-                search.cover(&coverage);
+                search.cover(&table.at(@ctz(rest), first));
             }
             while (undecided != 0) : (undecided &= undecided - 1) {
                 search.coverUndecided(&table.at(@ctz(undecided), first));
@@ -419,10 +325,8 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
                 least_t = least_t.minFast(t);
                 greatest_inverse = greatest_inverse.maxFast(inverse.abs());
             }
-            var margin = reach.mul(greatest_inverse)
+            const margin = reach.mul(greatest_inverse)
                 .mul(.splat(16 * edges_file.unit_roundoff * dual.gain));
-            if (behind) margin = greatest_inverse
-                .mulAdd(.splat(search.window_apart[0]), margin).add(.splat(search.window_apart[1]));
             // Also where |t| is so small that rounding may have turned its sign.
             const bounded = least_t.gt(.zero()).bitAnd(margin.lt(.splat(side)));
             const zero: B = .zero();
@@ -493,7 +397,6 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
                     .last_x = @intCast(table.last_x[lane]),
                     .last_y = @intCast(table.last_y[lane]),
                     .slot = first + @as(exact.Slot, lane),
-                    .skipped = ray_file.no_primitive,
                 };
                 inline for (0..4) |index| {
                     coverage.base[index] = table.base[index][lane];
@@ -539,14 +442,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
                 var seen = most[3].gt(known).andNot(outside);
                 const least = most[0].sub(span[0]).minOrNegative(most[1].sub(span[1]))
                     .minOrNegative(most[2].sub(span[2]));
-                var covered = seen.bitAnd(least.gt(.splat(coverage.slack)));
-                if (behind) {
-                    const lowest = most[3].sub(span[3])
-                        .mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
-                    seen = seen.andNot(lowest.ge(search.starts.of("block_upper", first)));
-                    covered = covered.bitAnd(most[3].lt(search.starts.of("block_lower", first)));
-                    if (coverage.skipped != ray_file.no_primitive) covered = .splat(false);
-                }
+                const covered = seen.bitAnd(least.gt(.splat(coverage.slack)));
                 if (covered.any()) {
                     const depth = .{ most[3].sub(span[3]), most[3] };
                     seen = seen.andNot(search.fill(coverage, first, covered, depth));
@@ -607,21 +503,13 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
                 const lower = search.found.of("lower", group);
                 const least = value[0].minOrNegative(value[1]).minOrNegative(value[2]);
                 const known: F32 = .loadAligned(lower);
-                var possible = value[3].gt(known).andNot(least.isNegative());
+                const possible = value[3].gt(known).andNot(least.isNegative());
                 const surely = value[3].mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
-                const pixel = group * lanes;
-                if (behind) {
-                    possible = possible.andNot(surely.ge(search.starts.of("upper", pixel)));
-                    if (coverage.skipped != ray_file.no_primitive) possible = possible
-                        .andNot(search.bundle.groups[group].skip.eq(.splat(coverage.skipped)));
-                }
                 if (possible.any()) {
                     const upper = search.found.of("upper", group);
                     const slots = search.found.of("slot", group);
-                    var certain = least.gt(.splat(coverage.slack))
+                    const certain = least.gt(.splat(coverage.slack))
                         .bitAnd(surely.gt(.loadAligned(upper)));
-                    if (behind) certain = certain.bitAnd(possible)
-                        .bitAnd(value[3].lt(search.starts.of("lower", pixel)));
                     F32.select(certain, surely, known).storeAligned(lower);
                     F32.select(certain, value[3], .loadAligned(upper)).storeAligned(upper);
                     Rays.I32.select(certain, .splat(coverage.slot), .loadAligned(slots))
@@ -653,13 +541,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             const ray = &search.bundle.groups[group];
             const pad = search.geometry.pad;
             const hit = exact.meet(Kernel, search.tree, pad, ray, slot);
-            var met = hit.mask.bitAnd(doubtful);
-            var t = hit.t;
-            if (behind) {
-                const number: Rays.I32 = .splat(exact.primitiveAt(width, search.tree, slot));
-                met = met.bitAnd(Starts(Kernel).counted(ray, hit.t, number));
-                t = t.add(search.starts.t[group]);
-            }
+            const met = hit.mask.bitAnd(doubtful);
             const known_lower = search.found.of("lower", group);
             const known_upper = search.found.of("upper", group);
             const slots = search.found.of("slot", group);
@@ -667,7 +549,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             const unclear = met.bitAnd(hit.t.gt(.zero())).andNot(nearer);
             const first = exact
                 .comeFirst(Kernel, search.tree, pad, ray, unclear, hit.t, slot, slots);
-            const inverse = F32.splat(1).div(t);
+            const inverse = F32.splat(1).div(hit.t);
             const below = inverse.mul(.splat(1 - 4 * edges_file.unit_roundoff));
             const above = inverse.mul(.splat(1 + 4 * edges_file.unit_roundoff));
             F32.select(nearer, lower, .select(first, below, .loadAligned(known_lower)))

@@ -116,7 +116,7 @@ pub fn Footprint(comptime Lanes: type) type {
             slope_max: f32,
             reach_max: f32,
         ) Self {
-            const edges: Edges = .init(corners, .splat(projection.origin), reach_max, null);
+            const edges: Edges = .init(corners, .splat(projection.origin), reach_max);
             const sign: F32 = .splat(projection.sign);
             var edge: [3]Linear(Lanes) = undefined;
             inline for (&edge, edges.normal) |*to, normal| {
@@ -206,7 +206,7 @@ pub fn Footprint(comptime Lanes: type) type {
             const sign: F32 = .splat(projection.sign);
             const unit = unitOf(slope_max);
             if (projection.slope != null) return parallelNearness(facet, sign, unit);
-            const inverse = facet.inverse(null);
+            const inverse = facet.inverse();
             return .{
                 .form = .of(turn(Lanes, projection.axis, inverse.vector.scale(sign))),
                 .relative = inverse.relative,

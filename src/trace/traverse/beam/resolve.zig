@@ -1,4 +1,4 @@
-//! What a beam of rays has found, exactly: t and barycentric weights of every hit.
+//! What a beam of rays has found, exactly: t of every hit.
 //!
 //! In: a triangle's slot for each ray. Out: hits in the bundle, by the expressions of triangle.zig,
 //! bit for bit. Rays of a beam mostly have the same longest axis and the same signs, and neighbours
@@ -18,25 +18,22 @@ const Found = @import("tile_depth_buffer.zig").Found;
 const Grid = @import("grid.zig").Grid;
 const assert = std.debug.assert;
 
-/// Puts the hits of the triangles found into the bundle, and weights of the second and third corner
-/// into `shares`, if given. Rays start behind the grid's origin, each at its own, or at it.
+/// Puts the hits of the triangles found into the bundle.
 pub fn resolve(
     comptime Kernel: type,
-    comptime behind: bool,
     geometry: *const world_file.Geometry,
     grid: *const Grid,
     found: *Found(Kernel),
     bundle: *bundle_file.Bundle(Kernel),
-    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
 ) void {
     const course = Course.of(grid);
     switch (course.axis orelse 3) {
         inline 0...2 => |axis| {
             const tree = geometry.tree.get(Kernel.width);
-            const Octant = UniformOctant(Kernel, behind, axis);
-            Octant.run(geometry, tree, &course, grid, found, bundle, shares);
+            const Octant = UniformOctant(Kernel, axis);
+            Octant.run(geometry, tree, &course, grid, found, bundle);
         },
-        else => apart(Kernel, geometry, found, bundle, shares),
+        else => apart(Kernel, geometry, found, bundle),
     }
 }
 
@@ -82,7 +79,6 @@ fn apart(
     geometry: *const world_file.Geometry,
     found: *Found(Kernel),
     bundle: *bundle_file.Bundle(Kernel),
-    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
 ) void {
     const Rays = Kernel.Rays;
     found.spreadAll();
@@ -94,7 +90,6 @@ fn apart(
         const gathered = exact.gather(Kernel, tree, own);
         const hit = triangle.intersect(Rays, gathered.corners, group.line, geometry.pad);
         assert(there.andNot(hit.mask).none());
-        if (shares) |all| keepShares(Rays, &all[index], there, hit.shares());
         group.closest = .{
             .t = .select(there, hit.t, group.closest.t),
             .primitive = .select(there, gathered.primitive, group.closest.primitive),
@@ -102,23 +97,13 @@ fn apart(
     }
 }
 
-/// EdgeFunctions of the rays that hit something: others may be another beam's.
-inline fn keepShares(
-    comptime Rays: type,
-    kept: *[2]Rays.F32,
-    there: Rays.Mask,
-    shares: [2]Rays.F32,
-) void {
-    for (kept, shares) |*to, share| to.* = .select(there, share, to.*);
-}
-
 /// All groups alike.
-fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2) type {
+fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
     const Rays = Kernel.Rays;
     const F32 = Rays.F32;
     const Vec3 = Rays.Vec3;
     return struct {
-        /// A triangle as it is or seen from the rays' origin, in lanes or the same in all of them.
+        /// A triangle seen from the rays' origin, in lanes or the same in all of them.
         fn Placed(comptime Value: type) type {
             return struct {
                 /// Turned corners from the origin.
@@ -126,14 +111,6 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
                 /// Corners of its grown box from there.
                 lower: Value,
                 upper: Value,
-
-                inline fn seenFrom(placed: *const @This(), origin: Vec3) @This() {
-                    var seen = placed.*;
-                    for (&seen.offsets) |*offset| offset.* = offset.sub(origin);
-                    seen.lower = seen.lower.sub(origin);
-                    seen.upper = seen.upper.sub(origin);
-                    return seen;
-                }
             };
         }
 
@@ -144,10 +121,8 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
             grid: *const Grid,
             found: *Found(Kernel),
             bundle: *bundle_file.Bundle(Kernel),
-            shares: ?*[Kernel.group_count][2]F32,
         ) void {
-            // Of what starts behind it nothing is subtracted before the ray's own start is.
-            const common: ?[3]f32 = if (behind) null else turned(grid.origin);
+            const origin = turned(grid.origin);
             const down = turned(course.negative);
             var last: Last = .{};
             for (0..Kernel.subtile_count) |block| {
@@ -156,10 +131,6 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
                 if (whole and block_slot == exact.no_slot) continue;
                 for (block * Kernel.subtile_groups..(block + 1) * Kernel.subtile_groups) |index| {
                     const group = &bundle.groups[index];
-                    const from: Vec3 = if (behind)
-                        turn(group.line.origin)
-                    else
-                        .splat(common.?);
                     const own = found.of("slot", index);
                     const lanes: Rays.I32 = .loadAligned(own);
                     if (whole or lanes.eq(.splat(own[0])).all()) {
@@ -167,23 +138,18 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
                         if (slot == exact.no_slot) continue;
                         if (slot != last.slot) last = .{
                             .slot = slot,
-                            .placed = inLanes(&placeOne(tree, geometry.pad, common, slot)),
+                            .placed = inLanes(&placeOne(tree, geometry.pad, origin, slot)),
                             .primitive = .splat(exact.primitiveAt(Kernel.width, tree, slot)),
                         };
-                        const hit = if (behind)
-                            intersect(group, &last.placed.seenFrom(from), down, .splat(true))
-                        else
-                            intersect(group, &last.placed, down, .splat(true));
-                        if (shares) |all| all[index] = hit.shares();
+                        const hit = intersect(group, &last.placed, down, .splat(true));
                         group.closest = .{ .t = hit.t, .primitive = last.primitive };
                         continue;
                     }
                     const there = lanes.gt(.splat(exact.no_slot));
                     const gathered = exact.gather(Kernel, tree, own);
-                    const each = placeEach(geometry.pad, gathered.corners).seenFrom(from);
+                    const each = placeEach(geometry.pad, gathered.corners, origin);
                     const hit = intersect(group, &each, down, there);
                     assert(there.andNot(hit.mask).none());
-                    if (shares) |all| keepShares(Rays, &all[index], there, hit.shares());
                     group.closest = .{
                         .t = .select(there, hit.t, group.closest.t),
                         .primitive = .select(there, gathered.primitive, group.closest.primitive),
@@ -207,12 +173,12 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
             };
         }
 
-        /// One triangle, seen from `origin` if there is one. Minima and maxima are those of
+        /// One triangle. Minima and maxima are those of
         /// `triangle.locate`.
         fn placeOne(
             tree: *const world_file.Tree(Kernel.width),
             pad: f32,
-            origin: ?[3]f32,
+            origin: [3]f32,
             slot: exact.Slot,
         ) Placed([3]f32) {
             var corners: [3][3]f32 = undefined;
@@ -226,15 +192,12 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
                 const c = corners[2][component];
                 const low = if (b < a) b else a;
                 const high = if (b > a) b else a;
-                placed.lower[component] = (if (c < low) c else low) - pad;
-                placed.upper[component] = (if (c > high) c else high) + pad;
+                const from = origin[component];
+                placed.lower[component] = (if (c < low) c else low) - pad - from;
+                placed.upper[component] = (if (c > high) c else high) + pad - from;
                 for (&placed.offsets, corners) |*offset, corner| {
-                    offset[component] = corner[component];
+                    offset[component] = corner[component] - from;
                 }
-                const from = (origin orelse continue)[component];
-                placed.lower[component] -= from;
-                placed.upper[component] -= from;
-                for (&placed.offsets) |*offset| offset[component] -= from;
             }
             return placed;
         }
@@ -252,15 +215,16 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
         }
 
         /// A triangle in each lane.
-        inline fn placeEach(pad: f32, corners: [3]Vec3) Placed(Vec3) {
+        inline fn placeEach(pad: f32, corners: [3]Vec3, origin: [3]f32) Placed(Vec3) {
             const grow: Vec3 = .splat(@splat(pad));
+            const from: Vec3 = .splat(origin);
             const a = turn(corners[0]);
             const b = turn(corners[1]);
             const c = turn(corners[2]);
             return .{
-                .offsets = .{ a, b, c },
-                .lower = c.min(b.min(a)).sub(grow),
-                .upper = c.max(b.max(a)).add(grow),
+                .offsets = .{ a.sub(from), b.sub(from), c.sub(from) },
+                .lower = c.min(b.min(a)).sub(grow).sub(from),
+                .upper = c.max(b.max(a)).add(grow).sub(from),
             };
         }
 

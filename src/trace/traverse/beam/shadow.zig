@@ -145,7 +145,7 @@ fn Search(comptime Kernel: type) type {
                     walk.countNode(Kernel, node, search.counts);
                     const depth_max = search.points.bounds.depth;
                     entry_count = frustum
-                        .pushChildren(node, null, depth_max, &entries, entry_count);
+                        .pushChildren(node, depth_max, &entries, entry_count);
                     continue;
                 }
                 if (!cost.pays(child.pack_count, entry_count)) {
