@@ -126,7 +126,7 @@ fn expectTile(
     const hits = hitsOf(world, &queries);
     var bundle = bundleOf(Kernel, &queries);
     var counts: raylane.statistics.TestCounts = .{};
-    const traced = raylane.trace.primary
+    const traced = raylane.trace.eye_rays
         .trace(Kernel, &world.geometry, grid, &bundle, &counts);
     try std.testing.expect(traced);
     for (&bundle.groups, 0..) |*group, index| for (0..Kernel.ray_count) |lane| {
@@ -285,7 +285,7 @@ test "a tile too wide for a beam is declined" {
         const grid = aim(.{ 0, 0, 7 }, .{ 0, 0, 0 }, 0.1, generator.random());
         var bundle: raylane.trace.bundle.Bundle(Kernel) = undefined;
         var counts: raylane.statistics.TestCounts = .{};
-        const traced = raylane.trace.primary
+        const traced = raylane.trace.eye_rays
             .trace(Kernel, &world.geometry, &grid, &bundle, &counts);
         try std.testing.expect(!traced);
     }

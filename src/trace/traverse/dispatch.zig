@@ -9,7 +9,7 @@ const TestCounts = @import("../../statistics.zig").TestCounts;
 const interval_packet = @import("interval_packet.zig");
 const single = @import("single.zig");
 const bundle_file = @import("bundle.zig");
-const primary = @import("beam/primary.zig");
+const eye_rays = @import("beam/eye_rays.zig");
 const Grid = @import("beam/grid.zig").Grid;
 const shadow = @import("beam/shadow.zig");
 const Query = @import("walk.zig").Query;
@@ -32,7 +32,7 @@ pub fn closestHit(
         return .none;
     }
     if (grid) |known| {
-        if (primary.trace(Kernel, geometry, known, bundle, counts)) return .all;
+        if (eye_rays.trace(Kernel, geometry, known, bundle, counts)) return .all;
     }
     byInterval(Kernel, .closest_hit, geometry, bundle, counts);
     return .none;

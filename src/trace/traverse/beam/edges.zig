@@ -1,9 +1,9 @@
-//! Triangles as a beam sees them from the point that its rays share: three edge functions and 1/t,
-//! all linear in a ray's direction, each with a bound on what rounding may have done to it.
+//! 3D rasterisation (Davidovic et al. 2012, "3D Rasterization: A Bridge between Rasterization and
+//! Ray Casting"): edge functions and 1/t of triangles as seen from the point that rays share, all
+//! linear in a ray's direction, each with a bound on what rounding may have done to it.
 //!
-//! In: a block of triangles, the rays' origin. Out: per triangle the vectors whose dot products
-//! with a direction D are the edge functions and 1/t (Davidovic et al., "3D Rasterization: A Bridge
-//! between Rasterization and Ray Casting", 2012). Edges are taken in Pluecker form,
+//! In: a pack of triangles, the rays' origin. Out: per triangle the vectors whose dot products
+//! with a direction D are the edge functions and 1/t. Edges are taken in Pluecker form,
 //! (c + b) x (c - b) = 2 b x c, with the difference of the corners as they are in the scene: then
 //! the rounding of an edge is in proportion to its length, not to its distance.
 //!
@@ -53,16 +53,16 @@ pub const turning_roundings = 64.0;
 /// Outside of this range of L^2 and R, in metres, products may leave the range of floats.
 pub const length_squared_min = 0x1p-80;
 /// See `length_squared_min`.
-pub const reach_limit = 1e11;
+const reach_limit = 1e11;
 
 /// The largest R for which bounds hold: boxes are grown for rays of no more than a certain length
 /// (`Geometry.pad`), so that the exact test accepts whatever is surely inside the edges.
-pub fn reachMax(pad: f32) f32 {
-    const covered = pad / world_file.pad_relative;
+pub fn reachMax(geometry: *const world_file.Geometry) f32 {
+    const covered = geometry.pad / world_file.pad_relative;
     return if (covered < reach_limit) covered else reach_limit;
 }
 
-/// Triangles of a block in lanes, turned so that edge functions are positive within.
+/// Triangles of a pack in lanes, turned so that edge functions are positive within.
 pub fn Edges(comptime Lanes: type) type {
     const F32 = Lanes.F32;
     const Vec3 = Lanes.Vec3;
@@ -75,7 +75,7 @@ pub fn Edges(comptime Lanes: type) type {
 
         const Self = @This();
 
-        /// Sets up the triangles of a block. Bounds do not hold for those with a corner farther
+        /// Sets up the triangles of a pack. Bounds do not hold for those with a corner farther
         /// away than `reach_max`.
         pub inline fn init(
             corners: [3]Vec3,

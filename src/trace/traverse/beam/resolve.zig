@@ -14,7 +14,7 @@ const triangle = @import("../triangle.zig");
 const kernel_file = @import("../kernel.zig");
 const edges_file = @import("edges.zig");
 const exact = @import("exact.zig");
-const Found = @import("tile_depth_buffer.zig").Found;
+const TileDepthBuffer = @import("tile_depth_buffer.zig").TileDepthBuffer;
 const Grid = @import("grid.zig").Grid;
 const assert = std.debug.assert;
 
@@ -23,7 +23,7 @@ pub fn resolve(
     comptime Kernel: type,
     geometry: *const world_file.Geometry,
     grid: *const Grid,
-    found: *Found(Kernel),
+    buffer: *TileDepthBuffer(Kernel),
     bundle: *bundle_file.Bundle(Kernel),
 ) void {
     const course = Course.of(grid);
@@ -31,9 +31,9 @@ pub fn resolve(
         inline 0...2 => |axis| {
             const tree = geometry.tree.get(Kernel.width);
             const Octant = UniformOctant(Kernel, axis);
-            Octant.run(geometry, tree, &course, grid, found, bundle);
+            Octant.run(geometry, tree, &course, grid, buffer, bundle);
         },
-        else => apart(Kernel, geometry, found, bundle),
+        else => apart(Kernel, geometry, buffer, bundle),
     }
 }
 
@@ -77,13 +77,13 @@ const Course = struct {
 fn apart(
     comptime Kernel: type,
     geometry: *const world_file.Geometry,
-    found: *Found(Kernel),
+    buffer: *TileDepthBuffer(Kernel),
     bundle: *bundle_file.Bundle(Kernel),
 ) void {
     const Rays = Kernel.Rays;
-    found.spreadAll();
+    buffer.spreadAll();
     for (&bundle.groups, 0..) |*group, index| {
-        const own = found.of("slot", index);
+        const own = buffer.of("slot", index);
         const there = Rays.I32.loadAligned(own).gt(.splat(exact.no_slot));
         if (there.none()) continue;
         const tree = geometry.tree.get(Kernel.width);
@@ -103,42 +103,55 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
     const F32 = Rays.F32;
     const Vec3 = Rays.Vec3;
     return struct {
-        /// A triangle seen from the rays' origin, in lanes or the same in all of them.
-        fn Placed(comptime Value: type) type {
-            return struct {
-                /// Turned corners from the origin.
-                offsets: [3]Value,
-                /// Corners of its grown box from there.
-                lower: Value,
-                upper: Value,
-            };
-        }
+        /// Triangles in lanes as seen from the rays' origin.
+        const Placed = struct {
+            /// Turned corners from the origin.
+            offsets: [3]Vec3,
+            /// Corners of the grown box from there.
+            lower: Vec3,
+            upper: Vec3,
+
+            /// Minima and maxima are those of `triangle.locate`.
+            inline fn of(pad: f32, corners: [3]Vec3, origin: [3]f32) Placed {
+                const grow: Vec3 = .splat(@splat(pad));
+                const from: Vec3 = .splat(origin);
+                const a = turn(corners[0]);
+                const b = turn(corners[1]);
+                const c = turn(corners[2]);
+                return .{
+                    .offsets = .{ a.sub(from), b.sub(from), c.sub(from) },
+                    .lower = c.min(b.min(a)).sub(grow).sub(from),
+                    .upper = c.max(b.max(a)).add(grow).sub(from),
+                };
+            }
+        };
 
         fn run(
             geometry: *const world_file.Geometry,
             tree: *const world_file.Tree(Kernel.width),
             course: *const Course,
             grid: *const Grid,
-            found: *Found(Kernel),
+            buffer: *TileDepthBuffer(Kernel),
             bundle: *bundle_file.Bundle(Kernel),
         ) void {
             const origin = turned(grid.origin);
             const down = turned(course.negative);
             var last: Last = .{};
-            for (0..Kernel.subtile_count) |block| {
-                const whole = found.isWhole(block);
-                const block_slot = found.block_slot[block];
-                if (whole and block_slot == exact.no_slot) continue;
-                for (block * Kernel.subtile_groups..(block + 1) * Kernel.subtile_groups) |index| {
+            for (0..Kernel.subtile_count) |subtile| {
+                const whole = buffer.isWhole(subtile);
+                const subtile_slot = buffer.subtile_slot[subtile];
+                if (whole and subtile_slot == exact.no_slot) continue;
+                const first = subtile * Kernel.subtile_groups;
+                for (first..first + Kernel.subtile_groups) |index| {
                     const group = &bundle.groups[index];
-                    const own = found.of("slot", index);
+                    const own = buffer.of("slot", index);
                     const lanes: Rays.I32 = .loadAligned(own);
                     if (whole or lanes.eq(.splat(own[0])).all()) {
-                        const slot = if (whole) block_slot else own[0];
+                        const slot = if (whole) subtile_slot else own[0];
                         if (slot == exact.no_slot) continue;
                         if (slot != last.slot) last = .{
                             .slot = slot,
-                            .placed = inLanes(&placeOne(tree, geometry.pad, origin, slot)),
+                            .placed = .of(geometry.pad, exact.splat(Kernel, tree, slot), origin),
                             .primitive = .splat(exact.primitiveAt(Kernel.width, tree, slot)),
                         };
                         const hit = intersect(group, &last.placed, down, .splat(true));
@@ -147,7 +160,7 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
                     }
                     const there = lanes.gt(.splat(exact.no_slot));
                     const gathered = exact.gather(Kernel, tree, own);
-                    const each = placeEach(geometry.pad, gathered.corners, origin);
+                    const each: Placed = .of(geometry.pad, gathered.corners, origin);
                     const hit = intersect(group, &each, down, there);
                     assert(there.andNot(hit.mask).none());
                     group.closest = .{
@@ -161,7 +174,7 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
         /// The triangle that was met last, in all lanes: mostly the next rays meet it, too.
         const Last = struct {
             slot: exact.Slot = exact.no_slot,
-            placed: Placed(Vec3) = undefined,
+            placed: Placed = undefined,
             primitive: Rays.I32 = undefined,
         };
 
@@ -173,61 +186,6 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
             };
         }
 
-        /// One triangle. Minima and maxima are those of
-        /// `triangle.locate`.
-        fn placeOne(
-            tree: *const world_file.Tree(Kernel.width),
-            pad: f32,
-            origin: [3]f32,
-            slot: exact.Slot,
-        ) Placed([3]f32) {
-            var corners: [3][3]f32 = undefined;
-            for (&corners, 0..) |*corner, index| {
-                corner.* = turned(exact.cornerAt(Kernel.width, tree, slot, index));
-            }
-            var placed: Placed([3]f32) = undefined;
-            for (0..3) |component| {
-                const a = corners[0][component];
-                const b = corners[1][component];
-                const c = corners[2][component];
-                const low = if (b < a) b else a;
-                const high = if (b > a) b else a;
-                const from = origin[component];
-                placed.lower[component] = (if (c < low) c else low) - pad - from;
-                placed.upper[component] = (if (c > high) c else high) + pad - from;
-                for (&placed.offsets, corners) |*offset, corner| {
-                    offset[component] = corner[component] - from;
-                }
-            }
-            return placed;
-        }
-
-        inline fn inLanes(placed: *const Placed([3]f32)) Placed(Vec3) {
-            return .{
-                .offsets = .{
-                    .splat(placed.offsets[0]),
-                    .splat(placed.offsets[1]),
-                    .splat(placed.offsets[2]),
-                },
-                .lower = .splat(placed.lower),
-                .upper = .splat(placed.upper),
-            };
-        }
-
-        /// A triangle in each lane.
-        inline fn placeEach(pad: f32, corners: [3]Vec3, origin: [3]f32) Placed(Vec3) {
-            const grow: Vec3 = .splat(@splat(pad));
-            const from: Vec3 = .splat(origin);
-            const a = turn(corners[0]);
-            const b = turn(corners[1]);
-            const c = turn(corners[2]);
-            return .{
-                .offsets = .{ a.sub(from), b.sub(from), c.sub(from) },
-                .lower = c.min(b.min(a)).sub(grow).sub(from),
-                .upper = c.max(b.max(a)).add(grow).sub(from),
-            };
-        }
-
         inline fn turn(vector: Vec3) Vec3 {
             const components = turned([3]F32{ vector.x, vector.y, vector.z });
             return .{ .x = components[0], .y = components[1], .z = components[2] };
@@ -236,7 +194,7 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
         /// The hits of the rays in `found`.
         inline fn intersect(
             group: *const ray_file.Ray(Rays),
-            placed: *const Placed(Vec3),
+            placed: *const Placed,
             down: [3]bool,
             found: Rays.Mask,
         ) triangle.WeightedIntersection(Rays) {
@@ -272,7 +230,7 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
         /// Points so far within the box that t is surely within the range that the slab test gives:
         /// that is off by 3 u of a face's distance, the point by 1 u, and no component is longer
         /// than the last. Spares two divisions.
-        inline fn isWithin(point: Vec3, placed: *const Placed(Vec3)) Rays.Mask {
+        inline fn isWithin(point: Vec3, placed: *const Placed) Rays.Mask {
             const above = point.sub(placed.lower);
             const below = placed.upper.sub(point);
             const least = above.x.minOrNegative(above.y).minOrNegative(above.z)
