@@ -80,7 +80,7 @@ fn bench(
     diagnostic: *Diagnostic,
 ) ExitCode {
     const io = init.io;
-    const settings = benchSettings(options);
+    var settings = benchSettings(options);
     if (std.mem.findScalar(bool, &settings.wanted, true) == null) {
         say(io, "raylane: no variant's name contains {f}; --list-variants names them\n", .{
             raylane.diagnostic.quote(options.variants.?),
@@ -94,6 +94,7 @@ fn bench(
         return .failed;
     };
     defer target.abandon();
+    settings.output = target.replaces;
     var run_of: raylane.bench.Bench = .{
         .arena = init.arena.allocator(),
         .gpa = init.gpa,
