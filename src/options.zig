@@ -256,7 +256,8 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\
     \\Messages
     \\      --stats FORM         report as text, json or none (default: text, or none
-    \\                           when the image goes to standard output)
+    \\                           when the image goes to standard output); when it is
+    \\                           given, a report that cannot be printed is an error
     \\      --count-tests        count intersection tests, in a second, untimed pass
     \\  -q, --quiet              no warnings, no progress, no report but by --stats
     \\  -v, --verbose            say what was chosen by default
@@ -264,7 +265,7 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\      --version            print the version
     \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
-    \\supported, 130 interrupted.
+    \\supported, 128 + N ended by signal N.
     \\
 ;
 

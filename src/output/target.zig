@@ -496,3 +496,30 @@ test "pipes, devices and descriptors are written where they stand" {
     try writeAll(io, file, &.{"behind"});
     try folder.expectFile("file", "before, picture, picture, behind");
 }
+
+test "a small stack is enough" {
+    var folder: TestFolder = .init();
+    defer folder.folder.cleanup();
+    const Thread = struct {
+        result: anyerror!void = error.NotRun,
+
+        fn run(thread: *@This(), test_folder: *TestFolder) void {
+            thread.result = thread.replace(test_folder);
+        }
+
+        fn replace(_: *@This(), test_folder: *TestFolder) !void {
+            for (0..2) |_| {
+                var target = try test_folder.open("a");
+                try target.finish(&.{"new"}, &test_folder.diagnostic);
+            }
+        }
+    };
+    var thread: Thread = .{};
+    // A quarter of `ulimit -s 256`.
+    const handle = try std.Thread.spawn(.{ .stack_size = 64 << 10 }, Thread.run, .{
+        &thread, &folder,
+    });
+    handle.join();
+    try thread.result;
+    try folder.expectOnly("a", "new");
+}
