@@ -672,9 +672,11 @@ test "a killed run's leftover goes with the next one, nobody else's does" {
     const leftover = both[@intFromBool(std.mem.eql(u8, both[0], living_name))];
 
     // The same from another machine, whose processes and locks are not to be seen from here.
-    const host = std.mem.find(u8, leftover, ".raylane-").? + ".raylane-".len;
+    const mark = ".raylane-";
+    const host = std.mem.find(u8, leftover, mark) orelse return error.NotItsName;
     const foreign = try sandbox.arena_state.allocator().dupe(u8, leftover);
-    foreign[host] = if (foreign[host] == '0') '1' else '0';
+    const digit = &foreign[host + mark.len];
+    digit.* = if (digit.* == '0') '1' else '0';
     try sandbox.write(foreign, "");
 
     _ = try sandbox.expectExit(0, &.{ "builtin:cornell", "-r8x8", "-q", "-ob.png" });

@@ -72,9 +72,7 @@ pub const Target = struct {
             }) catch |err| switch (err) {
                 error.FileNotFound => null,
                 error.SymLinkLoop => {
-                    const length = place.folder.readLink(io, place.name(), &link_buffer) catch
-                        return fail(err, diagnostic);
-                    rest = link_buffer[0..length];
+                    rest = place.follow(io, &link_buffer) catch |why| return fail(why, diagnostic);
                     continue;
                 },
                 else => return fail(err, diagnostic),
@@ -140,6 +138,15 @@ const Place = struct {
         place.folder = folder;
         @memcpy(place.name_buffer[0..last.len], last);
         place.name_length = last.len;
+    }
+
+    /// Where a symbolic link leads, unless the system forbids to follow it, as it does with those
+    /// of others in folders that everybody may write.
+    fn follow(place: *const Place, io: Io, buffer: []u8) ![]const u8 {
+        if (place.folder.openFile(io, place.name(), .{ .path_only = true })) |file| {
+            file.close(io);
+        } else |err| if (err != error.FileNotFound) return err;
+        return buffer[0..try place.folder.readLink(io, place.name(), buffer)];
     }
 
     fn open(place: *Place, io: Io, temporaries: *TemporaryFiles) !Target {
