@@ -10,7 +10,7 @@
 //!
 //! Every step of the slab test is monotone in origin, inverse and bound, rounding included. So
 //! from the ends of intervals come bounds of what the test gives for any ray between, and nothing
-//! is culled that the ray by itself would have found (box.zig; `Geometry.fused_reach` for multiply-
+//! is culled that the ray by itself would have found (box.zig; world/padding.zig for multiply-
 //! adds).
 //!
 //! S. Boulos, I. Wald and P. Shirley, "Geometric and Arithmetic Culling Methods for Entire Ray
@@ -35,11 +35,11 @@ const packet_rays_min = std.EnumArray(Query, u32).init(.{ .closest_hit = 4, .any
 /// incoherent, too, and each comparison goes over the whole subtile.
 const incoherent_max = 2;
 /// How far apart the directions of rays are that go together, over their length, and the origins,
-/// over the size of the scene. Both are rough: what they let through costs little more than single
+/// over `Geometry.size`. Both are rough: what they let through costs little more than single
 /// rays, since a child is entered only where a ray is (`Search.meet`).
 const direction_apart_max = 0.06;
 /// See `direction_apart_max`.
-const origin_apart_max = 0.01;
+const origin_apart_max = 0.03;
 
 /// Whether packets of shadow rays pay: every node that a packet visits earns a little, every
 /// child that its intervals meet though none of its rays enters it costs much more. Once all is
@@ -97,7 +97,8 @@ fn traceSubtile(
     var views: [Kernel.subtile_groups]bundle_file.Precalculations(Rays) = undefined;
     for (&active, groups) |*mask, *group| mask.* = group.active;
     if (firstOf(Rays, &active) == null) return;
-    for (&views, groups) |*view, *group| view.* = bundle_file.viewOf(Rays, group);
+    const padding = &stream.geometry.padding;
+    for (&views, groups) |*view, *group| view.* = bundle_file.viewOf(Rays, padding, group);
     var rest = active;
     var incoherent: [Kernel.subtile_groups]Rays.Mask = @splat(.splat(false));
     var incoherent_count: u32 = 0;
@@ -165,7 +166,7 @@ fn CoherentGroup(comptime Rays: type) type {
             return .{
                 .origin = .splat(group.line.origin.lane(lane)),
                 .direction = .splat(direction),
-                .origin_apart = .splat(geometry.pad * (origin_apart_max / world_file.pad_relative)),
+                .origin_apart = .splat(geometry.size * origin_apart_max),
                 .direction_apart = .splat(length * direction_apart_max),
                 .octant = octant,
             };
@@ -202,8 +203,10 @@ fn tracePacket(
 ) bool {
     @setEvalBranchQuota(4000); // For what is inlined here.
     const tree = geometry.tree.get(Kernel.width);
-    const ends: Ends = .of(Kernel, groups, views);
-    if (!(ends.reach() < geometry.fused_reach)) return false;
+    for (groups, views) |*group, *view| {
+        if (group.active.andNot(view.fusable).any()) return false;
+    }
+    const ends: Ends = .of(Kernel, &geometry.padding, groups, views);
     var search: Search(Kernel, query) = .init(geometry, groups, views, octant, &ends, budget.*);
     _ = walk.walk(Kernel, tree, &search, counts);
     budget.balance = @min(search.budget.balance, PacketBudget.balance_max);
@@ -217,26 +220,33 @@ fn tracePacket(
 
 /// The least and the greatest of what rays have.
 const Ends = struct {
+    /// The least from which an upper face of a node is met, the greatest from which a lower one is.
     origin: [3][2]f32,
     inverse: [3][2]f32,
     tnear_t: f32,
     closest_t: f32,
 
-    inline fn of(comptime Kernel: type, groups: anytype, views: anytype) Ends {
+    inline fn of(
+        comptime Kernel: type,
+        padding: *const world_file.Padding,
+        groups: anytype,
+        views: anytype,
+    ) Ends {
         const Rays = Kernel.Rays;
         const inf: Rays.F32 = .splat(std.math.inf(f32));
         var least: [7]Rays.F32 = @splat(inf);
         var greatest: [7]Rays.F32 = @splat(inf.neg());
         for (groups, views) |*group, *view| {
             if (group.active.none()) continue;
-            const origin = group.line.origin;
+            const most, const origin = bundle_file.nodeOrigins(Rays, padding, group.line.origin);
             const inverse = view.slabs.direction_inv;
-            const values = [6]Rays.F32{
+            const lows = [6]Rays.F32{
                 origin.x, origin.y, origin.z, inverse.x, inverse.y, inverse.z,
             };
-            for (values, least[0..6], greatest[0..6]) |value, *low, *high| {
-                low.* = low.minFast(.select(group.active, value, inf));
-                high.* = high.maxFast(.select(group.active, value, inf.neg()));
+            const highs = [6]Rays.F32{ most.x, most.y, most.z, inverse.x, inverse.y, inverse.z };
+            for (lows, highs, least[0..6], greatest[0..6]) |less, more, *low, *high| {
+                low.* = low.minFast(.select(group.active, less, inf));
+                high.* = high.maxFast(.select(group.active, more, inf.neg()));
             }
             least[6] = least[6].minFast(.select(group.active, group.tnear.t, inf));
             const closest: Rays.F32 = .select(group.active, group.closest.t, inf.neg());
@@ -250,13 +260,6 @@ const Ends = struct {
         ends.tnear_t = least[6].reduceMin();
         ends.closest_t = greatest[6].reduceMax();
         return ends;
-    }
-
-    /// The largest |coordinate| of an origin.
-    fn reach(ends: *const Ends) f32 {
-        var largest: f32 = 0;
-        for (ends.origin) |range| largest = @max(largest, @abs(range[0]), @abs(range[1]));
-        return largest;
     }
 };
 
@@ -278,10 +281,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         tnear_t: F32,
         /// The greatest t that matters.
         limit: f32,
-        /// By how much boxes of triangles are grown: more than their own pad and a node's margin.
-        grow: f32,
-        /// See `Geometry.pad`.
-        pad: f32,
+        padding: *const world_file.Padding,
         budget: PacketBudget,
 
         const Self = @This();
@@ -357,8 +357,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
                 .slabs = slabs,
                 .tnear_t = .splat(ends.tnear_t),
                 .limit = ends.closest_t,
-                .grow = geometry.pad + 2 * geometry.node_margin,
-                .pad = geometry.pad,
+                .padding = &geometry.padding,
                 .budget = budget,
             };
         }
@@ -431,12 +430,14 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             const group = &search.groups[index];
             bundle_file.countBoxes(Kernel, group, counts);
             const inverse = search.views[index].slabs.direction_inv;
-            const shift = search.views[index].shift;
+            const near_shift = search.views[index].near_shift;
+            const far_shift = search.views[index].far_shift;
             var first: [3]Rays.F32 = undefined;
             var last: [3]Rays.F32 = undefined;
             inline for (&first, &last, near, far, .{ "x", "y", "z" }) |*a, *b, low, high, axis| {
-                a.* = Rays.F32.splat(low).mulAdd(@field(inverse, axis), @field(shift, axis));
-                b.* = Rays.F32.splat(high).mulAdd(@field(inverse, axis), @field(shift, axis));
+                const factor = @field(inverse, axis);
+                a.* = Rays.F32.splat(low).mulAdd(factor, @field(near_shift, axis));
+                b.* = Rays.F32.splat(high).mulAdd(factor, @field(far_shift, axis));
             }
             const range = box.between(Rays, first, last, group.tnear.t, group.closest.t);
             return range.isMet().bitAnd(group.active);
@@ -485,17 +486,25 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             search: *const Self,
             pack: *const world_file.TrianglePack(Kernel.width),
         ) Met {
-            const grow: F32 = .splat(search.grow);
             var near: [3]F32 = undefined;
             var far: [3]F32 = undefined;
             var lowers: [3]F32 = undefined;
             var uppers: [3]F32 = undefined;
-            inline for (&near, &far, &search.slabs, 0..) |*first, *last, *slab, axis| {
+            inline for (&lowers, &uppers, 0..) |*lower, *upper, axis| {
                 const a: F32 = .load(&pack.corner[0][axis]);
                 const b: F32 = .load(&pack.corner[1][axis]);
                 const c: F32 = .load(&pack.corner[2][axis]);
-                lowers[axis] = a.minFast(b).minFast(c).sub(grow);
-                uppers[axis] = a.maxFast(b).maxFast(c).add(grow);
+                lower.* = a.minFast(b).minFast(c);
+                upper.* = a.maxFast(b).maxFast(c);
+            }
+            const grow = search.padding.marginOfBoxes(
+                Boxes,
+                .{ .x = lowers[0], .y = lowers[1], .z = lowers[2] },
+                .{ .x = uppers[0], .y = uppers[1], .z = uppers[2] },
+            );
+            inline for (&near, &far, &search.slabs, 0..) |*first, *last, *slab, axis| {
+                lowers[axis] = lowers[axis].sub(grow);
+                uppers[axis] = uppers[axis].add(grow);
                 first.* = slab.near(.select(slab.negative, uppers[axis], lowers[axis]));
                 last.* = slab.far(.select(slab.negative, lowers[axis], uppers[axis]));
             }
@@ -531,7 +540,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             while (rest != 0) : (rest &= rest - 1) {
                 const lane = @ctz(rest);
                 var ray: TraversalRay = .of(Rays, true, group, view, lane);
-                if (!ray.intersect(pack, search.pad, counts)) continue;
+                if (!ray.intersect(pack, search.padding, counts)) continue;
                 found |= @as(u32, 1) << @intCast(lane);
                 ts[lane] = if (query == .any_hit) -std.math.inf(f32) else ray.limit;
                 primitives[lane] = ray.closest_primitive;
@@ -555,7 +564,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             while (rest != 0) : (rest &= rest - 1) {
                 found = bundle_file.intersectLane(Kernel, query, group, view, pack, .{
                     .lane = @ctz(rest),
-                    .pad = search.pad,
+                    .padding = search.padding,
                 }, counts) or found;
             }
             return found;

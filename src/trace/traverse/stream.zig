@@ -79,10 +79,8 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
             const groups = stream.bundle.groups[first_group..][0..views.len];
             for (groups, views, first_group..) |*group, *view, number| {
                 if (group.active.none()) continue;
-                const origin = group.line.origin.abs();
-                const reach = origin.x.max(origin.y).max(origin.z);
-                const near = group.active.bitAnd(reach.lt(.splat(stream.geometry.fused_reach)));
-                var bits = near.bits();
+                const fusable = group.active.bitAnd(view.fusable);
+                var bits = fusable.bits();
                 while (bits != 0) : (bits &= bits - 1) {
                     if (stream.count == rays_max) stream.finish(counts);
                     const lane = @ctz(bits);
@@ -90,9 +88,9 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                     stream.places[stream.count] = .{ .group = @intCast(number), .lane = lane };
                     stream.count += 1;
                 }
-                const far = group.active.andNot(near);
-                if (far.none()) continue;
-                group.active = far;
+                const others = group.active.andNot(fusable);
+                if (others.none()) continue;
+                group.active = others;
                 single.traceEach(Kernel, query, stream.geometry, group, view, counts);
             }
         }
@@ -166,7 +164,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                 const number = @ctz(rest);
                 const ray = &stream.rays[number];
                 for (packs) |*pack| {
-                    if (!ray.intersect(pack, stream.geometry.pad, counts)) continue;
+                    if (!ray.intersect(pack, &stream.geometry.padding, counts)) continue;
                     stream.found |= @as(Set, 1) << @intCast(number);
                 }
             }

@@ -38,8 +38,8 @@ pub fn TileDepthBuffer(comptime Kernel: type) type {
     const lanes = Kernel.ray_count;
     const subtile_groups = Kernel.subtile_groups;
     return struct {
-        /// Subtiles that one triangle fills, or none, a bit each: `subtile_slot` and `depth` tell of
-        /// these. Others have it by pixel.
+        /// Subtiles that one triangle fills, or none, a bit each: `subtile_slot` and `depth` tell
+        /// of these. Others have it by pixel.
         whole: u32,
         subtile_slot: [subtile_count]exact.Slot align(64),
         depth: Depth([subtile_count]f32) align(64),
