@@ -191,6 +191,7 @@ test {
     _ = @import("trace/traverse/beam/budget.zig");
     _ = @import("trace/traverse/beam/tile_depth_buffer.zig");
     _ = @import("trace/traverse/beam/grid.zig");
+    _ = @import("trace/traverse/beam/projected_triangle.zig");
     _ = @import("trace/integrate/camera.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/offset.zig");
