@@ -190,8 +190,10 @@ test {
     _ = Tiles;
     _ = @import("trace/traverse/beam/budget.zig");
     _ = @import("trace/traverse/beam/tile_depth_buffer.zig");
+    _ = @import("trace/traverse/beam/frustum.zig");
     _ = @import("trace/traverse/beam/grid.zig");
     _ = @import("trace/traverse/beam/projected_triangle.zig");
+    _ = @import("trace/traverse/beam/shadow_plane.zig");
     _ = @import("trace/integrate/camera.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/offset.zig");

@@ -146,3 +146,85 @@ pub fn Met(comptime Lanes: type) type {
         }
     };
 }
+
+const Grid = @import("grid.zig").Grid;
+const vec3 = @import("../../../math.zig").vec3;
+
+/// A random tile, and what a point may be seen at.
+const TestBeam = struct {
+    grid: Grid,
+    frustum: Frustum(Four),
+    pad: f32,
+
+    const Four = @import("../../../simd.zig").Lanes(.vector, 4);
+
+    fn init(random: std.Random, place: f32, reach: f32) ?TestBeam {
+        var grid: Grid = undefined;
+        for (&grid.origin, &grid.corner, &grid.right, &grid.down) |*at, *to, *right, *down| {
+            at.* = random.floatNorm(f32) * place;
+            to.* = random.floatNorm(f32);
+            right.* = random.floatNorm(f32) * 1e-2;
+            down.* = random.floatNorm(f32) * 1e-2;
+        }
+        const sides = grid.sides() orelse return null;
+        const along = grid.depthNormal() orelse return null;
+        const farthest = vec3.length1(grid.origin) + reach;
+        const pad = 0x1p-24 * (32 * reach + 4 * farthest);
+        return .{
+            .grid = grid,
+            .frustum = .init(grid.origin, sides, along, slack_pads * pad),
+            .pad = pad,
+        };
+    }
+
+    /// A box from `lower` to `upper` as the third child of a node.
+    fn meets(beam: *const TestBeam, lower: [3]f32, upper: [3]f32, depth_max: f32) ?f32 {
+        var node: world_file.Node(4) = .empty;
+        for (0..3) |axis| {
+            node.bounds[0][axis][2] = lower[axis];
+            node.bounds[1][axis][2] = upper[axis];
+        }
+        const met = beam.frustum.meet(&node, depth_max);
+        return if (met.mask.lane(2)) met.near.lane(2) else null;
+    }
+};
+
+test "no box or triangle that a ray reaches is culled; what is well beside the beam is" {
+    var generator = std.Random.DefaultPrng.init(31);
+    const random = generator.random();
+    var beam_count: u32 = 0;
+    for (0..4000) |round| {
+        const reach: f32 = ([_]f32{ 1, 50, 1e4 })[round % 3];
+        const beam = TestBeam.init(random, if (round % 4 == 0) 1e4 else 1, reach) orelse continue;
+        beam_count += 1;
+        const grid = &beam.grid;
+        const x: f32 = @floatFromInt(random.uintLessThan(u32, 16));
+        const y: f32 = @floatFromInt(random.uintLessThan(u32, 16));
+        const direction = grid.direction(x, y);
+        // On the ray in 128 bits, then the next float of either side.
+        const t = random.float(f32) * reach / vec3.length1(direction);
+        var lower: [3]f32 = undefined;
+        var upper: [3]f32 = undefined;
+        for (&lower, &upper, grid.origin, direction) |*low, *high, from, way| {
+            const exact = @as(f128, from) + @as(f128, t) * @as(f128, way);
+            const rounded: f32 = @floatCast(exact);
+            low.* = if (rounded > exact) std.math.nextAfter(f32, rounded, -1e9) else rounded;
+            high.* = if (rounded < exact) std.math.nextAfter(f32, rounded, 1e9) else rounded;
+        }
+        const near = beam.meets(lower, upper, std.math.inf(f32));
+        try std.testing.expect(near != null and near.? <= t);
+        try std.testing.expect(beam.meets(lower, upper, t) != null);
+        const Vec3 = TestBeam.Four.Vec3;
+        const corners = [3]Vec3{ .splat(lower), .splat(upper), .splat(lower) };
+        try std.testing.expect(beam.frustum.mayMeet(corners).all());
+        // As far beyond a plane as twice what it stands off.
+        for (beam.frustum.sides) |plane| {
+            const far = 2 * slack_pads * beam.pad + 2 * reach * 0x1p-20;
+            const length = vec3.dot(plane.normal, plane.normal);
+            const out = -far * vec3.length1(plane.normal) / length;
+            const beyond = vec3.add(grid.origin, vec3.scale(plane.normal, out));
+            try std.testing.expectEqual(null, beam.meets(beyond, beyond, std.math.inf(f32)));
+        }
+    }
+    try std.testing.expect(beam_count > 1000);
+}

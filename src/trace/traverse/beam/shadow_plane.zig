@@ -8,6 +8,7 @@
 const std = @import("std");
 const world_file = @import("../../../world.zig");
 const kernel_file = @import("../kernel.zig");
+const bundle_file = @import("../bundle.zig");
 const ray_file = @import("../ray.zig");
 const edges_file = @import("edges.zig");
 const frustum_file = @import("frustum.zig");
@@ -411,4 +412,137 @@ fn median(comptime Kernel: type, values: *const [subtile_count]f32, count: usize
         if (less <= count / 2 and count / 2 < not_more) return value;
     }
     return values[0];
+}
+
+/// Rays of a tile that end on a rough plane, or scattered.
+fn randomBundle(
+    comptime Kernel: type,
+    random: std.Random,
+    light: *const world_file.Light,
+    scattered: bool,
+) bundle_file.Bundle(Kernel) {
+    var bundle: bundle_file.Bundle(Kernel) = undefined;
+    var axes: [3][3]f32 = undefined;
+    for (&axes) |*axis| for (axis) |*component| {
+        component.* = random.floatNorm(f32);
+    };
+    const spread: f32 = if (scattered) 1 else 1e-3;
+    for (&bundle.groups, 0..) |*group, index| {
+        var point: [3][Kernel.ray_count]f32 = undefined;
+        var active: [Kernel.ray_count]bool = undefined;
+        for (&active, 0..) |*is_active, lane| {
+            is_active.* = !scattered or random.float(f32) < 0.8;
+            const x = @as(f32, @floatFromInt(Kernel.pixelX(index, lane))) * 0.02;
+            const y = @as(f32, @floatFromInt(Kernel.pixelY(index, lane))) * 0.02;
+            for (&point, 0..) |*component, axis| component[lane] = axes[0][axis] +
+                x * axes[1][axis] + y * axes[2][axis] + spread * random.floatNorm(f32);
+        }
+        const ends: Kernel.Rays.Vec3 =
+            .{ .x = .fromArray(point[0]), .y = .fromArray(point[1]), .z = .fromArray(point[2]) };
+        const none: Kernel.Rays.Vec3 = .splat(light.position);
+        group.active = .fromArray(active);
+        group.skip = .splat(ray_file.no_primitive);
+        group.closest = .before(.splat(if (light.kind == .point) 1 else inf));
+        group.line = if (light.kind == .point)
+            .init(none, ends.sub(none))
+        else
+            .init(ends, .splat(.{ -light.direction[0], -light.direction[1], -light.direction[2] }));
+    }
+    return bundle;
+}
+
+/// Whether bounds of subtiles and of all hold every member, and the planes around them the way from
+/// the light; places are those of the rays' own numbers in 128 bits.
+fn expectEnclosed(
+    comptime Kernel: type,
+    set: *const ShadowReceivers(Kernel),
+    members: *const Members,
+    random: std.Random,
+) !void {
+    const projection = &set.projection;
+    var ends: [2][2]f128 = @splat(.{ inf, -inf });
+    for (0..pixel_count) |pixel| {
+        const subtile = pixel / subtile_pixels;
+        if (members[subtile] >> @intCast(pixel % subtile_pixels) & 1 == 0) continue;
+        const group = &set.bundle.groups[pixel / Kernel.ray_count];
+        const lane = pixel % Kernel.ray_count;
+        const origin = group.line.origin.lane(lane);
+        const direction = group.line.direction.lane(lane);
+        var from: [3]f128 = undefined;
+        var way: [3]f128 = undefined;
+        for (&from, &way, 0..) |*start, *along, index| {
+            const axis = projection.axisAt(index);
+            start.* = @as(f128, origin[axis]) - projection.origin[axis];
+            along.* = direction[axis];
+        }
+        const depth = if (projection.slope == null) way[2] else from[2];
+        const flat: [2]f128 = if (projection.slope == null)
+            .{ way[0] / way[2], way[1] / way[2] }
+        else
+            .{ from[0] - from[2] * way[0] / way[2], from[1] - from[2] * way[1] / way[2] };
+        const basis = &set.basis;
+        const axes = [2]f128{
+            flat[0] * basis.i00 + flat[1] * basis.i01,
+            flat[0] * basis.i10 + flat[1] * basis.i11,
+        };
+        const all = [2][2]f32{ set.bounds.u, set.bounds.v };
+        const subtiles = [2]*const [2][subtile_count]f32{ &set.subtile_u, &set.subtile_v };
+        for (axes, all, subtiles, &ends) |at, bounds, own, *end| {
+            try std.testing.expect(bounds[0] <= at and at <= bounds[1]);
+            try std.testing.expect(own[0][subtile] <= at and at <= own[1][subtile]);
+            end.* = .{ @min(end[0], at), @max(end[1], at) };
+        }
+        const farthest: f128 = @as(f128, set.bounds.depth) * (1 + 0x1p-20) + 0x1p-20;
+        try std.testing.expect(depth * projection.sign <= farthest);
+        // A point on the way between light and receiver.
+        const share: f32 = random.float(f32) * @as(f32, if (projection.slope == null) 1 else 3);
+        var corner: [3]f32 = undefined;
+        for (&corner, origin, direction) |*to, start, along| to.* = start + share * along;
+        const at: Kernel.Boxes.Vec3 = .splat(corner);
+        try std.testing.expect(set.frustum.mayMeet(.{ at, at, at }).all());
+    }
+    // Not wider than what is there by more than some hundred roundings of the largest number.
+    for (ends, [2][2]f32{ set.bounds.u, set.bounds.v }) |end, bounds| {
+        const size = @max(1, @abs(end[0]), @abs(end[1]), projection.reach);
+        const margin = 0x1p-14 * size * set.basis.norm();
+        try std.testing.expect(bounds[0] >= end[0] - margin and bounds[1] <= end[1] + margin);
+    }
+}
+
+test "bounds and planes hold every receiver and the light's way to it, and little more" {
+    var generator = std.Random.DefaultPrng.init(41);
+    const random = generator.random();
+    inline for (.{ 4, 16 }) |lanes| {
+        const Kernel = kernel_file
+            .Kernel(.{ .backend = .vector, .traversal = .beam, .lanes = lanes }, false);
+        for (0..60) |round| {
+            var light: world_file.Light = .{
+                .kind = if (round % 2 == 0) .point else .directional,
+                .position = undefined,
+                .direction = undefined,
+                .intensity = @splat(1),
+                .range_inv_squared = 0,
+                .cone_scale = 0,
+                .cone_offset = 1,
+            };
+            for (&light.position, &light.direction) |*at, *way| {
+                at.* = random.floatNorm(f32) * 4;
+                way.* = random.floatNorm(f32);
+            }
+            var bundle = randomBundle(Kernel, random, &light, round % 3 == 0);
+            var geometry: world_file.Geometry = undefined;
+            geometry.pad = 40 * 0x1p-20;
+            var set: ShadowReceivers(Kernel) = undefined;
+            set.geometry = &geometry;
+            set.bundle = &bundle;
+            var members = members_file.activeOf(Kernel, &bundle);
+            const count = members_file.count(&members);
+            const rest = place(Kernel, &set, &light, &members);
+            try std.testing.expectEqual(count, members_file.count(&members) +
+                members_file.count(&rest));
+            if (members_file.count(&members) == 0) continue;
+            encloseRays(Kernel, &set);
+            try expectEnclosed(Kernel, &set, &members, random);
+        }
+    }
 }
