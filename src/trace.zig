@@ -37,6 +37,14 @@ pub const bundle = @import("trace/traverse/bundle.zig");
 pub const eye_rays = @import("trace/traverse/beam/eye_rays.zig");
 /// The directions of a beam's rays.
 pub const Grid = @import("trace/traverse/beam/grid.zig").Grid;
+/// The parts of beams whose bounds are tested.
+pub const beam = struct {
+    pub const frustum = @import("trace/traverse/beam/frustum.zig");
+    pub const members = @import("trace/traverse/beam/members.zig");
+    pub const projected_triangle = @import("trace/traverse/beam/projected_triangle.zig");
+    pub const shadow_plane = @import("trace/traverse/beam/shadow_plane.zig");
+    pub const shadow_receivers = @import("trace/traverse/beam/shadow_receivers.zig");
+};
 /// A bundle in the variant's own way.
 pub const dispatch = @import("trace/traverse/dispatch.zig");
 

@@ -84,7 +84,7 @@ pub fn Tracer(comptime Kernel: type) type {
             for (&batch.groups, &batch.shares, hits) |*group, *all, hit| {
                 if (hit.none()) continue;
                 const primitive: Lanes.I32 = .select(hit, group.closest.primitive, .zero());
-                const weights = edgeFunctions(tracer.gather(primitive), group.line, hit);
+                const weights = edgeFunctions(tracer.cornersOf(primitive, hit), group.line, hit);
                 const share = Lanes.F32.splat(1).div(weights.sum());
                 const both = [2]Lanes.F32{ weights.b.mul(share), weights.c.mul(share) };
                 for (all, both) |*to, value| {
@@ -102,6 +102,18 @@ pub fn Tracer(comptime Kernel: type) type {
                 const numbers = geometry.triangles[@intCast(primitives[@ctz(hits)])].corner;
                 inline for (numbers) |number| @prefetch(&geometry.positions[number], .{});
             }
+        }
+
+        /// Corners of what was hit: neighbours mostly hit the same.
+        fn cornersOf(tracer: *const Self, primitives: Lanes.I32, hit: Lanes.Mask) [3]Lanes.Vec3 {
+            const one = primitives.lane(@ctz(hit.bits()));
+            if (hit.andNot(primitives.eq(.splat(one))).any()) return tracer.gather(primitives);
+            const geometry = &tracer.world.geometry;
+            var corners: [3]Lanes.Vec3 = undefined;
+            for (&corners, geometry.triangles[@intCast(one)].corner) |*corner, number| {
+                corner.* = .splat(geometry.positions[number]);
+            }
+            return corners;
         }
 
         fn gather(tracer: *const Self, primitives: Lanes.I32) [3]Lanes.Vec3 {

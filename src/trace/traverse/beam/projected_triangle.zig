@@ -24,7 +24,8 @@ pub fn Linear(comptime Value: type) type {
 
         /// In lanes, times a factor.
         pub inline fn scale(form: @This(), factor: Value) @This() {
-            return .{ .u = form.u.mul(factor), .v = form.v.mul(factor), .one = form.one.mul(factor) };
+            const one = form.one.mul(factor);
+            return .{ .u = form.u.mul(factor), .v = form.v.mul(factor), .one = one };
         }
 
         /// A form of numbers, at places in lanes.
@@ -154,7 +155,7 @@ pub const LightProjection = struct {
         projection.stretch = stretch;
         projection.scale = .{
             .edge = unit * stretch * edges_file.edge_roundings * if (parallel) stretch else 1,
-            .nearness = if (parallel) unit * stretch else unit * stretch * edges_file.inverse_roundings,
+            .nearness = unit * stretch * if (parallel) @as(f32, 1) else edges_file.inverse_roundings,
         };
     }
 
@@ -258,7 +259,8 @@ pub const LightProjection = struct {
                 .det = area,
             },
         };
-        inline for (&projected.edge, sides, [3]Vec3{ c.add(b), a.add(c), b.add(a) }) |*to, by, sum| {
+        const sums = [3]Vec3{ c.add(b), a.add(c), b.add(a) };
+        inline for (&projected.edge, sides, sums) |*to, by, sum| {
             const u = by.x.sub(by.z.mul(along.x)).mul(flip);
             const v = by.y.sub(by.z.mul(along.y)).mul(flip);
             const middle_u = sum.x.sub(sum.z.mul(along.x)).mul(.splat(0.5));
