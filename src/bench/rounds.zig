@@ -175,10 +175,10 @@ pub fn Rounds(comptime Subject: type) type {
             const subject = rounds.subject;
             for (rounds.plan.variants, rounds.series) |variant, *one| {
                 _ = try subject.prepare(variant);
-                const traced = subject.trace(variant, rounds.plan.thread_count);
+                const traced = try subject.trace(variant, rounds.plan.thread_count);
                 try rounds.check(variant, rounds.plan.thread_count);
                 rounds.rays = traced.rays;
-                one.tests = subject.count(variant);
+                one.tests = try subject.count(variant);
                 try rounds.check(variant, rounds.plan.thread_count);
                 subject.step();
             }
@@ -215,7 +215,7 @@ pub fn Rounds(comptime Subject: type) type {
             const start_ns = subject.now();
             while (frame_count == 0 or subject.now() - start_ns < window_ns) : (frame_count += 1) {
                 const prepared = try subject.prepare(variant);
-                const traced = subject.trace(variant, thread_count);
+                const traced = try subject.trace(variant, thread_count);
                 sums.parse += prepared.parse_ns;
                 sums.prepare += prepared.prepare_ns;
                 sums.build += prepared.bvh_build_ns;
@@ -240,7 +240,7 @@ pub fn Rounds(comptime Subject: type) type {
             const start = subject.mark();
             const start_ns = subject.now();
             while (frame_count == 0 or subject.now() - start_ns < subject.windowNs()) {
-                _ = subject.trace(variant, rounds.plan.thread_count);
+                _ = try subject.trace(variant, rounds.plan.thread_count);
                 frame_count += 1;
             }
             const energy = rounds.since(start, frame_count);
@@ -295,7 +295,7 @@ pub fn Rounds(comptime Subject: type) type {
                 for (scaled_variants, 0..) |variant, variant_index| {
                     _ = try subject.prepare(variant);
                     for (thread_counts, 0..) |thread_count, count_index| {
-                        const traced = subject.trace(variant, thread_count);
+                        const traced = try subject.trace(variant, thread_count);
                         try rounds.check(variant, thread_count);
                         subject.step();
                         const list = &lists[variant_index * thread_counts.len + count_index];

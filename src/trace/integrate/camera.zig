@@ -1,37 +1,12 @@
-//! Primary rays of pixels in lanes.
+//! Pinhole and orthographic cameras: primary rays of pixels in lanes.
 //!
-//! In: the camera, a sample's place within the pixel. Out: origins and directions, affine in the
-//! pixel's position and not normalised, so that all pixels of a bundle can share work.
+//! In: the view, places in the picture. Out: origins and directions, affine in the place and not
+//! normalised, so that all pixels of a bundle can share work.
 
-const std = @import("std");
 const world_file = @import("../../world.zig");
 const vec3 = @import("../../math.zig").vec3;
 const ray_file = @import("../traverse/ray.zig");
 const Grid = @import("../traverse/beam/grid.zig").Grid;
-const assert = std.debug.assert;
-
-/// A sample's place in its pixel, 0..1 from the upper left corner.
-pub const Offset = struct { x: f32, y: f32 };
-
-/// The place of one of `sample_count` samples: the middle for a single one; else the Hammersley
-/// points (x in equal strata, y the radical inverse in base 2), the same for every pixel.
-pub fn sampleOffset(sample: u32, sample_count: u32) Offset {
-    assert(sample < sample_count);
-    const count: f32 = @floatFromInt(sample_count);
-    const index: f32 = @floatFromInt(sample);
-    // @bitReverse of at most 24 significant bits, so that the conversion is exact.
-    const reversed: f32 = @floatFromInt(@bitReverse(sample) >> 8);
-    const radical_inverse = reversed / 16_777_216.0;
-    return .{
-        .x = (index + 0.5) / count,
-        .y = radical_inverse + 0.5 / count,
-    };
-}
-
-/// A ray in lanes before it is made ready for traversal.
-pub fn Start(comptime Lanes: type) type {
-    return struct { origin: Lanes.Vec3, direction: Lanes.Vec3 };
-}
 
 /// The rays through points (x, y) of the picture in pixels from its upper left corner.
 pub inline fn generate(
@@ -39,7 +14,7 @@ pub inline fn generate(
     view: *const world_file.View,
     x: Lanes.F32,
     y: Lanes.F32,
-) Start(Lanes) {
+) ray_file.Line(Lanes) {
     const camera = &view.camera;
     const width: f32 = @floatFromInt(view.width);
     const height: f32 = @floatFromInt(view.height);
@@ -79,22 +54,4 @@ pub fn grid(view: *const world_file.View, x: f32, y: f32) ?Grid {
         // and steps of up to a tile are as many again.
         .deviation_roundings = 12 * extent,
     };
-}
-
-test "one sample is in the middle, many fill every stratum of both axes" {
-    try std.testing.expectEqual(Offset{ .x = 0.5, .y = 0.5 }, sampleOffset(0, 1));
-    inline for (.{ 2, 4, 16, 64 }) |count| {
-        var columns: [count]bool = @splat(false);
-        var rows: [count]bool = @splat(false);
-        for (0..count) |sample| {
-            const offset = sampleOffset(@intCast(sample), count);
-            columns[@intFromFloat(offset.x * count)] = true;
-            rows[@intFromFloat(offset.y * count)] = true;
-        }
-        for (columns, rows) |column, row| try std.testing.expect(column and row);
-    }
-    for (0..7) |sample| {
-        const offset = sampleOffset(@intCast(sample), 7);
-        try std.testing.expect(offset.x > 0 and offset.x < 1 and offset.y > 0 and offset.y < 1);
-    }
 }

@@ -18,6 +18,9 @@ pub fn Bundle(comptime Kernel: type) type {
     return struct { groups: [Kernel.group_count]ray_file.Ray(Kernel.Rays) };
 }
 
+/// Where in a bundle a ray is.
+pub const Place = struct { group: u32, lane: u32 };
+
 /// Some of a bundle's rays, by group.
 pub fn Part(comptime Kernel: type) type {
     return [Kernel.group_count]Kernel.Rays.Mask;

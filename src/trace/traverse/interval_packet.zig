@@ -30,7 +30,7 @@ const Geometry = world_file.Geometry;
 
 /// Fewer rays are no packet. Both as measured (docs/performance.md): a set does so well with rays
 /// that look for any hit that few of them gain by going together.
-const packet_rays_min = std.EnumArray(Query, u32).init(.{ .closest_hit = 4, .any_hit = 6 });
+const packet_rays_min = std.EnumArray(Query, u32).initDefault(6, .{ .closest_hit = 4 });
 /// Once so many rays of a subtile are incoherent, the others are not compared any more: most are
 /// incoherent, too, and each comparison goes over the whole subtile.
 const incoherent_max = 2;
@@ -75,7 +75,7 @@ pub fn trace(
     counts: *TestCounts,
 ) void {
     var stream: Stream(Kernel, query) = undefined;
-    stream.init(geometry, bundle);
+    stream.init(geometry, bundle, {});
     for (0..Kernel.subtile_count) |subtile|
         traceSubtile(Kernel, query, &stream, subtile, budget, counts);
     stream.finish(counts);
@@ -132,12 +132,10 @@ fn traceSubtile(
     for (groups, active) |*group, mask| group.active = mask;
 }
 
-const Place = struct { group: usize, lane: usize };
-
-inline fn firstOf(comptime Rays: type, masks: []const Rays.Mask) ?Place {
+inline fn firstOf(comptime Rays: type, masks: []const Rays.Mask) ?bundle_file.Place {
     for (masks, 0..) |mask, group| {
         const bits = mask.bits();
-        if (bits != 0) return .{ .group = group, .lane = @ctz(bits) };
+        if (bits != 0) return .{ .group = @intCast(group), .lane = @ctz(bits) };
     }
     return null;
 }

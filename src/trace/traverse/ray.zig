@@ -207,6 +207,17 @@ pub fn Ray(comptime Lanes: type) type {
         /// Lanes without a ray are left alone.
         active: Lanes.Mask,
 
+        /// Rays that look for whatever they hit but `skip`.
+        pub inline fn endless(line: Line(Lanes), skip: Lanes.I32, active: Lanes.Mask) @This() {
+            return .{
+                .line = line,
+                .tnear = .start(),
+                .closest = .before(.splat(std.math.inf(f32))),
+                .skip = skip,
+                .active = active,
+            };
+        }
+
         /// The ray in one lane, by itself.
         pub fn extract(ray: *const @This(), lane: usize) Ray(Single) {
             assert(ray.active.lane(lane));

@@ -15,11 +15,13 @@ const TestCounts = @import("../../statistics.zig").TestCounts;
 const ray_file = @import("ray.zig");
 const traversal_ray = @import("traversal_ray.zig");
 const bundle_file = @import("bundle.zig");
+const multi_hit = @import("multi_hit.zig");
 const single = @import("single.zig");
 const stack_file = @import("stack.zig");
 const assert = std.debug.assert;
 const Query = @import("walk.zig").Query;
 const Geometry = world_file.Geometry;
+const Place = bundle_file.Place;
 
 /// Rays of a set, a bit each.
 const Set = u64;
@@ -38,17 +40,18 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
     return struct {
         geometry: *const Geometry,
         bundle: *bundle_file.Bundle(Kernel),
+        lists: Lists,
         rays: [rays_max]TraversalRay,
         places: [rays_max]Place,
         count: usize,
-        /// Those that have a hit.
+        /// Those that have a hit, or of several hits one that stops them.
         found: Set,
 
         const Self = @This();
+        /// Where hits go that are more than one a ray.
+        const Lists = if (query == .multi_hit) *multi_hit.HitLists(Kernel) else void;
         const Node = world_file.Node(Kernel.width);
         const Pack = world_file.TrianglePack(Kernel.width);
-        /// Where in the bundle a ray is.
-        const Place = struct { group: u32, lane: u32 };
         /// A child still to be visited, and by whom.
         const Entry = struct { child: world_file.Child, set: Set };
         /// Entries at most: that the next leaves the stack before children of the present one come
@@ -60,9 +63,11 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
             stream: *Self,
             geometry: *const Geometry,
             bundle: *bundle_file.Bundle(Kernel),
+            lists: Lists,
         ) void {
             stream.geometry = geometry;
             stream.bundle = bundle;
+            stream.lists = lists;
             stream.count = 0;
             stream.found = 0;
         }
@@ -93,7 +98,10 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                 const far = group.active.andNot(near);
                 if (far.none()) continue;
                 group.active = far;
-                single.traceEach(Kernel, query, stream.geometry, group, view, counts);
+                if (query == .multi_hit)
+                    stream.lists.traceEach(stream.bundle, number, view, counts)
+                else
+                    single.traceEach(Kernel, query, stream.geometry, group, view, counts);
             }
         }
 
@@ -101,7 +109,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
         pub fn finish(stream: *Self, counts: *TestCounts) void {
             if (stream.count == 0) return;
             stream.travel(counts);
-            var rest = stream.found;
+            var rest: Set = if (query == .multi_hit) 0 else stream.found;
             while (rest != 0) : (rest &= rest - 1) {
                 const ray = &stream.rays[@ctz(rest)];
                 const place = stream.places[@ctz(rest)];
@@ -151,7 +159,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
 
         /// Those of a set that have not yet found what they look for.
         inline fn looking(stream: *const Self, set: Set) Set {
-            return if (query == .any_hit) set & ~stream.found else set;
+            return if (query == .closest_hit) set else set & ~stream.found;
         }
 
         /// A ray of the set after the other against the triangles of a leaf.
@@ -166,8 +174,13 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                 const number = @ctz(rest);
                 const ray = &stream.rays[number];
                 for (packs) |*pack| {
-                    if (!ray.intersect(pack, stream.geometry.pad, counts)) continue;
+                    const found = if (query == .multi_hit)
+                        stream.lists.take(stream.places[number], ray, pack, counts)
+                    else
+                        ray.intersect(pack, stream.geometry.pad, counts);
+                    if (!found) continue;
                     stream.found |= @as(Set, 1) << @intCast(number);
+                    if (query == .multi_hit) break;
                 }
             }
         }
