@@ -27,6 +27,8 @@ pub const traversal_ray = @import("trace/traverse/traversal_ray.zig");
 pub const single = @import("trace/traverse/single.zig");
 /// Rays that have little in common, as a set.
 pub const stream = @import("trace/traverse/stream.zig");
+/// The first few hits of rays.
+pub const multi_hit = @import("trace/traverse/multi_hit.zig");
 /// A few rays that go much the same way.
 pub const interval_packet = @import("trace/traverse/interval_packet.zig");
 /// The way through the tree, and what rays want to know.
@@ -110,5 +112,5 @@ test {
     _ = @import("trace/shade/offset.zig");
     _ = @import("trace/shade/bsdf.zig");
     _ = @import("trace/shade/unique.zig");
-    _ = @import("trace/traverse/multi_hit.zig");
+    _ = multi_hit;
 }

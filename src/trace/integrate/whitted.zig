@@ -109,53 +109,21 @@ pub fn Whitted(comptime Kernel: type) type {
                     whitted.path = path.*;
                     whitted.step();
                 }
-                whitted.expose(rectangle, @intCast(sample), film);
-            }
-        }
-
-        fn expose(whitted: *const Self, rectangle: Rectangle, sample: u32, film: *Film) void {
-            for (&whitted.radiance, &whitted.escaped, 0..) |*radiance, *escaped, group| {
-                const red = radiance.x.toArray();
-                const green = radiance.y.toArray();
-                const blue = radiance.z.toArray();
-                const clear = escaped.toArray();
-                for (0..Kernel.ray_count) |lane| {
-                    const x = rectangle.x0 + Kernel.pixelX(group, lane);
-                    const y = rectangle.y0 + Kernel.pixelY(group, lane);
-                    if (x >= rectangle.x1 or y >= rectangle.y1) continue;
-                    film.add(x, y, sample, .{ red[lane], green[lane], blue[lane], clear[lane] });
-                }
+                const number: u32 = @intCast(sample);
+                const radiance = &whitted.radiance;
+                camera.expose(Kernel, film, rectangle, number, radiance, &whitted.escaped);
             }
         }
 
         fn pushPrimary(whitted: *Self, rectangle: Rectangle, sample: u32) void {
             const view = whitted.frame.view;
             const offset = sampler.pixelOffset(sample, whitted.settings.sample_count);
-            whitted.grid = camera.grid(
-                view,
-                @as(f32, @floatFromInt(rectangle.x0)) + offset.x,
-                @as(f32, @floatFromInt(rectangle.y0)) + offset.y,
-            );
-            const end_column: F32 = .splat(@floatFromInt(rectangle.x1));
-            const end_row: F32 = .splat(@floatFromInt(rectangle.y1));
+            whitted.grid = camera.grid(view, rectangle, offset);
             const path = whitted.stack.push(0, 0);
-            for (&path.bundle.groups, 0..) |*ray, group| {
-                const column = place(rectangle.x0 + Kernel.pixelX(group, 0), &Kernel.lane_x);
-                const row = place(rectangle.y0 + Kernel.pixelY(group, 0), &Kernel.lane_y);
-                const inside = column.lt(end_column).bitAnd(row.lt(end_row));
-                const x = column.add(.splat(offset.x));
-                const y = row.add(.splat(offset.y));
-                const line = camera.generate(Rays, view, x, y);
-                ray.* = .endless(line, .splat(ray_file.no_primitive), inside);
-                path.throughput[group] = .splat(.{ 1, 1, 1 });
-                path.sigma_a[group] = .splat(.{ 0, 0, 0 });
-                whitted.rays.primary += ray.active.popCount();
-            }
-        }
-
-        /// Columns or rows of a group's pixels; as integers floats hold them exactly.
-        inline fn place(first: u32, steps: *const [Kernel.ray_count]f32) F32 {
-            return F32.fromArray(steps.*).add(.splat(@floatFromInt(first)));
+            camera.primaryRays(Kernel, view, rectangle, offset, &path.bundle);
+            path.throughput = @splat(.splat(.{ 1, 1, 1 }));
+            path.sigma_a = @splat(.splat(.{ 0, 0, 0 }));
+            for (&path.bundle.groups) |*ray| whitted.rays.primary += ray.active.popCount();
         }
 
         /// Traces rays, adds what they see, and pushes what has to be traced because of it.
