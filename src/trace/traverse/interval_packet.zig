@@ -23,9 +23,11 @@ const ray_file = @import("ray.zig");
 const box = @import("box.zig");
 const bundle_file = @import("bundle.zig");
 const traversal_ray = @import("traversal_ray.zig");
-const Stream = @import("stream.zig").Stream;
+const multi_hit = @import("multi_hit.zig");
+const stream_file = @import("stream.zig");
 const walk = @import("walk.zig");
 const Query = walk.Query;
+const Stream = stream_file.Stream;
 const Geometry = world_file.Geometry;
 
 /// Fewer rays are no packet. Both as measured (docs/performance.md): a set does so well with rays
@@ -81,6 +83,21 @@ pub fn trace(
     stream.finish(counts);
 }
 
+/// Collects the first hits of the active rays in their lists.
+pub fn traceMultiHit(
+    comptime Kernel: type,
+    bundle: *bundle_file.Bundle(Kernel),
+    lists: *multi_hit.HitLists(Kernel),
+    counts: *TestCounts,
+) void {
+    var budget: PacketBudget = .{};
+    var stream: Stream(Kernel, .multi_hit) = undefined;
+    stream.init(lists.geometry, bundle, lists);
+    for (0..Kernel.subtile_count) |subtile|
+        traceSubtile(Kernel, .multi_hit, &stream, subtile, &budget, counts);
+    stream.finish(counts);
+}
+
 /// The rays of one subtile, or they are taken by the stream.
 fn traceSubtile(
     comptime Kernel: type,
@@ -120,9 +137,8 @@ fn traceSubtile(
         if (count < packet_rays_min.get(query)) {
             incoherent_count += count;
         } else {
-            const geometry = stream.geometry;
             const octant = coherent.octant;
-            if (tracePacket(Kernel, query, geometry, groups, &views, octant, budget, counts))
+            if (tracePacket(Kernel, query, stream, first_group, &views, octant, budget, counts))
                 continue;
         }
         for (&incoherent, groups) |*mask, *group| mask.* = mask.bitOr(group.active);
@@ -191,24 +207,27 @@ fn CoherentGroup(comptime Rays: type) type {
 fn tracePacket(
     comptime Kernel: type,
     comptime query: Query,
-    geometry: *const Geometry,
-    groups: *[Kernel.subtile_groups]ray_file.Ray(Kernel.Rays),
+    stream: *const Stream(Kernel, query),
+    first_group: usize,
     views: *const [Kernel.subtile_groups]bundle_file.Precalculations(Kernel.Rays),
     octant: [3]bool,
     budget: *PacketBudget,
     counts: *TestCounts,
 ) bool {
     @setEvalBranchQuota(4000); // For what is inlined here.
+    const geometry = stream.geometry;
+    const groups = stream.bundle.groups[first_group..][0..Kernel.subtile_groups];
     const tree = geometry.tree.get(Kernel.width);
     const ends: Ends = .of(Kernel, groups, views);
     if (!(ends.reach() < geometry.fused_reach)) return false;
     var search: Search(Kernel, query) = .init(geometry, groups, views, octant, &ends, budget.*);
+    search.first_group = @intCast(first_group);
+    search.lists = stream.lists;
     _ = walk.walk(Kernel, tree, &search, counts);
     budget.balance = @min(search.budget.balance, PacketBudget.balance_max);
     if (budget.lasts()) return true;
     for (groups) |*group| {
-        const found = group.closest.primitive.gt(.splat(ray_file.no_primitive));
-        group.active = group.active.andNot(found);
+        group.active = group.active.andNot(group.closest.t.eq(.splat(-std.math.inf(f32))));
     }
     return false;
 }
@@ -281,6 +300,9 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         /// See `Geometry.pad`.
         pad: f32,
         budget: PacketBudget,
+        /// That of `groups` in its bundle.
+        first_group: u32,
+        lists: stream_file.Lists(Kernel, query),
 
         const Self = @This();
         const Range = box.Range(Boxes);
@@ -358,6 +380,8 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
                 .grow = geometry.pad + 2 * geometry.node_margin,
                 .pad = geometry.pad,
                 .budget = budget,
+                .first_group = undefined,
+                .lists = undefined,
             };
         }
 
@@ -380,16 +404,16 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             var range = search.within(near, far);
             const guided = guide.meet(true, node, search.guide_limit, counts);
             var met = range.isMet().andNot(guided.isMet()).bits();
-            if (query == .any_hit) search.budget.earn();
+            if (query != .closest_hit) search.budget.earn();
             if (met == 0) return range;
             var nears = range.near.toArray();
             while (met != 0) : (met &= met - 1) {
                 const child = @ctz(met);
                 if (search.isEntered(node, child, counts)) continue;
                 nears[child] = std.math.inf(f32);
-                if (query == .any_hit) search.budget.spend();
+                if (query != .closest_hit) search.budget.spend();
             }
-            if (query == .any_hit and !search.budget.lasts()) {
+            if (query != .closest_hit and !search.budget.lasts()) {
                 search.limit = -std.math.inf(f32);
                 return .{ .near = .splat(0), .far = .splat(search.limit) };
             }
@@ -461,14 +485,14 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             if (met.lanes == 0) return false;
             const triangle_count = @popCount(met.lanes);
             var found = false;
-            for (search.groups, search.views, 0..) |*group, *view, index| {
+            for (search.groups, 0..) |*group, index| {
                 if (group.active.none()) continue;
                 const rays = search.entering(index, met.near, met.far, counts).bits();
                 if (rays == 0) continue;
                 const hit = if (@popCount(rays) < triangle_count)
-                    search.intersectEach(group, view, rays, pack, counts)
+                    search.intersectEach(index, rays, pack, counts)
                 else
-                    search.intersectAll(group, view, met.lanes, pack, counts);
+                    search.intersectAll(index, met.lanes, pack, counts);
                 found = found or hit;
             }
             if (found) search.shrink();
@@ -516,12 +540,13 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         /// Some rays of a group, each against all triangles of a pack.
         fn intersectEach(
             search: *Self,
-            group: *ray_file.Ray(Rays),
-            view: *const bundle_file.Precalculations(Rays),
+            index: usize,
             lanes: u32,
             pack: *const world_file.TrianglePack(Kernel.width),
             counts: *TestCounts,
         ) bool {
+            const group = &search.groups[index];
+            const view = &search.views[index];
             var found: u32 = 0;
             var ts = group.closest.t.toArray();
             var primitives = group.closest.primitive.toArray();
@@ -529,7 +554,13 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
             while (rest != 0) : (rest &= rest - 1) {
                 const lane = @ctz(rest);
                 var ray: TraversalRay = .of(Rays, true, group, view, lane);
-                if (!ray.intersect(pack, search.pad, counts)) continue;
+                const place: bundle_file.Place =
+                    .{ .group = search.first_group + @as(u32, @intCast(index)), .lane = lane };
+                const closer = if (query == .multi_hit)
+                    search.lists.take(place, &ray, pack, counts) or ray.limit < ts[lane]
+                else
+                    ray.intersect(pack, search.pad, counts);
+                if (!closer) continue;
                 found |= @as(u32, 1) << @intCast(lane);
                 ts[lane] = if (query == .any_hit) -std.math.inf(f32) else ray.limit;
                 primitives[lane] = ray.closest_primitive;
@@ -542,19 +573,22 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         /// All rays of a group against some triangles of a pack, one by one.
         inline fn intersectAll(
             search: *Self,
-            group: *ray_file.Ray(Rays),
-            view: *const bundle_file.Precalculations(Rays),
+            index: usize,
             lanes: u32,
             pack: *const world_file.TrianglePack(Kernel.width),
             counts: *TestCounts,
         ) bool {
+            const group = &search.groups[index];
+            const view = &search.views[index];
             var found = false;
             var rest = lanes;
             while (rest != 0) : (rest &= rest - 1) {
-                found = bundle_file.intersectLane(Kernel, query, group, view, pack, .{
-                    .lane = @ctz(rest),
-                    .pad = search.pad,
-                }, counts) or found;
+                const at: bundle_file.At = .{ .lane = @ctz(rest), .pad = search.pad };
+                const closer = if (query == .multi_hit)
+                    search.lists.takeLane(search.first_group + index, group, view, pack, at, counts)
+                else
+                    bundle_file.intersectLane(Kernel, query, group, view, pack, at, counts);
+                found = closer or found;
             }
             return found;
         }

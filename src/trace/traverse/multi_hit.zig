@@ -2,8 +2,8 @@
 //!
 //! In: rays of a bundle, the materials. Out: of each ray its first `hits_max` hits in the order of
 //! `ray.Hit`; or, at once, that some hit stops all light. Each goes through the tree once, where a
-//! search for the closest hit would go once for each surface on its way. Beams go as ray streams
-//! (stream.zig), others one ray after the other.
+//! search for the closest hit would go once for each surface on its way. The rays of beams go as
+//! interval packets and ray streams, others one after the other.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -13,7 +13,7 @@ const box = @import("box.zig");
 const bundle_file = @import("bundle.zig");
 const traversal_ray = @import("traversal_ray.zig");
 const walk = @import("walk.zig");
-const Stream = @import("stream.zig").Stream;
+const interval_packet = @import("interval_packet.zig");
 const Geometry = world_file.Geometry;
 const Place = bundle_file.Place;
 
@@ -69,20 +69,16 @@ pub fn HitLists(comptime Kernel: type) type {
             bundle: *bundle_file.Bundle(Kernel),
             counts: *TestCounts,
         ) void {
-            var stream: Stream(Kernel, .multi_hit) = undefined;
-            if (Kernel.variant.traversal == .beam) stream.init(lists.geometry, bundle, lists);
             for (&bundle.groups, &lists.lists, &lists.stopped, 0..) |*group, *each, *stop, number| {
                 if (group.active.none()) continue;
                 stop.* = 0;
                 for (each) |*list| list.count = 0;
+                if (Kernel.variant.traversal == .beam) continue;
                 const view = bundle_file.viewOf(Rays, group);
-                if (Kernel.variant.traversal == .beam) {
-                    const active = group.active;
-                    stream.take(number, (&view)[0..1], counts);
-                    group.active = active;
-                } else lists.traceEach(bundle, number, &view, counts);
+                lists.traceEach(bundle, number, &view, counts);
             }
-            if (Kernel.variant.traversal == .beam) stream.finish(counts);
+            if (Kernel.variant.traversal == .beam)
+                interval_packet.traceMultiHit(Kernel, bundle, lists, counts);
         }
 
         /// The hits of active rays of a group that come after `index` others; `no_primitive` where
@@ -160,26 +156,58 @@ pub fn HitLists(comptime Kernel: type) type {
             var rest = hits.lanes;
             while (rest != 0) : (rest &= rest - 1) {
                 const lane = @ctz(rest);
-                if (lists.keep(place, ray, .{
-                    .t = hits.t[lane],
-                    .primitive = @bitCast(pack.primitive[lane]),
-                })) return true;
+                const number: i32 = @bitCast(pack.primitive[lane]);
+                const limit = lists.keep(place, .{ .t = hits.t[lane], .primitive = number }) orelse
+                    continue;
+                ray.limit = limit.t;
+                ray.closest_primitive = limit.primitive;
+                if (limit.t < 0) return true;
             }
             return false;
         }
 
-        fn keep(lists: *Self, place: Place, ray: *TraversalRay, hit: Hit) bool {
+        /// The same of one triangle of a pack, hit by rays of a group; whether any limit changes.
+        pub inline fn takeLane(
+            lists: *Self,
+            number: usize,
+            group: *ray_file.Ray(Rays),
+            view: *const bundle_file.Precalculations(Rays),
+            pack: *const world_file.TrianglePack(Kernel.width),
+            which: bundle_file.At,
+            counts: *TestCounts,
+        ) bool {
+            const hit = bundle_file.hitsOfLane(Kernel, group, view, pack, which, counts) orelse
+                return false;
+            var rest = hit.mask.bits();
+            if (rest == 0) return false;
+            const found = hit.t.toArray();
+            var ts = group.closest.t.toArray();
+            var primitives = group.closest.primitive.toArray();
+            var changes = false;
+            while (rest != 0) : (rest &= rest - 1) {
+                const lane = @ctz(rest);
+                const limit = lists.keep(.{ .group = @intCast(number), .lane = lane }, .{
+                    .t = found[lane],
+                    .primitive = @bitCast(pack.primitive[which.lane]),
+                }) orelse continue;
+                ts[lane] = limit.t;
+                primitives[lane] = limit.primitive;
+                changes = true;
+            }
+            group.closest = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };
+            return changes;
+        }
+
+        /// Keeps a hit. Returns the ray's new limit where that changes; nothing is before that of a
+        /// ray that is stopped.
+        pub fn keep(lists: *Self, place: Place, hit: Hit) ?Hit {
             if (lists.isStopping(hit.primitive)) {
                 lists.stopped[place.group] |= @as(u32, 1) << @intCast(place.lane);
-                return true;
+                return .{ .t = -std.math.inf(f32), .primitive = hit.primitive };
             }
             const list = &lists.lists[place.group][place.lane];
             list.insert(hit);
-            if (list.count == hits_max) {
-                ray.limit = list.hits[hits_max - 1].t;
-                ray.closest_primitive = list.hits[hits_max - 1].primitive;
-            }
-            return false;
+            return if (list.count == hits_max) list.hits[hits_max - 1] else null;
         }
 
         /// A ray on its way through a tree, for `walk.walk`.

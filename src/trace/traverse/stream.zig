@@ -30,6 +30,11 @@ const rays_max = @bitSizeOf(Set);
 const word_bits = 32;
 const word_count = rays_max / word_bits;
 
+/// Where hits go that are more than one a ray.
+pub fn Lists(comptime Kernel: type, comptime query: Query) type {
+    return if (query == .multi_hit) *multi_hit.HitLists(Kernel) else void;
+}
+
 /// Collects the rays of a bundle.
 pub fn Stream(comptime Kernel: type, comptime query: Query) type {
     const Boxes = Kernel.Boxes;
@@ -40,7 +45,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
     return struct {
         geometry: *const Geometry,
         bundle: *bundle_file.Bundle(Kernel),
-        lists: Lists,
+        lists: Lists(Kernel, query),
         rays: [rays_max]TraversalRay,
         places: [rays_max]Place,
         count: usize,
@@ -48,8 +53,6 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
         found: Set,
 
         const Self = @This();
-        /// Where hits go that are more than one a ray.
-        const Lists = if (query == .multi_hit) *multi_hit.HitLists(Kernel) else void;
         const Node = world_file.Node(Kernel.width);
         const Pack = world_file.TrianglePack(Kernel.width);
         /// A child still to be visited, and by whom.
@@ -63,7 +66,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
             stream: *Self,
             geometry: *const Geometry,
             bundle: *bundle_file.Bundle(Kernel),
-            lists: Lists,
+            lists: Lists(Kernel, query),
         ) void {
             stream.geometry = geometry;
             stream.bundle = bundle;
