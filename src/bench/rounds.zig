@@ -109,8 +109,8 @@ const PerFrame = struct {
 /// Measures the scene of a subject of type `Subject`, which has
 ///
 ///     fn prepare(*Subject, variant: usize) !Prepared
-///     fn trace(*Subject, variant: usize, thread_count: usize) Traced
-///     fn count(*Subject, variant: usize) statistics.TestCounts
+///     fn trace(*Subject, variant: usize, thread_count: usize) !Traced
+///     fn count(*Subject, variant: usize) !statistics.TestCounts
 ///     fn hash(*Subject) u64
 ///     fn now(*Subject) u64
 ///     fn mark(*Subject) ?Mark                  null: energy is not measured
@@ -358,8 +358,8 @@ const Fake = struct {
         return .{ .parse_ns = 1_000_000, .prepare_ns = 2_000_000, .bvh_build_ns = 3_000_000 };
     }
 
-    pub fn trace(fake: *Fake, variant: usize, thread_count: usize) Traced {
-        fake.order.append(testing.allocator, @intCast(variant)) catch @panic("OOM");
+    pub fn trace(fake: *Fake, variant: usize, thread_count: usize) error{OutOfMemory}!Traced {
+        try fake.order.append(testing.allocator, @intCast(variant));
         fake.frame_count += 1;
         const noise = fake.noise * (2 * fake.random.random().float(f64) - 1);
         const time_ms = fake.trace_ms[variant] * (1 + noise) /
@@ -370,7 +370,7 @@ const Fake = struct {
         };
     }
 
-    pub fn count(_: *Fake, variant: usize) statistics.TestCounts {
+    pub fn count(_: *Fake, variant: usize) error{}!statistics.TestCounts {
         return .{ .box_issued = variant + 10 };
     }
 

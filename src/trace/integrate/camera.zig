@@ -1,7 +1,7 @@
-//! Pinhole and orthographic cameras: from pixels to primary rays in lanes, and from lanes to pixels.
+//! Pinhole and orthographic cameras: from pixels to primary rays, and from lanes back to pixels.
 //!
-//! In: the view, a bundle's place in the picture. Out: rays, affine in the place and not normalised,
-//! so that all pixels of a bundle can share work; samples on the film.
+//! In: the view, a bundle's place in the picture. Out: rays, affine in the place and not
+//! normalised, so that all pixels of a bundle can share work; samples on the film.
 
 const world_file = @import("../../world.zig");
 const vec3 = @import("../../math.zig").vec3;
