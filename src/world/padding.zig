@@ -8,12 +8,12 @@
 //!     margin(x) = 16 u |x - C| + 16 u |C| + 2^-100     of a node: x its corner farthest from C
 //!
 //! **Enough.** To the triangle test a corner is off by at most 6 u |corner - o| in each axis across
-//! the ray, and its t by 9 u of that distance (`trace/traverse/triangle.zig`); the slab test moves a
-//! face by 3 u of it. Points on a ray and corners themselves are rounded by a few u of their
+//! the ray, and its t by 9 u of that distance (`trace/traverse/triangle.zig`); the slab test moves
+//! a face by 3 u of it. Points on a ray and corners themselves are rounded by a few u of their
 //! coordinates. Since |corner - o| <= |corner - C| + |o - C|, pad and shift together are at least
 //! 36 u |corner - o| and 4 u of every coordinate: twice of what is needed. So the pad is local: it
-//! knows nothing of cameras, lights, or the rest of the scene, and the tree depends on none of them.
-//! One far vertex or lamp costs nothing but itself.
+//! knows nothing of cameras, lights, or the rest of the scene, and the tree depends on none of
+//! them. One far vertex or lamp costs nothing but itself.
 //!
 //! **Exact.** The box of a triangle is that of its corners, grown by its pad; a ray is tested
 //! against it from o + shift where it meets the lower faces, and from o - shift where it meets the
@@ -21,9 +21,9 @@
 //! box, rounding included, and the shift is the ray's own wherever it is tested: whatever the
 //! triangle test accepts within its own grown box no node above it can cull, in any order.
 //!
-//! **Multiply-adds.** A node may be tested by bound * inverse - origin * inverse, fused or not, which
-//! rounds otherwise: in units of u and as shifts of a bound, the exact expression is off by
-//! 3 |bound - o|, this one by |bound - o|, |o| and, not fused, |bound|: 4 (|bound| + |o|) together.
+//! **Multiply-adds.** A node may be tested by bound * inverse - origin * inverse, fused or not,
+//! which rounds otherwise: in units of u and as shifts of a bound, the exact expression is off by 3
+//! |bound - o|, this one by |bound - o|, |o| and, not fused, |bound|: 4 (|bound| + |o|) together.
 //! Boxes of nodes are grown by their margin when they are written, and a ray's shift by its own for
 //! such tests. Products must not overflow (`Padding.allowsProducts`).
 

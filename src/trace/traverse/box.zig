@@ -47,7 +47,8 @@ pub inline fn padded(
     upper: Lanes.Vec3,
     ray_inverse: anytype,
 ) Range(Lanes) {
-    const shift: Lanes.Vec3 = .{ .x = ray_inverse.shift, .y = ray_inverse.shift, .z = ray_inverse.shift };
+    const length = ray_inverse.shift;
+    const shift: Lanes.Vec3 = .{ .x = length, .y = length, .z = length };
     const from_lower = lower.sub(ray_inverse.origin.add(shift));
     const from_upper = upper.sub(ray_inverse.origin.sub(shift));
     return slab(

@@ -18,6 +18,9 @@ pub fn Bundle(comptime Kernel: type) type {
     return struct { groups: [Kernel.group_count]ray_file.Ray(Kernel.Rays) };
 }
 
+/// Where in a bundle a ray is.
+pub const Place = struct { group: u32, lane: u32 };
+
 /// How boxes and triangles look to a group.
 pub fn Precalculations(comptime Lanes: type) type {
     return struct {
@@ -171,7 +174,7 @@ pub fn countBoxes(comptime Kernel: type, group: anytype, counts: *TestCounts) vo
 }
 
 /// Which triangle of a pack, and the geometry's padding.
-const At = struct { lane: usize, padding: *const world_file.Padding };
+pub const At = struct { lane: usize, padding: *const world_file.Padding };
 
 /// Tests one triangle of a pack against the active rays of one group. Returns whether any took
 /// the hit.
@@ -184,43 +187,45 @@ pub inline fn intersectLane(
     at: At,
     counts: *TestCounts,
 ) bool {
+    const Rays = Kernel.Rays;
+    const hit = hitsOfLane(Kernel, group, view, pack, at, counts) orelse return false;
+    // A ray that found any hit accepts no other: nothing comes before t = -inf.
+    const t: Rays.F32 = if (query == .any_hit) .splat(-std.math.inf(f32)) else hit.t;
+    const primitive: Rays.I32 = .splat(@bitCast(pack.primitive[at.lane]));
+    group.closest.t = Rays.F32.select(hit.mask, t, group.closest.t);
+    group.closest.primitive = Rays.I32.select(hit.mask, primitive, group.closest.primitive);
+    return hit.mask.any();
+}
+
+/// The active rays of one group that hit one triangle of a pack within their limits; null: none.
+pub inline fn hitsOfLane(
+    comptime Kernel: type,
+    group: *const ray_file.Ray(Kernel.Rays),
+    view: *const Precalculations(Kernel.Rays),
+    pack: *const world_file.TrianglePack(Kernel.width),
+    at: At,
+    counts: *TestCounts,
+) ?triangle.Intersection(Kernel.Rays) {
     if (Kernel.counts_tests) {
         counts.triangle_issued += Kernel.ray_count;
         counts.triangle_useful += group.active.popCount();
     }
-    const primitive: i32 = @bitCast(pack.primitive[at.lane]);
-    const corners = turnedCorners(Kernel.Rays, pack, at.lane, view);
-    return intersect(Kernel, query, group, view, corners, primitive, at.padding);
-}
-
-inline fn intersect(
-    comptime Kernel: type,
-    comptime query: Query,
-    group: *ray_file.Ray(Kernel.Rays),
-    calculated: *const Precalculations(Kernel.Rays),
-    corners: [3]Kernel.Rays.Vec3,
-    primitive_number: i32,
-    padding: *const world_file.Padding,
-) bool {
     const Rays = Kernel.Rays;
-    const view = &calculated.view;
-    const seen = triangle.project(Rays, corners, view);
+    const corners = turnedCorners(Rays, pack, at.lane, view);
+    const seen = triangle.project(Rays, corners, &view.view);
     var weights = triangle.edgeFunctions(Rays, seen);
-    if (weights.mayAgree().bitAnd(group.active).none()) return false;
+    if (weights.mayAgree().bitAnd(group.active).none()) return null;
     const agreeing = weights.agree().bitAnd(group.active);
     const inside = triangle.resolveTies(Rays, seen, &weights, agreeing);
-    const center = turnedPoint(Rays, padding.center, calculated);
-    const hit = triangle.locate(Rays, seen, weights, corners, view, padding, center);
-    const primitive: Rays.I32 = .splat(primitive_number);
+    const center = turnedPoint(Rays, at.padding.center, view);
+    const hit = triangle
+        .locate(Rays, seen, weights, corners, &view.view, at.padding, center);
+    const primitive: Rays.I32 = .splat(@bitCast(pack.primitive[at.lane]));
     const accepted = inside.bitAnd(hit.mask)
         .bitAnd(group.tnear.isBefore(hit.t, primitive))
         .bitAnd(group.closest.isAfter(hit.t, primitive))
         .andNot(primitive.eq(group.skip));
-    // A ray that found any hit accepts no other: nothing comes before t = -inf.
-    const t: Rays.F32 = if (query == .any_hit) .splat(-std.math.inf(f32)) else hit.t;
-    group.closest.t = Rays.F32.select(accepted, t, group.closest.t);
-    group.closest.primitive = Rays.I32.select(accepted, primitive, group.closest.primitive);
-    return accepted.any();
+    return .{ .mask = accepted, .t = hit.t };
 }
 
 /// One triangle for all rays of a group, turned as each ray wants it.

@@ -196,13 +196,18 @@ pub fn ShearedRay(comptime Lanes: type) type {
                 .shift = slabs.shift,
                 .direction_inv = axis.turn(slabs.direction_inv),
                 .negative = axis.turnMasks(slabs.negative),
-                .shear = .{
-                    .x = direction.x.div(direction.z),
-                    .y = direction.y.div(direction.z),
-                    .z = Lanes.F32.splat(1).div(direction.z),
-                },
+                .shear = shearOf(Lanes, direction),
             };
         }
+    };
+}
+
+/// What shears space so that a line in this turned direction runs along z.
+pub inline fn shearOf(comptime Lanes: type, direction: Lanes.Vec3) Lanes.Vec3 {
+    return .{
+        .x = direction.x.div(direction.z),
+        .y = direction.y.div(direction.z),
+        .z = Lanes.F32.splat(1).div(direction.z),
     };
 }
 
@@ -218,6 +223,17 @@ pub fn Ray(comptime Lanes: type) type {
         skip: Lanes.I32,
         /// Lanes without a ray are left alone.
         active: Lanes.Mask,
+
+        /// Rays that look for whatever they hit but `skip`.
+        pub inline fn endless(line: Line(Lanes), skip: Lanes.I32, active: Lanes.Mask) @This() {
+            return .{
+                .line = line,
+                .tnear = .start(),
+                .closest = .before(.splat(std.math.inf(f32))),
+                .skip = skip,
+                .active = active,
+            };
+        }
 
         /// The ray in one lane, by itself.
         pub fn extract(ray: *const @This(), lane: usize) Ray(Single) {

@@ -66,8 +66,14 @@ pub fn TraversalRay(comptime Kernel: type) type {
             }
             return .{
                 .inverse = inverse,
-                .near_shift = if (fused) view.near_shift.laneIn(lane) else faceOrigin(view, lane, 1),
-                .far_shift = if (fused) view.far_shift.laneIn(lane) else faceOrigin(view, lane, -1),
+                .near_shift = if (fused)
+                    view.near_shift.laneIn(lane)
+                else
+                    faceOrigin(view, lane, 1),
+                .far_shift = if (fused)
+                    view.far_shift.laneIn(lane)
+                else
+                    faceOrigin(view, lane, -1),
                 .near_at = near_at,
                 .far_at = far_at,
                 .axis = view.uniform orelse view.axis.ofLane(lane),
@@ -162,13 +168,16 @@ pub fn TraversalRay(comptime Kernel: type) type {
             return @ptrCast(@alignCast(bounds + at));
         }
 
-        /// Tests the triangles of a pack and keeps the nearest hit. Returns whether there was one.
-        pub inline fn intersect(
-            ray: *Self,
+        /// Triangles of a pack that are hit within the limits, a bit each, and where.
+        pub const Hits = struct { lanes: u32, t: [width]f32 };
+
+        /// Tests the triangles of a pack.
+        pub inline fn hitsOf(
+            ray: *const Self,
             pack: *const Pack,
             padding: *const world_file.Padding,
             counts: *TestCounts,
-        ) bool {
+        ) Hits {
             @setEvalBranchQuota(4000); // For what is inlined here.
             walk.countPack(Kernel, pack, counts);
             const inverse: Boxes.Vec3 = .splat(ray.turned_inverse);
@@ -185,7 +194,7 @@ pub fn TraversalRay(comptime Kernel: type) type {
             var weights = triangle.edgeFunctions(Boxes, seen);
             const primitive: Boxes.I32 = .load(@ptrCast(&pack.primitive));
             const there = primitive.gt(.splat(ray_file.no_primitive));
-            if (weights.mayAgree().bitAnd(there).none()) return false;
+            if (weights.mayAgree().bitAnd(there).none()) return .{ .lanes = 0, .t = undefined };
             const agreeing = weights.agree().bitAnd(there);
             const inside = triangle.resolveTies(Boxes, seen, &weights, agreeing);
             const axis: u2 = @intCast(ray.axis);
@@ -203,20 +212,29 @@ pub fn TraversalRay(comptime Kernel: type) type {
                 .bitAnd(tnear.isBefore(hit.t, primitive))
                 .bitAnd(closest.isAfter(hit.t, primitive))
                 .andNot(primitive.eq(.splat(ray.skip)));
-            var bits = accepted.bits();
-            if (bits == 0) return false;
-            const ts = hit.t.toArray();
-            while (bits != 0) : (bits &= bits - 1) {
-                const lane = @ctz(bits);
+            return .{ .lanes = accepted.bits(), .t = hit.t.toArray() };
+        }
+
+        /// Tests the triangles of a pack and keeps the nearest hit. Returns whether there was one.
+        pub inline fn intersect(
+            ray: *Self,
+            pack: *const Pack,
+            padding: *const world_file.Padding,
+            counts: *TestCounts,
+        ) bool {
+            const hits = ray.hitsOf(pack, padding, counts);
+            var rest = hits.lanes;
+            while (rest != 0) : (rest &= rest - 1) {
+                const lane = @ctz(rest);
                 const number: i32 = @bitCast(pack.primitive[lane]);
-                const closer = ts[lane] < ray.limit or
-                    (ts[lane] == ray.limit and number < ray.closest_primitive);
+                const closer = hits.t[lane] < ray.limit or
+                    (hits.t[lane] == ray.limit and number < ray.closest_primitive);
                 if (closer) {
-                    ray.limit = ts[lane];
+                    ray.limit = hits.t[lane];
                     ray.closest_primitive = number;
                 }
             }
-            return true;
+            return hits.lanes != 0;
         }
     };
 }

@@ -81,6 +81,20 @@ pub fn EdgeFunctions(comptime Lanes: type) type {
         pub inline fn sum(weights: @This()) Lanes.F32 {
             return weights.a.add(weights.b).add(weights.c);
         }
+
+        /// Barycentric coordinates: weights of corners 0, 1, 2 whose sum is 1.
+        pub inline fn barycentrics(weights: @This()) [3]Lanes.F32 {
+            const F32 = Lanes.F32;
+            const area = weights.sum();
+            // All three can round to zero where a triangle is much smaller than its distance.
+            const none = area.eq(.zero());
+            const divisor = F32.select(none, .splat(1), area);
+            return .{
+                F32.select(none, .splat(1), weights.a.div(divisor)),
+                weights.b.div(divisor),
+                weights.c.div(divisor),
+            };
+        }
     };
 }
 
@@ -91,6 +105,21 @@ pub inline fn edgeFunctions(comptime Lanes: type, seen: Projection(Lanes)) EdgeF
         .b = seen.a.x.mul(seen.c.y).sub(seen.a.y.mul(seen.c.x)),
         .c = seen.b.x.mul(seen.a.y).sub(seen.b.y.mul(seen.a.x)),
     };
+}
+
+/// Those of corners as in the scene, to a line that is known to hit.
+pub inline fn edgeFunctionsOf(
+    comptime Lanes: type,
+    corners: [3]Lanes.Vec3,
+    line: ray_file.Line(Lanes),
+) EdgeFunctions(Lanes) {
+    const axis: ray_file.LongAxis(Lanes) = .of(line.direction);
+    const origin = axis.turn(line.origin);
+    return edgeFunctions(Lanes, projectOffsets(Lanes, .{
+        axis.turn(corners[0]).sub(origin),
+        axis.turn(corners[1]).sub(origin),
+        axis.turn(corners[2]).sub(origin),
+    }, ray_file.shearOf(Lanes, axis.turn(line.direction))));
 }
 
 /// Of the lanes where the rounded edge functions agree, those that the exact ones accept. Where one
@@ -208,8 +237,8 @@ pub fn WeightedIntersection(comptime Lanes: type) type {
 
 /// Second half of the test, for lanes inside the edges: t of the plane, held within the t range of
 /// the triangle's own padded box. A hit outside of this range comes from rounding alone (a triangle
-/// seen edge-on); holding it inside is what makes culling by boxes exact. Missing the box altogether
-/// is a miss. `corners` and the padding's `center` are turned but not sheared.
+/// seen edge-on); holding it inside is what makes culling by boxes exact. Missing the box
+/// altogether is a miss. `corners` and the padding's `center` are turned but not sheared.
 pub inline fn locate(
     comptime Lanes: type,
     seen: Projection(Lanes),
