@@ -252,7 +252,20 @@ fn inLanes(comptime Rays: type, v: [3][Rays.count]f32) Rays.Vec3 {
 pub const Corners = std.ArrayList([3]f32);
 
 /// Kinds of triangles that break careless code.
-pub const Soup = enum { uniform, tiny_and_huge, coplanar, slivers, stacked, far_away, grid };
+pub const Soup = enum {
+    uniform,
+    tiny_and_huge,
+    coplanar,
+    slivers,
+    stacked,
+    /// Many, and some that are 1e5 away.
+    far_away,
+    grid,
+    /// One corner far away on one side.
+    stray,
+    /// Triangles of millimetres among some of a hundred kilometres.
+    mixed_scales,
+};
 
 /// Appends three corners for each triangle.
 pub fn addTriangles(soup: Soup, corners: *Corners, random: std.Random, count: usize) !void {
@@ -273,8 +286,16 @@ pub fn addTriangles(soup: Soup, corners: *Corners, random: std.Random, count: us
                 .stacked => if (index % 4 != 0) {
                     p = corners.items[corners.items.len - 3];
                 },
-                .far_away => for (&p) |*x| {
+                .far_away => if (index % 8 < 3) for (&p) |*x| {
                     x.* += 1e5;
+                },
+                .stray => if (index == 5 and corners.items.len % 3 == 1) {
+                    p = .{ 1e4, 0, 0 };
+                },
+                .mixed_scales => {
+                    const size: f32 = if (index % 8 == 0) 1e5 else 1e-3;
+                    const place: f32 = @floatFromInt(index % 3);
+                    for (&p) |*x| x.* = x.* * size + place;
                 },
                 .grid => for (&p) |*x| {
                     x.* = @round(x.* * 2);
@@ -295,6 +316,8 @@ fn addQueries(soup: Soup, queries: []Query, corners: []const [3]f32, random: std
         // The first half starts at one point, as primary rays do.
         if (index >= queries.len / 2) for (&query.origin) |*x| {
             x.* = center + random.floatNorm(f32) * 4;
+            // Some of the others a thousand kilometres away.
+            if (index % 16 == 0) x.* = random.floatNorm(f32) * 1e6;
         };
         // And every other block's rays go much the same way from much the same place.
         const led = index % 32 < 16 and index % 16 > 0;
@@ -422,6 +445,8 @@ test "a closed surface stops every ray that aims at its edges and corners, near 
         var builder: fixture.Builder = try .init();
         const center: [3]f32 = .{ distance, -distance, distance };
         try builder.addSphere(fixture.matte(.{ 1, 1, 1 }), center, 1, 12);
+        // Most of the scene is elsewhere, so that it stays where it is.
+        try builder.addSphere(fixture.matte(.{ 1, 1, 1 }), .{ 0, 0, 0 }, 1, 14);
         try builder.addCamera(.{ 0, 0, 7 }, 1);
         var scene = builder.finish();
         defer scene.deinit();
