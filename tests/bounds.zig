@@ -1,5 +1,5 @@
-//! Property tests of what beams take for granted: every bound on what rounding may do holds, against
-//! 128-bit floats and the exact test, and is not much wider than need be.
+//! Property tests of what beams take for granted: every bound on what rounding may do holds,
+//! against 128-bit floats and the exact test, and is not much wider than need be.
 //!
 //! Edge functions and nearness of triangles as the eye and both kinds of light see them; planes
 //! around a beam; bounds of shadow receivers. Inputs are random and nasty, seeds fixed.
@@ -187,7 +187,8 @@ test "bounds of what the eye sees hold, and are not much too wide" {
         grid.deviation_roundings = 4 * (vec3.length1(grid.corner) + grid.spread());
         const projection: GridProjection = .init(&grid, 1e9);
         const at = [2]f32{
-            @floatFromInt(random.uintLessThan(u32, 16)), @floatFromInt(random.uintLessThan(u32, 16)),
+            @floatFromInt(random.uintLessThan(u32, 16)),
+            @floatFromInt(random.uintLessThan(u32, 16)),
         };
         const direction = grid.direction(at[0], at[1]);
         const distance = std.math.pow(f32, 10, random.float(f32) * 3 - 1);
@@ -245,7 +246,10 @@ fn truthAlong(corners: *const [3]Wide, point: Wide, way: Wide) [4]f128 {
     for (&flat, corners) |*place, corner| place.* = .{
         corner[0] - corner[2] * way[0] / way[2], corner[1] - corner[2] * way[1] / way[2],
     };
-    const at = [2]f128{ point[0] - point[2] * way[0] / way[2], point[1] - point[2] * way[1] / way[2] };
+    const at = [2]f128{
+        point[0] - point[2] * way[0] / way[2],
+        point[1] - point[2] * way[1] / way[2],
+    };
     var truth: [4]f128 = undefined;
     for (truth[0..3], 0..) |*value, index| {
         const from = flat[(index + 1) % 3];

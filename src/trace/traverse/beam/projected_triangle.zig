@@ -158,7 +158,10 @@ pub const LightProjection = struct {
         projection.stretch = stretch;
         projection.scale = .{
             .edge = unit * stretch * edges_file.edge_roundings * if (parallel) stretch else 1,
-            .nearness = unit * stretch * if (parallel) @as(f32, 1) else edges_file.inverse_roundings,
+            .nearness = if (parallel)
+                unit * stretch
+            else
+                unit * stretch * edges_file.inverse_roundings,
             .reach_max = reach_max,
         };
     }
