@@ -30,10 +30,12 @@ const pixel_count = kernel_file.beam_pixels;
 const Four = raylane.simd.Lanes(.vector, 4);
 const Wide = @Vector(3, f128);
 
-/// A geometry of which nothing is asked but its pad.
-fn paddedBy(pad: f32) Geometry {
+const padding: raylane.world.Padding = .init(@splat(0), .empty);
+
+/// A geometry of which nothing is asked but its padding.
+fn paddedGeometry() Geometry {
     var geometry: Geometry = undefined;
-    geometry.pad = pad;
+    geometry.padding = padding;
     return geometry;
 }
 
@@ -114,10 +116,7 @@ fn expectBounds(
     }
     const shown = projection.project(Four, corners);
     const nearness = projection.nearness(Four, &shown.facet);
-    // As long as the way from the origin, and a pad for it.
-    const reach = shown.facet.reach.toArray();
-    const pad = 32 * unit * @max(reach[0], reach[1], reach[2], reach[3]);
-    const hit = triangle.intersect(Four, corners, line, pad);
+    const hit = triangle.intersect(Four, corners, line, &padding);
     for (truth, 0..) |*true_values, lane| {
         const flip: f128 = if (shown.facet.det.lane(lane) < 0) -1 else 1;
         const slack = shown.slack.lane(lane);
@@ -185,7 +184,7 @@ test "bounds of what the eye sees hold, and are not much too wide" {
             .deviation_roundings = undefined,
         };
         grid.deviation_roundings = 4 * (vec3.length1(grid.corner) + grid.spread());
-        const projection: GridProjection = .init(&grid, 1e9);
+        const projection: GridProjection = .init(&grid);
         const at = [2]f32{
             @floatFromInt(random.uintLessThan(u32, 16)),
             @floatFromInt(random.uintLessThan(u32, 16)),
@@ -222,7 +221,7 @@ test "bounds of what a point light sees hold, and are not much too wide" {
         };
         const on_plane = projection.place(Four, .splat(direction));
         const at = [2]f32{ on_plane.u.lane(0), on_plane.v.lane(0) };
-        projection.bound(@max(@abs(at[0]), @abs(at[1])), 1e9);
+        projection.bound(@max(@abs(at[0]), @abs(at[1])));
         const depth = @abs(direction[axis]);
         const distance = std.math.pow(f32, 10, random.float(f32) * 3 - 1);
         const place = vec3.add(origin, vec3.scale(direction, distance));
@@ -247,8 +246,7 @@ fn truthAlong(corners: *const [3]Wide, point: Wide, way: Wide) [4]f128 {
         corner[0] - corner[2] * way[0] / way[2], corner[1] - corner[2] * way[1] / way[2],
     };
     const at = [2]f128{
-        point[0] - point[2] * way[0] / way[2],
-        point[1] - point[2] * way[1] / way[2],
+        point[0] - point[2] * way[0] / way[2], point[1] - point[2] * way[1] / way[2],
     };
     var truth: [4]f128 = undefined;
     for (truth[0..3], 0..) |*value, index| {
@@ -282,7 +280,7 @@ test "bounds of what a directional light sees hold, and are not much too wide" {
             .slope = .{ way[turned[0]] / way[axis], way[turned[1]] / way[axis] },
             .reach = vec3.length(vec3.sub(point, origin)),
         };
-        projection.bound(@max(@abs(projection.slope.?[0]), @abs(projection.slope.?[1])), 1e9);
+        projection.bound(@max(@abs(projection.slope.?[0]), @abs(projection.slope.?[1])));
         const on_plane = projection.place(Four, .splat(vec3.sub(point, origin)));
         const distance = std.math.pow(f32, 10, random.float(f32) * 3 - 1);
         const place = vec3.sub(point, vec3.scale(way, distance));
@@ -329,13 +327,14 @@ const Tile = struct {
         }
         const sides = grid.sides() orelse return null;
         const along = grid.depthNormal() orelse return null;
-        const farthest = vec3.length1(grid.origin) + reach;
-        const geometry = paddedBy(unit * (32 * reach + 4 * farthest));
-        const slack = beam.frustum.slackOf(&geometry);
+        const slack: beam.frustum.Slack = .{
+            .apart = beam.frustum.apartOf(&padding, grid.origin),
+            .by_depth = beam.frustum.by_distance * grid.longest(),
+        };
         return .{
             .grid = grid,
             .frustum = .init(grid.origin, sides, along, slack),
-            .slack = slack,
+            .slack = slack.apart + 2 * beam.frustum.by_distance * reach,
         };
     }
 
@@ -496,6 +495,7 @@ test "bounds and planes hold every receiver and the light's way to it, and littl
             var light: Light = .{
                 .kind = if (round % 2 == 0) .point else .directional,
                 .position = undefined,
+                .from_receiver = false,
                 .direction = undefined,
                 .intensity = @splat(1),
                 .range_inv_squared = 0,
@@ -507,7 +507,7 @@ test "bounds and planes hold every receiver and the light's way to it, and littl
                 way.* = random.floatNorm(f32);
             }
             var bundle = randomBundle(Kernel, random, &light, round % 3 == 0);
-            const geometry = paddedBy(40 * 0x1p-20);
+            const geometry = paddedGeometry();
             var set: ShadowReceivers(Kernel) = undefined;
             set.geometry = &geometry;
             set.bundle = &bundle;

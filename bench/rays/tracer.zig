@@ -69,7 +69,7 @@ pub fn Tracer(comptime Kernel: type) type {
                     bundle_file.trace(Kernel, query, geometry, group, tests);
                     continue;
                 }
-                const view = bundle_file.viewOf(Lanes, group);
+                const view = bundle_file.viewOf(Lanes, &geometry.padding, group);
                 raylane.trace.single.traceEach(Kernel, query, geometry, group, &view, tests);
             }
         }
@@ -138,7 +138,8 @@ pub fn Tracer(comptime Kernel: type) type {
             hit: Lanes.Mask,
         ) triangle.EdgeFunctions(Lanes) {
             const axis: ray_file.LongAxis(Lanes) = .of(line.direction);
-            const view: ray_file.ShearedRay(Lanes) = .init(line, axis);
+            const padding = &raylane.world.Padding.init(@splat(0), .empty);
+            const view: ray_file.ShearedRay(Lanes) = .init(line, axis, padding);
             const turned: [3]Lanes.Vec3 = .{
                 axis.turn(corners[0]), axis.turn(corners[1]), axis.turn(corners[2]),
             };

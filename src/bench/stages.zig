@@ -12,7 +12,8 @@ const statistics = @import("../statistics.zig");
 const trace_file = @import("../trace.zig");
 const variant_file = @import("../variant.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
-const Image = @import("../image.zig").Image;
+const Identity = @import("../identity.zig").Identity;
+const Film = @import("../film.zig").Film;
 const World = @import("../world.zig").World;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -21,6 +22,7 @@ const Io = std.Io;
 pub const Settings = struct {
     scene: []const u8,
     allow_outside: bool,
+    output: ?Identity,
     width: u32,
     height: u32,
     thread_count: usize,
@@ -36,15 +38,15 @@ pub const Stages = struct {
     diagnostic: *Diagnostic,
     meter: ?*energy.Meter,
     progress: std.Progress.Node,
-    image: Image,
+    film: Film,
     world: ?World = null,
     triangle_count: u64 = 0,
     /// By variant; tests depend on traversal and lanes alone.
     counts: [variant_file.compiled.len]?statistics.TestCounts = @splat(null),
 
-    pub const Error = parse.Error || prepare_file.Error;
+    pub const Error = parse.Error || prepare_file.Error || trace_file.Error;
 
-    /// Takes memory for the image.
+    /// Takes memory for the film.
     pub fn init(
         gpa: Allocator,
         io: Io,
@@ -60,13 +62,13 @@ pub const Stages = struct {
             .diagnostic = diagnostic,
             .meter = meter,
             .progress = progress,
-            .image = try .init(gpa, settings.width, settings.height),
+            .film = try .init(gpa, settings.width, settings.height, .init(.{ .color = true })),
         };
     }
 
     pub fn deinit(stages: *Stages) void {
         if (stages.world) |*world| world.deinit();
-        stages.image.deinit(stages.gpa);
+        stages.film.deinit(stages.gpa);
         stages.* = undefined;
     }
 
@@ -79,6 +81,7 @@ pub const Stages = struct {
         const start_ns = stages.now();
         var scene = try parse.parse(stages.gpa, stages.io, settings.scene, .{
             .allow_outside = settings.allow_outside,
+            .output = settings.output,
         }, stages.diagnostic);
         defer scene.deinit();
         stages.triangle_count = scene.triangleCount();
@@ -97,16 +100,16 @@ pub const Stages = struct {
     }
 
     /// Traces the image by a variant for whose width the tree was built.
-    pub fn trace(stages: *Stages, variant: usize, thread_count: usize) rounds.Traced {
+    pub fn trace(stages: *Stages, variant: usize, thread_count: usize) Error!rounds.Traced {
         const start_ns = stages.now();
         const frame = stages.world.?.frame();
         const settings = stages.traceSettings(thread_count);
-        const traced = trace_file.trace(variant, &frame, &stages.image, settings);
+        const traced = try trace_file.trace(stages.gpa, variant, &frame, &stages.film, settings);
         return .{ .trace_ns = stages.now() - start_ns, .rays = traced.rays };
     }
 
     /// Tests of boxes and triangles, by a pass that is not timed.
-    pub fn count(stages: *Stages, variant: usize) statistics.TestCounts {
+    pub fn count(stages: *Stages, variant: usize) Error!statistics.TestCounts {
         const compiled = variant_file.compiled;
         for (compiled, stages.counts) |other, counted| {
             if (other.traversal != compiled[variant].traversal) continue;
@@ -115,7 +118,8 @@ pub const Stages = struct {
         }
         const frame = stages.world.?.frame();
         const settings = stages.traceSettings(stages.settings.thread_count);
-        const traced = trace_file.traceCounting(variant, &frame, &stages.image, settings);
+        const traced = try trace_file
+            .traceCounting(stages.gpa, variant, &frame, &stages.film, settings);
         stages.counts[variant] = traced.tests;
         return traced.tests.?;
     }
@@ -129,7 +133,7 @@ pub const Stages = struct {
     }
 
     pub fn hash(stages: *const Stages) u64 {
-        return stages.image.hash();
+        return stages.film.image.hash();
     }
 
     /// A clock that never goes back, in nanoseconds.

@@ -17,6 +17,8 @@ pub const Query = enum {
     closest_hit,
     /// Whether there is a hit; which one is found depends on the tree.
     any_hit,
+    /// The first few hits in that order, unless something stops the ray: multi_hit.zig.
+    multi_hit,
 };
 
 /// Searches the whole tree, or until `search.isDone()`. Of a search it needs
