@@ -131,7 +131,8 @@ fn expectMultiHit(
             try std.testing.expectEqual(transmission == 0 and met, stopped);
             // Brute force takes its time.
             if (transmission == 0 or index % 8 != 0) continue;
-            try expectList(world, query, &lists.lists[group][lane]);
+            const list = lists.hits[group][lane][0..lists.counts[group][lane]];
+            try expectList(world, query, list);
         }
     }
 }
@@ -140,14 +141,14 @@ fn expectMultiHit(
 fn expectList(
     world: *const World,
     query: Query,
-    list: *const raylane.trace.multi_hit.HitList,
+    list: []const raylane.trace.multi_hit.Hit,
 ) !void {
     var next = query;
-    for (list.hits[0..list.count]) |hit| {
+    for (list) |hit| {
         next.tnear = bruteForce(world, next);
         try expectHit(next.tnear, hit.t, hit.primitive);
     }
-    if (list.count == list.hits.len) return;
+    if (list.len == raylane.trace.multi_hit.hits_max) return;
     try std.testing.expectEqual(ray_file.no_primitive, bruteForce(world, next).primitive);
 }
 
