@@ -1,6 +1,6 @@
 //! Builds Raylane: one static `raylane`, its tests on every target, and its tools.
 //!
-//! In: the command line's options, the sources, the headers that `vendor/fetch` checks. Out: the
+//! In: the command line's options, the sources, the files that `vendor/fetch` checks. Out: the
 //! steps at the top of `build`; `zig build` alone installs a fast, native, static program. What is
 //! wired once a target stands in build/package.zig, what only tests need in build/tests.zig.
 
@@ -30,7 +30,7 @@ pub fn build(b: *std.Build) void {
         .test_integration = b.step("test:integration", "Run its tests of rays and pictures"),
         .test_fmt = b.step("test:fmt", "Check the formatting"),
         .test_tidy = b.step("test:tidy", "Check the style of the source tree"),
-        .test_report = b.step("test:report", "Test the report of the benchmark"),
+        .test_report = b.step("test:report", "Test the tools in Python"),
         .check = b.step("check", "Compile the program, its benchmarks and tests, write nothing"),
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
@@ -39,7 +39,7 @@ pub fn build(b: *std.Build) void {
         .bench_structures = b.step("bench:structures", "Trees beside each other: -- SCENE"),
         .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
-        .vendor = b.step("vendor", "Fetch and check the third-party headers"),
+        .vendor = b.step("vendor", "Fetch and check the third-party files"),
     };
     const query = b.standardTargetOptionsQueryOnly(.{});
     const optimize = b.option(std.lang.Optimize, "optimize", "debug, safe, fast (default), small");
@@ -148,19 +148,17 @@ fn addLowering(step: *std.Build.Step) void {
     step.dependOn(&lowering.step);
 }
 
-/// The step that puts the headers in place, and the folder of copies that depends on it.
+/// The step that puts the third-party files in place, and the folder of copies that depends on it.
 fn addVendor(b: *std.Build) struct { step: *std.Build.Step, headers: std.Build.LazyPath } {
-    const fetch = b.addSystemCommand(&.{"sh"});
+    const fetch = b.addSystemCommand(&.{"python3"});
     fetch.setName("vendor/fetch");
     fetch.addFileArg(b.path("vendor/fetch"));
-    // It looks at files that a user may have put there, so it runs each time (10 ms).
+    // It looks at files that a user may have put there, so it runs each time (0.1 s).
     fetch.has_side_effects = true;
     const copies = b.addWriteFiles();
     copies.step.dependOn(&fetch.step);
-    for ([_][]const u8{ "cgltf.h", "stb_image.h" }) |name| {
-        _ = copies.addCopyFile(b.path(b.pathJoin(&.{ "vendor/include", name })), name);
-    }
-    return .{ .step = &fetch.step, .headers = copies.getDirectory() };
+    const headers = copies.addCopyDirectory(b.path("vendor/include"), "include", .{});
+    return .{ .step = &fetch.step, .headers = headers };
 }
 
 /// Fills in what a bare `-Dtarget=` leaves open: a static libc, and a NEON CPU for ARMv7.

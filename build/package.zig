@@ -1,11 +1,12 @@
 //! One build of Raylane for one target: the library module with all it imports, and the program.
 //!
 //! In: the target, the optimisation mode, the variant options, the checked third-party headers.
-//! Out: modules and programs that share nothing with those of another target. Third-party C is
-//! compiled without the undefined-behaviour sanitizer, ours with it outside fast mode; floating
-//! point is never contracted, so that every target computes the same bits.
+//! Out: modules and programs that share nothing with those of another target. Our C is compiled
+//! with the undefined-behaviour sanitizer outside fast mode; floating point is never contracted,
+//! so that every target computes the same bits. Third-party C is in libraries.zig.
 
 const std = @import("std");
+const libraries = @import("libraries.zig");
 const manifest = @import("../build.zig.zon");
 const Module = std.Build.Module;
 const LazyPath = std.Build.LazyPath;
@@ -36,9 +37,6 @@ pub const Options = struct {
 
 const own_c_flags: []const []const u8 = &.{
     "-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-Wall", "-Wextra", "-Werror",
-};
-const third_party_c_flags: []const []const u8 = &.{
-    "-std=c11", "-ffp-contract=off", "-fno-sanitize=undefined",
 };
 
 /// Declares the modules for `target`; `headers` is the folder of the third-party headers.
@@ -74,8 +72,13 @@ pub fn init(
         .imports = &.{
             .{ .name = "config", .module = config.createModule() },
             .{ .name = "cgltf", .module = package.cgltf() },
+            .{
+                .name = "licenses",
+                .module = libraries.licenses(b, headers, target.result.isMuslLibC()),
+            },
         },
     });
+    for (libraries.program) |library| library.addTo(package.raylane, headers);
     package.raylane.addCSourceFile(.{
         .file = b.path("src/simd/intrinsics.c"),
         .flags = own_c_flags,
@@ -111,30 +114,8 @@ pub fn addProgram(package: Package, name: []const u8, root: []const u8) *std.Bui
     }) });
 }
 
-/// stb_image as a module, for tests that decode pictures.
-pub fn stbImage(package: Package) *Module {
-    const b = package.owner;
-    const defines: []const []const u8 = &.{
-        "-DSTBI_ONLY_PNG", "-DSTBI_ONLY_JPEG", "-DSTBI_NO_STDIO", "-DSTBI_MAX_DIMENSIONS=32768",
-    };
-    const header = package.headers.path(b, "stb_image.h");
-    const translation = package.translate(header);
-    translation.addCFlags(defines);
-    const module = translation.createModule();
-    module.addCSourceFile(.{
-        .file = header,
-        .language = .c,
-        .flags = b.graph.dupeStrings(defines ++ third_party_c_flags ++
-            .{"-DSTB_IMAGE_IMPLEMENTATION"}),
-    });
-    return module;
-}
-
 fn cgltf(package: Package) *Module {
-    const b = package.owner;
-    const module = package.translate(b.path("src/parse/cgltf_shim.h")).createModule();
-    package.addThirdParty(module, "src/parse/cgltf.c");
-    return module;
+    return package.translate(package.owner.path("src/parse/cgltf_shim.h")).createModule();
 }
 
 fn translate(package: Package, header: LazyPath) *std.Build.Step.TranslateC {
@@ -145,14 +126,6 @@ fn translate(package: Package, header: LazyPath) *std.Build.Step.TranslateC {
     });
     translation.addIncludePath(package.headers);
     return translation;
-}
-
-fn addThirdParty(package: Package, module: *Module, implementation: []const u8) void {
-    module.addIncludePath(package.headers);
-    module.addCSourceFile(.{
-        .file = package.owner.path(implementation),
-        .flags = third_party_c_flags,
-    });
 }
 
 /// As many lanes as the registers hold; the C intrinsics and 2x2 packets have 4 only.

@@ -6,6 +6,7 @@
 //! every time: what they read (scenes, pictures, the source tree) is more than the build knows of.
 
 const std = @import("std");
+const libraries = @import("libraries.zig");
 const Package = @import("package.zig");
 const Compile = std.Build.Step.Compile;
 const LazyPath = std.Build.LazyPath;
@@ -54,7 +55,7 @@ pub fn addAll(tests: Tests, step: *std.Build.Step, targets: []const Target) void
     var logs: std.ArrayList(LazyPath) = .empty;
     const arena = tests.owner.allocator;
     logs.appendSlice(arena, &.{
-        tests.format(), tests.tidy(), tests.machinery(), tests.report(),
+        tests.format(), tests.tidy(), tests.machinery(), tests.report(), tests.fetcher(),
     }) catch @panic("OOM");
     for (targets) |target| {
         logs.appendSlice(arena, &.{
@@ -86,9 +87,9 @@ pub fn addTidy(tests: Tests, step: *std.Build.Step) void {
     tests.close(step, &.{tests.tidy()}, .logs_only);
 }
 
-/// Makes `step` test the report of the benchmark.
+/// Makes `step` test the tools in Python: the report of the benchmark, and vendor/fetch.
 pub fn addReport(tests: Tests, step: *std.Build.Step) void {
-    tests.close(step, &.{tests.report()}, .logs_only);
+    tests.close(step, &.{ tests.report(), tests.fetcher() }, .logs_only);
 }
 
 /// Makes `step` compile the test programs of `target` without a file as the result.
@@ -116,6 +117,14 @@ fn report(tests: Tests) LazyPath {
     const run, const log = tests.start("report", "sources");
     run.addArgs(&.{ "--one", "--needs=python3", "--", "python3", "-m", "unittest", "discover" });
     run.addArgs(&.{ "-s", "bench/reporting", "-t", "bench" });
+    return log;
+}
+
+/// What fetches the third-party files; each kind of package is tested where its tool is installed.
+fn fetcher(tests: Tests) LazyPath {
+    const run, const log = tests.start("fetch", "sources");
+    run.addArgs(&.{ "--one", "--needs=python3", "--", "python3", "-m", "unittest", "discover" });
+    run.addArgs(&.{ "-s", "vendor" });
     return log;
 }
 
@@ -158,16 +167,15 @@ fn unitProgram(tests: Tests, target: Target) *Compile {
 
 fn integrationProgram(tests: Tests, target: Target) *Compile {
     const b = tests.owner;
-    return tests.program("integration", b.createModule(.{
+    const root = b.createModule(.{
         .root_source_file = b.path("tests/integration.zig"),
         .target = target.package.target,
         .optimize = target.package.optimize,
         .error_tracing = target.package.raylane.error_tracing,
-        .imports = &.{
-            .{ .name = "raylane", .module = target.package.raylane },
-            .{ .name = "stb_image", .module = target.package.stbImage() },
-        },
-    }));
+        .imports = &.{.{ .name = "raylane", .module = target.package.raylane }},
+    });
+    libraries.stb_image.addTo(root, target.package.headers);
+    return tests.program("integration", root);
 }
 
 /// A test program of this machine whose root is `tests/NAME.zig`.
