@@ -146,7 +146,7 @@ fn localTransform(source: *const Source, index: u32) Error!Affine {
         local = .fromTrs(node.translation, rotation, node.scale);
     }
     inline for (.{ &local.x, &local.y, &local.z, &local.translation }) |column| {
-        for (column) |*value| value.* = math.vec3.flushDenormal(value.*);
+        for (column) |*value| value.* = math.flushDenormal(value.*);
     }
     if (!local.isFinite()) return source.fail("node {d}: transform is not finite", .{index});
     return local;

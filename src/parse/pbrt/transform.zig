@@ -182,7 +182,7 @@ pub fn toVec3(vector: Vector) math.Vec3 {
     var result: math.Vec3 = undefined;
     for (vector, &result) |number, *component| {
         const bounded = std.math.clamp(number, -largest, largest);
-        component.* = math.vec3.flushDenormal(@floatCast(bounded));
+        component.* = math.flushDenormal(@floatCast(bounded));
     }
     return result;
 }
