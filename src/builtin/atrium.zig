@@ -615,7 +615,7 @@ fn addFountain(parts: *Parts) Allocator.Error!void {
 
 /// A clipped shrub in a pot.
 fn addShrub(parts: *Parts, origin: Point) Allocator.Error!void {
-    parts.setPlace(.at(origin));
+    parts.setPlace(.translate(origin));
     var pot: Outline = .from(.{ 0.26, 0 });
     pot.line(&.{ .{ 0.3, 0.04 }, .{ 0.27, 0.1 } });
     pot.curve(.{ 0.38, 0.3 }, .{ 0.4, 0.54 }, 4);

@@ -60,7 +60,7 @@ const pose: Place = .{
     .x = .{ 0.936, 0.352, 0 },
     .y = .{ -0.2112, 0.5616, 0.8 },
     .z = .{ 0.2816, -0.7488, 0.6 },
-    .origin = .{ 0, 0, 0 },
+    .translation = .{ 0, 0, 0 },
 };
 
 /// Adds the sculpture about the origin and returns the height of its lowest point.
@@ -88,7 +88,7 @@ fn addSculpture(scene: *SceneBuilder, gpa: Allocator) Allocator.Error!f64 {
 /// Adds a floor that bends up into a wall behind, as photographers use.
 fn addStudio(scene: *SceneBuilder, floor_y: f64) Allocator.Error!void {
     var mesh: MeshBuilder = .init(scene.arena());
-    mesh.place = .at(.{ 0, floor_y, 0 });
+    mesh.place = .translate(.{ 0, floor_y, 0 });
     const bend = 3.0;
     const bend_z = -3.5;
     const segments = 16;

@@ -385,12 +385,12 @@ test "solids face outwards" {
     }
     const outline = [_]OutlinePoint{ .{ 0, 0 }, .{ 1, 0 }, .{ 1, 2 }, .{ 0, 2 } };
     var square: MeshBuilder = .init(arena.allocator());
-    square.place = .at(.{ 3, 0, 0 });
+    square.place = .translate(.{ 3, 0, 0 });
     try square.prism(&outline);
     const square_mesh = try square.finish(0);
     try std.testing.expectApproxEqRel(@as(f32, 6 * 8), volumeSixfold(square_mesh), 1e-5);
     var cylinder: MeshBuilder = .init(arena.allocator());
-    cylinder.place = geometry.Place.at(.{ 9, 1, 2 }).turned(1);
+    cylinder.place = geometry.Place.translate(.{ 9, 1, 2 }).turned(1);
     try cylinder.revolve(&outline, 64);
     const cylinder_mesh = try cylinder.finish(0);
     const volume: f32 = 6 * 2 * std.math.pi;

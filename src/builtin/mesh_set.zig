@@ -49,7 +49,7 @@ test "meshes keep to their materials" {
     var scene: SceneBuilder = .init(std.testing.allocator);
     defer scene.deinit();
     var set: MeshSet(Part) = .init(scene.arena());
-    set.setPlace(.at(.{ 1, 2, 3 }));
+    set.setPlace(.translate(.{ 1, 2, 3 }));
     try set.get(.stone).box(.{ 0, 0, 0 }, .{ 1, 1, 1 });
     try set.get(.wood).quad(.{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 1, 1, 0 }, .{ 0, 1, 0 });
     try set.finish(&scene, .init(.{

@@ -105,6 +105,24 @@ pub fn Affine(comptime V: type) type {
             return map;
         }
 
+        /// This map after a move by `offset`: moved in its own axes.
+        pub fn moved(map: Self, offset: V) Self {
+            var result = map;
+            result.translation = map.point(offset);
+            return result;
+        }
+
+        /// This map after quarter turns from x towards z: turned about its own y.
+        pub fn turned(map: Self, quarters: u2) Self {
+            var result = map;
+            for (0..quarters) |_| {
+                const old_x = result.x;
+                result.x = result.z;
+                result.z = vec.neg(old_x);
+            }
+            return result;
+        }
+
         /// The map back, or null where there is none.
         pub fn inverse(map: Self) ?Self {
             const volume = map.determinant();
@@ -167,6 +185,15 @@ test "compose equals doing one after the other, normals stay perpendicular" {
     try std.testing.expectApproxEqAbs(@as(f32, 0), Single.vec.dot(n, a.direction(v)), 1e-4);
     const again = Single.vec.cross(a.direction(u), a.direction(v)); // Mirrored maps included.
     for (n, again) |p, q| try std.testing.expectApproxEqAbs(p, q, 1e-4);
+}
+
+test "maps move and turn in their own axes" {
+    const quarter = Single.translate(.{ 1, 2, 3 }).turned(1);
+    try std.testing.expectEqual([3]f32{ 0, 2, 3 }, quarter.point(.{ 0, 0, 1 }));
+    try std.testing.expectEqual([3]f32{ 1, 2, 4 }, quarter.point(.{ 1, 0, 0 }));
+    const moved = quarter.moved(.{ 1, 0, 0 });
+    try std.testing.expectEqual([3]f32{ 1, 7, 4 }, moved.point(.{ 0, 5, 0 }));
+    try std.testing.expectEqual(Single.identity, Single.identity.turned(3).turned(1));
 }
 
 test "a map and its inverse are nothing, in either precision" {

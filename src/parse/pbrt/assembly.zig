@@ -10,7 +10,8 @@ const math = @import("../../math.zig");
 const scene_data = @import("../../scene.zig");
 const Input = @import("input.zig");
 const Maker = @import("shapes/maker.zig");
-const Transform = @import("transform.zig");
+const vec3d = math.vec3d;
+const Transform = math.AffineD;
 const Allocator = std.mem.Allocator;
 const Error = Input.Error;
 const Geometry = Maker.Geometry;
@@ -112,7 +113,7 @@ pub fn show(assembly: *Assembly, mesh: u32, place: *const Transform) Error!void 
         if (assembly.last_node) |last| {
             if (std.meta.eql(last.place, place.*)) break :node last.index;
         }
-        break :node try assembly.addNode(root, place.toAffine());
+        break :node try assembly.addNode(root, place.toSingle());
     };
     assembly.last_node = .{ .index = node, .place = place.* };
     try assembly.showAt(mesh, node);
@@ -134,7 +135,7 @@ pub fn addPart(assembly: *Assembly, mesh: u32, place: *const Transform) Allocato
 
 /// Shows an object at `place`.
 pub fn showObject(assembly: *Assembly, object: Object, place: *const Transform) Error!void {
-    const above = try assembly.addNode(root, place.toAffine());
+    const above = try assembly.addNode(root, place.toSingle());
     assembly.last_node = null;
     var last: ?struct { index: u32, place: Transform } = null;
     for (object.first..object.first + object.count) |index| {
@@ -144,7 +145,7 @@ pub fn showObject(assembly: *Assembly, object: Object, place: *const Transform) 
             const node = if (is_plain)
                 above
             else
-                try assembly.addNode(above, part.place.toAffine());
+                try assembly.addNode(above, part.place.toSingle());
             last = .{ .index = node, .place = part.place };
         }
         try assembly.showAt(part.mesh, last.?.index);
@@ -154,18 +155,19 @@ pub fn showObject(assembly: *Assembly, object: Object, place: *const Transform) 
 /// Adds a light at a node of its own, from which it shines along `direction`.
 pub fn addLight(
     assembly: *Assembly,
-    origin: Transform.Vector,
-    direction: Transform.Vector,
+    origin: math.Vec3d,
+    direction: math.Vec3d,
     light: scene_data.Light,
 ) Allocator.Error!void {
-    const z = Transform.normalize(Transform.scaled(direction, -1)) orelse
-        Transform.Vector{ 0, 0, 1 };
+    const z = vec3d.normalize(vec3d.scale(direction, -1)) orelse
+        math.Vec3d{ 0, 0, 1 };
     // Any direction that is not along z.
-    const hint: Transform.Vector = if (@abs(z[0]) < 0.6) .{ 1, 0, 0 } else .{ 0, 1, 0 };
-    const x = Transform.normalize(Transform.cross(hint, z)).?;
-    const place: Transform = .{ .axes = .{ x, Transform.cross(z, x), z }, .origin = origin };
+    const hint: math.Vec3d = if (@abs(z[0]) < 0.6) .{ 1, 0, 0 } else .{ 0, 1, 0 };
+    const x = vec3d.normalize(vec3d.cross(hint, z)).?;
+    const place: Transform =
+        .{ .x = x, .y = vec3d.cross(z, x), .z = z, .translation = origin };
     var placed = light;
-    placed.node = try assembly.addNode(root, place.toAffine());
+    placed.node = try assembly.addNode(root, place.toSingle());
     try assembly.lights.append(assembly.gpa, placed);
 }
 
@@ -179,9 +181,9 @@ pub fn finish(
     const scene = assembly.scene;
     const arena = scene.arena.allocator();
     // Our cameras look along -z.
-    const backward = Transform.scaling(.{ 1, 1, -1 });
-    const node = try assembly.addNode(root, camera.compose(&backward).toAffine());
-    if (camera.determinant() > 0) assembly.nodes.items[root].local = backward.toAffine();
+    const backward = Transform.scale(.{ 1, 1, -1 });
+    const node = try assembly.addNode(root, camera.compose(backward).toSingle());
+    if (camera.determinant() > 0) assembly.nodes.items[root].local = backward.toSingle();
     scene.nodes = try arena.dupe(scene_data.Node, assembly.nodes.items);
     scene.meshes = try arena.dupe(scene_data.Mesh, assembly.meshes.items);
     scene.instances = try arena.dupe(scene_data.Instance, assembly.instances.items);

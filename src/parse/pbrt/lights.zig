@@ -18,10 +18,11 @@ const Assembly = @import("assembly.zig");
 const Colors = @import("colors.zig");
 const Input = @import("input.zig");
 const Parameters = @import("parameters.zig");
-const Transform = @import("transform.zig");
+const vec3d = math.vec3d;
+const Transform = math.AffineD;
 const Error = Input.Error;
 const Vec3 = math.Vec3;
-const Vector = Transform.Vector;
+const Vector = math.Vec3d;
 
 /// Points that a shining shape becomes, where there are not too many of them.
 pub const points_per_shape = 16;
@@ -101,8 +102,8 @@ pub fn add(source: *const Source, name: []const u8) Error!void {
         .distant => {
             const from = source.point("from", .{ 0, 0, 0 });
             const to = source.point("to", .{ 0, 0, 1 });
-            const way = Transform.subtract(to, from);
-            if (Transform.normalize(way) == null)
+            const way = vec3d.sub(to, from);
+            if (vec3d.normalize(way) == null)
                 return source.colors.input.fail(source.position, "the light has no direction", .{});
             try assembly.addLight(.{ 0, 0, 0 }, way, .{
                 .kind = .directional,
@@ -134,8 +135,8 @@ fn addSpot(source: *const Source, name: []const u8, is_projection: bool) Error!v
         source.place.point(.{ 0, 0, 1 })
     else
         source.point("to", .{ 0, 0, 1 });
-    const way = Transform.subtract(target, origin);
-    if (Transform.normalize(way) == null)
+    const way = vec3d.sub(target, origin);
+    if (vec3d.normalize(way) == null)
         return source.colors.input.fail(source.position, "the light has no direction", .{});
     var outer_deg = parameters.float("coneangle", 30);
     var inner_deg = outer_deg - parameters.float("conedeltaangle", 5);
@@ -168,12 +169,12 @@ pub fn placeEmitters(assembly: *Assembly) Error!void {
 fn facing(emitter: *const Assembly.Emitter, triangle: [3]u32) Vector {
     var corners: [3]Vector = undefined;
     for (&corners, triangle) |*corner, vertex| corner.* = cornerAt(emitter, vertex);
-    const normal = Transform.cross(
-        Transform.subtract(corners[1], corners[0]),
-        Transform.subtract(corners[2], corners[0]),
+    const normal = vec3d.cross(
+        vec3d.sub(corners[1], corners[0]),
+        vec3d.sub(corners[2], corners[0]),
     );
     // Normals do not turn where the place mirrors.
-    return if (emitter.place.determinant() < 0) Transform.scaled(normal, -1) else normal;
+    return if (emitter.place.determinant() < 0) vec3d.scale(normal, -1) else normal;
 }
 
 fn cornerAt(emitter: *const Assembly.Emitter, vertex: u32) Vector {
@@ -189,7 +190,7 @@ fn placeEmitter(
     var area: f64 = 0;
     for (emitter.geometry.triangles) |triangle| {
         const normal = facing(emitter, triangle);
-        area += 0.5 * @sqrt(Transform.dot(normal, normal));
+        area += 0.5 * vec3d.length(normal);
     }
     if (!(area > 0 and area < 1e30)) return;
     const step = area / @as(f64, @floatFromInt(count));
@@ -199,13 +200,13 @@ fn placeEmitter(
     var made: u32 = 0;
     for (emitter.geometry.triangles) |triangle| {
         const normal = facing(emitter, triangle);
-        const doubled = @sqrt(Transform.dot(normal, normal));
+        const doubled = vec3d.length(normal);
         passed += 0.5 * doubled;
         while (made < count and (@as(f64, @floatFromInt(made)) + 0.5) * step < passed) {
             const at = pointWithin(emitter, triangle, made);
             made += 1;
-            const unit = Transform.normalize(normal) orelse continue;
-            try addPoint(assembly, emitter, at, Transform.scaled(unit, lift), step);
+            const unit = vec3d.normalize(normal) orelse continue;
+            try addPoint(assembly, emitter, at, vec3d.scale(unit, lift), step);
         }
     }
 }
@@ -222,9 +223,9 @@ fn pointWithin(emitter: *const Assembly.Emitter, triangle: [3]u32, index: u32) V
         v = 1 - v;
     }
     const a = cornerAt(emitter, triangle[0]);
-    const b = Transform.subtract(cornerAt(emitter, triangle[1]), a);
-    const c = Transform.subtract(cornerAt(emitter, triangle[2]), a);
-    return Transform.add(a, Transform.add(Transform.scaled(b, u), Transform.scaled(c, v)));
+    const b = vec3d.sub(cornerAt(emitter, triangle[1]), a);
+    const c = vec3d.sub(cornerAt(emitter, triangle[2]), a);
+    return vec3d.add(a, vec3d.add(vec3d.scale(b, u), vec3d.scale(c, v)));
 }
 
 fn addPoint(
@@ -236,8 +237,8 @@ fn addPoint(
 ) Error!void {
     const sides: usize = if (emitter.two_sided) 2 else 1;
     for (0..sides) |side| {
-        const way = if (side == 0) lift else Transform.scaled(lift, -1);
-        try assembly.addLight(Transform.add(at, way), way, .{
+        const way = if (side == 0) lift else vec3d.scale(lift, -1);
+        try assembly.addLight(vec3d.add(at, way), way, .{
             .kind = .spot,
             .node = undefined,
             .color = emitter.radiance,

@@ -17,7 +17,9 @@ const Colors = @import("colors.zig");
 const Input = @import("input.zig");
 const Maker = @import("shapes/maker.zig");
 const Parameters = @import("parameters.zig");
-const Transform = @import("transform.zig");
+const math = @import("../../math.zig");
+const transforms = @import("transform.zig");
+const Transform = math.AffineD;
 const View = @import("view.zig");
 const Allocator = std.mem.Allocator;
 const Error = Input.Error;
@@ -220,17 +222,17 @@ fn perform(reader: *Reader, directive: Directive, position: usize) Error!void {
     switch (directive) {
         .Identity => try reader.setTransform(position, .identity),
         .Translate => {
-            try reader.transform(position, .translation(try reader.numbers(3)));
+            try reader.transform(position, .translate(try reader.numbers(3)));
         },
-        .Scale => try reader.transform(position, .scaling(try reader.numbers(3))),
+        .Scale => try reader.transform(position, .scale(try reader.numbers(3))),
         .Rotate => {
             const n = try reader.numbers(4);
-            try reader.transform(position, Transform.rotation(n[0], n[1..4].*) orelse
+            try reader.transform(position, transforms.rotation(n[0], n[1..4].*) orelse
                 return reader.input.fail(position, "the axis has no direction", .{}));
         },
         .LookAt => {
             const n = try reader.numbers(9);
-            try reader.transform(position, Transform.lookAt(n[0..3].*, n[3..6].*, n[6..9].*) orelse
+            try reader.transform(position, transforms.lookAt(n[0..3].*, n[3..6].*, n[6..9].*) orelse
                 return reader.input.fail(position, "the three points leave no direction", .{}));
         },
         .Transform => try reader.setTransform(position, try reader.matrix(position)),
@@ -365,7 +367,7 @@ fn numbers(reader: *Reader, comptime count: usize) Error![count]f64 {
 
 fn matrix(reader: *Reader, position: usize) Error!Transform {
     const sixteen = try reader.numbers(16);
-    return Transform.fromMatrix(&sixteen) orelse
+    return transforms.fromMatrix(&sixteen) orelse
         reader.input.fail(position, "the matrix is not affine", .{});
 }
 
@@ -395,12 +397,12 @@ fn keep(
 }
 
 fn transform(reader: *Reader, position: usize, inner: Transform) Error!void {
-    try reader.setTransform(position, reader.graphics.transform.compose(&inner));
+    try reader.setTransform(position, reader.graphics.transform.compose(inner));
 }
 
 fn setTransform(reader: *Reader, position: usize, to: Transform) Error!void {
     if (!reader.graphics.at_start) return;
-    if (!to.isFinite())
+    if (!transforms.fitsSingle(&to))
         return reader.input.fail(position, "the transformation is out of range", .{});
     reader.graphics.transform = to;
 }

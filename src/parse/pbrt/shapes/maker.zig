@@ -11,8 +11,8 @@ const Input = @import("../input.zig");
 const Parameters = @import("../parameters.zig");
 const Error = Input.Error;
 const Vec3 = math.Vec3;
-const Transform = @import("../transform.zig");
-const Vector = Transform.Vector;
+const vec3d = math.vec3d;
+const Vector = math.Vec3d;
 const assert = std.debug.assert;
 
 const Maker = @This();
@@ -117,8 +117,8 @@ pub fn grid(
     for (0..size.rows + 1) |row| for (0..@intCast(stride)) |column| {
         const sample = sampleAt(context, @intCast(column), @intCast(row));
         const index = row * @as(usize, @intCast(stride)) + column;
-        result.positions[index] = Transform.toVec3(sample.point);
-        result.normals.?[index] = Transform.toVec3(sample.normal);
+        result.positions[index] = vec3d.toSingle(sample.point);
+        result.normals.?[index] = vec3d.toSingle(sample.normal);
     };
     const wide: u32 = @intCast(stride);
     var made: usize = 0;

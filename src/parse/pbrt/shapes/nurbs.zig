@@ -8,11 +8,12 @@
 const std = @import("std");
 const limits = @import("../limits.zig");
 const Maker = @import("maker.zig");
-const Transform = @import("../transform.zig");
+const math = @import("../../../math.zig");
+const vec3d = math.vec3d;
 const Error = @import("../input.zig").Error;
 const Geometry = Maker.Geometry;
 const Sample = Maker.Sample;
-const Vector = Transform.Vector;
+const Vector = math.Vec3d;
 
 const order_max = limits.nurbs_order_max;
 
@@ -107,15 +108,15 @@ const Surface = struct {
         const by_v = surface.sum(&u, &v, &u.values, &v.slopes);
         const w = if (whole[3] != 0) whole[3] else 1;
         const point: Vector = .{ whole[0] / w, whole[1] / w, whole[2] / w };
-        const normal = Transform.cross(slope(by_u, point), slope(by_v, point));
+        const normal = vec3d.cross(slope(by_u, point), slope(by_v, point));
         if (!isFinite(point)) return .{ .point = .{ 0, 0, 0 }, .normal = .{ 0, 0, 0 } };
-        return .{ .point = point, .normal = Transform.normalize(normal) orelse .{ 0, 0, 0 } };
+        return .{ .point = point, .normal = vec3d.normalize(normal) orelse .{ 0, 0, 0 } };
     }
 
     /// Derivative of a quotient, but for a factor above 0.
     fn slope(homogeneous: [4]f64, point: Vector) Vector {
         const own: Vector = homogeneous[0..3].*;
-        return Transform.subtract(own, Transform.scaled(point, homogeneous[3]));
+        return vec3d.sub(own, vec3d.scale(point, homogeneous[3]));
     }
 
     fn isFinite(point: Vector) bool {

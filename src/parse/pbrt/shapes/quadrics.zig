@@ -6,12 +6,13 @@
 const std = @import("std");
 const elementary = @import("../../../math.zig").elementary;
 const Maker = @import("maker.zig");
-const Transform = @import("../transform.zig");
+const math = @import("../../../math.zig");
+const vec3d = math.vec3d;
 const Error = @import("../input.zig").Error;
 const Geometry = Maker.Geometry;
 const Grid = Maker.Grid;
 const Sample = Maker.Sample;
-const Vector = Transform.Vector;
+const Vector = math.Vec3d;
 
 /// Where the turning curve is, and the normal there: distance from the axis and height each.
 const Outline = struct { radius: f64, height: f64, normal_out: f64, normal_up: f64 };
@@ -215,12 +216,12 @@ const Hyperboloid = struct {
         const cosine = elementary.cos(phi);
         const sine = elementary.sin(phi);
         const v = share(row, self.size.rows);
-        const along = Transform.subtract(self.last, self.first);
-        const on_line = Transform.add(self.first, Transform.scaled(along, v));
+        const along = vec3d.sub(self.last, self.first);
+        const on_line = vec3d.add(self.first, vec3d.scale(along, v));
         const point = turn(on_line, cosine, sine);
         const across: Vector = .{ -point[1], point[0], 0 };
-        const normal = Transform.cross(across, turn(along, cosine, sine));
-        return .{ .point = point, .normal = Transform.normalize(normal) orelse .{ 0, 0, 0 } };
+        const normal = vec3d.cross(across, turn(along, cosine, sine));
+        return .{ .point = point, .normal = vec3d.normalize(normal) orelse .{ 0, 0, 0 } };
     }
 
     fn turn(vector: Vector, cosine: f64, sine: f64) Vector {
