@@ -10,6 +10,9 @@ const assert = std.debug.assert;
 const Affine = math.Affine;
 const Vec3 = math.Vec3;
 
+/// Grows a `Scene`.
+pub const Builder = @import("scene/builder.zig");
+
 /// Index that stands for "none".
 pub const none: u32 = std.math.maxInt(u32);
 
@@ -174,6 +177,10 @@ pub const Scene = struct {
         assert(scene.camera_default == none or scene.camera_default < scene.cameras.len);
     }
 };
+
+test {
+    _ = Builder;
+}
 
 test "an empty scene is a scene" {
     var scene: Scene = .init(std.testing.allocator);

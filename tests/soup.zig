@@ -346,7 +346,7 @@ test "a tree without triangles and one with a single triangle" {
             triangles[0..triangle_count],
         );
         try builder.addCamera(.{ 0, 0, 7 }, 1);
-        var scene = builder.finish();
+        var scene = try builder.finish();
         defer scene.deinit();
         const queries = [_]Query{.{ .origin = .{ 0.2, 0.2, 1 }, .direction = .{ 0, 0, -1 } }};
         const hit: Hit = if (triangle_count == 0)
@@ -367,7 +367,7 @@ test "a closed surface stops every ray that aims at its edges and corners, near 
         const center: [3]f32 = .{ distance, -distance, distance };
         try builder.addSphere(fixture.matte(.{ 1, 1, 1 }), center, 1, 12);
         try builder.addCamera(.{ 0, 0, 7 }, 1);
-        var scene = builder.finish();
+        var scene = try builder.finish();
         defer scene.deinit();
         const lanes = raylane.variant.compiled[0].lanes;
         var world = try fixture.prepare(&scene, lanes, .{});

@@ -131,10 +131,9 @@ test "orthographic views, directional and spot lights, holes, veils and absorbin
     try builder.addQuad(veil, .{ 0.4, 0.2, -2 }, .{ 0.8, 0.1, 0 }, .{ 0, 0.7, 0.2 });
     try builder.addQuad(hole, .{ 0, 0, -1 }, .{ 4, 0, 0 }, .{ 0, 4, 0 });
     try builder.addPointLight(.{ 1, 3, -1 }, 30);
-    const arena = builder.scene.arena.allocator();
     const tilted = try builder.addNode(.fromTrs(.{ -2, 3, 0 }, .{ -0.6, 0, 0, 0.8 }, .{ 1, 1, 1 }));
-    try builder.lights.append(arena, .{ .kind = .directional, .node = tilted, .intensity = 1.5 });
-    try builder.lights.append(arena, .{
+    try builder.scene.addLight(.{ .kind = .directional, .node = tilted, .intensity = 1.5 });
+    try builder.scene.addLight(.{
         .kind = .spot,
         .node = tilted,
         .intensity = 60,
@@ -142,10 +141,10 @@ test "orthographic views, directional and spot lights, holes, veils and absorbin
         .inner_cone_rad = 0.2,
         .outer_cone_rad = 0.9,
     });
-    try builder.cameras.append(arena, .{ .name = "flat", .node = 0, .projection = .{
+    try builder.scene.addCamera(.{ .name = "flat", .node = 0, .projection = .{
         .orthographic = .{ .half_width = 2, .half_height = 1.6 },
     } });
-    var scene = builder.finish();
+    var scene = try builder.finish();
     defer scene.deinit();
     const base: fixture.Options = .{ .width = 50, .height = 40, .ambient = 0.2 };
     var first = try fixture.render(&scene, base);

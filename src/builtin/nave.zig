@@ -11,13 +11,15 @@ const masonry = @import("masonry.zig");
 const sky = @import("sky.zig");
 const elementary = @import("../math.zig").elementary;
 const MeshBuilder = @import("mesh_builder.zig");
-const SceneBuilder = @import("scene_builder.zig");
-const Material = @import("../scene.zig").Material;
-const Scene = @import("../scene.zig").Scene;
+const placing = @import("placing.zig");
+const scene_data = @import("../scene.zig");
 const Arch = masonry.Arch;
 const Outline = masonry.Outline;
 const Place = geometry.Place;
 const Point = geometry.Point;
+const Builder = scene_data.Builder;
+const Material = scene_data.Material;
+const Scene = scene_data.Scene;
 const Allocator = std.mem.Allocator;
 
 const bay = 5.0;
@@ -67,9 +69,9 @@ const materials: std.EnumArray(Part, Material) = .init(.{
 
 /// The scene, owned by the caller.
 pub fn build(gpa: Allocator) Allocator.Error!Scene {
-    var scene: SceneBuilder = .init(gpa);
-    errdefer scene.deinit();
-    var parts: Parts = .init(scene.arena());
+    var builder: Builder = .init(gpa);
+    errdefer builder.deinit();
+    var parts: Parts = .init(builder.arena());
     try addSide(&parts, Place.translate(.{ -half_length, 0, -pier_z }));
     try addSide(&parts, Place.identity.turned(2).moved(.{ -half_length, 0, -pier_z }));
     try addVaults(&parts);
@@ -83,9 +85,9 @@ pub fn build(gpa: Allocator) Allocator.Error!Scene {
     }
     const lamps = [_]Point{ .{ -5, 5.4, 0 }, .{ 5, 5.4, 0 } };
     for (lamps) |lamp| try addChandelier(&parts, .translate(lamp));
-    try parts.finish(&scene, materials);
+    try parts.finish(&builder, materials);
 
-    try sky.add(&scene, .{
+    try sky.add(&builder, .{
         .radius = 60,
         .azimuth_deg = 40,
         .half_width_deg = 130,
@@ -94,22 +96,22 @@ pub fn build(gpa: Allocator) Allocator.Error!Scene {
         .low_color = .{ 0.85, 0.92, 1 },
         .high_color = .{ 0.4, 0.6, 0.95 },
     });
-    try scene.addDirectionalLight(.{ -0.42, 0.6, 0.62 }, .{ 1, 0.86, 0.64 }, 9);
+    try placing.addDirectionalLight(&builder, .{ -0.42, 0.6, 0.62 }, .{ 1, 0.86, 0.64 }, 9);
     for (lamps) |lamp| {
         // Beside the rod, so that its knob does not darken the crown of the vault.
         const flames = lamp + Point{ -0.3, 0.8, 0 };
-        try scene.addPointLight(flames, .{ 1, 0.78, 0.52 }, 30);
+        try placing.addPointLight(&builder, flames, .{ 1, 0.78, 0.52 }, 30);
     }
-    try scene.addPointLight(.{ 14.2, 4.5, 0 }, .{ 1, 0.85, 0.65 }, 20);
-    scene.setAmbient(0.12);
-    try scene.addCamera(.{
+    try placing.addPointLight(&builder, .{ 14.2, 4.5, 0 }, .{ 1, 0.85, 0.65 }, 20);
+    builder.scene.ambient = 0.12;
+    try placing.addCamera(&builder, .{
         .name = "nave",
         .eye = .{ -14, 2.3, 0.5 },
         .target = .{ 4, 5.2, -0.2 },
         .y_fov_deg = 62,
         .aspect = 1.5,
     });
-    return scene.finish();
+    return builder.finish();
 }
 
 /// Arcade, wall and aisle of one side.

@@ -5,9 +5,10 @@
 
 const std = @import("std");
 const elementary = @import("../math.zig").elementary;
+const scene_data = @import("../scene.zig");
 const MeshBuilder = @import("mesh_builder.zig");
-const SceneBuilder = @import("scene_builder.zig");
 const Vec3 = @import("../math.zig").Vec3;
+const Builder = scene_data.Builder;
 const Allocator = std.mem.Allocator;
 const assert = std.debug.assert;
 
@@ -29,9 +30,9 @@ const columns = 24;
 const rows = 8;
 
 /// Adds the sky as a mesh of its own, seen from inside.
-pub fn add(scene: *SceneBuilder, sky: Sky) Allocator.Error!void {
+pub fn add(builder: *Builder, sky: Sky) Allocator.Error!void {
     assert(sky.half_width_deg > 0 and sky.half_width_deg < 180 and sky.radius > 0);
-    var mesh: MeshBuilder = .init(scene.arena());
+    var mesh: MeshBuilder = .init(builder.arena());
     for (0..rows + 1) |row| {
         const height = @as(f64, @floatFromInt(row)) / rows;
         const elevation_deg = sky.elevation_min_deg +
@@ -60,14 +61,14 @@ pub fn add(scene: *SceneBuilder, sky: Sky) Allocator.Error!void {
             try mesh.triangle(lower, upper + 1, upper);
         }
     }
-    const material = try scene.addMaterial(.{ .metallic = 0, .unlit = true });
-    try scene.addMesh(try mesh.finish(material));
+    const material = try builder.addMaterial(.{ .metallic = 0, .unlit = true });
+    try builder.addWorldMesh(try mesh.finish(material));
 }
 
 test "the sky is seen from the origin" {
-    var scene: SceneBuilder = .init(std.testing.allocator);
-    defer scene.deinit();
-    try add(&scene, .{
+    var builder: Builder = .init(std.testing.allocator);
+    defer builder.deinit();
+    try add(&builder, .{
         .radius = 10,
         .azimuth_deg = 0,
         .half_width_deg = 90,
@@ -77,7 +78,7 @@ test "the sky is seen from the origin" {
         .high_color = .{ 0, 0, 1 },
     });
     const vec3 = @import("../math.zig").vec3;
-    const mesh = scene.meshes.items[0];
+    const mesh = builder.meshes.items[0];
     try std.testing.expectEqual(2 * columns * rows, mesh.triangles.len);
     for (mesh.triangles) |t| {
         const a = mesh.positions[t[0]];

@@ -77,11 +77,12 @@ pub fn parseBytes(
     defer if (simplified) |copy| gpa.free(copy);
     var document = try parseDocument(gpa, simplified orelse parts.json, diagnostic);
     defer document.deinit();
-    var scene: Scene = .init(gpa);
-    errdefer scene.deinit();
+    var builder: scene_data.Builder = .init(gpa);
+    errdefer builder.deinit();
     var source: Source = .{
         .gpa = gpa,
-        .arena = scene.arena.allocator(),
+        .builder = &builder,
+        .arena = builder.arena(),
         .data = document.data,
         .diagnostic = diagnostic,
     };
@@ -99,7 +100,8 @@ pub fn parseBytes(
     source.buffers = buffers.list;
     source.decoded_bytes_left = limits.decodedBytesMax(input_bytes);
     try accessors.checkAll(&source);
-    try fill(&source, &scene);
+    try fill(&source);
+    const scene = try builder.finish();
     warnOfGaps(&source, &scene);
     return scene;
 }
@@ -132,50 +134,36 @@ fn parseDocument(gpa: Allocator, text: []const u8, diagnostic: *Diagnostic) Erro
 }
 
 /// Puts the parts of the document into the scene.
-fn fill(source: *Source, scene: *Scene) Error!void {
-    const gpa = source.gpa;
-    const hierarchy = try nodes.collect(source);
-    defer gpa.free(hierarchy.origins);
+fn fill(source: *Source) Error!void {
+    const builder = source.builder;
+    const origins = try nodes.collect(source);
+    defer source.gpa.free(origins);
     var meshes: Meshes = .{ .source = source };
     defer meshes.deinit();
     var skins: Skins = .{ .source = source };
     defer skins.deinit();
     try skins.checkAll();
-    var instances: std.ArrayList(scene_data.Instance) = .empty;
-    defer instances.deinit(gpa);
-    var cameras: std.ArrayList(scene_data.Camera) = .empty;
-    defer cameras.deinit(gpa);
-    var lights: std.ArrayList(scene_data.Light) = .empty;
-    defer lights.deinit(gpa);
-    for (hierarchy.origins, 0..) |origin, index| {
+    for (origins, 0..) |origin, index| {
         const node = Source.item(source.data.nodes, origin);
         const node_index: u32 = @intCast(index);
         if (node.mesh) |mesh| {
             const mesh_index = Source.indexOf(source.data.meshes, mesh);
             try skins.checkNode(node, mesh_index);
             const range = try meshes.get(mesh_index);
-            if (instances.items.len + range.count > limits.instance_count_max) return source.fail(
-                "over {d} showings of meshes",
-                .{limits.instance_count_max},
-            );
+            if (builder.instances.items.len + range.count > limits.instance_count_max)
+                return source.fail("over {d} showings of meshes", .{limits.instance_count_max});
             for (range.first..range.first + range.count) |drawn| {
-                try instances.append(gpa, .{ .mesh = @intCast(drawn), .node = node_index });
+                try builder.addInstance(@intCast(drawn), node_index);
             }
         }
         if (node.camera) |raw| {
-            try cameras.append(gpa, try views.readCamera(source, raw, node.name, node_index));
+            try builder.addCamera(try views.readCamera(source, raw, node.name, node_index));
         }
         if (node.light) |raw| {
-            if (views.readLight(source, raw, node_index)) |light| try lights.append(gpa, light);
+            if (views.readLight(source, raw, node_index)) |light| try builder.addLight(light);
         }
     }
-    scene.nodes = hierarchy.list;
-    scene.meshes = try source.arena.dupe(scene_data.Mesh, meshes.list.items);
-    scene.instances = try source.arena.dupe(scene_data.Instance, instances.items);
-    scene.materials = try materials.read(source, meshes.default_material_used);
-    scene.cameras = try source.arena.dupe(scene_data.Camera, cameras.items);
-    scene.lights = try source.arena.dupe(scene_data.Light, lights.items);
-    if (cameras.items.len > 0) scene.camera_default = 0;
+    try materials.read(source, meshes.default_material_used);
 }
 
 /// Says what the picture will lack.

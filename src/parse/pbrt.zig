@@ -7,12 +7,13 @@
 const std = @import("std");
 const file = @import("file.zig");
 const limits = @import("pbrt/limits.zig");
+const scene_data = @import("../scene.zig");
 const Allocator = std.mem.Allocator;
-const Assembly = @import("pbrt/assembly.zig");
+const SceneBuilder = @import("pbrt/scene_builder.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Input = @import("pbrt/input.zig");
 const Reader = @import("pbrt/reader.zig");
-const Scene = @import("../scene.zig").Scene;
+const Scene = scene_data.Scene;
 const Settings = @import("settings.zig").Settings;
 
 /// See parse.zig.
@@ -92,22 +93,23 @@ fn read(
     };
     defer input.deinit();
     try input.push(text.name, text.bytes, text.identity);
-    var scene: Scene = .init(gpa);
-    errdefer scene.deinit();
+    var scene_builder: scene_data.Builder = .init(gpa);
+    errdefer scene_builder.deinit();
     var names: std.heap.ArenaAllocator = .init(gpa);
     defer names.deinit();
-    var assembly: Assembly = .{ .gpa = gpa, .input = &input, .scene = &scene };
-    defer assembly.deinit();
+    var builder: SceneBuilder = try .init(&input, &scene_builder);
+    defer builder.deinit();
     var reader: Reader = .{
         .input = &input,
         .arena = names.allocator(),
-        .assembly = &assembly,
+        .builder = &builder,
         .colors = .{ .arena = names.allocator(), .input = &input },
-        .maker = .{ .input = &input, .arena = scene.arena.allocator() },
+        .tessellator = .{ .input = &input, .arena = scene_builder.arena() },
     };
     defer reader.deinit();
     try reader.run();
-    try reader.finish(&scene);
+    try reader.finish();
+    const scene = try scene_builder.finish();
     if (scene.triangleCount() == 0) diagnostic.warn("nothing to render: no triangles", .{});
     return scene;
 }
@@ -122,7 +124,7 @@ test {
     _ = @import("pbrt/spectra.zig");
     _ = @import("pbrt/transform.zig");
     _ = @import("pbrt/view.zig");
-    _ = Assembly;
+    _ = SceneBuilder;
     _ = Input;
     _ = Reader;
 }

@@ -5,13 +5,15 @@
 
 const std = @import("std");
 const c = @import("cgltf");
+const scene = @import("../../scene.zig");
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
 const Allocator = std.mem.Allocator;
 const assert = std.debug.assert;
 const Source = @This();
 
 gpa: Allocator,
-/// The scene's memory.
+/// The scene that results go to, and its memory.
+builder: *scene.Builder,
 arena: Allocator,
 data: *const c.cgltf_data,
 /// Bytes of each buffer, as many as its byteLength says; null where the file gives none.

@@ -1,6 +1,6 @@
 //! The directives of a PBRT text, one after the other, and the state that they change.
 //!
-//! In: texts. Out: an `Assembly` of everything they show, and what they ask of the picture.
+//! In: texts. Out: an `SceneBuilder` of everything they show, and what they ask of the picture.
 //! Nothing recurses: attributes, objects and included files lie on stacks with limits.
 
 const std = @import("std");
@@ -12,10 +12,10 @@ const number = @import("number.zig");
 const scene_data = @import("../../scene.zig");
 const shapes = @import("shapes.zig");
 const spectra = @import("spectra.zig");
-const Assembly = @import("assembly.zig");
+const SceneBuilder = @import("scene_builder.zig");
 const Colors = @import("colors.zig");
 const Input = @import("input.zig");
-const Maker = @import("shapes/maker.zig");
+const Tessellator = @import("shapes/tessellator.zig");
 const Parameters = @import("parameters.zig");
 const math = @import("../../math.zig");
 const transforms = @import("transform.zig");
@@ -23,7 +23,6 @@ const Transform = math.AffineD;
 const View = @import("view.zig");
 const Allocator = std.mem.Allocator;
 const Error = Input.Error;
-const Scene = scene_data.Scene;
 const Vec3 = @import("../../math.zig").Vec3;
 const assert = std.debug.assert;
 const quote = diagnostic_file.quote;
@@ -33,7 +32,7 @@ const Reader = @This();
 /// Everything that AttributeBegin keeps and AttributeEnd brings back.
 const Graphics = struct {
     transform: Transform = .identity,
-    /// Index into `Assembly.materials`, `scene_data.none` for the default one.
+    /// Index into `SceneBuilder.materials`, `scene_data.none` for the default one.
     material: u32 = scene_data.none,
     /// Surfaces only bound a medium and are not shown.
     is_boundary: bool = false,
@@ -72,9 +71,9 @@ const Phase = enum { options, world, done };
 input: *Input,
 /// Lives as long as the scene is read.
 arena: Allocator,
-assembly: *Assembly,
+builder: *SceneBuilder,
 colors: Colors,
-maker: Maker,
+tessellator: Tessellator,
 parameters: Parameters = .{},
 graphics: Graphics = .{},
 stack: std.ArrayList(Kept) = .empty,
@@ -86,7 +85,7 @@ sample_count: ?u32 = null,
 depth: ?u32 = null,
 /// The object that is being defined.
 object: ?struct { name: []const u8, first: usize } = null,
-objects: std.StringHashMapUnmanaged(Assembly.Object) = .empty,
+objects: std.StringHashMapUnmanaged(SceneBuilder.Object) = .empty,
 spaces: std.StringHashMapUnmanaged(Transform) = .empty,
 named: std.StringHashMapUnmanaged(NamedMaterial) = .empty,
 /// Meshes of curved shapes by all that they depend on.
@@ -322,7 +321,7 @@ fn performNamed(
         },
         .LightSource => try lights.add(&.{
             .colors = &reader.colors,
-            .assembly = reader.assembly,
+            .builder = reader.builder,
             .parameters = parameters,
             .place = &reader.graphics.transform,
             .position = position,
@@ -451,7 +450,7 @@ fn objectBegin(reader: *Reader, position: usize) Error!void {
     try reader.begin(.object, position);
     reader.object = .{
         .name = try reader.arena.dupe(u8, name),
-        .first = reader.assembly.parts.items.len,
+        .first = reader.builder.parts.items.len,
     };
 }
 
@@ -460,9 +459,9 @@ fn objectEnd(reader: *Reader, position: usize) Error!void {
         return reader.input.fail(position, "no object has begun", .{});
     try reader.end(.object, position);
     reader.object = null;
-    try reader.keep(Assembly.Object, &reader.objects, object.name, .{
+    try reader.keep(SceneBuilder.Object, &reader.objects, object.name, .{
         .first = object.first,
-        .count = reader.assembly.parts.items.len - object.first,
+        .count = reader.builder.parts.items.len - object.first,
     });
 }
 
@@ -472,12 +471,12 @@ fn objectInstance(reader: *Reader, position: usize) Error!void {
         return reader.input.fail(position, "an instance within an object", .{});
     const object = reader.objects.get(name) orelse
         return reader.input.fail(position, "no object {f}", .{quote(name)});
-    try reader.assembly.showObject(object, &reader.graphics.transform);
+    try reader.builder.showObject(object, &reader.graphics.transform);
 }
 
 /// Forgets a world that has only prepared the one that follows.
 fn startAgain(reader: *Reader) void {
-    reader.assembly.clear();
+    reader.builder.clear();
     reader.objects.clearRetainingCapacity();
     reader.known_meshes.clearRetainingCapacity();
     reader.is_preparation = false;
@@ -541,7 +540,7 @@ fn makeMaterial(reader: *Reader, name: []const u8, position: usize) Error!NamedM
     else
         try materials.convert(&reader.colors, name, position, &reader.parameters);
     return .{
-        .index = try reader.assembly.addMaterial(made.surface),
+        .index = try reader.builder.scene.addMaterial(made.surface),
         .is_boundary = made.is_boundary,
     };
 }
@@ -562,7 +561,7 @@ fn mixture(reader: *Reader, position: usize) Error!scene_data.Material {
     for (names, &parts) |name, *part| {
         const made = reader.named.get(name) orelse
             return reader.input.fail(position, "no material {f}", .{quote(name)});
-        part.* = reader.assembly.materials.items[made.index];
+        part.* = reader.builder.scene.materials.items[made.index];
     }
     return materials.mix(parts[0], parts[1], second_share);
 }
@@ -591,16 +590,16 @@ fn areaLight(reader: *Reader) Error!void {
 fn materialIndex(reader: *Reader) Allocator.Error!u32 {
     if (reader.graphics.material != scene_data.none) return reader.graphics.material;
     if (reader.default_material == scene_data.none)
-        reader.default_material = try reader.assembly.addMaterial(materials.matte_default);
+        reader.default_material = try reader.builder.scene.addMaterial(materials.matte_default);
     return reader.default_material;
 }
 
 fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
     const graphics = &reader.graphics;
     const input = reader.input;
-    reader.maker.parameters = &reader.parameters;
-    reader.maker.position = position;
-    reader.maker.name = name;
+    reader.tessellator.parameters = &reader.parameters;
+    reader.tessellator.position = position;
+    reader.tessellator.name = name;
     const kind = std.meta.stringToEnum(shapes.Kind, name) orelse return input.warn(
         position,
         name,
@@ -621,49 +620,49 @@ fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
     }
     const mesh = try reader.meshOf(kind, material);
     if (reader.object == null)
-        try reader.assembly.show(mesh, &graphics.transform)
+        try reader.builder.show(mesh, &graphics.transform)
     else
-        try reader.assembly.addPart(mesh, &graphics.transform);
+        try reader.builder.addPart(mesh, &graphics.transform);
 }
 
 /// The mesh of the shape that the parameters tell; curved ones are made once.
 fn meshOf(reader: *Reader, kind: shapes.Kind, material: u32) Error!u32 {
     if (!kind.isCurved()) {
-        const geometry = try shapes.make(&reader.maker, kind, reader.graphics.reverse);
-        return reader.assembly.addMesh(geometry, material);
+        const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
+        return reader.builder.addMesh(geometry, material);
     }
     const key = shapes.hash(kind, reader.graphics.reverse, &reader.parameters) ^
         (@as(u64, material) *% 0x9e3779b97f4a7c15);
     if (reader.known_meshes.get(key)) |mesh| return mesh;
-    const geometry = try shapes.make(&reader.maker, kind, reader.graphics.reverse);
-    const mesh = try reader.assembly.addMesh(geometry, material);
+    const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
+    const mesh = try reader.builder.addMesh(geometry, material);
     try reader.known_meshes.put(reader.arena, key, mesh);
     return mesh;
 }
 
 /// A shape that shines: seen bright from its front, plain from behind.
 fn shine(reader: *Reader, kind: shapes.Kind, material: u32, glow: Glow) Error!void {
-    const assembly = reader.assembly;
+    const builder = reader.builder;
     const place = &reader.graphics.transform;
-    const geometry = try shapes.make(&reader.maker, kind, reader.graphics.reverse);
-    var bright = assembly.materials.items[material];
+    const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
+    var bright = builder.scene.materials.items[material];
     bright.emissive = glow.radiance;
     bright.double_sided = glow.two_sided;
-    const front = try assembly.addMesh(geometry, try assembly.addMaterial(bright));
-    try assembly.show(front, place);
+    const front = try builder.addMesh(geometry, try builder.scene.addMaterial(bright));
+    try builder.show(front, place);
     if (!glow.two_sided) {
-        var plain = assembly.materials.items[material];
+        var plain = builder.scene.materials.items[material];
         plain.double_sided = false;
-        const back = try shapes.turned(&reader.maker, &geometry);
-        try assembly.show(try assembly.addMesh(back, try assembly.addMaterial(plain)), place);
+        const back = try shapes.turned(&reader.tessellator, &geometry);
+        try builder.show(try builder.addMesh(back, try builder.scene.addMaterial(plain)), place);
     }
-    if (assembly.emitters.items.len >= limits.emitter_count_max) return reader.input.warn(
-        reader.maker.position,
+    if (builder.emitters.items.len >= limits.emitter_count_max) return reader.input.warn(
+        reader.tessellator.position,
         "emitters",
         "Shape: over {d} shapes shine, the others are bright but give no light",
         .{limits.emitter_count_max},
     );
-    try assembly.emitters.append(reader.input.gpa, .{
+    try builder.emitters.append(reader.input.gpa, .{
         .geometry = geometry,
         .place = place.*,
         .radiance = glow.radiance,
@@ -671,8 +670,10 @@ fn shine(reader: *Reader, kind: shapes.Kind, material: u32, glow: Glow) Error!vo
     });
 }
 
-/// Makes the scene of what has been read.
-pub fn finish(reader: *Reader, scene: *Scene) Error!void {
+/// Completes the scene with what is known at the end of the text.
+pub fn finish(reader: *Reader) Error!void {
+    const builder = reader.builder;
+    const scene = &builder.scene.scene;
     const view = &reader.view;
     if (view.place == null) {
         view.place = .identity;
@@ -684,17 +685,17 @@ pub fn finish(reader: *Reader, scene: *Scene) Error!void {
         );
     }
     const projection = try view.projection(reader.input);
-    if (!view.place.?.isFinite())
+    if (!transforms.fitsSingle(&view.place.?))
         return reader.input.fail(0, "the camera's screen is too far away", .{});
-    try lights.placeEmitters(reader.assembly);
+    try lights.placeEmitters(builder);
     scene.resolution = view.size;
     scene.sample_count = reader.sample_count;
     scene.depth = reader.depth;
-    if (reader.assembly.has_unknown_sky and reader.assembly.sky == null and
-        reader.assembly.lights.items.len > 0) reader.assembly.sky = @splat(lights.unknown_sky);
-    if (reader.assembly.sky) |sky| {
+    if (builder.has_unknown_sky and builder.sky == null and builder.scene.lights.items.len > 0)
+        builder.sky = @splat(lights.unknown_sky);
+    if (builder.sky) |sky| {
         scene.background = sky;
         scene.ambient = spectra.luminance(sky);
     }
-    try reader.assembly.finish(&view.place.?, projection);
+    try builder.finish(view.place.?, projection);
 }

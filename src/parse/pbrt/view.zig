@@ -67,7 +67,8 @@ pub fn setCamera(
 ) Error!void {
     const place = to_camera.inverse() orelse
         return input.fail(position, "the camera's transformation has no inverse", .{});
-    if (!transforms.fitsSingle(&place)) return input.fail(position, "the camera is too far away", .{});
+    if (!transforms.fitsSingle(&place))
+        return input.fail(position, "the camera is too far away", .{});
     var result: View = .{ .size = view.size, .place = place };
     if (std.mem.eql(u8, name, "orthographic")) {
         result.kind = .orthographic;
