@@ -13,7 +13,7 @@ const Image = @import("image.zig").Image;
 const whitted = @import("trace/integrate/whitted.zig");
 const Tiles = @import("trace/integrate/tiles.zig");
 const assert = std.debug.assert;
-const World = world_file.World;
+const Frame = world_file.Frame;
 
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
 pub const kernel = @import("trace/traverse/kernel.zig");
@@ -71,63 +71,63 @@ pub const Statistics = struct {
 /// has the world's size and the tree the variant's width.
 pub fn trace(
     variant_index: usize,
-    world: *const World,
+    frame: *const Frame,
     image: *Image,
     settings: Settings,
 ) Statistics {
-    return run(false, variant_index, world, image, settings);
+    return run(false, variant_index, frame, image, settings);
 }
 
 /// The same with boxes and triangles counted, which takes longer: for a second pass, untimed.
 pub fn traceCounting(
     variant_index: usize,
-    world: *const World,
+    frame: *const Frame,
     image: *Image,
     settings: Settings,
 ) Statistics {
-    return run(true, variant_index, world, image, settings);
+    return run(true, variant_index, frame, image, settings);
 }
 
 fn run(
     comptime counting: bool,
     variant_index: usize,
-    world: *const World,
+    frame: *const Frame,
     image: *Image,
     settings: Settings,
 ) Statistics {
-    assert(image.width == world.width and image.height == world.height);
+    assert(image.width == frame.view.width and image.height == frame.view.height);
     assert(settings.sample_count >= 1 and settings.depth_max <= depth_limit);
     inline for (variant_file.compiled, 0..) |variant, index| {
         if (index == variant_index) {
             comptime var chosen = variant;
             if (counting) chosen.backend = variant_file.counting_backend;
-            return Frame(kernel.Kernel(chosen, counting)).run(world, image, settings);
+            return Render(kernel.Kernel(chosen, counting)).run(frame, image, settings);
         }
     }
     unreachable; // Asserts that the index is one of `compiled`.
 }
 
 /// One frame by one variant.
-fn Frame(comptime Kernel: type) type {
+fn Render(comptime Kernel: type) type {
     return struct {
-        world: *const World,
+        frame: *const Frame,
         image: *Image,
         settings: Settings,
         tiles: Tiles,
         by_thread: [parallel.thread_count_max]Statistics,
 
-        fn run(world: *const World, image: *Image, settings: Settings) Statistics {
-            var frame: @This() = .{
-                .world = world,
+        fn run(frame: *const Frame, image: *Image, settings: Settings) Statistics {
+            var render: @This() = .{
+                .frame = frame,
                 .image = image,
                 .settings = settings,
                 .tiles = .init(image.width, image.height, settings.tile_size),
                 .by_thread = @splat(.{}),
             };
-            parallel.share(settings.thread_count, &frame, work);
+            parallel.share(settings.thread_count, &render, work);
             var total: Statistics = .{};
             var tests: statistics.TestCounts = .{};
-            for (frame.by_thread[0..settings.thread_count]) |part| {
+            for (render.by_thread[0..settings.thread_count]) |part| {
                 total.rays.add(part.rays);
                 total.non_finite_count += part.non_finite_count;
                 if (part.tests) |counts| tests.add(counts);
@@ -136,20 +136,20 @@ fn Frame(comptime Kernel: type) type {
             return total;
         }
 
-        fn work(frame: *@This(), thread_index: usize) void {
+        fn work(render: *@This(), thread_index: usize) void {
             var tracer: whitted.Whitted(Kernel) = .{
-                .world = frame.world,
+                .frame = render.frame,
                 .settings = .{
-                    .sample_count = frame.settings.sample_count,
-                    .depth_max = frame.settings.depth_max,
-                    .transparent = frame.settings.transparent,
+                    .sample_count = render.settings.sample_count,
+                    .depth_max = render.settings.depth_max,
+                    .transparent = render.settings.transparent,
                 },
             };
-            while (frame.tiles.take()) |tile| {
-                renderTile(&tracer, tile, frame.image);
-                frame.settings.progress.completeOne();
+            while (render.tiles.take()) |tile| {
+                renderTile(&tracer, tile, render.image);
+                render.settings.progress.completeOne();
             }
-            frame.by_thread[thread_index] = .{
+            render.by_thread[thread_index] = .{
                 .rays = tracer.rays,
                 .tests = if (Kernel.counts_tests) tracer.tests else null,
                 .non_finite_count = tracer.non_finite_count,

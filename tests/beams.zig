@@ -126,7 +126,8 @@ fn expectTile(
     const hits = hitsOf(world, &queries);
     var bundle = bundleOf(Kernel, &queries);
     var counts: raylane.statistics.TestCounts = .{};
-    const traced = raylane.trace.primary.trace(Kernel, world, grid, &bundle, null, &counts);
+    const traced = raylane.trace.primary
+        .trace(Kernel, &world.geometry, grid, &bundle, null, &counts);
     try std.testing.expect(traced);
     for (&bundle.groups, 0..) |*group, index| for (0..Kernel.ray_count) |lane| {
         const x = Kernel.pixelX(index, lane);
@@ -184,7 +185,7 @@ fn expectShadows(
     const expected = hitsOf(world, &queries);
     var bundle = bundleOf(Kernel, &queries);
     var counts: raylane.statistics.TestCounts = .{};
-    raylane.trace.dispatch.anyHit(Kernel, world, &bundle, &light, &.all, &counts);
+    raylane.trace.dispatch.anyHit(Kernel, &world.geometry, &bundle, &light, &.all, &counts);
     for (&bundle.groups, 0..) |*group, index| for (0..Kernel.ray_count) |lane| {
         const x = Kernel.pixelX(index, lane);
         const y = Kernel.pixelY(index, lane);
@@ -249,7 +250,8 @@ fn expectMirror(
     const hits = hitsOf(world, &queries);
     var bundle = bundleOf(Kernel, &queries);
     var counts: raylane.statistics.TestCounts = .{};
-    const beams = raylane.trace.dispatch.closestHit(Kernel, world, &bundle, null, null, &counts);
+    const beams = raylane.trace.dispatch
+        .closestHit(Kernel, &world.geometry, &bundle, null, null, &counts);
     var beam_count: u32 = 0;
     for (&bundle.groups, 0..) |*group, index| for (0..Kernel.ray_count) |lane| {
         const x = Kernel.pixelX(index, lane);
@@ -412,7 +414,8 @@ test "a tile too wide for a beam is declined" {
         const grid = aim(.{ 0, 0, 7 }, .{ 0, 0, 0 }, 0.1, generator.random());
         var bundle: raylane.trace.bundle.Bundle(Kernel) = undefined;
         var counts: raylane.statistics.TestCounts = .{};
-        const traced = raylane.trace.primary.trace(Kernel, &world, &grid, &bundle, null, &counts);
+        const traced = raylane.trace.primary
+            .trace(Kernel, &world.geometry, &grid, &bundle, null, &counts);
         try std.testing.expect(!traced);
     }
 }

@@ -38,7 +38,7 @@ pub fn parse(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!Scene {
-    const bytes = try readFile(gpa, io, path, diagnostic);
+    const bytes = try readFile(gpa, io, path, settings, diagnostic);
     defer gpa.free(bytes);
     const folder_path = std.fs.path.dirname(path) orelse ".";
     const folder = std.Io.Dir.cwd().openDir(io, folder_path, .{}) catch
@@ -47,9 +47,15 @@ pub fn parse(
     return parseBytes(gpa, io, bytes, folder, settings, diagnostic);
 }
 
-fn readFile(gpa: Allocator, io: std.Io, path: []const u8, diagnostic: *Diagnostic) Error![]u8 {
+fn readFile(
+    gpa: Allocator,
+    io: std.Io,
+    path: []const u8,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error![]u8 {
     var reason: []const u8 = "";
-    const opened = file.open(io, .cwd(), path, &reason) catch
+    const opened = file.open(io, .cwd(), path, settings.output, &reason) catch
         return diagnostic.fail(error.InputOutput, "{s}", .{reason});
     defer opened.close(io);
     return file.read(gpa, io, opened, limits.file_bytes_max, &reason) catch |err| switch (err) {
@@ -92,6 +98,7 @@ pub fn parseBytes(
         .io = io,
         .folder = folder,
         .allow_outside = settings.allow_outside,
+        .output = settings.output,
         .binary = parts.binary,
     }, diagnostic);
     defer buffers.deinit();

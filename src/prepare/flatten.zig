@@ -44,7 +44,7 @@ pub const Surface = struct {
     /// Box of the triangles' corners, empty without triangles.
     bounds: Box3,
     /// Box of twice the middles of the triangles' boxes, empty without triangles.
-    middles_twice: Box3,
+    centroid_bounds: Box3,
     /// Triangles left out.
     dropped_count: u64,
 };
@@ -69,7 +69,7 @@ const ChunkResult = struct {
     kept_count: u32 = 0,
     outside_count: u32 = 0,
     bounds: Box3 = .empty,
-    middles_twice: Box3 = .empty,
+    centroid_bounds: Box3 = .empty,
 };
 
 /// Flattens the whole scene. `maps` holds a world map for each node. The surface's arrays come from
@@ -319,7 +319,7 @@ const Work = struct {
                 result.kept_count += 1;
                 const box = Box3.empty.include(a).include(b).include(c);
                 result.bounds = result.bounds.join(box);
-                result.middles_twice = result.middles_twice.include(box.centerTwice());
+                result.centroid_bounds = result.centroid_bounds.include(box.centerTwice());
             }
         }
     }
@@ -329,7 +329,7 @@ const Work = struct {
         var kept_count: usize = 0;
         var outside_count: u64 = 0;
         var bounds: Box3 = .empty;
-        var middles_twice: Box3 = .empty;
+        var centroid_bounds: Box3 = .empty;
         for (work.chunks, 0..) |chunk, index| {
             const begin = index * chunk_size;
             assert(kept_count <= begin);
@@ -341,7 +341,7 @@ const Work = struct {
             kept_count += chunk.kept_count;
             outside_count += chunk.outside_count;
             bounds = bounds.join(chunk.bounds);
-            middles_twice = middles_twice.join(chunk.middles_twice);
+            centroid_bounds = centroid_bounds.join(chunk.centroid_bounds);
         }
         if (outside_count > 0) diagnostic.warn(
             "{d} triangles left out: they reach farther than 2^40 m from the origin",
@@ -353,7 +353,7 @@ const Work = struct {
             .colors = work.colors,
             .triangles = work.triangles[0..kept_count],
             .bounds = bounds,
-            .middles_twice = middles_twice,
+            .centroid_bounds = centroid_bounds,
             .dropped_count = work.triangles.len - kept_count,
         };
     }

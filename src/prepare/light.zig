@@ -131,12 +131,12 @@ pub fn placeRig(
 
 /// Ambient light and background: the default rig comes with a grey of both, lights of the file
 /// with black, the scene may say what is ambient, and the user has the last word.
-pub fn surroundings(
+pub fn environment(
     lights_are_default: bool,
     scene_ambient: ?f32,
     ambient: ?f32,
     background: ?Vec3,
-) world.Surroundings {
+) world.Environment {
     const radiance = ambient orelse scene_ambient orelse
         if (lights_are_default) ambient_default else 0;
     assert(radiance >= 0);
@@ -200,19 +200,19 @@ test "the rig turns with the camera" {
 
 test "ambient and background by their precedence" {
     try std.testing.expectEqual(
-        world.Surroundings{ .ambient = 0.35, .background = @splat(0.35) },
-        surroundings(true, null, null, null),
+        world.Environment{ .ambient = 0.35, .background = @splat(0.35) },
+        environment(true, null, null, null),
     );
     try std.testing.expectEqual(
-        world.Surroundings{ .ambient = 0, .background = @splat(0) },
-        surroundings(false, null, null, null),
+        world.Environment{ .ambient = 0, .background = @splat(0) },
+        environment(false, null, null, null),
     );
     try std.testing.expectEqual(
-        world.Surroundings{ .ambient = 0.25, .background = @splat(0) },
-        surroundings(false, 0.25, null, null),
+        world.Environment{ .ambient = 0.25, .background = @splat(0) },
+        environment(false, 0.25, null, null),
     );
     try std.testing.expectEqual(
-        world.Surroundings{ .ambient = 0.5, .background = .{ 1, 0, 0 } },
-        surroundings(false, 0.25, 0.5, .{ 1, 0, 0 }),
+        world.Environment{ .ambient = 0.5, .background = .{ 1, 0, 0 } },
+        environment(false, 0.25, 0.5, .{ 1, 0, 0 }),
     );
 }

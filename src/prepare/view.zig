@@ -185,7 +185,7 @@ const test_surface: Surface = .{
     .colors = &.{},
     .triangles = &.{},
     .bounds = .empty,
-    .middles_twice = .empty,
+    .centroid_bounds = .empty,
     .dropped_count = 0,
 };
 

@@ -83,7 +83,7 @@ pub fn viewOf(comptime Rays: type, group: *const ray_file.Ray(Rays)) Precalculat
 pub fn trace(
     comptime Kernel: type,
     comptime query: Query,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     group: *ray_file.Ray(Kernel.Rays),
     counts: *TestCounts,
 ) void {
@@ -91,9 +91,9 @@ pub fn trace(
     var search: Search(Kernel, query) = .{
         .group = group,
         .view = viewOf(Kernel.Rays, group),
-        .pad = world.pad,
+        .pad = geometry.pad,
     };
-    _ = walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts);
+    _ = walk.walk(Kernel, geometry.tree.get(Kernel.width), &search, counts);
 }
 
 fn Search(comptime Kernel: type, comptime query: Query) type {
@@ -178,7 +178,7 @@ pub fn countBoxes(comptime Kernel: type, group: anytype, counts: *TestCounts) vo
     counts.box_useful += group.active.popCount();
 }
 
-/// Which triangle of a pack, and `World.pad`.
+/// Which triangle of a pack, and `Geometry.pad`.
 const At = struct { lane: usize, pad: f32 };
 
 /// Tests one triangle of a pack against the active rays of one group. Returns whether any took

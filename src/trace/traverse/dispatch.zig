@@ -26,23 +26,23 @@ pub fn Coherence(comptime Kernel: type) type {
 /// second and the third corner, by group.
 pub fn closestHit(
     comptime Kernel: type,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     bundle: *bundle_file.Bundle(Kernel),
     grid: ?*const Grid,
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
 ) Coherence(Kernel) {
     if (Kernel.variant.traversal != .beam) {
-        bySelf(Kernel, .closest_hit, world, bundle, counts);
+        bySelf(Kernel, .closest_hit, geometry, bundle, counts);
         return .none;
     }
     if (grid) |known| {
-        if (primary.trace(Kernel, world, known, bundle, shares, counts)) return .all;
-        byInterval(Kernel, .closest_hit, world, bundle, null, counts);
+        if (primary.trace(Kernel, geometry, known, bundle, shares, counts)) return .all;
+        byInterval(Kernel, .closest_hit, geometry, bundle, null, counts);
         return .none;
     }
-    const beams = pencil.trace(Kernel, world, bundle, shares, counts);
-    byInterval(Kernel, .closest_hit, world, bundle, if (beams) |*some| some else null, counts);
+    const beams = pencil.trace(Kernel, geometry, bundle, shares, counts);
+    byInterval(Kernel, .closest_hit, geometry, bundle, if (beams) |*some| some else null, counts);
     return if (beams) |some| .{ .some = some } else .none;
 }
 
@@ -51,22 +51,22 @@ pub fn closestHit(
 /// directional one.
 pub fn anyHit(
     comptime Kernel: type,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     bundle: *bundle_file.Bundle(Kernel),
     light: *const world_file.Light,
     coherence: *const Coherence(Kernel),
     counts: *TestCounts,
 ) void {
     if (Kernel.variant.traversal != .beam)
-        return bySelf(Kernel, .any_hit, world, bundle, counts);
+        return bySelf(Kernel, .any_hit, geometry, bundle, counts);
     switch (coherence.*) {
-        .none => byInterval(Kernel, .any_hit, world, bundle, null, counts),
-        .all => shadow.trace(Kernel, world, light, bundle, counts),
+        .none => byInterval(Kernel, .any_hit, geometry, bundle, null, counts),
+        .all => shadow.trace(Kernel, geometry, light, bundle, counts),
         .some => |*some| {
             const active = bundle_file.narrow(Kernel, bundle, some, true);
-            shadow.trace(Kernel, world, light, bundle, counts);
+            shadow.trace(Kernel, geometry, light, bundle, counts);
             bundle_file.restore(Kernel, bundle, &active);
-            byInterval(Kernel, .any_hit, world, bundle, some, counts);
+            byInterval(Kernel, .any_hit, geometry, bundle, some, counts);
         },
     }
 }
@@ -75,16 +75,16 @@ pub fn anyHit(
 fn byInterval(
     comptime Kernel: type,
     comptime query: Query,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     bundle: *bundle_file.Bundle(Kernel),
     done: ?*const bundle_file.Part(Kernel),
     counts: *TestCounts,
 ) void {
     var budget: interval_packet.PacketBudget = .{};
     const part = done orelse
-        return interval_packet.trace(Kernel, query, world, bundle, &budget, counts);
+        return interval_packet.trace(Kernel, query, geometry, bundle, &budget, counts);
     const active = bundle_file.narrow(Kernel, bundle, part, false);
-    interval_packet.trace(Kernel, query, world, bundle, &budget, counts);
+    interval_packet.trace(Kernel, query, geometry, bundle, &budget, counts);
     bundle_file.restore(Kernel, bundle, &active);
 }
 
@@ -92,14 +92,14 @@ fn byInterval(
 fn bySelf(
     comptime Kernel: type,
     comptime query: Query,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     bundle: *bundle_file.Bundle(Kernel),
     counts: *TestCounts,
 ) void {
     const group = &bundle.groups[0];
     if (Kernel.variant.traversal == .packet2x2) {
-        bundle_file.trace(Kernel, query, world, group, counts);
+        bundle_file.trace(Kernel, query, geometry, group, counts);
     } else if (group.active.lane(0)) {
-        _ = single.trace(Kernel, query, world, group, counts);
+        _ = single.trace(Kernel, query, geometry, group, counts);
     }
 }

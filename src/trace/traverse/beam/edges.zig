@@ -67,7 +67,7 @@ pub const Spread = struct {
 };
 
 /// The largest R for which bounds hold: boxes are grown for rays of no more than a certain length
-/// (`World.pad`), so that the exact test accepts whatever is surely inside the edges.
+/// (`Geometry.pad`), so that the exact test accepts whatever is surely inside the edges.
 pub fn reachMax(pad: f32) f32 {
     const covered = pad / world_file.pad_relative;
     return if (covered < reach_limit) covered else reach_limit;

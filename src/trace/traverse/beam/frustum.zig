@@ -1,17 +1,17 @@
 //! What encloses a beam: four planes through the rays' origin, and how deep it has to look.
 //!
 //! In: normals that point inward. Out: which children of a node the beam may meet, and the least
-//! depth at which. Conservative: planes stand off by `slack_pads` times `World.pad`, which covers
-//! the rounding of boxes, of ray directions and of the planes themselves. Of a box only the corner
-//! farthest along a plane's normal counts (Assarsson and Moeller 2000, "Optimized View Frustum
-//! Culling Algorithms for Bounding Boxes", the p-vertex).
+//! depth at which. Conservative: planes stand off by `slack_pads` times `Geometry.pad`, which
+//! covers the rounding of boxes, of ray directions and of the planes themselves. Of a box only the
+//! corner farthest along a plane's normal counts (Assarsson and Moeller 2000, "Optimized View
+//! Frustum Culling Algorithms for Bounding Boxes", the p-vertex).
 
 const std = @import("std");
 const world_file = @import("../../../world.zig");
 const stack = @import("../stack.zig");
 const assert = std.debug.assert;
 
-/// `World.pad` is at least 32 u R and 4 u X for distances R and coordinates X (`pad.zig`). A
+/// `Geometry.pad` is at least 32 u R and 4 u X for distances R and coordinates X (`pad.zig`). A
 /// fused plane equation in coordinates of the scene is off by at most 6 u (2 X + R) of the length
 /// of its normal; directions that are linear in the pixel up to 24 u put a ray off by 24 u R.
 pub const slack_pads = 8.0;

@@ -45,33 +45,33 @@ const block_last: f32 = subtile_side - 1;
 /// `shares` is null, or where barycentric weights go: of the second and the third corner, by group.
 pub fn trace(
     comptime Kernel: type,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     grid: *const Grid,
     bundle: *bundle_file.Bundle(Kernel),
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
 ) bool {
-    return run(Kernel, false, world, grid, {}, bundle, shares, counts);
+    return run(Kernel, false, geometry, grid, {}, bundle, shares, counts);
 }
 
 /// The same of rays that start where `starts` says, and may leave out what comes before and their
-/// own triangles. Their starts are within what `World.pad` allows for.
+/// own triangles. Their starts are within what `Geometry.pad` allows for.
 pub fn traceBehind(
     comptime Kernel: type,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     grid: *const Grid,
     starts: *const Starts(Kernel),
     bundle: *bundle_file.Bundle(Kernel),
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
 ) bool {
-    return run(Kernel, true, world, grid, starts, bundle, shares, counts);
+    return run(Kernel, true, geometry, grid, starts, bundle, shares, counts);
 }
 
 fn run(
     comptime Kernel: type,
     comptime behind: bool,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     grid: *const Grid,
     starts: if (behind) *const Starts(Kernel) else void,
     bundle: *bundle_file.Bundle(Kernel),
@@ -81,9 +81,9 @@ fn run(
     // In place: it is too large to be handed around.
     var search: Search(Kernel, behind) = undefined;
     search.starts = starts;
-    if (!search.init(world, grid, bundle, counts)) return false;
+    if (!search.init(geometry, grid, bundle, counts)) return false;
     if (!search.travel()) return false;
-    resolve.resolve(Kernel, behind, world, grid, &search.found, bundle, shares);
+    resolve.resolve(Kernel, behind, geometry, grid, &search.found, bundle, shares);
     return true;
 }
 
@@ -151,7 +151,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
     const width = Kernel.width;
     const lanes = Kernel.ray_count;
     return struct {
-        world: *const world_file.World,
+        geometry: *const world_file.Geometry,
         tree: *const world_file.Tree(width),
         grid: *const Grid,
         bundle: *bundle_file.Bundle(Kernel),
@@ -181,7 +181,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
 
         fn init(
             search: *Self,
-            world: *const world_file.World,
+            geometry: *const world_file.Geometry,
             grid: *const Grid,
             bundle: *bundle_file.Bundle(Kernel),
             counts: *TestCounts,
@@ -190,15 +190,15 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             const spread = grid.spread();
             const roundings = grid.deviation_roundings;
             const unit = edges_file.unit_roundoff;
-            search.world = world;
-            search.tree = world.tree.get(width);
+            search.geometry = geometry;
+            search.tree = geometry.tree.get(width);
             search.grid = grid;
             search.bundle = bundle;
             search.counts = counts;
             const area: Area = if (behind) search.starts.area else .{};
             const sides = grid.sides(area) orelse return false;
             const along = grid.depthNormal() orelse return false;
-            var standoff = frustum_file.slack_pads * world.pad;
+            var standoff = frustum_file.slack_pads * geometry.pad;
             if (behind) standoff += search.driftMax(along);
             search.frustum = .init(grid.origin, sides, along, standoff);
             if (behind) {
@@ -214,7 +214,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
             search.reach_max = if (behind)
                 edges_file.reach_limit
             else
-                edges_file.reachMax(world.pad);
+                edges_file.reachMax(geometry.pad);
             if (behind) search.edge_apart = 2 * search.starts.spread.apart * longest;
             search.dual = .of(grid);
             if (behind) search.window_apart = .{
@@ -234,7 +234,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
         fn driftMax(search: *const Self, along: [3]f32) f32 {
             const grid = search.grid;
             const unit = edges_file.unit_roundoff;
-            const reach = edges_file.reachMax(search.world.pad) + search.starts.spread.distance;
+            const reach = edges_file.reachMax(search.geometry.pad) + search.starts.spread.distance;
             // No direction is shorter than 1 / |along|.
             const t_max = reach * vec3.length(along);
             return 2 * search.starts.spread.apart +
@@ -651,7 +651,7 @@ fn Search(comptime Kernel: type, comptime behind: bool) type {
         ) void {
             @branchHint(.unlikely);
             const ray = &search.bundle.groups[group];
-            const pad = search.world.pad;
+            const pad = search.geometry.pad;
             const hit = exact.meet(Kernel, search.tree, pad, ray, slot);
             var met = hit.mask.bitAnd(doubtful);
             var t = hit.t;

@@ -23,7 +23,7 @@ const assert = std.debug.assert;
 pub fn resolve(
     comptime Kernel: type,
     comptime behind: bool,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     grid: *const Grid,
     found: *Found(Kernel),
     bundle: *bundle_file.Bundle(Kernel),
@@ -32,11 +32,11 @@ pub fn resolve(
     const course = Course.of(grid);
     switch (course.axis orelse 3) {
         inline 0...2 => |axis| {
-            const tree = world.tree.get(Kernel.width);
+            const tree = geometry.tree.get(Kernel.width);
             const Octant = UniformOctant(Kernel, behind, axis);
-            Octant.run(world, tree, &course, grid, found, bundle, shares);
+            Octant.run(geometry, tree, &course, grid, found, bundle, shares);
         },
-        else => apart(Kernel, world, found, bundle, shares),
+        else => apart(Kernel, geometry, found, bundle, shares),
     }
 }
 
@@ -79,7 +79,7 @@ const Course = struct {
 /// Every group with its own longest axes and signs.
 fn apart(
     comptime Kernel: type,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     found: *Found(Kernel),
     bundle: *bundle_file.Bundle(Kernel),
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
@@ -90,9 +90,9 @@ fn apart(
         const own = found.of("slot", index);
         const there = Rays.I32.loadAligned(own).gt(.splat(exact.no_slot));
         if (there.none()) continue;
-        const tree = world.tree.get(Kernel.width);
+        const tree = geometry.tree.get(Kernel.width);
         const gathered = exact.gather(Kernel, tree, own);
-        const hit = triangle.intersect(Rays, gathered.corners, group.line, world.pad);
+        const hit = triangle.intersect(Rays, gathered.corners, group.line, geometry.pad);
         assert(there.andNot(hit.mask).none());
         if (shares) |all| keepShares(Rays, &all[index], there, hit.shares());
         group.closest = .{
@@ -138,7 +138,7 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
         }
 
         fn run(
-            world: *const world_file.World,
+            geometry: *const world_file.Geometry,
             tree: *const world_file.Tree(Kernel.width),
             course: *const Course,
             grid: *const Grid,
@@ -167,7 +167,7 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
                         if (slot == exact.no_slot) continue;
                         if (slot != last.slot) last = .{
                             .slot = slot,
-                            .placed = inLanes(&placeOne(tree, world.pad, common, slot)),
+                            .placed = inLanes(&placeOne(tree, geometry.pad, common, slot)),
                             .primitive = .splat(exact.primitiveAt(Kernel.width, tree, slot)),
                         };
                         const hit = if (behind)
@@ -180,7 +180,7 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
                     }
                     const there = lanes.gt(.splat(exact.no_slot));
                     const gathered = exact.gather(Kernel, tree, own);
-                    const each = placeEach(world.pad, gathered.corners).seenFrom(from);
+                    const each = placeEach(geometry.pad, gathered.corners).seenFrom(from);
                     const hit = intersect(group, &each, down, there);
                     assert(there.andNot(hit.mask).none());
                     if (shares) |all| keepShares(Rays, &all[index], there, hit.shares());

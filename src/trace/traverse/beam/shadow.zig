@@ -37,14 +37,14 @@ const few_blocks = 3;
 /// that all active rays start at the light's place, or go against its direction.
 pub fn trace(
     comptime Kernel: type,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     light: *const world_file.Light,
     bundle: *bundle_file.Bundle(Kernel),
     counts: *TestCounts,
 ) void {
     var search: Search(Kernel) = .{
-        .world = world,
-        .tree = world.tree.get(Kernel.width),
+        .geometry = geometry,
+        .tree = geometry.tree.get(Kernel.width),
         .light = light,
         .bundle = bundle,
         .counts = counts,
@@ -58,7 +58,7 @@ fn Search(comptime Kernel: type) type {
     const width = Kernel.width;
     const lanes = Kernel.ray_count;
     return struct {
-        world: *const world_file.World,
+        geometry: *const world_file.Geometry,
         tree: *const world_file.Tree(width),
         light: *const world_file.Light,
         bundle: *bundle_file.Bundle(Kernel),
@@ -126,12 +126,12 @@ fn Search(comptime Kernel: type) type {
             }
             const bundle = search.bundle;
             const budget = &search.budget;
-            interval_packet.trace(Kernel, .any_hit, search.world, bundle, budget, search.counts);
+            interval_packet.trace(Kernel, .any_hit, search.geometry, bundle, budget, search.counts);
             for (active_before, groups) |mask, *group| group.active = mask;
         }
 
         fn travel(search: *Self, members: *const Members) void {
-            const frustum = search.points.frustumOf(search.world.pad);
+            const frustum = search.points.frustumOf(search.geometry.pad);
             var entries: [Kernel.stack_max]stack.Entry = undefined;
             entries[0] = .{ .child = .root, .near = -inf };
             var entry_count: usize = 1;
@@ -176,7 +176,7 @@ fn Search(comptime Kernel: type) type {
                 .bitAnd(frustum.mayMeet(corners));
             if (there.none()) return;
             const projection = &search.points.projection;
-            const reach_max = edges_file.reachMax(search.world.pad);
+            const reach_max = edges_file.reachMax(search.geometry.pad);
             const print: footprint_file.Footprint(Boxes) =
                 .init(corners, projection, search.points.slope_max, reach_max);
             const bounds = &search.points.bounds;
@@ -503,7 +503,7 @@ fn Search(comptime Kernel: type) type {
         ) Mask {
             @branchHint(.unlikely);
             const ray = &search.bundle.groups[group];
-            const hit = exact.meet(Kernel, search.tree, search.world.pad, ray, slot);
+            const hit = exact.meet(Kernel, search.tree, search.geometry.pad, ray, slot);
             const stands = hit.t.gt(.zero()).bitAnd(hit.t.lt(ray.closest.t));
             return doubtful.bitAnd(hit.mask).bitAnd(before.bitOr(stands));
         }

@@ -36,7 +36,7 @@ const length_range = [2]f64{ 1e-6, 1e6 };
 /// nothing changes. `shares` is null, or where barycentric weights go, as in `primary.trace`.
 pub fn trace(
     comptime Kernel: type,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     bundle: *bundle_file.Bundle(Kernel),
     shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
@@ -46,15 +46,16 @@ pub fn trace(
     var beams: ?bundle_file.Part(Kernel) = null;
     var guess_count: u32 = 0;
     for (0..Kernel.subtile_count) |block| {
-        const guess = Guess.of(Kernel, world, bundle, block, &beams) orelse continue;
+        const guess = Guess.of(Kernel, geometry, bundle, block, &beams) orelse continue;
         measured.measure(&guess, bundle, &beams);
         guess_count += 1;
-        if (measured.starts.ray_count >= rays_min and measured.isWithinReach(world)) {
+        if (measured.starts.ray_count >= rays_min and measured.isWithinReach(geometry)) {
             const active = bundle_file.narrow(Kernel, bundle, &measured.members, true);
             measured.starts.bound(bundle);
             const starts = &measured.starts;
             const grid = &measured.grid;
-            const went = primary.traceBehind(Kernel, world, grid, starts, bundle, shares, counts);
+            const went = primary
+                .traceBehind(Kernel, geometry, grid, starts, bundle, shares, counts);
             bundle_file.restore(Kernel, bundle, &active);
             // Others of the bundle would hardly do better.
             if (!went) break;
@@ -94,7 +95,7 @@ const Guess = struct {
     /// From the corners of a block, or null where these have no point in common.
     fn of(
         comptime Kernel: type,
-        world: *const world_file.World,
+        geometry: *const world_file.Geometry,
         bundle: *const bundle_file.Bundle(Kernel),
         block: usize,
         beams: *const ?bundle_file.Part(Kernel),
@@ -131,7 +132,7 @@ const Guess = struct {
         const offset = origins[1] - origin;
         const t = dot(offset, directions[1]) / dot(directions[1], directions[1]);
         const miss = offset - @as(Wide, @splat(t)) * directions[1];
-        const miss_max = [2]f64{ step, anyway * edges_file.reachMax(world.pad) };
+        const miss_max = [2]f64{ step, anyway * edges_file.reachMax(geometry.pad) };
         const miss_most = miss_max[0] * @abs(t) + miss_max[1];
         if (!(dot(miss, miss) <= miss_most * miss_most)) return null;
         const column: f64 = @floatFromInt(block % (side / subtile_side) * subtile_side);
@@ -264,9 +265,9 @@ fn Measured(comptime Kernel: type) type {
             };
         }
 
-        /// Whether no corner of the scene is farther from a start than `World.pad` allows for.
-        fn isWithinReach(measured: *const Self, world: *const world_file.World) bool {
-            const root = &world.tree.get(Kernel.width).nodes[0];
+        /// Whether no corner of the scene is farther from a start than `Geometry.pad` allows for.
+        fn isWithinReach(measured: *const Self, geometry: *const world_file.Geometry) bool {
+            const root = &geometry.tree.get(Kernel.width).nodes[0];
             const grid = &measured.grid;
             const last: f32 = side - 1;
             const turned =
@@ -288,7 +289,7 @@ fn Measured(comptime Kernel: type) type {
                 farthest += 2 * measured.starts.spread.apart + turned;
                 farthest_squared += farthest * farthest;
             }
-            const reach = edges_file.reachMax(world.pad);
+            const reach = edges_file.reachMax(geometry.pad);
             return farthest_squared <= reach * reach;
         }
     };
