@@ -1,6 +1,6 @@
 //! glTF 2.0 and GLB: a file becomes a `Scene`.
 //!
-//! In: a path. Out: a checked `Scene`; nothing of the file or of cgltf remains. The order is that
+//! In: a file's bytes. Out: a checked `Scene`; nothing of the file or of cgltf remains. The order is that
 //! of trust: container, JSON text, document, extensions, buffers, accessors, and only then the
 //! parts.
 
@@ -8,7 +8,6 @@ const std = @import("std");
 const accessors = @import("gltf/accessors.zig");
 const asset = @import("gltf/asset.zig");
 const container = @import("gltf/container.zig");
-const file = @import("file.zig");
 const escapes = @import("json/escapes.zig");
 const json = @import("json.zig");
 const limits = @import("gltf/limits.zig");
@@ -22,62 +21,17 @@ const Buffers = @import("gltf/buffers.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Document = @import("gltf/document.zig");
 const Meshes = @import("gltf/meshes.zig");
+const Resources = @import("resource.zig");
 const Scene = scene_data.Scene;
-const Settings = @import("settings.zig").Settings;
 const Skins = @import("gltf/skins.zig");
 const Source = @import("gltf/source.zig");
 
 /// See parse.zig.
 pub const Error = Source.Error;
 
-/// Reads the file at `path`; see `parse.parse`.
-pub fn parse(
-    gpa: Allocator,
-    io: std.Io,
-    path: []const u8,
-    settings: Settings,
-    diagnostic: *Diagnostic,
-) Error!Scene {
-    const bytes = try readFile(gpa, io, path, settings, diagnostic);
-    defer gpa.free(bytes);
-    const folder_path = std.fs.path.dirname(path) orelse ".";
-    const folder = std.Io.Dir.cwd().openDir(io, folder_path, .{}) catch
-        return diagnostic.fail(error.InputOutput, "its folder cannot be opened", .{});
-    defer folder.close(io);
-    return parseBytes(gpa, io, bytes, folder, settings, diagnostic);
-}
-
-fn readFile(
-    gpa: Allocator,
-    io: std.Io,
-    path: []const u8,
-    settings: Settings,
-    diagnostic: *Diagnostic,
-) Error![]u8 {
-    var reason: []const u8 = "";
-    const opened = file.open(io, .cwd(), path, settings.output, &reason) catch
-        return diagnostic.fail(error.InputOutput, "{s}", .{reason});
-    defer opened.close(io);
-    return file.read(gpa, io, opened, limits.file_bytes_max, &reason) catch |err| switch (err) {
-        error.OutOfMemory => error.OutOfMemory,
-        error.InputOutput, error.NotRegular => diagnostic.fail(error.InputOutput, "{s}", .{reason}),
-        error.TooLarge => diagnostic.fail(
-            error.InvalidInput,
-            "is over the limit of {d} bytes",
-            .{limits.file_bytes_max},
-        ),
-    };
-}
-
-/// Reads a file that is in memory; what it names is looked for in `folder`.
-pub fn parseBytes(
-    gpa: Allocator,
-    io: std.Io,
-    bytes: []const u8,
-    folder: std.Io.Dir,
-    settings: Settings,
-    diagnostic: *Diagnostic,
-) Error!Scene {
+/// Reads a file that is in memory; what it names comes from `resources`.
+pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) Error!Scene {
+    const gpa = resources.gpa;
     const parts = try container.open(bytes, diagnostic);
     const simplified = try escapes.simplifyEscapes(gpa, parts.json);
     defer if (simplified) |copy| gpa.free(copy);
@@ -94,13 +48,7 @@ pub fn parseBytes(
     };
     defer source.deinit();
     try asset.check(&source);
-    var buffers: Buffers = try .load(gpa, document.data, .{
-        .io = io,
-        .folder = folder,
-        .allow_outside = settings.allow_outside,
-        .output = settings.output,
-        .binary = parts.binary,
-    }, diagnostic);
+    var buffers: Buffers = try .load(resources, document.data, parts.binary, diagnostic);
     defer buffers.deinit();
     var input_bytes: u64 = bytes.len;
     for (buffers.owned.items) |owned| input_bytes += owned.len;

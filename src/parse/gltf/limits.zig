@@ -2,8 +2,6 @@
 //!
 //! Each limit has its own message where it is checked. Real files stay far below.
 
-/// A scene file or a buffer file, in bytes.
-pub const file_bytes_max: u64 = 2 << 30;
 /// The JSON text, data URIs included, in bytes.
 pub const json_bytes_max: u64 = 1 << 30;
 /// All buffers of a file together, in bytes.

@@ -27,7 +27,7 @@ sparse_checked: bool = false,
 finite: std.AutoHashMapUnmanaged(u32, void) = .empty,
 
 /// See parse.zig.
-pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
+pub const Error = @import("../resource.zig").Error;
 
 /// Frees what the reader has noted.
 pub fn deinit(source: *Source) void {

@@ -2,8 +2,6 @@
 //!
 //! Each limit has its own message where it is checked. Real files stay far below.
 
-/// A file of text, PLY or spectra, in bytes.
-pub const file_bytes_max: u64 = 2 << 30;
 /// All text of a scene, each file as often as it is included, in bytes.
 pub const text_bytes_max: u64 = 4 << 30;
 /// Files open at a time, each included by the one before.

@@ -167,7 +167,7 @@ pub fn nurbs(tessellator: *Tessellator) Error!Geometry {
         .v = v,
         .points = points,
         .weighted = weighted,
-        .steps = tessellator.input.settings.tessellation,
+        .steps = tessellator.input.resources.settings.tessellation,
     };
     const size: Tessellator.Grid = .{ .columns = surface.steps, .rows = surface.steps };
     return tessellator.grid(size, &surface, Surface.sampleAt);

@@ -329,7 +329,7 @@ pub fn mesh(tessellator: *Tessellator) Error!Geometry {
         return tessellator.fail("has no filename", .{});
     const name = tessellator.parameters.string("filename") orelse
         return tessellator.fail("has no filename", .{});
-    const bytes = try tessellator.input.readFile(parameter.offset, name, null);
-    defer tessellator.input.gpa.free(bytes);
-    return read(tessellator, name, bytes);
+    const file = try tessellator.input.readFile(parameter.offset, name);
+    defer tessellator.input.gpa.free(file.bytes);
+    return read(tessellator, name, file.bytes);
 }

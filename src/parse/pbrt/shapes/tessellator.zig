@@ -56,7 +56,7 @@ pub fn alloc(tessellator: *Tessellator, comptime Element: type, count: u64) Erro
 
 /// Counts memory before it is asked for.
 pub fn reserve(tessellator: *Tessellator, element_count: u64, element_bytes: u64) Error!void {
-    const limit = limits.decodedBytesMax(tessellator.input.bytes_read);
+    const limit = limits.decodedBytesMax(tessellator.input.resources.bytes_read);
     const bytes = std.math.mul(u64, element_count, element_bytes) catch limit;
     tessellator.bytes_used = std.math.add(u64, tessellator.bytes_used, bytes) catch limit + 1;
     // Each array within half of the address space, too.
@@ -80,7 +80,7 @@ pub fn sweep(tessellator: *Tessellator) Error!f64 {
 /// Steps that an arc of `angle` radians is cut into, `least` at the least.
 pub fn steps(tessellator: *const Tessellator, angle: f64, least: u32) u32 {
     assert(angle >= 0 and angle <= 2 * std.math.pi + 1e-9);
-    const full: f64 = @floatFromInt(tessellator.input.settings.tessellation);
+    const full: f64 = @floatFromInt(tessellator.input.resources.settings.tessellation);
     // A little less, lest rounding adds a step to a whole number of them.
     return @max(least, @as(u32, @intFromFloat(@ceil(full * angle / (2 * std.math.pi) - 1e-6))));
 }
