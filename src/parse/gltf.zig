@@ -1,8 +1,8 @@
 //! glTF 2.0 and GLB: a file becomes a `Scene`.
 //!
-//! In: a file's bytes. Out: a checked `Scene`; nothing of the file or of cgltf remains. The order is that
-//! of trust: container, JSON text, document, extensions, buffers, accessors, and only then the
-//! parts.
+//! In: a file's bytes. Out: a checked `Scene`; nothing of the file or of cgltf remains. The order
+//! is that of trust: container, JSON text, document, extensions, buffers, accessors, and only then
+//! the parts.
 
 const std = @import("std");
 const accessors = @import("gltf/accessors.zig");

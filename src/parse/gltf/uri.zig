@@ -39,7 +39,8 @@ fn schemeLength(uri: []const u8) ?usize {
     return null;
 }
 
-/// Decodes base64 with or without padding, a zero byte behind it. The caller frees the bytes with `gpa`.
+/// Decodes base64 with or without padding, a zero byte behind it. The caller frees the bytes with
+/// `gpa`.
 pub fn decodeBase64(gpa: Allocator, text: []const u8) error{ OutOfMemory, NotBase64 }![:0]u8 {
     var digits = text;
     for (0..2) |_| {
