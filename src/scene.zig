@@ -13,6 +13,9 @@ const Vec3 = math.Vec3;
 /// Grows a `Scene`.
 pub const Builder = @import("scene/builder.zig");
 
+/// How points in rows become triangles.
+pub const Grid = @import("scene/grid.zig");
+
 /// Index that stands for "none".
 pub const none: u32 = std.math.maxInt(u32);
 
@@ -180,6 +183,7 @@ pub const Scene = struct {
 
 test {
     _ = Builder;
+    _ = Grid;
 }
 
 test "an empty scene is a scene" {

@@ -53,14 +53,7 @@ pub fn add(builder: *Builder, sky: Sky) Allocator.Error!void {
             }, null);
         }
     }
-    for (0..rows) |row| {
-        for (0..columns) |column| {
-            const lower: u32 = @intCast(row * (columns + 1) + column);
-            const upper = lower + columns + 1;
-            try mesh.triangle(lower, lower + 1, upper + 1);
-            try mesh.triangle(lower, upper + 1, upper);
-        }
-    }
+    try mesh.gridFaces(.{ .columns = columns, .rows = rows }, 0);
     const material = try builder.addMaterial(.{ .metallic = 0, .unlit = true });
     try builder.addWorldMesh(try mesh.finish(material));
 }

@@ -7,6 +7,7 @@ const limits = @import("../limits.zig");
 const Tessellator = @import("tessellator.zig");
 const Error = @import("../input.zig").Error;
 const Geometry = Tessellator.Geometry;
+const Grid = @import("../../../scene.zig").Grid;
 const Vec3 = @import("../../../math.zig").Vec3;
 
 /// Triples of floats as points.
@@ -80,8 +81,8 @@ pub fn bilinear(tessellator: *Tessellator) Error!Geometry {
             to.* = try checked(tessellator, vertex, from.len);
         }
         // In the order (0, 0), (1, 0), (0, 1), (1, 1).
-        result.triangles[2 * patch] = .{ corner[0], corner[1], corner[3] };
-        result.triangles[2 * patch + 1] = .{ corner[0], corner[3], corner[2] };
+        const quad = [4]u32{ corner[0], corner[1], corner[3], corner[2] };
+        result.triangles[2 * patch ..][0..2].* = Grid.cut(quad);
     }
     Tessellator.orient(&result);
     return result;
@@ -114,12 +115,10 @@ pub fn heightfield(tessellator: *Tessellator) Error!Geometry {
         share(index / wide, high - 1),
         height,
     };
-    var made: usize = 0;
-    for (0..high - 1) |row| for (0..wide - 1) |column| {
-        const corner: u32 = @intCast(row * wide + column);
-        result.triangles[made] = .{ corner, corner + 1, corner + wide + 1 };
-        result.triangles[made + 1] = .{ corner, corner + wide + 1, corner + wide };
-        made += 2;
+    const grid: Grid = .{ .columns = wide - 1, .rows = high - 1 };
+    for (0..grid.rows) |row| for (0..grid.columns) |column| {
+        const index = row * grid.columns + column;
+        result.triangles[2 * index ..][0..2].* = Grid.cut(grid.corners(row, column));
     };
     return result;
 }

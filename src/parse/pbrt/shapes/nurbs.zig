@@ -12,6 +12,7 @@ const math = @import("../../../math.zig");
 const vec3d = math.vec3d;
 const Error = @import("../input.zig").Error;
 const Geometry = Tessellator.Geometry;
+const Grid = @import("../../../scene.zig").Grid;
 const Sample = Tessellator.Sample;
 const Vector = math.Vec3d;
 
@@ -169,8 +170,8 @@ pub fn nurbs(tessellator: *Tessellator) Error!Geometry {
         .weighted = weighted,
         .steps = tessellator.input.resources.settings.tessellation,
     };
-    const size: Tessellator.Grid = .{ .columns = surface.steps, .rows = surface.steps };
-    return tessellator.grid(size, &surface, Surface.sampleAt);
+    const grid: Grid = .{ .columns = surface.steps, .rows = surface.steps };
+    return tessellator.tessellate(.{ .grid = grid }, &surface, Surface.sampleAt);
 }
 
 /// Asserts nothing: all of it is the file's.

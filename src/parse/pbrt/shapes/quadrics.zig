@@ -10,7 +10,7 @@ const math = @import("../../../math.zig");
 const vec3d = math.vec3d;
 const Error = @import("../input.zig").Error;
 const Geometry = Tessellator.Geometry;
-const Grid = Tessellator.Grid;
+const Grid = @import("../../../scene.zig").Grid;
 const Sample = Tessellator.Sample;
 const Vector = math.Vec3d;
 
@@ -21,14 +21,14 @@ const Outline = struct { radius: f64, height: f64, normal_out: f64, normal_up: f
 fn Revolution(comptime Curve: type) type {
     return struct {
         curve: Curve,
-        size: Grid,
+        surface: Tessellator.Surface,
         phi_max: f64,
 
         fn sampleAt(self: *const @This(), column: u32, row: u32) Sample {
-            const phi = share(column, self.size.columns) * self.phi_max;
+            const phi = share(column, self.surface.grid.columns) * self.phi_max;
             const cosine = elementary.cos(phi);
             const sine = elementary.sin(phi);
-            const at = self.curve.at(share(row, self.size.rows));
+            const at = self.curve.at(share(row, self.surface.grid.rows));
             return .{
                 .point = .{ at.radius * cosine, at.radius * sine, at.height },
                 .normal = .{ at.normal_out * cosine, at.normal_out * sine, at.normal_up },
@@ -41,20 +41,31 @@ fn share(index: u32, count: u32) f64 {
     return @as(f64, @floatFromInt(index)) / @as(f64, @floatFromInt(count));
 }
 
+/// Columns around, closed where the turn is whole.
+fn gridOf(tessellator: *const Tessellator, phi_max: f64, rows: u32) Grid {
+    return .{
+        .columns = tessellator.steps(phi_max, 3),
+        .rows = rows,
+        .closed = phi_max > 2 * std.math.pi - 1e-9,
+    };
+}
+
 fn revolve(tessellator: *Tessellator, curve: anytype, rows: u32, ends: [2]bool) Error!Geometry {
     const phi_max = try tessellator.sweep();
     const revolution: Revolution(@TypeOf(curve)) = .{
         .curve = curve,
         .phi_max = phi_max,
-        .size = .{
-            .columns = tessellator.steps(phi_max, 3),
-            .rows = rows,
-            .closed = phi_max > 2 * std.math.pi - 1e-9,
+        .surface = .{
+            .grid = gridOf(tessellator, phi_max, rows),
             .first_row_is_point = ends[0],
             .last_row_is_point = ends[1],
         },
     };
-    return tessellator.grid(revolution.size, &revolution, Revolution(@TypeOf(curve)).sampleAt);
+    return tessellator.tessellate(
+        revolution.surface,
+        &revolution,
+        Revolution(@TypeOf(curve)).sampleAt,
+    );
 }
 
 /// The lower and the higher of two heights, each held between bounds.
@@ -210,14 +221,14 @@ pub fn paraboloid(tessellator: *Tessellator) Error!Geometry {
 const Hyperboloid = struct {
     first: Vector,
     last: Vector,
-    size: Grid,
+    surface: Tessellator.Surface,
     phi_max: f64,
 
     fn sampleAt(self: *const Hyperboloid, column: u32, row: u32) Sample {
-        const phi = share(column, self.size.columns) * self.phi_max;
+        const phi = share(column, self.surface.grid.columns) * self.phi_max;
         const cosine = elementary.cos(phi);
         const sine = elementary.sin(phi);
-        const v = share(row, self.size.rows);
+        const v = share(row, self.surface.grid.rows);
         const along = vec3d.sub(self.last, self.first);
         const on_line = vec3d.add(self.first, vec3d.scale(along, v));
         const point = turn(on_line, cosine, sine);
@@ -240,17 +251,15 @@ pub fn hyperboloid(tessellator: *Tessellator) Error!Geometry {
     const first = tessellator.parameters.vector("p1", .{ 0, 0, 0 });
     const last = tessellator.parameters.vector("p2", .{ 1, 1, 1 });
     const phi_max = try tessellator.sweep();
-    const surface: Hyperboloid = .{
+    const turned: Hyperboloid = .{
         .first = .{ first[0], first[1], first[2] },
         .last = .{ last[0], last[1], last[2] },
         .phi_max = phi_max,
-        .size = .{
-            .columns = tessellator.steps(phi_max, 3),
-            .rows = tessellator.steps(std.math.pi, 2),
-            .closed = phi_max > 2 * std.math.pi - 1e-9,
+        .surface = .{
+            .grid = gridOf(tessellator, phi_max, tessellator.steps(std.math.pi, 2)),
             .first_row_is_point = first[0] == 0 and first[1] == 0,
             .last_row_is_point = last[0] == 0 and last[1] == 0,
         },
     };
-    return tessellator.grid(surface.size, &surface, Hyperboloid.sampleAt);
+    return tessellator.tessellate(turned.surface, &turned, Hyperboloid.sampleAt);
 }

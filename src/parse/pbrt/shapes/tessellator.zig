@@ -10,6 +10,7 @@ const math = @import("../../../math.zig");
 const Input = @import("../input.zig");
 const Parameters = @import("../parameters.zig");
 const Error = Input.Error;
+const Grid = @import("../../../scene.zig").Grid;
 const Vec3 = math.Vec3;
 const vec3d = math.vec3d;
 const Vector = math.Vec3d;
@@ -88,55 +89,47 @@ pub fn steps(tessellator: *const Tessellator, angle: f64, least: u32) u32 {
 /// A surface over rows and columns: point and normal of each crossing.
 pub const Sample = struct { point: Vector, normal: Vector };
 
-/// How a grid is joined.
-pub const Grid = struct {
-    columns: u32,
-    rows: u32,
-    /// The last column is the first.
-    closed: bool = false,
-    /// All points of the first or last row are one.
+/// A grid, and whether all points of its first or last row are one.
+pub const Surface = struct {
+    grid: Grid,
     first_row_is_point: bool = false,
     last_row_is_point: bool = false,
 };
 
-/// Triangles of a grid: seen from the front, columns run to the right and rows upwards.
-/// `sampleAt` gives the crossing of a column and a row.
-pub fn grid(
+/// Triangles of a surface; `sampleAt` gives the point of a column and a row.
+pub fn tessellate(
     tessellator: *Tessellator,
-    size: Grid,
+    surface: Surface,
     context: anytype,
     comptime sampleAt: fn (@TypeOf(context), u32, u32) Sample,
 ) Error!Geometry {
-    assert(size.columns >= 1 and size.rows >= 1);
-    const stride: u64 = if (size.closed) size.columns else size.columns + 1;
-    const vertex_count = stride * (size.rows + 1);
-    const points: u32 = @as(u32, @intFromBool(size.first_row_is_point)) +
-        @intFromBool(size.last_row_is_point);
-    const triangle_count = @as(u64, size.columns) * (2 * @as(u64, size.rows) - points);
+    const grid = surface.grid;
+    assert(grid.columns >= 1 and grid.rows >= 1);
+    const vertex_count = @as(u64, grid.stride()) * (grid.rows + 1);
+    const points: u32 = @as(u32, @intFromBool(surface.first_row_is_point)) +
+        @intFromBool(surface.last_row_is_point);
+    const triangle_count = @as(u64, grid.columns) * (2 * @as(u64, grid.rows) - points);
     if (vertex_count > std.math.maxInt(u32)) return tessellator.fail("has too many vertices", .{});
     const result: Geometry = .{
         .positions = try tessellator.alloc(Vec3, vertex_count),
         .normals = try tessellator.alloc(Vec3, vertex_count),
         .triangles = try tessellator.alloc([3]u32, triangle_count),
     };
-    for (0..size.rows + 1) |row| for (0..@intCast(stride)) |column| {
+    for (0..grid.rows + 1) |row| for (0..grid.stride()) |column| {
         const sample = sampleAt(context, @intCast(column), @intCast(row));
-        const index = row * @as(usize, @intCast(stride)) + column;
+        const index = row * grid.stride() + column;
         result.positions[index] = vec3d.toSingle(sample.point);
         result.normals.?[index] = vec3d.toSingle(sample.normal);
     };
-    const wide: u32 = @intCast(stride);
     var made: usize = 0;
-    for (0..size.rows) |row| for (0..size.columns) |column| {
-        const first: u32 = @intCast(row * wide);
-        const left: u32 = @intCast(column);
-        const right: u32 = if (size.closed and left + 1 == size.columns) 0 else left + 1;
-        if (row > 0 or !size.first_row_is_point) {
-            result.triangles[made] = .{ first + left, first + right, first + wide + right };
+    for (0..grid.rows) |row| for (0..grid.columns) |column| {
+        const lower, const upper = Grid.cut(grid.corners(row, column));
+        if (row > 0 or !surface.first_row_is_point) {
+            result.triangles[made] = lower;
             made += 1;
         }
-        if (row + 1 < size.rows or !size.last_row_is_point) {
-            result.triangles[made] = .{ first + left, first + wide + right, first + wide + left };
+        if (row + 1 < grid.rows or !surface.last_row_is_point) {
+            result.triangles[made] = upper;
             made += 1;
         }
     };
