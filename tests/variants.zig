@@ -9,14 +9,17 @@ const fixture = @import("fixture.zig");
 const raylane = @import("raylane");
 const gpa = std.testing.allocator;
 
-const Golden = struct { scene: []const u8, width: u32, height: u32, hash: u64 };
+const Golden = struct { scene: []const u8, size: [2]u32, hash: u64 };
 
 /// Small pictures of scenes that take every path of shading and traversal.
 const goldens = [_]Golden{
-    .{ .scene = "builtin:cornell", .width = 61, .height = 47, .hash = 0x786fc2c79a965f00 },
-    .{ .scene = "builtin:atrium", .width = 53, .height = 40, .hash = 0xc71228fd03d18869 },
-    .{ .scene = "builtin:nave", .width = 53, .height = 40, .hash = 0xb3f44d630da93019 },
-    .{ .scene = "builtin:handles", .width = 40, .height = 53, .hash = 0xd1f7064ed445c955 },
+    .{ .scene = "builtin:cornell", .size = .{ 61, 47 }, .hash = 0x786fc2c79a965f00 },
+    .{ .scene = "builtin:atrium", .size = .{ 53, 40 }, .hash = 0xc71228fd03d18869 },
+    .{ .scene = "builtin:nave", .size = .{ 53, 40 }, .hash = 0xb3f44d630da93019 },
+    .{ .scene = "builtin:handles", .size = .{ 40, 53 }, .hash = 0xd1f7064ed445c955 },
+    .{ .scene = "tests/pictures/solids.gltf", .size = .{ 50, 40 }, .hash = 0xe65c005dcc1d139a },
+    .{ .scene = "tests/pictures/shapes.pbrt", .size = .{ 60, 40 }, .hash = 0x5b97cd2a5a6006b0 },
+    .{ .scene = "tests/pictures/view.pbrt", .size = .{ 48, 32 }, .hash = 0xc1592790030ab224 },
 };
 
 fn parse(name: []const u8) !raylane.scene.Scene {
@@ -46,14 +49,14 @@ fn expectAllVariants(scene: *const raylane.scene.Scene, base: fixture.Options, h
     }
 }
 
-test "every variant renders the built-in scenes to the golden hash" {
+test "every variant renders built-in scenes and files to the golden hash" {
     for (goldens) |golden| {
         var scene = try parse(golden.scene);
         defer scene.deinit();
         errdefer std.debug.print("scene {s}\n", .{golden.scene});
         try expectAllVariants(&scene, .{
-            .width = golden.width,
-            .height = golden.height,
+            .width = golden.size[0],
+            .height = golden.size[1],
             .thread_count = 2,
         }, golden.hash);
     }
