@@ -40,7 +40,7 @@ pub const Mesh = struct {
     material: u32,
 };
 
-/// One showing of a mesh.
+/// A mesh at a node.
 pub const Instance = struct {
     mesh: u32,
     node: u32,

@@ -1,4 +1,4 @@
-//! Grows one mesh of a procedural scene: vertices, faces, curved patches and the simple solids.
+//! A mesh builder of procedural scenes: vertices, faces, curved patches and the simple solids.
 //!
 //! Everything is described in the space of `place` and put into the world by it. Faces wind
 //! counter-clockwise seen from their visible side. A vertex of a flat face carries a zero normal,

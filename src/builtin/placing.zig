@@ -1,4 +1,4 @@
-//! Lights and cameras of the procedural scenes, each by where it stands and where it looks.
+//! Lights and cameras of procedural scenes, each by where it stands and where it looks.
 
 const std = @import("std");
 const math = @import("../math.zig");

@@ -1,4 +1,4 @@
-//! A part of a sky: an unlit dome behind what the camera sees, from the horizon up.
+//! A sky dome: unlit, behind what the camera sees, from the horizon up.
 //!
 //! It shines by its colour alone. Like everything else it casts shadows, so it is to be left open
 //! where the scene's directional lights come from.

@@ -106,7 +106,7 @@ fn fill(source: *Source) Error!void {
             try skins.checkNode(node, mesh_index);
             const range = try meshes.get(mesh_index);
             if (builder.instances.items.len + range.count > limits.instance_count_max)
-                return source.fail("over {d} showings of meshes", .{limits.instance_count_max});
+                return source.fail("over {d} instances of meshes", .{limits.instance_count_max});
             for (range.first..range.first + range.count) |drawn| {
                 try builder.addInstance(@intCast(drawn), node_index);
             }

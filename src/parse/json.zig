@@ -1,4 +1,4 @@
-//! JSON text, checked before anything believes it.
+//! A JSON validator: the text is checked before anything believes it.
 //!
 //! In: bytes and a `Rule` that says what a document may hold where. Out: nothing, or one line with
 //! the place and what is wrong. One linear scan with an explicit stack, strict about the grammar

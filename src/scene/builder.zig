@@ -71,18 +71,18 @@ pub fn addMaterial(builder: *Builder, material: scene_data.Material) Error!u32 {
     return builder.add("materials", material);
 }
 
-/// Adds a mesh without showing it and returns its index.
+/// Adds a mesh without an instance and returns its index.
 pub fn addMesh(builder: *Builder, mesh: scene_data.Mesh) Error!u32 {
     return builder.add("meshes", mesh);
 }
 
-/// Shows a mesh at a node.
+/// Adds an instance of a mesh at a node.
 pub fn addInstance(builder: *Builder, mesh: u32, node: u32) Error!void {
     assert(mesh < builder.meshes.items.len and node < builder.nodes.items.len);
     _ = try builder.add("instances", scene_data.Instance{ .mesh = mesh, .node = node });
 }
 
-/// Adds a mesh in world space, shown once.
+/// Adds a mesh in world space with its only instance.
 pub fn addWorldMesh(builder: *Builder, mesh: scene_data.Mesh) Error!void {
     const node = try builder.addNode(scene_data.none, .identity);
     try builder.addInstance(try builder.addMesh(mesh), node);

@@ -1,4 +1,4 @@
-//! The tests that hold the backends together: each against plain expressions of single values.
+//! Tests of the backends' agreement: each against plain expressions of single values.
 //!
 //! In: every backend and lane count that the target compiles, nasty values and random bits. Out: a
 //! failed test that names backend, lanes, operation and operands. All run with flush-to-zero, as

@@ -1,4 +1,4 @@
-//! What follows from a backend's primitives and is the same text in every backend.
+//! Derived operations: they follow from primitives and are the same text in every backend.
 //!
 //! In: a lane type of a backend, whose field `v` is an array or a vector of its lanes. Out: the
 //! declarations that the backend's type re-exports.

@@ -1,4 +1,4 @@
-//! What the parts of the glTF reader share: the document, its buffers, where results go.
+//! State of the glTF reader that its parts share: the document, its buffers, where results go.
 //!
 //! Nothing is checked here but that a reference is one. Memory from `arena` is the scene's and
 //! stays; memory from `gpa` is given back before the reader ends.

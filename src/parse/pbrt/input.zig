@@ -1,4 +1,4 @@
-//! The texts of a scene: the file that is read, the files that wait for it, and where we are.
+//! A stack of texts: the file that is read, the files that include it, and where we are.
 //!
 //! In: the first text, names of files to include. Out: a cursor over the top text, and errors and
 //! warnings with file, line and column. Included files lie on a stack of our own, at most

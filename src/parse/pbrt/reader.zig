@@ -36,14 +36,14 @@ const Graphics = struct {
     material: u32 = scene_data.none,
     /// Surfaces only bound a medium and are not shown.
     is_boundary: bool = false,
-    glow: ?Glow = null,
+    area_light: ?AreaLight = null,
     reverse: bool = false,
     /// Whether transformations are those of the time when the shutter opens.
     at_start: bool = true,
 };
 
 /// What AreaLightSource says of the shapes after it.
-const Glow = struct { radiance: Vec3, two_sided: bool };
+const AreaLight = struct { radiance: Vec3, two_sided: bool };
 
 const Kept = struct {
     const Kind = enum {
@@ -326,7 +326,7 @@ fn performNamed(
             .place = &reader.graphics.transform,
             .position = position,
         }, name),
-        .AreaLightSource => try reader.areaLight(),
+        .AreaLightSource => try reader.areaLightSource(),
         .Shape => try reader.shape(name, position),
         .Volume, .MakeNamedMedium => {
             try reader.note(directive, position, "participating media are not supported");
@@ -471,7 +471,7 @@ fn objectInstance(reader: *Reader, position: usize) Error!void {
         return reader.input.fail(position, "an instance within an object", .{});
     const object = reader.objects.get(name) orelse
         return reader.input.fail(position, "no object {f}", .{quote(name)});
-    try reader.builder.showObject(object, &reader.graphics.transform);
+    try reader.builder.instantiateObject(object, &reader.graphics.transform);
 }
 
 /// Forgets a world that has only prepared the one that follows.
@@ -574,7 +574,7 @@ fn namedMaterial(reader: *Reader, position: usize) Error!void {
     reader.graphics.is_boundary = made.is_boundary;
 }
 
-fn areaLight(reader: *Reader) Error!void {
+fn areaLightSource(reader: *Reader) Error!void {
     const parameters = &reader.parameters;
     const color = try reader.colors.rgb(parameters, "L", .{ 1, 1, 1 });
     const scale = try reader.colors.rgb(parameters, "scale", .{ 1, 1, 1 });
@@ -584,7 +584,7 @@ fn areaLight(reader: *Reader) Error!void {
         to.* = if (product > 0) @min(product, 1e30) else 0;
     }
     const two_sided = parameters.boolean("twosided", false);
-    reader.graphics.glow = .{ .radiance = radiance, .two_sided = two_sided };
+    reader.graphics.area_light = .{ .radiance = radiance, .two_sided = two_sided };
 }
 
 fn materialIndex(reader: *Reader) Allocator.Error!u32 {
@@ -614,13 +614,13 @@ fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
     }
     if (graphics.is_boundary) return;
     const material = try reader.materialIndex();
-    if (graphics.glow) |glow| {
-        if (reader.object == null) return reader.shine(kind, material, glow);
-        try input.warn(position, "glow", "Shape: objects do not shine", .{});
+    if (graphics.area_light) |area_light| {
+        if (reader.object == null) return reader.addAreaLight(kind, material, area_light);
+        try input.warn(position, "area light", "Shape: objects do not shine", .{});
     }
     const mesh = try reader.meshOf(kind, material);
     if (reader.object == null)
-        try reader.builder.show(mesh, &graphics.transform)
+        try reader.builder.instantiate(mesh, &graphics.transform)
     else
         try reader.builder.addPart(mesh, &graphics.transform);
 }
@@ -640,21 +640,27 @@ fn meshOf(reader: *Reader, kind: shapes.Kind, material: u32) Error!u32 {
     return mesh;
 }
 
-/// A shape that shines: seen bright from its front, plain from behind.
-fn shine(reader: *Reader, kind: shapes.Kind, material: u32, glow: Glow) Error!void {
+/// A shape that is an area light: bright from its front, plain from behind.
+fn addAreaLight(
+    reader: *Reader,
+    kind: shapes.Kind,
+    material: u32,
+    area_light: AreaLight,
+) Error!void {
     const builder = reader.builder;
     const place = &reader.graphics.transform;
     const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
     var bright = builder.scene.materials.items[material];
-    bright.emissive = glow.radiance;
-    bright.double_sided = glow.two_sided;
+    bright.emissive = area_light.radiance;
+    bright.double_sided = area_light.two_sided;
     const front = try builder.addMesh(geometry, try builder.scene.addMaterial(bright));
-    try builder.show(front, place);
-    if (!glow.two_sided) {
+    try builder.instantiate(front, place);
+    if (!area_light.two_sided) {
         var plain = builder.scene.materials.items[material];
         plain.double_sided = false;
         const back = try shapes.turned(&reader.tessellator, &geometry);
-        try builder.show(try builder.addMesh(back, try builder.scene.addMaterial(plain)), place);
+        const mesh = try builder.addMesh(back, try builder.scene.addMaterial(plain));
+        try builder.instantiate(mesh, place);
     }
     if (builder.emitters.items.len >= limits.emitter_count_max) return reader.input.warn(
         reader.tessellator.position,
@@ -665,8 +671,8 @@ fn shine(reader: *Reader, kind: shapes.Kind, material: u32, glow: Glow) Error!vo
     try builder.emitters.append(reader.input.gpa, .{
         .geometry = geometry,
         .place = place.*,
-        .radiance = glow.radiance,
-        .two_sided = glow.two_sided,
+        .radiance = area_light.radiance,
+        .two_sided = area_light.two_sided,
     });
 }
 

@@ -1,5 +1,5 @@
 //! A scene builder in PBRT's terms: shapes at the current transformation, objects and their
-//! instances, shapes that shine.
+//! instances, area lights.
 //!
 //! A PBRT world has the hand that its camera gives it: left with a plain LookAt, right after
 //! `Scale -1 1 1`. Ours is right-handed. So the root, under which everything hangs, mirrors z where
@@ -20,7 +20,7 @@ const Vec3 = math.Vec3;
 
 const SceneBuilder = @This();
 
-/// A shape that shines, to become lights once all of them are known.
+/// An area light, to become point lights once all of them are known.
 pub const Emitter = struct {
     geometry: Geometry,
     place: Transform,
@@ -31,7 +31,7 @@ pub const Emitter = struct {
 /// A mesh within an object, in the space of its definition.
 const Part = struct { mesh: u32, place: Transform };
 
-/// Meshes that are shown together, anywhere: a range of `parts`.
+/// Meshes that have their instances together, anywhere: a range of `parts`.
 pub const Object = struct { first: usize, count: usize };
 
 gpa: Allocator,
@@ -76,7 +76,7 @@ pub fn clear(builder: *SceneBuilder) void {
     builder.last_node = null;
 }
 
-/// Adds a mesh without showing it and returns its index.
+/// Adds a mesh without an instance and returns its index.
 pub fn addMesh(builder: *SceneBuilder, geometry: Geometry, material: u32) Allocator.Error!u32 {
     return builder.scene.addMesh(.{
         .positions = geometry.positions,
@@ -86,8 +86,8 @@ pub fn addMesh(builder: *SceneBuilder, geometry: Geometry, material: u32) Alloca
     });
 }
 
-/// Shows a mesh at `place` in the world.
-pub fn show(builder: *SceneBuilder, mesh: u32, place: *const Transform) Error!void {
+/// Adds an instance of a mesh at `place` in the world.
+pub fn instantiate(builder: *SceneBuilder, mesh: u32, place: *const Transform) Error!void {
     const node = node: {
         if (builder.last_node) |last| {
             if (std.meta.eql(last.place, place.*)) break :node last.index;
@@ -95,13 +95,13 @@ pub fn show(builder: *SceneBuilder, mesh: u32, place: *const Transform) Error!vo
         break :node try builder.scene.addNode(root, place.toSingle());
     };
     builder.last_node = .{ .index = node, .place = place.* };
-    try builder.showAt(mesh, node);
+    try builder.instantiateAt(mesh, node);
 }
 
-fn showAt(builder: *SceneBuilder, mesh: u32, node: u32) Error!void {
+fn instantiateAt(builder: *SceneBuilder, mesh: u32, node: u32) Error!void {
     if (builder.scene.instances.items.len >= limits.instance_count_max) return builder.input.fail(
         builder.input.offset(),
-        "over {d} showings of meshes",
+        "over {d} instances of meshes",
         .{limits.instance_count_max},
     );
     try builder.scene.addInstance(mesh, node);
@@ -112,8 +112,12 @@ pub fn addPart(builder: *SceneBuilder, mesh: u32, place: *const Transform) Alloc
     try builder.parts.append(builder.gpa, .{ .mesh = mesh, .place = place.* });
 }
 
-/// Shows an object at `place`.
-pub fn showObject(builder: *SceneBuilder, object: Object, place: *const Transform) Error!void {
+/// Adds an instance of an object at `place`.
+pub fn instantiateObject(
+    builder: *SceneBuilder,
+    object: Object,
+    place: *const Transform,
+) Error!void {
     const above = try builder.scene.addNode(root, place.toSingle());
     builder.last_node = null;
     var last: ?struct { index: u32, place: Transform } = null;
@@ -127,7 +131,7 @@ pub fn showObject(builder: *SceneBuilder, object: Object, place: *const Transfor
                 try builder.scene.addNode(above, part.place.toSingle());
             last = .{ .index = node, .place = part.place };
         }
-        try builder.showAt(part.mesh, last.?.index);
+        try builder.instantiateAt(part.mesh, last.?.index);
     }
 }
 

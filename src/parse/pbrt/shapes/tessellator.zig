@@ -1,4 +1,4 @@
-//! What every shape needs to become triangles: memory within bounds, and a way to complain.
+//! The tessellator of all shapes: grids of a surface, normals, memory within bounds.
 //!
 //! Geometry lives as long as the scene; what only the making of it needs is given back. Curved
 //! shapes and subdivision make many triangles of few bytes, so that everything is counted before
