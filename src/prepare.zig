@@ -97,8 +97,9 @@ noinline fn placeAll(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!World {
-    const maps = try pose.worldMaps(gpa, from.nodes);
-    defer gpa.free(maps);
+    const posed = try pose.compose(gpa, from);
+    defer posed.deinit(gpa);
+    const maps = posed.maps;
     const materials = try material.convertAll(arena, from.materials);
     const surface = try flatten.flatten(gpa, arena, from, maps, settings.thread_count, diagnostic);
     const seen = try view.choose(

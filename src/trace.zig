@@ -33,8 +33,8 @@ pub const interval_packet = @import("trace/traverse/interval_packet.zig");
 pub const walk = @import("trace/traverse/walk.zig");
 /// A bundle of rays through the tree.
 pub const bundle = @import("trace/traverse/bundle.zig");
-/// Rays from one point, or behind it, as a beam.
-pub const primary = @import("trace/traverse/beam/primary.zig");
+/// Rays from one point as a beam.
+pub const eye_rays = @import("trace/traverse/beam/eye_rays.zig");
 /// The directions of a beam's rays.
 pub const Grid = @import("trace/traverse/beam/grid.zig").Grid;
 /// A bundle in the variant's own way.

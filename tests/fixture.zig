@@ -24,7 +24,7 @@ pub const Builder = struct {
 
     /// A root node.
     pub fn addNode(builder: *Builder, local: Affine) !u32 {
-        return builder.scene.addNode(raylane.scene.none, local);
+        return builder.scene.addNode(raylane.scene.none, .of(local));
     }
 
     /// Triangles with flat faces, or with the given normals.

@@ -121,9 +121,9 @@ fn expectBundles(
             interval_packet.trace(Kernel, .any_hit, geometry, &poor, &budget, &counts);
             try expectBlocked(Kernel, &poor, expected[first..][0..part.len]);
         };
-        const coherence = dispatch.closestHit(Kernel, geometry, &bundle, null, null, &counts);
+        const coherence = dispatch.closestHit(Kernel, geometry, &bundle, null, &counts);
         try std.testing.expect(coherence == .none);
-        dispatch.anyHit(Kernel, geometry, &shadows, &no_light, &coherence, &counts);
+        dispatch.anyHit(Kernel, geometry, &shadows, &no_light, coherence, &counts);
         try expectBlocked(Kernel, &shadows, expected[first..][0..part.len]);
         for (0..part.len) |index| {
             if (!isActive(index)) continue;

@@ -23,10 +23,6 @@ pub fn Tracer(comptime Kernel: type) type {
         /// The benchmark's point light.
         light: raylane.world.Light,
         tests: raylane.statistics.TestCounts = .{},
-        /// Which rays of the last batch went as beams.
-        coherence: Coherence = .none,
-
-        const Coherence = dispatch.Coherence(Kernel);
         const Self = @This();
 
         /// Nearest hits of rays from the eye, one through each pixel of a tile, all active.
@@ -42,8 +38,7 @@ pub fn Tracer(comptime Kernel: type) type {
             const light = &tracer.light;
             switch (Kernel.variant.traversal) {
                 .beam => {
-                    const coherence: *const Coherence =
-                        if (bounced) &tracer.coherence else &.all;
+                    const coherence: dispatch.Coherence = if (bounced) .none else .all;
                     dispatch.anyHit(Kernel, geometry, batch.bundle(), light, coherence, tests);
                 },
                 .packet2x2, .single => tracer.traceEach(.any_hit, batch),
@@ -59,11 +54,10 @@ pub fn Tracer(comptime Kernel: type) type {
             const geometry = &tracer.world.geometry;
             const tests = &tracer.tests;
             switch (Kernel.variant.traversal) {
-                .beam => tracer.coherence = dispatch
-                    .closestHit(Kernel, geometry, batch.bundle(), grid, &batch.shares, tests),
+                .beam => _ = dispatch.closestHit(Kernel, geometry, batch.bundle(), grid, tests),
                 .packet2x2, .single => tracer.traceEach(.closest_hit, batch),
             }
-            if (tracer.coherence != .all) tracer.weighHits(batch);
+            tracer.weighHits(batch);
         }
 
         /// Group by group, each by itself.
@@ -80,14 +74,11 @@ pub fn Tracer(comptime Kernel: type) type {
             }
         }
 
-        /// Barycentric weights of the nearest hits, by the edge functions that decided them; those
-        /// of beams are there already.
+        /// Barycentric weights of the nearest hits, by the edge functions that decided them.
         fn weighHits(tracer: *const Self, batch: *Batch) void {
             var hits: [Batch.group_count]Lanes.Mask = undefined;
-            for (&hits, &batch.groups, 0..) |*hit, *group, index| {
+            for (&hits, &batch.groups) |*hit, *group| {
                 hit.* = group.active.andNot(group.closest.primitive.lt(.zero()));
-                if (Kernel.variant.traversal == .beam and tracer.coherence == .some)
-                    hit.* = hit.andNot(tracer.coherence.some[index]);
                 if (hit.any()) tracer.prefetchCorners(group.closest.primitive, hit.bits());
             }
             for (&batch.groups, &batch.shares, hits) |*group, *all, hit| {

@@ -48,7 +48,7 @@ fn addLight(
     color: math.Vec3,
     intensity: f32,
 ) Error!void {
-    const node = try builder.addNode(scene_data.none, place);
+    const node = try builder.addNode(scene_data.none, .of(place));
     try builder.addLight(.{ .kind = kind, .node = node, .color = color, .intensity = intensity });
 }
 
@@ -58,7 +58,7 @@ pub fn addCamera(builder: *scene_data.Builder, view: View) Error!void {
     const place = lookAt(view.eye, view.target - view.eye);
     try builder.addCamera(.{
         .name = view.name,
-        .node = try builder.addNode(scene_data.none, place),
+        .node = try builder.addNode(scene_data.none, .of(place)),
         .projection = .{ .perspective = .{
             .y_fov_rad = @floatCast(view.y_fov_deg * (std.math.pi / 180.0)),
             .aspect = view.aspect,

@@ -46,6 +46,15 @@ pub fn Affine(comptime V: type) type {
             };
         }
 
+        /// The same map in another precision, rounded.
+        pub fn of(from: anytype) Self {
+            var map: Self = undefined;
+            inline for (.{ "x", "y", "z", "translation" }) |name| {
+                for (&@field(map, name), @field(from, name)) |*to, value| to.* = @floatCast(value);
+            }
+            return map;
+        }
+
         /// The image of a point.
         pub inline fn point(map: Self, p: V) V {
             return vec.add(map.direction(p), map.translation);

@@ -35,8 +35,12 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
     const parts = try container.open(bytes, diagnostic);
     const simplified = try escapes.simplifyEscapes(gpa, parts.json);
     defer if (simplified) |copy| gpa.free(copy);
-    var document = try parseDocument(gpa, simplified orelse parts.json, diagnostic);
+    const text = simplified orelse parts.json;
+    const checked = try json.check(text, &schema.document, diagnostic);
+    var document = try parseDocument(gpa, text, checked.lengths, diagnostic);
     defer document.deinit();
+    const doubles = try json.readDoubles(gpa, text, &schema.document, &checked);
+    defer gpa.free(doubles);
     var builder: scene_data.Builder = .init(gpa);
     errdefer builder.deinit();
     var source: Source = .{
@@ -44,6 +48,7 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
         .builder = &builder,
         .arena = builder.arena(),
         .data = document.data,
+        .doubles = doubles,
         .diagnostic = diagnostic,
     };
     defer source.deinit();
@@ -61,9 +66,13 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
     return scene;
 }
 
-/// Checks the JSON text and has cgltf parse it.
-fn parseDocument(gpa: Allocator, text: []const u8, diagnostic: *Diagnostic) Error!Document {
-    const lengths = try json.check(text, &schema.document, diagnostic);
+/// Has cgltf parse a JSON text that has been checked.
+fn parseDocument(
+    gpa: Allocator,
+    text: []const u8,
+    lengths: json.Lengths,
+    diagnostic: *Diagnostic,
+) Error!Document {
     return Document.parse(gpa, text) catch |err| switch (err) {
         error.OutOfMemory => error.OutOfMemory,
         error.TooLarge => diagnostic.fail(

@@ -7,7 +7,6 @@
 const std = @import("std");
 const math = @import("../math.zig");
 const scene_data = @import("../scene.zig");
-const Affine = math.Affine;
 const Allocator = std.mem.Allocator;
 const Error = Allocator.Error;
 const Scene = scene_data.Scene;
@@ -61,7 +60,7 @@ fn add(builder: *Builder, comptime name: []const u8, element: anytype) Error!u32
 }
 
 /// Adds a node below `parent`, which is `scene.none` for a root, and returns its index.
-pub fn addNode(builder: *Builder, parent: u32, local: Affine) Error!u32 {
+pub fn addNode(builder: *Builder, parent: u32, local: math.AffineD) Error!u32 {
     assert(parent == scene_data.none or parent < builder.nodes.items.len);
     return builder.add("nodes", scene_data.Node{ .parent = parent, .local = local });
 }

@@ -92,7 +92,7 @@ pub fn instantiate(builder: *SceneBuilder, mesh: u32, place: *const Transform) E
         if (builder.last_node) |last| {
             if (std.meta.eql(last.place, place.*)) break :node last.index;
         }
-        break :node try builder.scene.addNode(root, place.toSingle());
+        break :node try builder.scene.addNode(root, place.*);
     };
     builder.last_node = .{ .index = node, .place = place.* };
     try builder.instantiateAt(mesh, node);
@@ -118,7 +118,7 @@ pub fn instantiateObject(
     object: Object,
     place: *const Transform,
 ) Error!void {
-    const above = try builder.scene.addNode(root, place.toSingle());
+    const above = try builder.scene.addNode(root, place.*);
     builder.last_node = null;
     var last: ?struct { index: u32, place: Transform } = null;
     for (object.first..object.first + object.count) |index| {
@@ -128,7 +128,7 @@ pub fn instantiateObject(
             const node = if (is_plain)
                 above
             else
-                try builder.scene.addNode(above, part.place.toSingle());
+                try builder.scene.addNode(above, part.place);
             last = .{ .index = node, .place = part.place };
         }
         try builder.instantiateAt(part.mesh, last.?.index);
@@ -149,7 +149,7 @@ pub fn addLight(
     const place: Transform =
         .{ .x = x, .y = vec3d.cross(z, x), .z = z, .translation = origin };
     var placed = light;
-    placed.node = try builder.scene.addNode(root, place.toSingle());
+    placed.node = try builder.scene.addNode(root, place);
     try builder.scene.addLight(placed);
 }
 
@@ -162,7 +162,7 @@ pub fn finish(
 ) Allocator.Error!void {
     // Our cameras look along -z.
     const backward: Transform = .scale(.{ 1, 1, -1 });
-    const node = try builder.scene.addNode(root, camera.compose(backward).toSingle());
-    if (camera.determinant() > 0) builder.scene.nodes.items[root].local = backward.toSingle();
+    const node = try builder.scene.addNode(root, camera.compose(backward));
+    if (camera.determinant() > 0) builder.scene.nodes.items[root].local = backward;
     try builder.scene.addCamera(.{ .name = "", .node = node, .projection = projection });
 }

@@ -222,7 +222,7 @@ pub fn Whitted(comptime Kernel: type) type {
                 any_seen = any_seen or point.seen.any();
             }
             if (any_seen) for (tracer.frame.lights) |*light| {
-                tracer.addLight(light, pending, &points, &coherence);
+                tracer.addLight(light, pending, &points, coherence);
             };
             // The last pushed is traced first: reflection, refraction, the ray's own rest.
             tracer.pushRest(pending, &points);
@@ -232,13 +232,13 @@ pub fn Whitted(comptime Kernel: type) type {
         }
 
         /// Finds what rays see. Returns those whose hits are near to each other.
-        fn trace(tracer: *Self, pending: *Pending) dispatch.Coherence(Kernel) {
+        fn trace(tracer: *Self, pending: *Pending) dispatch.Coherence {
             const first = pending.depth == 0 and pending.layer == 0;
             const known = if (tracer.grid) |*grid| grid else null;
             const grid = if (first) known else null;
             const geometry = tracer.frame.geometry;
             const beams = dispatch
-                .closestHit(Kernel, geometry, &pending.bundle, grid, null, &tracer.tests);
+                .closestHit(Kernel, geometry, &pending.bundle, grid, &tracer.tests);
             return if (pending.depth == 0) .all else beams;
         }
 
@@ -327,7 +327,7 @@ pub fn Whitted(comptime Kernel: type) type {
             light: *const world_file.Light,
             pending: *const Pending,
             points: *const [group_count]Point,
-            coherence: *const dispatch.Coherence(Kernel),
+            coherence: dispatch.Coherence,
         ) void {
             var bundle: bundle_file.Bundle(Kernel) = undefined;
             var light_seen: [group_count]Vec3 = undefined;
@@ -380,7 +380,7 @@ pub fn Whitted(comptime Kernel: type) type {
             tracer: *Self,
             bundle: *bundle_file.Bundle(Kernel),
             light: *const world_file.Light,
-            coherence: *const dispatch.Coherence(Kernel),
+            coherence: dispatch.Coherence,
             passing: *[group_count]Vec3,
         ) void {
             dispatch.anyHit(Kernel, tracer.frame.geometry, bundle, light, coherence, &tracer.tests);
@@ -396,7 +396,7 @@ pub fn Whitted(comptime Kernel: type) type {
             tracer: *Self,
             bundle: *bundle_file.Bundle(Kernel),
             light: *const world_file.Light,
-            coherence: *const dispatch.Coherence(Kernel),
+            coherence: dispatch.Coherence,
             passing: *[group_count]Vec3,
         ) void {
             passing.* = @splat(.splat(.{ 1, 1, 1 }));
@@ -407,7 +407,7 @@ pub fn Whitted(comptime Kernel: type) type {
             for (&bundle.groups, limits) |*ray, limit| ray.closest = limit;
             for (0..layer_max) |_| {
                 const geometry = tracer.frame.geometry;
-                _ = dispatch.closestHit(Kernel, geometry, bundle, null, null, &tracer.tests);
+                _ = dispatch.closestHit(Kernel, geometry, bundle, null, &tracer.tests);
                 var any_left = false;
                 for (&bundle.groups, passing, &weakened, limits) |*ray, *share, *count, limit| {
                     if (ray.active.none()) continue;
@@ -429,16 +429,12 @@ pub fn Whitted(comptime Kernel: type) type {
             tracer: *Self,
             bundle: *bundle_file.Bundle(Kernel),
             light: *const world_file.Light,
-            coherence: *const dispatch.Coherence(Kernel),
+            coherence: dispatch.Coherence,
             passing: *[group_count]Vec3,
         ) void {
-            if (Kernel.variant.traversal != .beam) return;
-            const before = switch (coherence.*) {
-                .none => return,
-                .all => activeMasks(bundle),
-                .some => |*part| bundle_file.narrow(Kernel, bundle, part, true),
-            };
-            dispatch.anyHit(Kernel, tracer.frame.geometry, bundle, light, &.all, &tracer.tests);
+            if (Kernel.variant.traversal != .beam or coherence == .none) return;
+            const before = activeMasks(bundle);
+            dispatch.anyHit(Kernel, tracer.frame.geometry, bundle, light, .all, &tracer.tests);
             for (&bundle.groups, before, passing) |*ray, active, *share| {
                 if (active.none()) continue;
                 const primitive = ray.closest.primitive;

@@ -18,35 +18,6 @@ pub fn Bundle(comptime Kernel: type) type {
     return struct { groups: [Kernel.group_count]ray_file.Ray(Kernel.Rays) };
 }
 
-/// Some of a bundle's rays, by group.
-pub fn Part(comptime Kernel: type) type {
-    return [Kernel.group_count]Kernel.Rays.Mask;
-}
-
-/// Leaves those rays active that are in a part, or those that are not. Returns which were active.
-pub fn narrow(
-    comptime Kernel: type,
-    bundle: *Bundle(Kernel),
-    part: *const Part(Kernel),
-    within: bool,
-) Part(Kernel) {
-    var active: Part(Kernel) = undefined;
-    for (&active, &bundle.groups, part) |*before, *group, chosen| {
-        before.* = group.active;
-        group.active = if (within) before.bitAnd(chosen) else before.andNot(chosen);
-    }
-    return active;
-}
-
-/// Makes these rays active.
-pub fn restore(
-    comptime Kernel: type,
-    bundle: *Bundle(Kernel),
-    active: *const Part(Kernel),
-) void {
-    for (&bundle.groups, active) |*group, mask| group.active = mask;
-}
-
 /// How boxes and triangles look to a group.
 pub fn Precalculations(comptime Lanes: type) type {
     return struct {
