@@ -17,9 +17,9 @@ const goldens = [_]Golden{
     .{ .scene = "builtin:atrium", .size = .{ 53, 40 }, .hash = 0xc71228fd03d18869 },
     .{ .scene = "builtin:nave", .size = .{ 53, 40 }, .hash = 0xb3f44d630da93019 },
     .{ .scene = "builtin:handles", .size = .{ 40, 53 }, .hash = 0xd1f7064ed445c955 },
-    .{ .scene = "tests/pictures/solids.gltf", .size = .{ 50, 40 }, .hash = 0xe65c005dcc1d139a },
-    .{ .scene = "tests/pictures/shapes.pbrt", .size = .{ 60, 40 }, .hash = 0x5b97cd2a5a6006b0 },
-    .{ .scene = "tests/pictures/view.pbrt", .size = .{ 48, 32 }, .hash = 0xc1592790030ab224 },
+    .{ .scene = "tests/pictures/solids.gltf", .size = .{ 50, 40 }, .hash = 0xeca7519afeb767a5 },
+    .{ .scene = "tests/pictures/shapes.pbrt", .size = .{ 60, 40 }, .hash = 0x41ed4c6a9947061b },
+    .{ .scene = "tests/pictures/view.pbrt", .size = .{ 48, 32 }, .hash = 0x3afc7b59342d46f4 },
 };
 
 fn parse(name: []const u8) !raylane.scene.Scene {

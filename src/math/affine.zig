@@ -50,7 +50,9 @@ pub fn Affine(comptime V: type) type {
         pub fn of(from: anytype) Self {
             var map: Self = undefined;
             inline for (.{ "x", "y", "z", "translation" }) |name| {
-                for (&@field(map, name), @field(from, name)) |*to, value| to.* = @floatCast(value);
+                inline for (0..3) |axis| {
+                    @field(map, name)[axis] = @floatCast(@field(from, name)[axis]);
+                }
             }
             return map;
         }
@@ -153,16 +155,6 @@ pub fn Affine(comptime V: type) type {
             return result;
         }
 
-        /// Rounded to f32 as in `vec3.toSingle`.
-        pub fn toSingle(map: Self) Affine([3]f32) {
-            return .{
-                .x = vec.toSingle(map.x),
-                .y = vec.toSingle(map.y),
-                .z = vec.toSingle(map.z),
-                .translation = vec.toSingle(map.translation),
-            };
-        }
-
         const Self = @This();
         const Float = std.meta.Elem(V);
         const vec = vec3.Operations(V);
@@ -217,7 +209,7 @@ test "a map and its inverse are nothing, in either precision" {
     inline for (.{ 0.3, -0.7, 2 }, 0..) |expected, axis| {
         try std.testing.expectApproxEqAbs(expected, back[axis], 1e-14);
     }
-    const single = map.toSingle();
+    const single: Single = .of(map);
     const single_back = single.inverse().?.point(single.point(.{ 0.3, -0.7, 2 }));
     for ([3]f32{ 0.3, -0.7, 2 }, single_back) |expected, component| {
         try std.testing.expectApproxEqAbs(expected, component, 2e-6);
