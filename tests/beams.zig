@@ -175,6 +175,7 @@ fn expectShadows(
     }
     const light: Light = .{
         .kind = kind,
+        .from_receiver = false,
         .position = place,
         .direction = vec3.sub(grid.origin, place),
         .intensity = .{ 1, 1, 1 },
@@ -249,6 +250,8 @@ fn expectSoup(soup: soup_file.Soup, triangle_count: usize, tile_count: usize) !v
             if (tile % 3 == 1) origin[2] = target[2];
             var light = stage.place(5);
             if (tile % 4 == 2) light[2] = target[2];
+            // As far as a lamp in the sky of a scene that is small.
+            if (tile % 8 == 5) light = stage.place(65e3);
             const step: f32 = if (tile % 2 == 0) 1e-3 else 8e-3;
             const grid = aim(origin, target, step, random);
             inline for (raylane.variant.compiled) |variant| {
