@@ -426,7 +426,7 @@ test "a tree without triangles and one with a single triangle" {
             triangles[0..triangle_count],
         );
         try builder.addCamera(.{ 0, 0, 7 }, 1);
-        var scene = builder.finish();
+        var scene = try builder.finish();
         defer scene.deinit();
         const queries = [_]Query{.{ .origin = .{ 0.2, 0.2, 1 }, .direction = .{ 0, 0, -1 } }};
         const hit: Hit = if (triangle_count == 0)
@@ -449,7 +449,7 @@ test "a closed surface stops every ray that aims at its edges and corners, near 
         // Most of the scene is elsewhere, so that it stays where it is.
         try builder.addSphere(fixture.matte(.{ 1, 1, 1 }), .{ 0, 0, 0 }, 1, 14);
         try builder.addCamera(.{ 0, 0, 7 }, 1);
-        var scene = builder.finish();
+        var scene = try builder.finish();
         defer scene.deinit();
         const lanes = raylane.variant.compiled[0].lanes;
         var world = try fixture.prepare(&scene, lanes, .{});
