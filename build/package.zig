@@ -71,11 +71,9 @@ pub fn init(
         // A failed test tells where its error came from, in safe mode too.
         .error_tracing = if (optimize == .safe) true else null,
         .omit_frame_pointer = if (optimize == .fast) true else null,
-        .imports = &.{
-            .{ .name = "config", .module = config.createModule() },
-            .{ .name = "cgltf", .module = package.cgltf() },
-        },
+        .imports = &.{.{ .name = "config", .module = config.createModule() }},
     });
+    package.addThirdParty(package.raylane, b.path("src/parse/cgltf.c"), &.{});
     package.raylane.addCSourceFile(.{
         .file = b.path("src/simd/intrinsics.c"),
         .flags = own_c_flags,
@@ -114,44 +112,35 @@ pub fn addProgram(package: Package, name: []const u8, root: []const u8) *std.Bui
 /// stb_image as a module, for tests that decode pictures.
 pub fn stbImage(package: Package) *Module {
     const b = package.owner;
-    const defines: []const []const u8 = &.{
-        "-DSTBI_ONLY_PNG", "-DSTBI_ONLY_JPEG", "-DSTBI_NO_STDIO", "-DSTBI_MAX_DIMENSIONS=32768",
-    };
-    const header = package.headers.path(b, "stb_image.h");
-    const translation = package.translate(header);
-    translation.addCFlags(defines);
-    const module = translation.createModule();
-    module.addCSourceFile(.{
-        .file = header,
-        .language = .c,
-        .flags = b.graph.dupeStrings(defines ++ third_party_c_flags ++
-            .{"-DSTB_IMAGE_IMPLEMENTATION"}),
-    });
-    return module;
-}
-
-fn cgltf(package: Package) *Module {
-    const b = package.owner;
-    const module = package.translate(b.path("src/parse/cgltf_shim.h")).createModule();
-    package.addThirdParty(module, "src/parse/cgltf.c");
-    return module;
-}
-
-fn translate(package: Package, header: LazyPath) *std.Build.Step.TranslateC {
-    const translation = package.owner.addTranslateC(.{
-        .root_source_file = header,
+    const module = b.createModule(.{
+        .root_source_file = b.path("tests/stb_image.zig"),
         .target = package.target,
         .optimize = package.optimize,
+        .link_libc = true,
     });
-    translation.addIncludePath(package.headers);
-    return translation;
+    package.addThirdParty(module, package.headers.path(b, "stb_image.h"), &.{
+        "-DSTB_IMAGE_IMPLEMENTATION", "-DSTBI_ONLY_PNG",             "-DSTBI_ONLY_JPEG",
+        "-DSTBI_NO_STDIO",            "-DSTBI_MAX_DIMENSIONS=32768",
+    });
+    return module;
 }
 
-fn addThirdParty(package: Package, module: *Module, implementation: []const u8) void {
+fn addThirdParty(
+    package: Package,
+    module: *Module,
+    implementation: LazyPath,
+    defines: []const []const u8,
+) void {
+    const b = package.owner;
     module.addIncludePath(package.headers);
     module.addCSourceFile(.{
-        .file = package.owner.path(implementation),
-        .flags = third_party_c_flags,
+        .file = implementation,
+        .language = .c,
+        .flags = b.graph.dupeStrings(std.mem.concat(
+            b.allocator,
+            []const u8,
+            &.{ third_party_c_flags, defines },
+        ) catch @panic("OOM")),
     });
 }
 

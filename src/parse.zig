@@ -56,6 +56,7 @@ pub const parsePbrt = pbrt.parseBytes;
 
 test {
     _ = builtin;
+    _ = @import("parse/cgltf.zig");
     _ = gltf;
     _ = pbrt;
 }

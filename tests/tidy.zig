@@ -20,7 +20,7 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
     .{ .part = "huge_pages", .may_import = &.{} },
     .{ .part = "math", .may_import = &.{} },
     .{ .part = "parallel", .may_import = &.{"simd"} },
-    .{ .part = "parse", .may_import = &.{ "scene", "cgltf", "stb_image", "parallel", "builtin" } },
+    .{ .part = "parse", .may_import = &.{ "scene", "parallel", "builtin" } },
     .{ .part = "builtin", .may_import = &.{ "scene", "parallel" } },
     .{ .part = "scene", .may_import = &.{} },
     .{ .part = "prepare", .may_import = &.{ "scene", "world", "simd", "variant", "parallel" } },
@@ -62,6 +62,7 @@ const roots = [_][]const u8{
     "tests/integration.zig",
     "tests/launch.zig",
     "tests/runner.zig",
+    "tests/stb_image.zig",
     "tests/summary.zig",
     "tests/tidy.zig",
 };

@@ -5,7 +5,7 @@
 //! the file has to be in a tree, shown or not.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const Source = @import("source.zig");
