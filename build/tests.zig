@@ -23,8 +23,6 @@ filters: []const []const u8,
 pub const Target = struct {
     name: []const u8,
     package: Package,
-    /// Of the program whose command line is tested.
-    command: Package,
     /// The program, with its arguments, that runs foreign executables here; empty for this machine.
     emulator: []const []const u8,
 };
@@ -143,7 +141,7 @@ fn commandLine(tests: Tests, target: Target) LazyPath {
         const command = std.mem.join(b.allocator, " ", target.emulator) catch @panic("OOM");
         run.addArg(b.fmt("--env=RAYLANE_EMULATOR={s}", .{command}));
     }
-    run.addArtifactArg2(target.command.program(), .{
+    run.addArtifactArg2(target.package.program(), .{
         .prefix = "--env=RAYLANE_PROGRAM=",
         .make_absolute = true,
     });
@@ -153,12 +151,14 @@ fn commandLine(tests: Tests, target: Target) LazyPath {
 }
 
 fn unitProgram(tests: Tests, target: Target) *Compile {
-    return tests.program("unit", target.package.raylane);
+    const root = target.package.library();
+    target.package.addToTests(root);
+    return tests.program("unit", root);
 }
 
 fn integrationProgram(tests: Tests, target: Target) *Compile {
     const b = tests.owner;
-    return tests.program("integration", b.createModule(.{
+    const root = b.createModule(.{
         .root_source_file = b.path("tests/integration.zig"),
         .target = target.package.target,
         .optimize = target.package.optimize,
@@ -167,7 +167,9 @@ fn integrationProgram(tests: Tests, target: Target) *Compile {
             .{ .name = "raylane", .module = target.package.raylane },
             .{ .name = "stb_image", .module = target.package.stbImage() },
         },
-    }));
+    });
+    target.package.addToTests(root);
+    return tests.program("integration", root);
 }
 
 /// A test program of this machine whose root is `tests/NAME.zig`.

@@ -15,6 +15,8 @@ const Tiles = @import("trace/integrate/tiles.zig");
 const assert = std.debug.assert;
 const World = world_file.World;
 
+/// How kernels are found.
+pub const link = @import("trace/link.zig");
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
 pub const kernel = @import("trace/traverse/kernel.zig");
 /// Rays in lanes.
@@ -97,87 +99,125 @@ fn run(
 ) Statistics {
     assert(image.width == world.width and image.height == world.height);
     assert(settings.sample_count >= 1 and settings.depth_max <= depth_limit);
-    inline for (variant_file.compiled, 0..) |variant, index| {
-        if (index == variant_index) {
-            comptime var chosen = variant;
-            if (counting) chosen.backend = variant_file.counting_backend;
-            return Frame(kernel.Kernel(chosen, counting)).run(world, image, settings);
-        }
+    var frame: Frame = .{
+        .world = world,
+        .image = image,
+        .settings = settings,
+        .tiles = .init(image.width, image.height, settings.tile_size),
+        .work = workOf(counting, variant_index),
+        .tile_done = Frame.completeTile,
+    };
+    parallel.share(settings.thread_count, &frame, Frame.share);
+    var total: Statistics = .{};
+    var tests: statistics.TestCounts = .{};
+    for (frame.by_thread[0..settings.thread_count]) |part| {
+        total.rays.add(part.rays);
+        total.non_finite_count += part.non_finite_count;
+        tests.add(part.tests);
     }
-    unreachable; // Asserts that the index is one of `compiled`.
+    if (counting) total.tests = tests;
+    return total;
 }
 
-/// One frame by one variant.
-fn Frame(comptime Kernel: type) type {
-    return struct {
-        world: *const World,
-        image: *Image,
-        settings: Settings,
-        tiles: Tiles,
-        by_thread: [parallel.thread_count_max]Statistics,
-
-        fn run(world: *const World, image: *Image, settings: Settings) Statistics {
-            var frame: @This() = .{
-                .world = world,
-                .image = image,
-                .settings = settings,
-                .tiles = .init(image.width, image.height, settings.tile_size),
-                .by_thread = @splat(.{}),
-            };
-            parallel.share(settings.thread_count, &frame, work);
-            var total: Statistics = .{};
-            var tests: statistics.TestCounts = .{};
-            for (frame.by_thread[0..settings.thread_count]) |part| {
-                total.rays.add(part.rays);
-                total.non_finite_count += part.non_finite_count;
-                if (part.tests) |counts| tests.add(counts);
-            }
-            if (Kernel.counts_tests) total.tests = tests;
-            return total;
+/// The kernel of a variant. Asserts that the index is one of `variant.compiled`.
+fn workOf(comptime counting: bool, variant_index: usize) Frame.Work {
+    _ = PanicOfKernels;
+    const kernels = comptime kernels: {
+        var list: [variant_file.compiled.len]Frame.Work = undefined;
+        for (&list, variant_file.compiled) |*to, held| {
+            const chosen = if (counting) variant_file.countingOf(held) else held;
+            const symbol = link.workSymbol(Frame, chosen, counting);
+            to.* = @extern(Frame.Work, .{ .name = symbol });
         }
+        break :kernels list;
+    };
+    return kernels[variant_index];
+}
 
-        fn work(frame: *@This(), thread_index: usize) void {
-            var tracer: whitted.Whitted(Kernel) = .{
-                .world = frame.world,
-                .settings = .{
-                    .sample_count = frame.settings.sample_count,
-                    .depth_max = frame.settings.depth_max,
-                    .transparent = frame.settings.transparent,
-                },
-            };
-            while (frame.tiles.take()) |tile| {
-                renderTile(&tracer, tile, frame.image);
-                frame.settings.progress.completeOne();
-            }
-            frame.by_thread[thread_index] = .{
-                .rays = tracer.rays,
-                .tests = if (Kernel.counts_tests) tracer.tests else null,
-                .non_finite_count = tracer.non_finite_count,
-            };
-        }
+/// Exported once there is a kernel.
+const PanicOfKernels = struct {
+    comptime {
+        @export(&panicOfKernel, .{ .name = "rl_kernel_panic" });
+        assert(@TypeOf(panicOfKernel) == @TypeOf(link.rl_kernel_panic));
+    }
 
-        fn renderTile(
-            tracer: *whitted.Whitted(Kernel),
-            tile: whitted.Rectangle,
-            image: *Image,
-        ) void {
-            var y = tile.y0;
-            while (y < tile.y1) : (y += Kernel.bundle_height) {
-                var x = tile.x0;
-                while (x < tile.x1) : (x += Kernel.bundle_width) {
-                    tracer.render(.{
-                        .x0 = x,
-                        .y0 = y,
-                        .x1 = @min(x + Kernel.bundle_width, tile.x1),
-                        .y1 = @min(y + Kernel.bundle_height, tile.y1),
-                    }, image);
-                }
-            }
-        }
+    fn panicOfKernel(message: [*]const u8, byte_count: usize, _: usize) callconv(.c) noreturn {
+        @panic(message[0..byte_count]);
+    }
+};
+
+/// A picture under way: what a kernel is handed.
+pub const Frame = struct {
+    world: *const World,
+    image: *Image,
+    settings: Settings,
+    tiles: Tiles,
+    work: Work,
+    /// Called after every tile: the state behind `settings.progress` is the program's.
+    tile_done: *const fn (frame: *Frame) callconv(.c) void,
+    by_thread: [parallel.thread_count_max]ThreadStatistics = @splat(.{}),
+
+    /// What one thread does for a frame.
+    pub const Work = *const fn (frame: *Frame, thread_index: usize) callconv(.c) void;
+
+    const ThreadStatistics = struct {
+        rays: statistics.RayCounts = .{},
+        tests: statistics.TestCounts = .{},
+        non_finite_count: u64 = 0,
+    };
+
+    fn completeTile(frame: *Frame) callconv(.c) void {
+        frame.settings.progress.completeOne();
+    }
+
+    fn share(frame: *Frame, thread_index: usize) void {
+        frame.work(frame, thread_index);
+    }
+};
+
+/// Takes tiles of the frame, until there are none left, and traces them.
+pub fn work(comptime Kernel: type, frame: *Frame, thread_index: usize) void {
+    var tracer: whitted.Whitted(Kernel) = .{
+        .world = frame.world,
+        .settings = .{
+            .sample_count = frame.settings.sample_count,
+            .depth_max = frame.settings.depth_max,
+            .transparent = frame.settings.transparent,
+        },
+    };
+    while (frame.tiles.take()) |tile| {
+        renderTile(Kernel, &tracer, tile, frame.image);
+        frame.tile_done(frame);
+    }
+    frame.by_thread[thread_index] = .{
+        .rays = tracer.rays,
+        .tests = tracer.tests,
+        .non_finite_count = tracer.non_finite_count,
     };
 }
 
+fn renderTile(
+    comptime Kernel: type,
+    tracer: *whitted.Whitted(Kernel),
+    tile: whitted.Rectangle,
+    image: *Image,
+) void {
+    var y = tile.y0;
+    while (y < tile.y1) : (y += Kernel.bundle_height) {
+        var x = tile.x0;
+        while (x < tile.x1) : (x += Kernel.bundle_width) {
+            tracer.render(.{
+                .x0 = x,
+                .y0 = y,
+                .x1 = @min(x + Kernel.bundle_width, tile.x1),
+                .y1 = @min(y + Kernel.bundle_height, tile.y1),
+            }, image);
+        }
+    }
+}
+
 test {
+    _ = link;
     _ = kernel;
     _ = ray;
     _ = triangle;
