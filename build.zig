@@ -44,18 +44,7 @@ pub fn build(b: *std.Build) void {
     };
     const query = b.standardTargetOptionsQueryOnly(.{});
     const optimize = b.option(std.lang.Optimize, "optimize", "debug, safe, fast (default), small");
-    const extent = b.option(
-        variants.Extent,
-        "variants",
-        "Hold that variant, the scalar reference beside it (few, the default), or all",
-    );
-    const options: Package.Options = .{
-        .backend = b.option(variants.Backend, "backend", "Arithmetic of the default variant") orelse
-            .vector,
-        .traversal = b.option(variants.Traversal, "traversal", "Its bundles of rays") orelse .beam,
-        .lanes = b.option(u8, "lanes", "Its SIMD width: 4, 8 or 16 (default: the target's)"),
-        .extent = extent orelse .few,
-    };
+    const options, const all = variantOptions(b);
     const filters = b.option([]const []const u8, "test-filter", "Only tests with this in the name");
     const vendor = addVendor(b);
     steps.vendor.dependOn(vendor.step);
@@ -73,8 +62,6 @@ pub fn build(b: *std.Build) void {
     addBenchmark(steps.check, steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
     const structures = package.benchmark("structures", "bench/structures.zig");
     addBenchmark(steps.check, steps.bench_structures, structures);
-    var all = options;
-    all.extent = extent orelse .all;
     const full: Package = .init(b, target, optimize orelse .fast, vendor.headers, all);
     addCompare(steps.compare, full, vendor.headers);
 
@@ -97,6 +84,23 @@ pub fn build(b: *std.Build) void {
     const here: Package = .init(b, resolve(b, .{}), .safe, vendor.headers, options);
     addScenes(steps.scenes, here);
     addLowering(steps.lowering);
+}
+
+/// The choice of variants, for programs that are used and for those that compare variants.
+fn variantOptions(b: *std.Build) [2]Package.Options {
+    var options: Package.Options = .{
+        .backend = b.option(variants.Backend, "backend", "Arithmetic of the default variant") orelse
+            .vector,
+        .traversal = b.option(variants.Traversal, "traversal", "Its bundles of rays") orelse .beam,
+        .lanes = b.option(u8, "lanes", "Its SIMD width: 4, 8 or 16 (default: the target's)"),
+        .extent = undefined,
+    };
+    const description = "Hold that variant (one), the scalar reference beside it (few), or all";
+    const extent = b.option(variants.Extent, "variants", description);
+    options.extent = extent orelse .few;
+    var all = options;
+    all.extent = extent orelse .all;
+    return .{ options, all };
 }
 
 /// Makes `step` write the scenes that come with Raylane.

@@ -14,6 +14,7 @@ const testing = std.testing;
 /// of `src` with the folder of the same name; names without a file are modules of the build.
 const directions = [_]struct { part: []const u8, may_import: []const []const u8 }{
     .{ .part = "main", .may_import = &.{"raylane"} },
+    .{ .part = "kernel", .may_import = &.{ "config", "trace", "variant" } },
     .{ .part = "options", .may_import = &.{ "config", "variant" } },
     .{ .part = "variant", .may_import = &.{"config"} },
     .{ .part = "simd", .may_import = &.{"variant"} },
@@ -55,6 +56,7 @@ const roots = [_][]const u8{
     "bench/parse.zig",
     "bench/rays.zig",
     "bench/structures.zig",
+    "src/kernel.zig",
     "src/main.zig",
     "src/raylane.zig",
     "scenes/make.zig",
