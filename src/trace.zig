@@ -224,6 +224,7 @@ test {
     _ = single;
     _ = traversal_ray;
     _ = stream;
+    _ = @import("trace/traverse/stack.zig");
     _ = bundle;
     _ = dispatch;
     _ = whitted;
