@@ -1,7 +1,7 @@
 //! A kernel: the tracer of one variant, compiled into an object of its own.
 //!
 //! In: the build options, which name the variant and whether it counts tests. Out: one symbol, of
-//! the frame's work by one thread. Nothing in it is mutable but what it is handed, and no thread is
+//! what one thread does for a picture. Nothing in it is mutable but what it is handed, and no thread is
 //! started: the program that it is linked to does that, and panics for it.
 
 const std = @import("std");
@@ -12,12 +12,12 @@ const variant = @import("variant.zig");
 const is_counting = config.counting.len > 0;
 const Kernel = trace.kernel.Kernel(variant.default, is_counting);
 
-fn work(frame: *trace.Frame, thread_index: usize) callconv(.c) void {
-    trace.work(Kernel, frame, thread_index);
+fn work(render: *trace.Render, thread_index: usize) callconv(.c) void {
+    trace.work(Kernel, render, thread_index);
 }
 
 comptime {
-    @export(&work, .{ .name = trace.link.workSymbol(trace.Frame, variant.default, is_counting) });
+    @export(&work, .{ .name = trace.link.workSymbol(trace.Render, variant.default, is_counting) });
 }
 
 /// The program's: what prints a trace of the stack is large and has state.

@@ -5,6 +5,7 @@
 
 const std = @import("std");
 const raylane = @import("raylane");
+const signals = @import("signals.zig");
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
 const assert = std.debug.assert;
@@ -31,12 +32,11 @@ const ExitCode = enum(u8) {
     invalid = 3,
     /// Images that must be the same are not.
     differ = 4,
-    interrupted = 130,
 };
 
 pub fn main(init: std.process.Init) u8 {
     holdStandardFiles();
-    catchSignals();
+    signals.catchAll();
     _ = raylane.simd.setFlushToZero();
     return @backingInt(run(init));
 }
@@ -44,10 +44,8 @@ pub fn main(init: std.process.Init) u8 {
 fn run(init: std.process.Init) ExitCode {
     const io = init.io;
     var diagnostic: Diagnostic = .{};
-    const arguments = init.minimal.args.toSlice(init.arena.allocator()) catch {
-        say(io, "raylane: out of memory\n", .{});
-        return .failed;
-    };
+    const arguments = init.minimal.args.toSlice(init.arena.allocator()) catch
+        return outOfMemory(io);
     const own_arguments = arguments[@min(1, arguments.len)..];
     const names = raylane.variant.names;
     const command = raylane.options.parse(own_arguments, names, &diagnostic) catch {
@@ -82,7 +80,7 @@ fn bench(
     diagnostic: *Diagnostic,
 ) ExitCode {
     const io = init.io;
-    const settings = benchSettings(options);
+    var settings = benchSettings(options);
     if (std.mem.findScalar(bool, &settings.wanted, true) == null) {
         say(io, "raylane: no variant's name contains {f}; --list-variants names them\n", .{
             raylane.diagnostic.quote(options.variants.?),
@@ -101,6 +99,7 @@ fn bench(
         return .failed;
     };
     defer target.abandon();
+    settings.output = target.replaces;
     var run_of: raylane.bench.Bench = .{
         .arena = init.arena.allocator(),
         .gpa = init.gpa,
@@ -172,7 +171,7 @@ fn printBench(
     raylane.bench.writeTables(results, &text.writer) catch return outOfMemory(io);
     if (options.json) |path| {
         raylane.bench.writeJson(results, &json.writer) catch return outOfMemory(io);
-        if (std.mem.eql(u8, path, "-")) return print(io, json.written());
+        if (raylane.options.isStdout(path)) return print(io, json.written());
         target.finish(&.{json.written()}, diagnostic) catch {
             _ = print(io, text.written()); // Minutes of work: show what was found.
             say(io, "raylane: {f}: {s}\n", .{ printable(path), diagnostic.message.text() });
@@ -189,8 +188,8 @@ fn openJson(
     diagnostic: *Diagnostic,
 ) raylane.output.TargetError!Target {
     const name = path orelse return .openStdout(io);
-    if (std.mem.eql(u8, name, "-")) return .openStdout(io);
-    return .openFile(io, name, diagnostic);
+    if (raylane.options.isStdout(name)) return .openStdout(io);
+    return .openFile(io, &signals.temporary_files, name, diagnostic);
 }
 
 /// Where an error of a scene is: a place in its text, or the file as a whole.
@@ -222,10 +221,7 @@ fn renderAndReport(
     options: *const Options,
     diagnostic: *Diagnostic,
 ) ExitCode {
-    const output_name = raylane.options.outputName(gpa, options) catch {
-        say(io, "raylane: out of memory\n", .{});
-        return .failed;
-    };
+    const output_name = raylane.options.outputName(gpa, options) catch return outOfMemory(io);
     defer gpa.free(output_name);
     var job: Job = .{
         .gpa = gpa,
@@ -293,6 +289,7 @@ const Job = struct {
         var scene = try raylane.parse.parse(gpa, io, job.options.scene, .{
             .allow_outside = job.options.allow_outside,
             .tessellation = job.options.tessellation,
+            .output = target.replaces,
         }, job.diagnostic);
         const triangle_count = scene.triangleCount();
         job.sample_count = job.options.sample_count orelse scene.sample_count orelse
@@ -315,11 +312,12 @@ const Job = struct {
         job.sayWarnings();
         job.sayFacts(&world);
 
-        var image: Image = try .init(gpa, world.width, world.height);
+        var image: Image = try .init(gpa, world.view.width, world.view.height);
         defer image.deinit(gpa);
         const trace_start = Io.Clock.awake.now(io);
+        const frame = world.frame();
         const settings = job.traceSettings();
-        const traced = raylane.trace.trace(variant_index, &world, &image, settings);
+        const traced = raylane.trace.trace(variant_index, &frame, &image, settings);
         times.trace_ns = since(io, trace_start);
         if (traced.non_finite_count > 0) job.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
@@ -336,7 +334,7 @@ const Job = struct {
         report.times = times;
         report.rays = traced.rays;
         if (job.options.count_tests) {
-            const counted = raylane.trace.traceCounting(variant_index, &world, &image, settings);
+            const counted = raylane.trace.traceCounting(variant_index, &frame, &image, settings);
             report.tests = counted.tests;
         }
         return report;
@@ -359,10 +357,10 @@ const Job = struct {
             .rays = .{},
             .tests = null,
             .bvh = .{
-                .node_count = world.tree_statistics.node_count,
-                .depth = world.tree_statistics.depth,
-                .sah_cost = world.tree_statistics.sah_cost,
-                .bytes = world.tree_statistics.bytes,
+                .node_count = world.facts.tree.node_count,
+                .depth = world.facts.tree.depth,
+                .sah_cost = world.facts.tree.sah_cost,
+                .bytes = world.facts.tree.bytes,
             },
             .memory_peak_bytes = raylane.report.memoryPeakBytes(),
             .image_hash = image.hash(),
@@ -377,7 +375,9 @@ const Job = struct {
 
     fn openTarget(job: *Job) error{OutputFailed}!Target {
         if (job.options.toStdout()) return .openStdout(job.io);
-        return Target.openFile(job.io, job.output_name, job.diagnostic) catch error.OutputFailed;
+        const temporaries = &signals.temporary_files;
+        return Target.openFile(job.io, temporaries, job.output_name, job.diagnostic) catch
+            error.OutputFailed;
     }
 
     fn prepareSettings(job: *const Job) raylane.prepare.Settings {
@@ -452,18 +452,18 @@ const Job = struct {
     /// With `--verbose`: what was chosen where the user did not.
     fn sayFacts(job: *Job, world: *const World) void {
         if (!job.options.verbose) return;
-        if (world.camera_is_default) job.sayOfScene("view: framed on all there is", .{});
-        if (world.lights_are_default) {
+        if (world.facts.camera_is_default) job.sayOfScene("view: framed on all there is", .{});
+        if (world.facts.lights_are_default) {
             job.sayOfScene("lights: three directional ones fixed to the camera", .{});
         } else {
             job.sayOfScene("lights: {d}", .{world.lights.len});
         }
-        job.sayOfScene("ambient radiance: {d}", .{world.surroundings.ambient});
+        job.sayOfScene("ambient radiance: {d}", .{world.environment.ambient});
         job.sayOfScene("tracer: {s}, {d} threads", .{
             raylane.variant.names[job.options.variant_index], job.threadCount(),
         });
-        if (world.degenerate_count > 0) {
-            job.sayOfScene("{d} triangles without area left out", .{world.degenerate_count});
+        if (world.facts.degenerate_count > 0) {
+            job.sayOfScene("{d} triangles without area left out", .{world.facts.degenerate_count});
         }
     }
 
@@ -492,14 +492,17 @@ const Job = struct {
             .text => raylane.report.writeText(&report, &text.writer),
             .json => raylane.report.writeJson(&report, &text.writer),
         };
-        written catch |err| switch (err) {
-            error.WriteFailed => {
-                say(job.io, "raylane: out of memory\n", .{});
-                return .failed;
-            },
-        };
-        if (to_stdout) return print(job.io, text.written());
-        say(job.io, "{s}", .{text.written()});
+        written catch return outOfMemory(job.io);
+        if (!to_stdout) {
+            say(job.io, "{s}", .{text.written()});
+            return .ok;
+        }
+        // The picture is written. That goes for success where the report was not asked for.
+        if (options.stats != null) return print(job.io, text.written());
+        writeToStdout(job.io, text.written(), diagnostic) catch
+            say(job.io, "raylane: warning: no report, standard output: {s}\n", .{
+                diagnostic.message.text(),
+            });
         return .ok;
     }
 };
@@ -511,12 +514,20 @@ fn since(io: Io, start: Io.Timestamp) u64 {
 /// Prints what was asked for to standard output.
 fn print(io: Io, text: []const u8) ExitCode {
     var diagnostic: Diagnostic = .{};
-    var target: Target = .openStdout(io);
-    target.finish(&.{text}, &diagnostic) catch {
+    writeToStdout(io, text, &diagnostic) catch {
         say(io, "raylane: standard output: {s}\n", .{diagnostic.message.text()});
         return .failed;
     };
     return .ok;
+}
+
+fn writeToStdout(
+    io: Io,
+    text: []const u8,
+    diagnostic: *Diagnostic,
+) raylane.output.TargetError!void {
+    var target: Target = .openStdout(io);
+    return target.finish(&.{text}, diagnostic);
 }
 
 /// Writes to standard error, beside the progress that may be shown there. When that fails there is
@@ -536,28 +547,4 @@ fn holdStandardFiles() void {
         if (std.c.fcntl(@intCast(file), std.c.F.GETFD) >= 0) continue;
         _ = std.c.open("/dev/null", .{ .ACCMODE = .RDONLY });
     }
-}
-
-/// Makes signals that end the program remove the unfinished output, and a file size limit an error
-/// of writing.
-fn catchSignals() void {
-    const interrupt: std.posix.Sigaction = .{
-        .handler = .{ .handler = interrupted },
-        .mask = std.posix.sigemptyset(),
-        .flags = 0,
-    };
-    std.posix.sigaction(.INT, &interrupt, null);
-    std.posix.sigaction(.TERM, &interrupt, null);
-    const ignore: std.posix.Sigaction = .{
-        .handler = .{ .handler = std.posix.SIG.IGN },
-        .mask = std.posix.sigemptyset(),
-        .flags = 0,
-    };
-    std.posix.sigaction(.XFSZ, &ignore, null);
-}
-
-/// Only async-signal-safe calls are made here.
-fn interrupted(_: std.posix.SIG) callconv(.c) void {
-    raylane.output.discardPending();
-    std.c._exit(@backingInt(ExitCode.interrupted));
 }

@@ -98,7 +98,7 @@ pub const exposure_ev_max = 64;
 /// How to render one scene.
 pub const Options = struct {
     scene: []const u8,
-    /// Null: the scene's name in the working directory; "-": standard output.
+    /// Null: the scene's name in the working directory. See `isStdout`.
     output: ?[]const u8 = null,
     format: Format = .png,
     /// Width and height in pixels; null: the scene's, or its camera's aspect with 1024 on the long
@@ -130,9 +130,17 @@ pub const Options = struct {
 
     /// Whether the image goes to standard output.
     pub fn toStdout(options: *const Options) bool {
-        return std.mem.eql(u8, options.output orelse return false, "-");
+        return isStdout(options.output orelse return false);
     }
 };
+
+/// Whether a name for a file to write stands for standard output.
+pub fn isStdout(name: []const u8) bool {
+    for ([_][]const u8{ "-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1" }) |other| {
+        if (std.mem.eql(u8, name, other)) return true;
+    }
+    return false;
+}
 
 /// Where the image goes: as given, else the scene's file name in the working directory with the
 /// format's extension instead of its own. The caller frees it.
@@ -248,7 +256,8 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\
     \\Messages
     \\      --stats FORM         report as text, json or none (default: text, or none
-    \\                           when the image goes to standard output)
+    \\                           when the image goes to standard output); when it is
+    \\                           given, a report that cannot be printed is an error
     \\      --count-tests        count intersection tests, in a second, untimed pass
     \\  -q, --quiet              no warnings, no progress, no report but by --stats
     \\  -v, --verbose            say what was chosen by default
@@ -256,7 +265,7 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\      --version            print the version
     \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
-    \\supported, 130 interrupted.
+    \\supported, 128 + N ended by signal N.
     \\
 ;
 

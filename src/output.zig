@@ -18,7 +18,8 @@ const assert = std.debug.assert;
 pub const Target = target_file.Target;
 /// What a target fails with.
 pub const TargetError = target_file.Error;
-pub const discardPending = target_file.discardPending;
+/// What targets create until they are in place.
+pub const TemporaryFiles = @import("output/temporary.zig").TemporaryFiles;
 
 /// File formats.
 pub const Format = enum { png, ppm, pfm };
@@ -111,6 +112,7 @@ test {
     _ = png;
     _ = ppm;
     _ = target_file;
+    _ = @import("output/temporary.zig");
     _ = tonemap;
 }
 
@@ -128,7 +130,8 @@ fn writeForTest(
     const path = try std.fs.path.join(gpa, &.{ folder_path, name });
     defer gpa.free(path);
     var diagnostic: Diagnostic = .{};
-    var target: Target = try .openFile(io, path, &diagnostic);
+    var temporaries: TemporaryFiles = .{};
+    var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
     try write(gpa, image, settings, &target, &diagnostic);
     return folder.readFileAlloc(io, name, gpa, .unlimited);
 }
@@ -184,7 +187,8 @@ test "memory that runs out leaves no file, whenever it does" {
             .fail_index = 0,
         });
         var diagnostic: Diagnostic = .{};
-        var target: Target = try .openFile(io, path, &diagnostic);
+        var temporaries: TemporaryFiles = .{};
+        var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
         const settings: Settings = .{ .format = format, .exposure = .auto };
         const result = write(failing.allocator(), &image, settings, &target, &diagnostic);
         try std.testing.expectError(error.OutOfMemory, result);

@@ -10,6 +10,7 @@ pub const bench = @import("bench.zig");
 pub const diagnostic = @import("diagnostic.zig");
 pub const energy = @import("energy.zig");
 pub const huge_pages = @import("huge_pages.zig");
+pub const identity = @import("identity.zig");
 pub const image = @import("image.zig");
 pub const math = @import("math.zig");
 pub const options = @import("options.zig");

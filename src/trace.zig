@@ -13,7 +13,7 @@ const Image = @import("image.zig").Image;
 const whitted = @import("trace/integrate/whitted.zig");
 const Tiles = @import("trace/integrate/tiles.zig");
 const assert = std.debug.assert;
-const World = world_file.World;
+const Frame = world_file.Frame;
 
 /// How kernels are found.
 pub const link = @import("trace/link.zig");
@@ -35,8 +35,8 @@ pub const interval_packet = @import("trace/traverse/interval_packet.zig");
 pub const walk = @import("trace/traverse/walk.zig");
 /// A bundle of rays through the tree.
 pub const bundle = @import("trace/traverse/bundle.zig");
-/// Rays from one point, or behind it, as a beam.
-pub const primary = @import("trace/traverse/beam/primary.zig");
+/// Rays from one point as a beam.
+pub const eye_rays = @import("trace/traverse/beam/eye_rays.zig");
 /// The directions of a beam's rays.
 pub const Grid = @import("trace/traverse/beam/grid.zig").Grid;
 /// A bundle in the variant's own way.
@@ -73,44 +73,44 @@ pub const Statistics = struct {
 /// has the world's size and the tree the variant's width.
 pub fn trace(
     variant_index: usize,
-    world: *const World,
+    frame: *const Frame,
     image: *Image,
     settings: Settings,
 ) Statistics {
-    return run(false, variant_index, world, image, settings);
+    return run(false, variant_index, frame, image, settings);
 }
 
 /// The same with boxes and triangles counted, which takes longer: for a second pass, untimed.
 pub fn traceCounting(
     variant_index: usize,
-    world: *const World,
+    frame: *const Frame,
     image: *Image,
     settings: Settings,
 ) Statistics {
-    return run(true, variant_index, world, image, settings);
+    return run(true, variant_index, frame, image, settings);
 }
 
 fn run(
     comptime counting: bool,
     variant_index: usize,
-    world: *const World,
+    frame: *const Frame,
     image: *Image,
     settings: Settings,
 ) Statistics {
-    assert(image.width == world.width and image.height == world.height);
+    assert(image.width == frame.view.width and image.height == frame.view.height);
     assert(settings.sample_count >= 1 and settings.depth_max <= depth_limit);
-    var frame: Frame = .{
-        .world = world,
+    var render: Render = .{
+        .frame = frame,
         .image = image,
         .settings = settings,
         .tiles = .init(image.width, image.height, settings.tile_size),
         .work = workOf(counting, variant_index),
-        .tile_done = Frame.completeTile,
+        .tile_done = Render.completeTile,
     };
-    parallel.share(settings.thread_count, &frame, Frame.share);
+    parallel.share(settings.thread_count, &render, Render.share);
     var total: Statistics = .{};
     var tests: statistics.TestCounts = .{};
-    for (frame.by_thread[0..settings.thread_count]) |part| {
+    for (render.by_thread[0..settings.thread_count]) |part| {
         total.rays.add(part.rays);
         total.non_finite_count += part.non_finite_count;
         tests.add(part.tests);
@@ -120,14 +120,14 @@ fn run(
 }
 
 /// The kernel of a variant. Asserts that the index is one of `variant.compiled`.
-fn workOf(comptime counting: bool, variant_index: usize) Frame.Work {
+fn workOf(comptime counting: bool, variant_index: usize) Render.Work {
     _ = PanicOfKernels;
     const kernels = comptime kernels: {
-        var list: [variant_file.compiled.len]Frame.Work = undefined;
+        var list: [variant_file.compiled.len]Render.Work = undefined;
         for (&list, variant_file.compiled) |*to, held| {
             const chosen = if (counting) variant_file.countingOf(held) else held;
-            const symbol = link.workSymbol(Frame, chosen, counting);
-            to.* = @extern(Frame.Work, .{ .name = symbol });
+            const symbol = link.workSymbol(Render, chosen, counting);
+            to.* = @extern(Render.Work, .{ .name = symbol });
         }
         break :kernels list;
     };
@@ -147,18 +147,18 @@ const PanicOfKernels = struct {
 };
 
 /// A picture under way: what a kernel is handed.
-pub const Frame = struct {
-    world: *const World,
+pub const Render = struct {
+    frame: *const Frame,
     image: *Image,
     settings: Settings,
     tiles: Tiles,
     work: Work,
     /// Called after every tile: the state behind `settings.progress` is the program's.
-    tile_done: *const fn (frame: *Frame) callconv(.c) void,
+    tile_done: *const fn (render: *Render) callconv(.c) void,
     by_thread: [parallel.thread_count_max]ThreadStatistics = @splat(.{}),
 
-    /// What one thread does for a frame.
-    pub const Work = *const fn (frame: *Frame, thread_index: usize) callconv(.c) void;
+    /// What one thread does for a render.
+    pub const Work = *const fn (render: *Render, thread_index: usize) callconv(.c) void;
 
     const ThreadStatistics = struct {
         rays: statistics.RayCounts = .{},
@@ -166,30 +166,30 @@ pub const Frame = struct {
         non_finite_count: u64 = 0,
     };
 
-    fn completeTile(frame: *Frame) callconv(.c) void {
-        frame.settings.progress.completeOne();
+    fn completeTile(render: *Render) callconv(.c) void {
+        render.settings.progress.completeOne();
     }
 
-    fn share(frame: *Frame, thread_index: usize) void {
-        frame.work(frame, thread_index);
+    fn share(render: *Render, thread_index: usize) void {
+        render.work(render, thread_index);
     }
 };
 
-/// Takes tiles of the frame, until there are none left, and traces them.
-pub fn work(comptime Kernel: type, frame: *Frame, thread_index: usize) void {
+/// Takes tiles, until there are none left, and traces them.
+pub fn work(comptime Kernel: type, render: *Render, thread_index: usize) void {
     var tracer: whitted.Whitted(Kernel) = .{
-        .world = frame.world,
+        .frame = render.frame,
         .settings = .{
-            .sample_count = frame.settings.sample_count,
-            .depth_max = frame.settings.depth_max,
-            .transparent = frame.settings.transparent,
+            .sample_count = render.settings.sample_count,
+            .depth_max = render.settings.depth_max,
+            .transparent = render.settings.transparent,
         },
     };
-    while (frame.tiles.take()) |tile| {
-        renderTile(Kernel, &tracer, tile, frame.image);
-        frame.tile_done(frame);
+    while (render.tiles.take()) |tile| {
+        renderTile(Kernel, &tracer, tile, render.image);
+        render.tile_done(render);
     }
-    frame.by_thread[thread_index] = .{
+    render.by_thread[thread_index] = .{
         .rays = tracer.rays,
         .tests = tracer.tests,
         .non_finite_count = tracer.non_finite_count,

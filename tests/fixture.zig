@@ -36,7 +36,7 @@ pub const Builder = struct {
     /// A root node.
     pub fn addNode(builder: *Builder, local: Affine) !u32 {
         const parent = raylane.scene.none;
-        try builder.nodes.append(builder.arena(), .{ .parent = parent, .local = local });
+        try builder.nodes.append(builder.arena(), .{ .parent = parent, .local = .of(local) });
         return @intCast(builder.nodes.items.len - 1);
     }
 
@@ -206,10 +206,10 @@ pub fn render(scene: *const Scene, options: Options) !Image {
 
 /// The picture of a world that has the variant's width of tree.
 pub fn renderWorld(world: *const World, options: Options) !Image {
-    var image: Image = try .init(gpa, world.width, world.height);
+    var image: Image = try .init(gpa, world.view.width, world.view.height);
     // Every pixel must be written.
     @memset(image.pixels, @splat(std.math.nan(f32)));
-    const traced = raylane.trace.trace(options.variant, world, &image, .{
+    const traced = raylane.trace.trace(options.variant, &world.frame(), &image, .{
         .thread_count = options.thread_count,
         .sample_count = options.sample_count,
         .depth_max = options.depth_max,

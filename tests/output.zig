@@ -63,7 +63,8 @@ fn written(image: *const Image, settings: raylane.output.Settings) ![]u8 {
     defer gpa.free(path);
 
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
-    var target: raylane.output.Target = try .openFile(io, path, &diagnostic);
+    var temporaries: raylane.output.TemporaryFiles = .{};
+    var target: raylane.output.Target = try .openFile(io, &temporaries, path, &diagnostic);
     try raylane.output.write(gpa, image, settings, &target, &diagnostic);
     return folder.dir.readFileAlloc(io, "a.png", gpa, .unlimited);
 }

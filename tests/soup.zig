@@ -44,13 +44,13 @@ pub const Hit = struct { t: f32, primitive: i32 };
 pub fn bruteForce(world: *const World, query: Query) Hit {
     const triangle = raylane.trace.triangle;
     var ray = query.ray();
-    for (world.triangles, 0..) |corners, number| {
+    for (world.geometry.triangles, 0..) |corners, number| {
         const p: [3]Single.Vec3 = .{
-            .splat(world.positions[corners.corner[0]]),
-            .splat(world.positions[corners.corner[1]]),
-            .splat(world.positions[corners.corner[2]]),
+            .splat(world.geometry.positions[corners.corner[0]]),
+            .splat(world.geometry.positions[corners.corner[1]]),
+            .splat(world.geometry.positions[corners.corner[2]]),
         };
-        const hit = triangle.intersect(Single, p, ray.line, world.pad);
+        const hit = triangle.intersect(Single, p, ray.line, world.geometry.pad);
         const primitive: Single.I32 = .splat(@intCast(number));
         const accepted = hit.mask
             .bitAnd(ray.tnear.isBefore(hit.t, primitive))
@@ -84,14 +84,15 @@ fn expectVariant(
         const found = raylane.trace.single.trace(
             Kernel,
             .closest_hit,
-            world,
+            &world.geometry,
             &ray,
             &counts,
         );
         try expectHit(hit, ray.closest.t.lane(0), ray.closest.primitive.lane(0));
         try std.testing.expectEqual(hit.primitive != ray_file.no_primitive, found);
         var shadow = query.ray();
-        const blocked = raylane.trace.single.trace(Kernel, .any_hit, world, &shadow, &counts);
+        const blocked = raylane.trace.single
+            .trace(Kernel, .any_hit, &world.geometry, &shadow, &counts);
         try std.testing.expectEqual(found, blocked);
     }
     if (Kernel.ray_count > 1) try expectBundles(Kernel, world, queries, expected);
@@ -103,6 +104,9 @@ fn expectBundles(
     queries: []const Query,
     expected: []const Hit,
 ) !void {
+    const dispatch = raylane.trace.dispatch;
+    const interval_packet = raylane.trace.interval_packet;
+    const geometry = &world.geometry;
     var counts: raylane.statistics.TestCounts = .{};
     const size = Kernel.group_count * Kernel.ray_count;
     var first: usize = 0;
@@ -111,16 +115,15 @@ fn expectBundles(
         var bundle = makeBundle(Kernel, part);
         var shadows = bundle;
         if (Kernel.variant.traversal == .beam) for ([_]i32{ 0, 1, 3, 12 }) |balance| {
-            // Without budget all go as sets; with little, companies run out of it on their way.
+            // Without budget all go as streams; with little, packets run out of it on their way.
             var poor = bundle;
-            var budget: raylane.trace.interval_packet.PacketBudget = .{ .balance = balance };
-            raylane.trace.interval_packet.trace(Kernel, .any_hit, world, &poor, &budget, &counts);
+            var budget: interval_packet.PacketBudget = .{ .balance = balance };
+            interval_packet.trace(Kernel, .any_hit, geometry, &poor, &budget, &counts);
             try expectBlocked(Kernel, &poor, expected[first..][0..part.len]);
         };
-        const coherence = raylane.trace.dispatch
-            .closestHit(Kernel, world, &bundle, null, null, &counts);
+        const coherence = dispatch.closestHit(Kernel, geometry, &bundle, null, &counts);
         try std.testing.expect(coherence == .none);
-        raylane.trace.dispatch.anyHit(Kernel, world, &shadows, &no_light, &coherence, &counts);
+        dispatch.anyHit(Kernel, geometry, &shadows, &no_light, coherence, &counts);
         try expectBlocked(Kernel, &shadows, expected[first..][0..part.len]);
         for (0..part.len) |index| {
             if (!isActive(index)) continue;
@@ -401,7 +404,7 @@ test "a closed surface stops every ray that aims at its edges and corners, near 
             const hit = raylane.trace.single.trace(
                 Kernel,
                 .closest_hit,
-                &world,
+                &world.geometry,
                 &ray,
                 &counts,
             );

@@ -13,7 +13,8 @@ const testing = std.testing;
 /// What each part of `src` may import besides std, its own folder and `leaves`. A part is a file
 /// of `src` with the folder of the same name; names without a file are modules of the build.
 const directions = [_]struct { part: []const u8, may_import: []const []const u8 }{
-    .{ .part = "main", .may_import = &.{"raylane"} },
+    .{ .part = "main", .may_import = &.{ "raylane", "signals" } },
+    .{ .part = "signals", .may_import = &.{"raylane"} },
     .{ .part = "kernel", .may_import = &.{ "config", "trace", "variant" } },
     .{ .part = "options", .may_import = &.{ "config", "variant" } },
     .{ .part = "variant", .may_import = &.{"config"} },
@@ -42,11 +43,14 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
         },
     },
     .{ .part = "diagnostic", .may_import = &.{} },
+    .{ .part = "identity", .may_import = &.{} },
     .{ .part = "statistics", .may_import = &.{} },
 };
 
 /// Parts that import no other part and that all may import; `raylane` re-exports everything.
-const leaves = [_][]const u8{ "diagnostic", "huge_pages", "math", "statistics", "std", "builtin" };
+const leaves = [_][]const u8{
+    "diagnostic", "huge_pages", "identity", "math", "statistics", "std", "builtin",
+};
 
 /// Where the compiler starts to read; every other Zig file is imported from one of them.
 const roots = [_][]const u8{

@@ -282,7 +282,7 @@ pub fn traceSingle(
         if (near <= far) {
             var found = false;
             for (tree.blocks[at.first..][0..at.pack_count]) |*block| {
-                found = traversal_ray.intersect(block, world.pad, &counts) or found;
+                found = traversal_ray.intersect(block, world.geometry.pad, &counts) or found;
             }
             if (query == .any_hit and found) break;
         }
@@ -394,7 +394,7 @@ inline fn intersectBlock(
         if (block.primitive[lane] == raylane.world.none) break;
         _ = bundle_file.intersectLane(Kernel, query, group, view, block, .{
             .lane = lane,
-            .pad = world.pad,
+            .pad = world.geometry.pad,
         }, counts);
     }
 }

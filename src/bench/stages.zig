@@ -12,6 +12,7 @@ const statistics = @import("../statistics.zig");
 const trace_file = @import("../trace.zig");
 const variant_file = @import("../variant.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const Identity = @import("../identity.zig").Identity;
 const Image = @import("../image.zig").Image;
 const World = @import("../world.zig").World;
 const Allocator = std.mem.Allocator;
@@ -21,6 +22,7 @@ const Io = std.Io;
 pub const Settings = struct {
     scene: []const u8,
     allow_outside: bool,
+    output: ?Identity,
     width: u32,
     height: u32,
     thread_count: usize,
@@ -79,6 +81,7 @@ pub const Stages = struct {
         const start_ns = stages.now();
         var scene = try parse.parse(stages.gpa, stages.io, settings.scene, .{
             .allow_outside = settings.allow_outside,
+            .output = settings.output,
         }, stages.diagnostic);
         defer scene.deinit();
         stages.triangle_count = scene.triangleCount();
@@ -99,8 +102,9 @@ pub const Stages = struct {
     /// Traces the image by a variant for whose width the tree was built.
     pub fn trace(stages: *Stages, variant: usize, thread_count: usize) rounds.Traced {
         const start_ns = stages.now();
+        const frame = stages.world.?.frame();
         const settings = stages.traceSettings(thread_count);
-        const traced = trace_file.trace(variant, &stages.world.?, &stages.image, settings);
+        const traced = trace_file.trace(variant, &frame, &stages.image, settings);
         return .{ .trace_ns = stages.now() - start_ns, .rays = traced.rays };
     }
 
@@ -112,8 +116,9 @@ pub const Stages = struct {
             if (other.lanes != compiled[variant].lanes) continue;
             if (counted) |tests| return tests;
         }
+        const frame = stages.world.?.frame();
         const settings = stages.traceSettings(stages.settings.thread_count);
-        const traced = trace_file.traceCounting(variant, &stages.world.?, &stages.image, settings);
+        const traced = trace_file.traceCounting(variant, &frame, &stages.image, settings);
         stages.counts[variant] = traced.tests;
         return traced.tests.?;
     }

@@ -7,11 +7,13 @@
 const std = @import("std");
 const math = @import("../math.zig");
 const scene = @import("../scene.zig");
+const pose = @import("pose.zig");
 const world = @import("../world.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const assert = std.debug.assert;
 const vec3 = math.vec3;
-const Affine = math.Affine;
+const vec3d = math.vec3d;
+const AffineD = math.AffineD;
 const Vec3 = math.Vec3;
 
 /// Ambient radiance with the default rig.
@@ -33,7 +35,7 @@ const rig = [_]RigLight{
 pub fn place(
     arena: std.mem.Allocator,
     lights: []const scene.Light,
-    maps: []const Affine,
+    maps: []const AffineD,
     diagnostic: *Diagnostic,
 ) error{OutOfMemory}![]world.Light {
     const placed = try arena.alloc(world.Light, lights.len);
@@ -51,13 +53,13 @@ pub fn place(
     return placed[0..placed_count];
 }
 
-fn placeOne(light: *const scene.Light, map: Affine) ?world.Light {
+fn placeOne(light: *const scene.Light, map: AffineD) ?world.Light {
     const direction: Vec3 = switch (light.kind) {
         .point => .{ 0, 0, -1 }, // Unused, but a unit vector.
-        .spot, .directional => vec3.normalize(vec3.neg(map.z)) orelse return null,
+        .spot, .directional => pose.round(vec3d.normalize(vec3d.neg(map.z)) orelse return null),
     };
     const position: Vec3 = switch (light.kind) {
-        .point, .spot => map.translation,
+        .point, .spot => pose.round(map.translation),
         .directional => .{ 0, 0, 0 },
     };
     if (!vec3.isFinite(position)) return null;
@@ -131,12 +133,12 @@ pub fn placeRig(
 
 /// Ambient light and background: the default rig comes with a grey of both, lights of the file
 /// with black, the scene may say what is ambient, and the user has the last word.
-pub fn surroundings(
+pub fn environment(
     lights_are_default: bool,
     scene_ambient: ?f32,
     ambient: ?f32,
     background: ?Vec3,
-) world.Surroundings {
+) world.Environment {
     const radiance = ambient orelse scene_ambient orelse
         if (lights_are_default) ambient_default else 0;
     assert(radiance >= 0);
@@ -146,7 +148,7 @@ pub fn surroundings(
 
 test "a spot shines along its node's -z from its node's origin, scale aside" {
     const half = @sqrt(@as(f32, 0.5)); // A quarter turn about y: -z becomes -x.
-    const maps = [_]Affine{
+    const maps = [_]AffineD{
         .fromTrs(.{ 1, 2, 3 }, .{ 0, half, 0, half }, .{ 5, 5, 5 }),
         .fromTrs(.{ 0, 0, 0 }, .{ 0, 0, 0, 1 }, .{ 1, 1, 0 }),
     };
@@ -200,19 +202,19 @@ test "the rig turns with the camera" {
 
 test "ambient and background by their precedence" {
     try std.testing.expectEqual(
-        world.Surroundings{ .ambient = 0.35, .background = @splat(0.35) },
-        surroundings(true, null, null, null),
+        world.Environment{ .ambient = 0.35, .background = @splat(0.35) },
+        environment(true, null, null, null),
     );
     try std.testing.expectEqual(
-        world.Surroundings{ .ambient = 0, .background = @splat(0) },
-        surroundings(false, null, null, null),
+        world.Environment{ .ambient = 0, .background = @splat(0) },
+        environment(false, null, null, null),
     );
     try std.testing.expectEqual(
-        world.Surroundings{ .ambient = 0.25, .background = @splat(0) },
-        surroundings(false, 0.25, null, null),
+        world.Environment{ .ambient = 0.25, .background = @splat(0) },
+        environment(false, 0.25, null, null),
     );
     try std.testing.expectEqual(
-        world.Surroundings{ .ambient = 0.5, .background = .{ 1, 0, 0 } },
-        surroundings(false, 0.25, 0.5, .{ 1, 0, 0 }),
+        world.Environment{ .ambient = 0.5, .background = .{ 1, 0, 0 } },
+        environment(false, 0.25, 0.5, .{ 1, 0, 0 }),
     );
 }

@@ -1,5 +1,5 @@
-//! How far rounding may carry a ray past a triangle: `World.pad`, and past a node:
-//! `World.node_margin`.
+//! How far rounding may carry a ray past a triangle: `Geometry.pad`, and past a node:
+//! `Geometry.node_margin`.
 //!
 //! In: the scene's box, the camera and the lights. Out: lengths in metres. The pad scales with the
 //! largest distance between a ray's origin and a corner, and with the coordinates themselves, whose
@@ -33,7 +33,7 @@ const fused_reach_max: f64 = 0x1p27;
 
 /// What `World` says of rounding.
 pub const Pads = struct {
-    /// `World.pad`.
+    /// `Geometry.pad`.
     triangle: f32,
     node_margin: f32,
     fused_reach: f32,

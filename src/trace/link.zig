@@ -2,19 +2,19 @@
 //!
 //! Kernels are compiled by themselves, and what they share with the program are Zig's structures,
 //! whose layout is the compiler's choice. So the name of a kernel's symbol ends with a hash of all
-//! layouts that can be reached from the frame: where the two sides do not agree, linking fails.
+//! layouts that can be reached from `Render`: where the two sides do not agree, linking fails.
 
 const std = @import("std");
 const Variant = @import("../variant.zig").Variant;
 
-/// Name of the symbol behind which a variant does its share of a frame.
+/// Name of the symbol behind which a variant does its share of a picture.
 pub fn workSymbol(
-    comptime Frame: type,
+    comptime Render: type,
     comptime variant: Variant,
     comptime counting: bool,
 ) [:0]const u8 {
     return std.fmt.comptimePrint("rl_work_{s}{s}_{x:0>16}", .{
-        variant.name(), if (counting) "_counting" else "", layoutOf(Frame),
+        variant.name(), if (counting) "_counting" else "", layoutOf(Render),
     });
 }
 

@@ -22,10 +22,10 @@ pub const Input = struct {
     positions: []const Vec3,
     triangles: []const world.Triangle,
     /// Box of twice the middles of the triangles' boxes, give or take rounding.
-    middles_twice: Box3,
-    /// `World.pad`.
+    centroid_bounds: Box3,
+    /// `Geometry.pad`.
     pad: f32,
-    /// `World.node_margin`.
+    /// `Geometry.node_margin`.
     node_margin: f32,
     thread_count: usize,
     quality: Quality = .default,

@@ -36,13 +36,13 @@ pub fn Start(comptime Lanes: type) type {
 /// The rays through points (x, y) of the picture in pixels from its upper left corner.
 pub inline fn generate(
     comptime Lanes: type,
-    world: *const world_file.World,
+    view: *const world_file.View,
     x: Lanes.F32,
     y: Lanes.F32,
 ) Start(Lanes) {
-    const camera = &world.camera;
-    const width: f32 = @floatFromInt(world.width);
-    const height: f32 = @floatFromInt(world.height);
+    const camera = &view.camera;
+    const width: f32 = @floatFromInt(view.width);
+    const height: f32 = @floatFromInt(view.height);
     const one: Lanes.F32 = .splat(1);
     const across = x.mul(.splat(2 / width)).sub(one);
     const upward = one.sub(y.mul(.splat(2 / height)));
@@ -60,14 +60,14 @@ pub inline fn generate(
 
 /// The directions of the rays around the one through (x, y), pixel by pixel; null where rays do not
 /// share an origin.
-pub fn grid(world: *const world_file.World, x: f32, y: f32) ?Grid {
-    const camera = &world.camera;
+pub fn grid(view: *const world_file.View, x: f32, y: f32) ?Grid {
+    const camera = &view.camera;
     if (camera.orthographic) return null;
-    const width: f32 = @floatFromInt(world.width);
-    const height: f32 = @floatFromInt(world.height);
+    const width: f32 = @floatFromInt(view.width);
+    const height: f32 = @floatFromInt(view.height);
     const right = vec3.scale(camera.right, 2 / width);
     const down = vec3.scale(camera.up, -2 / height);
-    const start = generate(ray_file.Single, world, .splat(x), .splat(y));
+    const start = generate(ray_file.Single, view, .splat(x), .splat(y));
     var extent: f32 = 0;
     for (camera.right ++ camera.up ++ camera.forward) |component| extent += @abs(component);
     return .{

@@ -18,7 +18,7 @@ const light_file = @import("../shade/light.zig");
 const exponential = @import("../shade/exponential.zig");
 const Grid = @import("../traverse/beam/grid.zig").Grid;
 const assert = std.debug.assert;
-const World = world_file.World;
+const Frame = world_file.Frame;
 
 /// Bounces at most, whatever the options say.
 pub const depth_limit = 32;
@@ -59,7 +59,7 @@ pub fn Whitted(comptime Kernel: type) type {
     return struct {
         const Self = @This();
 
-        world: *const World,
+        frame: *const Frame,
         settings: Settings,
         rays: statistics.RayCounts = .{},
         tests: statistics.TestCounts = .{},
@@ -168,7 +168,7 @@ pub fn Whitted(comptime Kernel: type) type {
         fn pushPrimary(tracer: *Self, rectangle: Rectangle, sample: u32) void {
             const offset = camera.sampleOffset(sample, tracer.settings.sample_count);
             tracer.grid = camera.grid(
-                tracer.world,
+                tracer.frame.view,
                 @as(f32, @floatFromInt(rectangle.x0)) + offset.x,
                 @as(f32, @floatFromInt(rectangle.y0)) + offset.y,
             );
@@ -182,7 +182,7 @@ pub fn Whitted(comptime Kernel: type) type {
                 const inside = column.lt(end_column).bitAnd(row.lt(end_row));
                 const x = column.add(.splat(offset.x));
                 const y = row.add(.splat(offset.y));
-                const start = camera.generate(Rays, tracer.world, x, y);
+                const start = camera.generate(Rays, tracer.frame.view, x, y);
                 ray.* = .{
                     .line = .init(start.origin, start.direction),
                     .tnear = .start(),
@@ -221,8 +221,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 tracer.find(pending, group, point);
                 any_seen = any_seen or point.seen.any();
             }
-            if (any_seen) for (tracer.world.lights) |*light| {
-                tracer.addLight(light, pending, &points, &coherence);
+            if (any_seen) for (tracer.frame.lights) |*light| {
+                tracer.addLight(light, pending, &points, coherence);
             };
             // The last pushed is traced first: reflection, refraction, the ray's own rest.
             tracer.pushRest(pending, &points);
@@ -232,12 +232,13 @@ pub fn Whitted(comptime Kernel: type) type {
         }
 
         /// Finds what rays see. Returns those whose hits are near to each other.
-        fn trace(tracer: *Self, pending: *Pending) dispatch.Coherence(Kernel) {
+        fn trace(tracer: *Self, pending: *Pending) dispatch.Coherence {
             const first = pending.depth == 0 and pending.layer == 0;
             const known = if (tracer.grid) |*grid| grid else null;
             const grid = if (first) known else null;
+            const geometry = tracer.frame.geometry;
             const beams = dispatch
-                .closestHit(Kernel, tracer.world, &pending.bundle, grid, null, &tracer.tests);
+                .closestHit(Kernel, geometry, &pending.bundle, grid, &tracer.tests);
             return if (pending.depth == 0) .all else beams;
         }
 
@@ -248,11 +249,11 @@ pub fn Whitted(comptime Kernel: type) type {
             const gone = ray.active.bitAnd(missed);
             if (gone.none()) return;
             const weight: Vec3 = .select(gone, pending.weight[group], .splat(.{ 0, 0, 0 }));
-            const surroundings = &tracer.world.surroundings;
-            var seen: [3]f32 = @splat(surroundings.ambient);
+            const environment = tracer.frame.environment;
+            var seen: [3]f32 = @splat(environment.ambient);
             if (pending.depth == 0) {
                 tracer.escaped[group] = tracer.escaped[group].add(weight.x);
-                seen = if (tracer.settings.transparent) .{ 0, 0, 0 } else surroundings.background;
+                seen = if (tracer.settings.transparent) .{ 0, 0, 0 } else environment.background;
             }
             tracer.radiance[group] = tracer.radiance[group].add(weight.mul(.splat(seen)));
         }
@@ -266,7 +267,7 @@ pub fn Whitted(comptime Kernel: type) type {
                 point.seen = .splat(false);
                 return;
             }
-            point.surface = surface_file.resolve(Rays, tracer.world, ray);
+            point.surface = surface_file.resolve(Rays, tracer.frame, ray);
             const surface = &point.surface;
             surface.coverage = F32.select(surface.culled, .zero(), surface.coverage);
             point.lobe = shade.lobes(Rays, surface);
@@ -305,7 +306,7 @@ pub fn Whitted(comptime Kernel: type) type {
             var scattered = diffuse.add(.select(traced, none, lobe.reflected));
             const ends = pending.depth == tracer.settings.depth_max;
             if (ends) scattered = scattered.add(lobe.transmitted);
-            return scattered.scale(.splat(tracer.world.surroundings.ambient));
+            return scattered.scale(.splat(tracer.frame.environment.ambient));
         }
 
         /// Lanes whose reflection is traced.
@@ -326,7 +327,7 @@ pub fn Whitted(comptime Kernel: type) type {
             light: *const world_file.Light,
             pending: *const Pending,
             points: *const [group_count]Point,
-            coherence: *const dispatch.Coherence(Kernel),
+            coherence: dispatch.Coherence,
         ) void {
             var bundle: bundle_file.Bundle(Kernel) = undefined;
             var light_seen: [group_count]Vec3 = undefined;
@@ -348,7 +349,7 @@ pub fn Whitted(comptime Kernel: type) type {
                     .bitOr(worth.z.gt(zero)));
                 const primitive = pending.bundle.groups[group].closest.primitive;
                 const away = point.surface.normal_geometric;
-                const end = point.surface.off(away, arrival.distance, tracer.world.pad);
+                const end = point.surface.off(away, arrival.distance, tracer.frame.geometry.pad);
                 ray.* = light_file.shadowRay(Rays, light, end, primitive, arrives);
                 tracer.rays.shadow += arrives.popCount();
                 any_lit = any_lit or arrives.any();
@@ -356,7 +357,7 @@ pub fn Whitted(comptime Kernel: type) type {
             if (!any_lit) return;
             var passing: [group_count]Vec3 = undefined;
             const active = activeMasks(&bundle);
-            if (tracer.world.has_transparency or tracer.world.has_holes) {
+            if (tracer.frame.materials.has_transparency or tracer.frame.materials.has_holes) {
                 tracer.filter(&bundle, light, coherence, &passing);
             } else {
                 tracer.block(&bundle, light, coherence, &passing);
@@ -379,10 +380,10 @@ pub fn Whitted(comptime Kernel: type) type {
             tracer: *Self,
             bundle: *bundle_file.Bundle(Kernel),
             light: *const world_file.Light,
-            coherence: *const dispatch.Coherence(Kernel),
+            coherence: dispatch.Coherence,
             passing: *[group_count]Vec3,
         ) void {
-            dispatch.anyHit(Kernel, tracer.world, bundle, light, coherence, &tracer.tests);
+            dispatch.anyHit(Kernel, tracer.frame.geometry, bundle, light, coherence, &tracer.tests);
             for (&bundle.groups, passing) |*ray, *share| {
                 if (ray.active.none()) continue;
                 const free = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
@@ -395,7 +396,7 @@ pub fn Whitted(comptime Kernel: type) type {
             tracer: *Self,
             bundle: *bundle_file.Bundle(Kernel),
             light: *const world_file.Light,
-            coherence: *const dispatch.Coherence(Kernel),
+            coherence: dispatch.Coherence,
             passing: *[group_count]Vec3,
         ) void {
             passing.* = @splat(.splat(.{ 1, 1, 1 }));
@@ -405,7 +406,8 @@ pub fn Whitted(comptime Kernel: type) type {
             tracer.settle(bundle, light, coherence, passing);
             for (&bundle.groups, limits) |*ray, limit| ray.closest = limit;
             for (0..layer_max) |_| {
-                _ = dispatch.closestHit(Kernel, tracer.world, bundle, null, null, &tracer.tests);
+                const geometry = tracer.frame.geometry;
+                _ = dispatch.closestHit(Kernel, geometry, bundle, null, &tracer.tests);
                 var any_left = false;
                 for (&bundle.groups, passing, &weakened, limits) |*ray, *share, *count, limit| {
                     if (ray.active.none()) continue;
@@ -427,22 +429,18 @@ pub fn Whitted(comptime Kernel: type) type {
             tracer: *Self,
             bundle: *bundle_file.Bundle(Kernel),
             light: *const world_file.Light,
-            coherence: *const dispatch.Coherence(Kernel),
+            coherence: dispatch.Coherence,
             passing: *[group_count]Vec3,
         ) void {
-            if (Kernel.variant.traversal != .beam) return;
-            const before = switch (coherence.*) {
-                .none => return,
-                .all => activeMasks(bundle),
-                .some => |*part| bundle_file.narrow(Kernel, bundle, part, true),
-            };
-            dispatch.anyHit(Kernel, tracer.world, bundle, light, &.all, &tracer.tests);
+            if (Kernel.variant.traversal != .beam or coherence == .none) return;
+            const before = activeMasks(bundle);
+            dispatch.anyHit(Kernel, tracer.frame.geometry, bundle, light, .all, &tracer.tests);
             for (&bundle.groups, before, passing) |*ray, active, *share| {
                 if (active.none()) continue;
                 const primitive = ray.closest.primitive;
                 const free = ray.active.bitAnd(primitive.eq(.splat(ray_file.no_primitive)));
                 const met = ray.active.andNot(free);
-                const stopped = surface_file.stopped(Rays, tracer.world, primitive, met);
+                const stopped = surface_file.stopped(Rays, tracer.frame, primitive, met);
                 share.* = .select(stopped, .splat(.{ 0, 0, 0 }), share.*);
                 ray.active = active.andNot(free).andNot(stopped);
             }
@@ -460,7 +458,7 @@ pub fn Whitted(comptime Kernel: type) type {
             const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
             ray.active = ray.active.andNot(missed);
             if (ray.active.none()) return;
-            const surface = surface_file.resolve(Rays, tracer.world, ray);
+            const surface = surface_file.resolve(Rays, tracer.frame, ray);
             const material = &surface.material;
             const clear = material.transmission.mul(one.sub(material.metallic));
             const tint = material.base_color.scale(clear.mul(surface.coverage));
@@ -582,7 +580,7 @@ pub fn Whitted(comptime Kernel: type) type {
             direction: Vec3,
             from: ray_file.Hit(Rays),
         ) void {
-            const origin = point.surface.off(away, .zero(), tracer.world.pad);
+            const origin = point.surface.off(away, .zero(), tracer.frame.geometry.pad);
             const active = ray.active;
             ray.* = .{
                 .line = .init(origin, direction),

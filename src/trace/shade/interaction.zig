@@ -12,7 +12,8 @@ const ray_file = @import("../traverse/ray.zig");
 const offset = @import("offset.zig");
 const triangle = @import("../traverse/triangle.zig");
 const assert = std.debug.assert;
-const World = world_file.World;
+const Frame = world_file.Frame;
+const Geometry = world_file.Geometry;
 
 /// A material in lanes: the fields of `world.Material`, base colour times the vertex colours.
 pub fn Material(comptime Lanes: type) type {
@@ -109,27 +110,32 @@ fn Corners(comptime Lanes: type) type {
 
         /// A triangle at a time: neighbours mostly see the same. A lane that is not asked for has
         /// one that another does.
-        inline fn of(world: *const World, primitive: Lanes.I32, asked: Lanes.Mask) Self {
+        inline fn of(geometry: *const Geometry, primitive: Lanes.I32, asked: Lanes.Mask) Self {
             const triangles: Distinct(Lanes) = .of(primitive, asked);
             var corners: Self = undefined;
             for (0..triangles.count) |index| {
-                corners.put(world, triangles.numbers[index], triangles.lanes[index]);
+                corners.put(geometry, triangles.numbers[index], triangles.lanes[index]);
             }
             return corners;
         }
 
-        inline fn put(corners: *Self, world: *const World, number: u32, lanes: Lanes.Mask) void {
-            const triangle_ = &world.triangles[number];
+        inline fn put(
+            corners: *Self,
+            geometry: *const Geometry,
+            number: u32,
+            lanes: Lanes.Mask,
+        ) void {
+            const triangle_ = &geometry.triangles[number];
             inline for (0..3) |corner| {
                 const vertex = triangle_.corner[corner];
                 corners.position[corner] =
-                    .select(lanes, .splat(world.positions[vertex]), corners.position[corner]);
+                    .select(lanes, .splat(geometry.positions[vertex]), corners.position[corner]);
                 corners.normal[corner] =
-                    .select(lanes, .splat(world.normals[vertex]), corners.normal[corner]);
-                if (world.colors.len > 0) {
+                    .select(lanes, .splat(geometry.normals[vertex]), corners.normal[corner]);
+                if (geometry.colors.len > 0) {
                     const channels = &corners.color[corner];
                     inline for (channels, 0..) |*channel, index| {
-                        const value = world.colors[vertex][index];
+                        const value = geometry.colors[vertex][index];
                         channel.* = .select(lanes, .splat(value), channel.*);
                     }
                 }
@@ -143,14 +149,14 @@ fn Corners(comptime Lanes: type) type {
 /// The surfaces that `ray.closest` names. Asserts that some lane hit something.
 pub fn resolve(
     comptime Lanes: type,
-    world: *const World,
+    frame: *const Frame,
     ray: *const ray_file.Ray(Lanes),
 ) Surface(Lanes) {
     const F32 = Lanes.F32;
     const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
     const hit = ray.active.andNot(missed);
     assert(hit.any());
-    const all: Corners(Lanes) = .of(world, ray.closest.primitive, hit);
+    const all: Corners(Lanes) = .of(frame.geometry, ray.closest.primitive, hit);
     const corners = all.position;
     const share = shares(Lanes, edgeFunctions(Lanes, corners, ray));
     const edges = [2]Lanes.Vec3{ corners[1].sub(corners[0]), corners[2].sub(corners[0]) };
@@ -163,9 +169,9 @@ pub fn resolve(
     const direction_length = ray.line.direction.length();
     const distance = ray.closest.t.mul(direction_length);
     const view = ray.line.direction.neg().scale(F32.splat(1).div(direction_length));
-    const color = vertexColor(Lanes, world, &all.color, share);
+    const color = vertexColor(Lanes, frame.geometry, &all.color, share);
     const materials: Materials(Lanes) = .{
-        .all = world.materials,
+        .all = frame.materials.all,
         .used = .of(all.material, hit),
     };
     const material = loadMaterial(Lanes, &materials, color.rgb);
@@ -188,14 +194,14 @@ pub fn resolve(
 /// Those of the rays asked for, all of which hit something, that hit what lets no light pass.
 pub fn stopped(
     comptime Lanes: type,
-    world: *const World,
+    frame: *const Frame,
     primitive: Lanes.I32,
     asked: Lanes.Mask,
 ) Lanes.Mask {
     var found: Lanes.Mask = .splat(false);
     const triangles: Distinct(Lanes) = .of(primitive, asked);
     for (triangles.numbers[0..triangles.count], 0..) |number, index| {
-        const material = &world.materials[world.triangles[number].material];
+        const material = &frame.materials.all[frame.geometry.triangles[number].material];
         if (material.stopsLight()) found = found.bitOr(triangles.lanes[index]);
     }
     return found.bitAnd(asked);
@@ -262,11 +268,11 @@ fn Color(comptime Lanes: type) type {
 
 fn vertexColor(
     comptime Lanes: type,
-    world: *const World,
+    geometry: *const Geometry,
     colors: *const [3][4]Lanes.F32,
     share: [3]Lanes.F32,
 ) Color(Lanes) {
-    if (world.colors.len == 0) return .{ .rgb = .splat(.{ 1, 1, 1 }), .alpha = .splat(1) };
+    if (geometry.colors.len == 0) return .{ .rgb = .splat(.{ 1, 1, 1 }), .alpha = .splat(1) };
     var channels: [4]Lanes.F32 = undefined;
     inline for (&channels, 0..) |*channel, index| {
         const a = colors[0][index].mul(share[0]);

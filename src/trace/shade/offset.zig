@@ -40,8 +40,8 @@ const sliver_roundings = 1.5;
 /// Of the tests' part; see above.
 const safety = 2;
 
-/// No offset exceeds this many times `World.pad`: the tree and the beams take for granted that rays
-/// start in the scene, give or take a few pads.
+/// No offset exceeds this many times `Geometry.pad`: the tree and the beams take for granted that
+/// rays start in the scene, give or take a few pads.
 const pads_max = 8;
 
 /// The bound as far as the hit alone decides it, in metres over u. `normal` is of unit length,

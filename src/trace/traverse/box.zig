@@ -64,7 +64,7 @@ pub inline fn mayHold(
 /// What is left of the ranges of all three axes between `tnear_t`, which is not negative, and
 /// `closest_t`: `Range.isMet` where there may be a hit. For culling only. The way from node to node
 /// is little but a chain of minima and maxima, so they are the quickest. A far end of -0 may be
-/// missed: boxes are grown (`World.pad`), so that no hit lies at their very end.
+/// missed: boxes are grown (`Geometry.pad`), so that no hit lies at their very end.
 pub inline fn between(
     comptime Lanes: type,
     near: [3]Lanes.F32,

@@ -18,35 +18,6 @@ pub fn Bundle(comptime Kernel: type) type {
     return struct { groups: [Kernel.group_count]ray_file.Ray(Kernel.Rays) };
 }
 
-/// Some of a bundle's rays, by group.
-pub fn Part(comptime Kernel: type) type {
-    return [Kernel.group_count]Kernel.Rays.Mask;
-}
-
-/// Leaves those rays active that are in a part, or those that are not. Returns which were active.
-pub fn narrow(
-    comptime Kernel: type,
-    bundle: *Bundle(Kernel),
-    part: *const Part(Kernel),
-    within: bool,
-) Part(Kernel) {
-    var active: Part(Kernel) = undefined;
-    for (&active, &bundle.groups, part) |*before, *group, chosen| {
-        before.* = group.active;
-        group.active = if (within) before.bitAnd(chosen) else before.andNot(chosen);
-    }
-    return active;
-}
-
-/// Makes these rays active.
-pub fn restore(
-    comptime Kernel: type,
-    bundle: *Bundle(Kernel),
-    active: *const Part(Kernel),
-) void {
-    for (&bundle.groups, active) |*group, mask| group.active = mask;
-}
-
 /// How boxes and triangles look to a group.
 pub fn Precalculations(comptime Lanes: type) type {
     return struct {
@@ -83,7 +54,7 @@ pub fn viewOf(comptime Rays: type, group: *const ray_file.Ray(Rays)) Precalculat
 pub fn trace(
     comptime Kernel: type,
     comptime query: Query,
-    world: *const world_file.World,
+    geometry: *const world_file.Geometry,
     group: *ray_file.Ray(Kernel.Rays),
     counts: *TestCounts,
 ) void {
@@ -91,9 +62,9 @@ pub fn trace(
     var search: Search(Kernel, query) = .{
         .group = group,
         .view = viewOf(Kernel.Rays, group),
-        .pad = world.pad,
+        .pad = geometry.pad,
     };
-    _ = walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts);
+    _ = walk.walk(Kernel, geometry.tree.get(Kernel.width), &search, counts);
 }
 
 fn Search(comptime Kernel: type, comptime query: Query) type {
@@ -178,7 +149,7 @@ pub fn countBoxes(comptime Kernel: type, group: anytype, counts: *TestCounts) vo
     counts.box_useful += group.active.popCount();
 }
 
-/// Which triangle of a pack, and `World.pad`.
+/// Which triangle of a pack, and `Geometry.pad`.
 const At = struct { lane: usize, pad: f32 };
 
 /// Tests one triangle of a pack against the active rays of one group. Returns whether any took

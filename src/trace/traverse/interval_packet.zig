@@ -10,7 +10,7 @@
 //!
 //! Every step of the slab test is monotone in origin, inverse and bound, rounding included. So
 //! from the ends of intervals come bounds of what the test gives for any ray between, and nothing
-//! is culled that the ray by itself would have found (box.zig; `World.fused_reach` for multiply-
+//! is culled that the ray by itself would have found (box.zig; `Geometry.fused_reach` for multiply-
 //! adds).
 //!
 //! S. Boulos, I. Wald and P. Shirley, "Geometric and Arithmetic Culling Methods for Entire Ray
@@ -26,7 +26,7 @@ const traversal_ray = @import("traversal_ray.zig");
 const Stream = @import("stream.zig").Stream;
 const walk = @import("walk.zig");
 const Query = walk.Query;
-const World = world_file.World;
+const Geometry = world_file.Geometry;
 
 /// Fewer rays are no packet. Both as measured (docs/performance.md): a set does so well with rays
 /// that look for any hit that few of them gain by going together.
@@ -69,13 +69,13 @@ pub const PacketBudget = struct {
 pub fn trace(
     comptime Kernel: type,
     comptime query: Query,
-    world: *const World,
+    geometry: *const Geometry,
     bundle: *bundle_file.Bundle(Kernel),
     budget: *PacketBudget,
     counts: *TestCounts,
 ) void {
     var stream: Stream(Kernel, query) = undefined;
-    stream.init(world, bundle);
+    stream.init(geometry, bundle);
     for (0..Kernel.subtile_count) |subtile|
         traceSubtile(Kernel, query, &stream, subtile, budget, counts);
     stream.finish(counts);
@@ -105,7 +105,7 @@ fn traceSubtile(
         const first = firstOf(Rays, &rest) orelse break;
         const leader = &groups[first.group];
         const coherent: CoherentGroup(Rays) =
-            .of(stream.world, leader, &views[first.group], first.lane);
+            .of(stream.geometry, leader, &views[first.group], first.lane);
         var count: u32 = 0;
         for (&rest, &views, groups, 0..) |*left, *view, *group, index| {
             group.active = .splat(false);
@@ -120,9 +120,10 @@ fn traceSubtile(
         if (count < packet_rays_min.get(query)) {
             incoherent_count += count;
         } else {
-            const world = stream.world;
+            const geometry = stream.geometry;
             const octant = coherent.octant;
-            if (tracePacket(Kernel, query, world, groups, &views, octant, budget, counts)) continue;
+            if (tracePacket(Kernel, query, geometry, groups, &views, octant, budget, counts))
+                continue;
         }
         for (&incoherent, groups) |*mask, *group| mask.* = mask.bitOr(group.active);
     }
@@ -152,7 +153,7 @@ fn CoherentGroup(comptime Rays: type) type {
         octant: [3]bool,
 
         inline fn of(
-            world: *const World,
+            geometry: *const Geometry,
             group: *const ray_file.Ray(Rays),
             view: *const bundle_file.Precalculations(Rays),
             lane: usize,
@@ -164,7 +165,7 @@ fn CoherentGroup(comptime Rays: type) type {
             return .{
                 .origin = .splat(group.line.origin.lane(lane)),
                 .direction = .splat(direction),
-                .origin_apart = .splat(world.pad * (origin_apart_max / world_file.pad_relative)),
+                .origin_apart = .splat(geometry.pad * (origin_apart_max / world_file.pad_relative)),
                 .direction_apart = .splat(length * direction_apart_max),
                 .octant = octant,
             };
@@ -192,7 +193,7 @@ fn CoherentGroup(comptime Rays: type) type {
 fn tracePacket(
     comptime Kernel: type,
     comptime query: Query,
-    world: *const World,
+    geometry: *const Geometry,
     groups: *[Kernel.subtile_groups]ray_file.Ray(Kernel.Rays),
     views: *const [Kernel.subtile_groups]bundle_file.Precalculations(Kernel.Rays),
     octant: [3]bool,
@@ -200,10 +201,10 @@ fn tracePacket(
     counts: *TestCounts,
 ) bool {
     @setEvalBranchQuota(4000); // For what is inlined here.
-    const tree = world.tree.get(Kernel.width);
+    const tree = geometry.tree.get(Kernel.width);
     const ends: Ends = .of(Kernel, groups, views);
-    if (!(ends.reach() < world.fused_reach)) return false;
-    var search: Search(Kernel, query) = .init(world, groups, views, octant, &ends, budget.*);
+    if (!(ends.reach() < geometry.fused_reach)) return false;
+    var search: Search(Kernel, query) = .init(geometry, groups, views, octant, &ends, budget.*);
     _ = walk.walk(Kernel, tree, &search, counts);
     budget.balance = @min(search.budget.balance, PacketBudget.balance_max);
     if (budget.lasts()) return true;
@@ -279,7 +280,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         limit: f32,
         /// By how much boxes of triangles are grown: more than their own pad and a node's margin.
         grow: f32,
-        /// See `World.pad`.
+        /// See `Geometry.pad`.
         pad: f32,
         budget: PacketBudget,
 
@@ -332,7 +333,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
         };
 
         inline fn init(
-            world: *const World,
+            geometry: *const Geometry,
             groups: *[Kernel.subtile_groups]ray_file.Ray(Rays),
             views: *const [Kernel.subtile_groups]bundle_file.Precalculations(Rays),
             octant: [3]bool,
@@ -356,8 +357,8 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
                 .slabs = slabs,
                 .tnear_t = .splat(ends.tnear_t),
                 .limit = ends.closest_t,
-                .grow = world.pad + 2 * world.node_margin,
-                .pad = world.pad,
+                .grow = geometry.pad + 2 * geometry.node_margin,
+                .pad = geometry.pad,
                 .budget = budget,
             };
         }

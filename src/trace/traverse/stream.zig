@@ -19,7 +19,7 @@ const single = @import("single.zig");
 const stack_file = @import("stack.zig");
 const assert = std.debug.assert;
 const Query = @import("walk.zig").Query;
-const World = world_file.World;
+const Geometry = world_file.Geometry;
 
 /// Rays of a set, a bit each.
 const Set = u64;
@@ -36,7 +36,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
     const I32 = Boxes.I32;
     const TraversalRay = traversal_ray.TraversalRay(Kernel);
     return struct {
-        world: *const World,
+        geometry: *const Geometry,
         bundle: *bundle_file.Bundle(Kernel),
         rays: [rays_max]TraversalRay,
         places: [rays_max]Place,
@@ -58,10 +58,10 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
         /// For rays of this bundle. In place: it is too large to be handed around.
         pub fn init(
             stream: *Self,
-            world: *const World,
+            geometry: *const Geometry,
             bundle: *bundle_file.Bundle(Kernel),
         ) void {
-            stream.world = world;
+            stream.geometry = geometry;
             stream.bundle = bundle;
             stream.count = 0;
             stream.found = 0;
@@ -81,7 +81,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                 if (group.active.none()) continue;
                 const origin = group.line.origin.abs();
                 const reach = origin.x.max(origin.y).max(origin.z);
-                const near = group.active.bitAnd(reach.lt(.splat(stream.world.fused_reach)));
+                const near = group.active.bitAnd(reach.lt(.splat(stream.geometry.fused_reach)));
                 var bits = near.bits();
                 while (bits != 0) : (bits &= bits - 1) {
                     if (stream.count == rays_max) stream.finish(counts);
@@ -93,7 +93,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                 const far = group.active.andNot(near);
                 if (far.none()) continue;
                 group.active = far;
-                single.traceEach(Kernel, query, stream.world, group, view, counts);
+                single.traceEach(Kernel, query, stream.geometry, group, view, counts);
             }
         }
 
@@ -117,7 +117,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
         }
 
         fn travel(stream: *Self, counts: *TestCounts) void {
-            const tree = stream.world.tree.get(Kernel.width);
+            const tree = stream.geometry.tree.get(Kernel.width);
             var entries: [entries_max]Entry = undefined;
             var entry_count: usize = 0;
             const all = @as(Set, std.math.maxInt(Set)) >> @intCast(rays_max - stream.count);
@@ -143,7 +143,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                 entry_count.* -= 1;
                 const entry = entries[entry_count.*];
                 if (stream.looking(entry.set) == 0) continue;
-                stream.world.tree.get(Kernel.width).prefetch(entry.child);
+                stream.geometry.tree.get(Kernel.width).prefetch(entry.child);
                 return entry;
             }
             return null;
@@ -166,7 +166,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                 const number = @ctz(rest);
                 const ray = &stream.rays[number];
                 for (packs) |*pack| {
-                    if (!ray.intersect(pack, stream.world.pad, counts)) continue;
+                    if (!ray.intersect(pack, stream.geometry.pad, counts)) continue;
                     stream.found |= @as(Set, 1) << @intCast(number);
                 }
             }

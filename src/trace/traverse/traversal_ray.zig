@@ -3,7 +3,7 @@
 //! In: a ray of a group. Out: which children it enters; its nearest hit. It is kept as plain
 //! numbers: little is copied to make it, and a load puts a number into all lanes where a test wants
 //! it. Which hit wins does not depend on the order of the tests (ray.zig), nor does culling change
-//! it (box.zig; `World.fused_reach` for the rounding of multiply-adds).
+//! it (box.zig; `Geometry.fused_reach` for the rounding of multiply-adds).
 
 const world_file = @import("../../world.zig");
 const TestCounts = @import("../../statistics.zig").TestCounts;
@@ -44,7 +44,7 @@ pub fn TraversalRay(comptime Kernel: type) type {
         const Pack = world_file.TrianglePack(width);
 
         /// The ray in one lane of a group. With `fused`, nodes are tested by multiply-adds: it has
-        /// to start within `World.fused_reach`.
+        /// to start within `Geometry.fused_reach`.
         pub inline fn of(
             comptime Rays: type,
             comptime fused: bool,

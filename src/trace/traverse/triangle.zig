@@ -202,12 +202,6 @@ pub fn WeightedIntersection(comptime Lanes: type) type {
         mask: Lanes.Mask,
         t: Lanes.F32,
         weights: EdgeFunctions(Lanes),
-
-        /// Barycentric weights of the second and the third corner.
-        pub inline fn shares(hit: @This()) [2]Lanes.F32 {
-            const share = Lanes.F32.splat(1).div(hit.weights.sum());
-            return .{ hit.weights.b.mul(share), hit.weights.c.mul(share) };
-        }
     };
 }
 

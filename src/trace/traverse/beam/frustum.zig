@@ -1,20 +1,24 @@
-//! What encloses a beam: four planes through the rays' origin, and how deep it has to look.
+//! View frustum culling by p-vertices (Assarsson and Moeller 2000, "Optimized View Frustum Culling
+//! Algorithms for Bounding Boxes"): four planes around a beam against all children of a node.
 //!
-//! In: normals that point inward. Out: which children of a node the beam may meet, and the least
-//! depth at which. Conservative: planes stand off by `slack_pads` times `World.pad`, which covers
-//! the rounding of boxes, of ray directions and of the planes themselves. Of a box only the corner
-//! farthest along a plane's normal counts (Assarsson and Moeller 2000, "Optimized View Frustum
-//! Culling Algorithms for Bounding Boxes", the p-vertex).
+//! In: normals that point inward. Out: which children the beam may meet, and the least depth at
+//! which. Conservative: planes stand off by `slack_pads` times `Geometry.pad`, which covers the
+//! rounding of boxes, of ray directions and of the planes themselves. Of a box only the corner
+//! farthest along a plane's normal counts.
 
 const std = @import("std");
 const world_file = @import("../../../world.zig");
-const stack = @import("../stack.zig");
 const assert = std.debug.assert;
 
-/// `World.pad` is at least 32 u R and 4 u X for distances R and coordinates X (`pad.zig`). A
+/// `Geometry.pad` is at least 32 u R and 4 u X for distances R and coordinates X (`pad.zig`). A
 /// fused plane equation in coordinates of the scene is off by at most 6 u (2 X + R) of the length
 /// of its normal; directions that are linear in the pixel up to 24 u put a ray off by 24 u R.
-pub const slack_pads = 8.0;
+const slack_pads = 8.0;
+
+/// How far, in metres, planes stand off the rays.
+pub fn slackOf(geometry: *const world_file.Geometry) f32 {
+    return slack_pads * geometry.pad;
+}
 
 /// Components of a normal are at least this long, so that infinite corners of empty boxes never
 /// meet a zero.
@@ -111,24 +115,34 @@ pub fn Frustum(comptime Lanes: type) type {
             return least.isNegative().bitNot();
         }
 
-        /// Pushes the children of a node that the beam may meet before `depth_max`, and behind
-        /// `front` if there is one, the nearest on top. Returns the new count of the stack.
-        pub inline fn pushChildren(
+        /// Children of a node that the beam may meet before `depth_max`, and where.
+        pub inline fn meet(
             frustum: *const Self,
             node: *const world_file.Node(width),
-            front: ?*const Plane(width),
             depth_max: f32,
-            entries: []stack.Entry,
-            entry_count: usize,
-        ) usize {
+        ) Met(Lanes) {
             var least = frustum.sides[0].extreme(Lanes, node, 1);
             inline for (frustum.sides[1..]) |*side| {
                 least = least.minOrNegative(side.extreme(Lanes, node, 1));
             }
             const near = frustum.depth.extreme(Lanes, node, 0);
-            if (front) |plane| least = least.minOrNegative(plane.extreme(Lanes, node, 1));
-            const met = near.le(.splat(depth_max)).andNot(least.isNegative());
-            return stack.push(Lanes, node, met, near, entries, entry_count);
+            return .{
+                .near = near,
+                .mask = near.le(.splat(depth_max)).andNot(least.isNegative()),
+            };
+        }
+    };
+}
+
+/// Children of a node in lanes, as `walk.zig` wants them.
+pub fn Met(comptime Lanes: type) type {
+    return struct {
+        /// The least depth of each.
+        near: Lanes.F32,
+        mask: Lanes.Mask,
+
+        pub inline fn isMet(met: @This()) Lanes.Mask {
+            return met.mask;
         }
     };
 }
