@@ -125,12 +125,12 @@ fn names(package: Package, list: []const Variant) []const []const u8 {
 /// them, and the linker inlines one into the other.
 fn intrinsicsObject(package: Package) *Compile {
     const b = package.owner;
-    const object = b.addObject(.{ .name = "intrinsics", .root_module = b.createModule(.{
+    const object = package.archive("intrinsics", b.createModule(.{
         .target = package.target,
         .optimize = package.optimize,
         .link_libc = true,
         .omit_frame_pointer = if (package.optimize == .fast) true else null,
-    }) });
+    }));
     object.root_module.addCSourceFile(.{
         .file = b.path("src/simd/intrinsics.c"),
         .flags = own_c_flags,
@@ -166,26 +166,21 @@ fn kernel(package: Package, variant: Variant, is_counting: bool) *Compile {
     root.addImport("config", package.configOf(own, if (is_counting) own else &.{}, false));
     root.strip = package.optimize == .fast;
     const suffix = if (is_counting) "-counting" else "";
-    const object = b.addObject(.{
-        .name = b.fmt("kernel-{s}{s}", .{ variant.name(b.allocator), suffix }),
-        .root_module = root,
-    });
+    const name = b.fmt("kernel-{s}{s}", .{ variant.name(b.allocator), suffix });
+    const object = package.archive(name, root);
     if (package.optimize == .fast and variant.backend == .intrinsics) object.lto = .full;
     return object;
 }
 
-/// Links a program that traces with its kernels, and with the intrinsics where they call them.
-fn addKernels(package: Package, root: *Module) void {
-    for (package.kernels) |object| root.addObject(object);
-    for (package.held) |variant| {
-        if (variant.backend == .intrinsics) return root.addObject(package.intrinsics);
-    }
+/// An object in an archive, so that programs that do not refer to it do without.
+fn archive(package: Package, name: []const u8, root: *Module) *Compile {
+    return package.owner.addLibrary(.{ .linkage = .static, .name = name, .root_module = root });
 }
 
-/// Links a test program, which may trace and call the intrinsics itself.
-pub fn addToTests(package: Package, root: *Module) void {
-    for (package.kernels) |object| root.addObject(object);
-    root.addObject(package.intrinsics);
+/// Links a program with its kernels, and with the intrinsics for them and for itself.
+pub fn addKernels(package: Package, root: *Module) void {
+    for (package.kernels) |object| root.linkLibrary(object);
+    root.linkLibrary(package.intrinsics);
 }
 
 /// The program.
@@ -200,7 +195,7 @@ pub fn program(package: Package) *Compile {
 pub fn benchmark(package: Package, name: []const u8, root: []const u8) *Compile {
     const exe = package.addProgram(name, root);
     exe.root_module.strip = false;
-    exe.root_module.addObject(package.intrinsics);
+    exe.root_module.linkLibrary(package.intrinsics);
     if (package.optimize == .fast) exe.lto = .full;
     return exe;
 }

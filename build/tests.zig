@@ -152,7 +152,7 @@ fn commandLine(tests: Tests, target: Target) LazyPath {
 
 fn unitProgram(tests: Tests, target: Target) *Compile {
     const root = target.package.library();
-    target.package.addToTests(root);
+    target.package.addKernels(root);
     return tests.program("unit", root);
 }
 
@@ -168,7 +168,7 @@ fn integrationProgram(tests: Tests, target: Target) *Compile {
             .{ .name = "stb_image", .module = target.package.stbImage() },
         },
     });
-    target.package.addToTests(root);
+    target.package.addKernels(root);
     return tests.program("integration", root);
 }
 

@@ -9,15 +9,18 @@ const config = @import("config");
 const trace = @import("trace.zig");
 const variant = @import("variant.zig");
 
+/// Of this kernel; `trace/link.zig` tells kernels from programs by it.
+pub const kernel_variant = variant.default;
+
 const is_counting = config.counting.len > 0;
-const Kernel = trace.kernel.Kernel(variant.default, is_counting);
+const Kernel = trace.kernel.Kernel(kernel_variant, is_counting);
 
 fn work(render: *trace.Render, thread_index: usize) callconv(.c) void {
     trace.work(Kernel, render, thread_index);
 }
 
 comptime {
-    @export(&work, .{ .name = trace.link.workSymbol(trace.Render, variant.default, is_counting) });
+    @export(&work, .{ .name = trace.link.workSymbol(trace.Render, kernel_variant, is_counting) });
 }
 
 /// The program's: what prints a trace of the stack is large and has state.

@@ -121,7 +121,6 @@ fn run(
 
 /// The kernel of a variant. Asserts that the index is one of `variant.compiled`.
 fn workOf(comptime counting: bool, variant_index: usize) Render.Work {
-    _ = PanicOfKernels;
     const kernels = comptime kernels: {
         var list: [variant_file.compiled.len]Render.Work = undefined;
         for (&list, variant_file.compiled) |*to, held| {
@@ -133,18 +132,6 @@ fn workOf(comptime counting: bool, variant_index: usize) Render.Work {
     };
     return kernels[variant_index];
 }
-
-/// Exported once there is a kernel.
-const PanicOfKernels = struct {
-    comptime {
-        @export(&panicOfKernel, .{ .name = "rl_kernel_panic" });
-        assert(@TypeOf(panicOfKernel) == @TypeOf(link.rl_kernel_panic));
-    }
-
-    fn panicOfKernel(message: [*]const u8, byte_count: usize, _: usize) callconv(.c) noreturn {
-        @panic(message[0..byte_count]);
-    }
-};
 
 /// A picture under way: what a kernel is handed.
 pub const Render = struct {
