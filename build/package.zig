@@ -179,8 +179,8 @@ fn archive(package: Package, name: []const u8, root: *Module) *Compile {
 
 /// Links a program with its kernels, and with the intrinsics for them and for itself.
 pub fn addKernels(package: Package, root: *Module) void {
-    for (package.kernels) |object| root.linkLibrary(object);
-    root.linkLibrary(package.intrinsics);
+    for (package.kernels) |object| root.addObjectFile(object.getEmittedBin());
+    root.addObjectFile(package.intrinsics.getEmittedBin());
 }
 
 /// The program.
@@ -195,7 +195,7 @@ pub fn program(package: Package) *Compile {
 pub fn benchmark(package: Package, name: []const u8, root: []const u8) *Compile {
     const exe = package.addProgram(name, root);
     exe.root_module.strip = false;
-    exe.root_module.linkLibrary(package.intrinsics);
+    exe.root_module.addObjectFile(package.intrinsics.getEmittedBin());
     if (package.optimize == .fast) exe.lto = .full;
     return exe;
 }

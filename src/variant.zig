@@ -61,6 +61,7 @@ pub fn countingOf(comptime variant: Variant) Variant {
 
 fn listOf(comptime list_names: []const []const u8) []const Variant {
     comptime {
+        @setEvalBranchQuota(100_000);
         var list: []const Variant = &.{};
         for (list_names) |name| {
             var parts = std.mem.tokenizeScalar(u8, name, '-');
