@@ -1,7 +1,7 @@
 //! A kernel: the tracer of one variant, compiled into an object of its own.
 //!
-//! In: the build options, which name the variant and whether it counts tests. Out: one symbol, of
-//! what one thread does for a picture. Nothing in it is mutable but what it is handed, and no thread is
+//! In: the build options, which name the variant and whether it counts tests. Out: one symbol, the
+//! integrator behind pointers. Nothing in it is mutable but what it is handed, and no thread is
 //! started: the program that it is linked to does that, and panics for it.
 
 const std = @import("std");
@@ -14,13 +14,11 @@ pub const kernel_variant = variant.default;
 
 const is_counting = config.counting.len > 0;
 const Kernel = trace.kernel.Kernel(kernel_variant, is_counting);
-
-fn work(render: *trace.Render, thread_index: usize) callconv(.c) void {
-    trace.work(Kernel, render, thread_index);
-}
+const integrator: trace.Integrator = .of(trace.Whitted(Kernel));
 
 comptime {
-    @export(&work, .{ .name = trace.link.workSymbol(trace.Render, kernel_variant, is_counting) });
+    const symbol = trace.link.symbolOf(trace.Integrator, kernel_variant, is_counting);
+    @export(&integrator, .{ .name = symbol });
 }
 
 /// The program's: what prints a trace of the stack is large and has state.

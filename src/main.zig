@@ -10,6 +10,7 @@ const Allocator = std.mem.Allocator;
 const Io = std.Io;
 const assert = std.debug.assert;
 const Diagnostic = raylane.diagnostic.Diagnostic;
+const Film = raylane.film.Film;
 const Image = raylane.image.Image;
 const Options = raylane.options.Options;
 const Report = raylane.report.Report;
@@ -124,6 +125,7 @@ fn bench(
             error.CameraUnknown => .usage,
             error.InvalidInput, error.SceneTooLarge => .invalid,
             error.ImagesDiffer => .differ,
+            error.Canceled => unreachable, // Nobody does.
         };
     };
     return printBench(init.gpa, io, options, &results, &target, diagnostic);
@@ -247,6 +249,7 @@ fn renderAndReport(
             error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
             error.CameraUnknown => .usage,
             error.InvalidInput, error.SceneTooLarge => .invalid,
+            error.Canceled => unreachable, // Nobody does.
         };
     };
     return job.printReport(&report);
@@ -266,7 +269,8 @@ const Job = struct {
     /// Warnings that the user has seen.
     warning_count: usize = 0,
 
-    const Error = raylane.parse.Error || raylane.prepare.Error || error{OutputFailed};
+    const Error = raylane.parse.Error || raylane.prepare.Error || raylane.trace.Error ||
+        error{OutputFailed};
 
     fn run(job: *Job) Error!Report {
         if (!job.options.quiet) {
@@ -276,7 +280,7 @@ const Job = struct {
         return job.render();
     }
 
-    /// parse -> Scene -> prepare -> World -> trace -> Image -> output.
+    /// parse -> Scene -> prepare -> World -> trace -> Film -> output.
     fn render(job: *Job) Error!Report {
         const gpa = job.gpa;
         const io = job.io;
@@ -312,12 +316,15 @@ const Job = struct {
         job.sayWarnings();
         job.sayFacts(&world);
 
-        var image: Image = try .init(gpa, world.view.width, world.view.height);
-        defer image.deinit(gpa);
+        const view = &world.view;
+        const has_alpha = job.options.background == .transparent;
+        const layers: raylane.film.Layers = .init(.{ .color = true, .alpha = has_alpha });
+        var film: Film = try .init(gpa, view.width, view.height, layers);
+        defer film.deinit(gpa);
         const trace_start = Io.Clock.awake.now(io);
         const frame = world.frame();
         const settings = job.traceSettings();
-        const traced = raylane.trace.trace(variant_index, &frame, &image, settings);
+        const traced = try raylane.trace.trace(gpa, variant_index, &frame, &film, settings);
         times.trace_ns = since(io, trace_start);
         if (traced.non_finite_count > 0) job.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
@@ -325,16 +332,17 @@ const Job = struct {
         );
 
         const output_start = Io.Clock.awake.now(io);
-        try job.write(&image, &target);
+        try job.write(&film.image, &target);
         times.output_ns = since(io, output_start);
         times.total_ns = since(io, start);
 
-        var report = job.reportOf(&world, &image);
+        var report = job.reportOf(&world, &film.image);
         report.triangle_count = triangle_count;
         report.times = times;
         report.rays = traced.rays;
         if (job.options.count_tests) {
-            const counted = raylane.trace.traceCounting(variant_index, &frame, &image, settings);
+            const counted = try raylane.trace
+                .traceCounting(gpa, variant_index, &frame, &film, settings);
             report.tests = counted.tests;
         }
         return report;
@@ -413,7 +421,6 @@ const Job = struct {
             .sample_count = job.sample_count,
             .depth_max = job.depth,
             .tile_size = job.options.tile_size,
-            .transparent = job.options.background == .transparent,
             .progress = job.progress,
         };
     }

@@ -175,6 +175,7 @@ fn expectShadows(
     }
     const light: Light = .{
         .kind = kind,
+        .from_receiver = false,
         .position = place,
         .direction = vec3.sub(grid.origin, place),
         .intensity = .{ 1, 1, 1 },

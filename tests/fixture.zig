@@ -206,18 +206,19 @@ pub fn render(scene: *const Scene, options: Options) !Image {
 
 /// The picture of a world that has the variant's width of tree.
 pub fn renderWorld(world: *const World, options: Options) !Image {
-    var image: Image = try .init(gpa, world.view.width, world.view.height);
+    const layers: raylane.film.Layers = .init(.{ .color = true, .alpha = options.transparent });
+    var film: raylane.film.Film = try .init(gpa, world.view.width, world.view.height, layers);
+    errdefer film.deinit(gpa);
     // Every pixel must be written.
-    @memset(image.pixels, @splat(std.math.nan(f32)));
-    const traced = raylane.trace.trace(options.variant, &world.frame(), &image, .{
+    @memset(film.image.pixels, @splat(std.math.nan(f32)));
+    const traced = try raylane.trace.trace(gpa, options.variant, &world.frame(), &film, .{
         .thread_count = options.thread_count,
         .sample_count = options.sample_count,
         .depth_max = options.depth_max,
         .tile_size = options.tile_size,
-        .transparent = options.transparent,
     });
     try std.testing.expectEqual(0, traced.non_finite_count);
-    return image;
+    return film.image;
 }
 
 /// A material without reflection, lit or shining by itself only.

@@ -50,7 +50,7 @@ pub fn bruteForce(world: *const World, query: Query) Hit {
             .splat(world.geometry.positions[corners.corner[1]]),
             .splat(world.geometry.positions[corners.corner[2]]),
         };
-        const hit = triangle.intersect(Single, p, ray.line, world.geometry.pad);
+        const hit = triangle.intersect(Single, p, ray.line, &world.geometry.padding);
         const primitive: Single.I32 = .splat(@intCast(number));
         const accepted = hit.mask
             .bitAnd(ray.tnear.isBefore(hit.t, primitive))
@@ -95,7 +95,60 @@ fn expectVariant(
             .trace(Kernel, .any_hit, &world.geometry, &shadow, &counts);
         try std.testing.expectEqual(found, blocked);
     }
+    const size = Kernel.group_count * Kernel.ray_count;
+    var first: usize = 0;
+    while (first < queries.len) : (first += size) {
+        const end = @min(first + size, queries.len);
+        try expectMultiHit(Kernel, world, queries[first..end], expected[first..end]);
+    }
     if (Kernel.ray_count > 1) try expectBundles(Kernel, world, queries, expected);
+}
+
+/// One way through the tree finds the first hits in order, or that one of them stops all light.
+fn expectMultiHit(
+    comptime Kernel: type,
+    world: *const World,
+    queries: []const Query,
+    expected: []const Hit,
+) !void {
+    const lists = try gpa.create(raylane.trace.multi_hit.HitLists(Kernel));
+    defer gpa.destroy(lists);
+    var material = std.mem.zeroes(raylane.world.Material);
+    material.alpha_cutoff = -1;
+    lists.geometry = &world.geometry;
+    lists.materials = (&material)[0..1];
+    for ([_]f32{ 0, 1 }) |transmission| {
+        material.transmission = transmission;
+        var counts: raylane.statistics.TestCounts = .{};
+        var bundle = makeBundle(Kernel, queries);
+        lists.trace(&bundle, &counts);
+        for (queries, expected, 0..) |query, hit, index| {
+            if (!isActive(index)) continue;
+            const group = index / Kernel.ray_count;
+            const lane = index % Kernel.ray_count;
+            const stopped = lists.stopped[group] >> @intCast(lane) & 1 == 1;
+            const met = hit.primitive != ray_file.no_primitive;
+            try std.testing.expectEqual(transmission == 0 and met, stopped);
+            // Brute force takes its time.
+            if (transmission == 0 or index % 8 != 0) continue;
+            try expectList(world, query, &lists.lists[group][lane]);
+        }
+    }
+}
+
+/// The hits of a ray are those that brute force finds one behind the other.
+fn expectList(
+    world: *const World,
+    query: Query,
+    list: *const raylane.trace.multi_hit.HitList,
+) !void {
+    var next = query;
+    for (list.hits[0..list.count]) |hit| {
+        next.tnear = bruteForce(world, next);
+        try expectHit(next.tnear, hit.t, hit.primitive);
+    }
+    if (list.count == list.hits.len) return;
+    try std.testing.expectEqual(ray_file.no_primitive, bruteForce(world, next).primitive);
 }
 
 fn expectBundles(

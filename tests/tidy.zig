@@ -27,10 +27,8 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
     .{ .part = "scene", .may_import = &.{} },
     .{ .part = "prepare", .may_import = &.{ "scene", "world", "simd", "variant", "parallel" } },
     .{ .part = "world", .may_import = &.{} },
-    .{
-        .part = "trace",
-        .may_import = &.{ "world", "image", "options", "variant", "simd", "parallel" },
-    },
+    .{ .part = "trace", .may_import = &.{ "world", "film", "variant", "simd", "parallel" } },
+    .{ .part = "film", .may_import = &.{"image"} },
     .{ .part = "image", .may_import = &.{} },
     .{ .part = "output", .may_import = &.{ "image", "parallel" } },
     .{ .part = "report", .may_import = &.{ "config", "options", "variant", "world" } },
@@ -39,7 +37,7 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
         // The second program, beside `main`, that leads scenes through all stages.
         .part = "bench",
         .may_import = &.{
-            "parse", "prepare", "trace", "world", "image", "options", "variant", "energy",
+            "parse", "prepare", "trace", "world", "film", "options", "variant", "energy",
         },
     },
     .{ .part = "diagnostic", .may_import = &.{} },
@@ -50,6 +48,16 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
 /// Parts that import no other part and that all may import; `raylane` re-exports everything.
 const leaves = [_][]const u8{
     "diagnostic", "huge_pages", "identity", "math", "statistics", "std", "builtin",
+};
+
+/// Folders of a part, and which others of its files each may import besides its own.
+const rooms = [_]struct { room: []const u8, may_import: []const []const u8 }{
+    .{ .room = "src/trace/traverse/", .may_import = &.{} },
+    .{ .room = "src/trace/shade/", .may_import = &.{} },
+    .{
+        .room = "src/trace/integrate/",
+        .may_import = &.{ "src/trace/traverse/", "src/trace/shade/" },
+    },
 };
 
 /// Where the compiler starts to read; every other Zig file is imported from one of them.
@@ -298,6 +306,41 @@ test "an import against the way of the data is found" {
     );
     try expectFinding(rule, "src/new.zig", "", "src/new.zig:1: 'new' is not in tidy's table");
     try expectFinding(rule, "src/raylane.zig", "const a = @import(\"trace.zig\");", null);
+}
+
+fn checkRooms(findings: *Findings, file: File) Allocator.Error!void {
+    const row = for (rooms) |row| {
+        if (std.mem.startsWith(u8, file.path, row.room)) break row;
+    } else return;
+    const part = partOf(file.path).?;
+    imports: for (try importsOf(findings.arena, file)) |import| {
+        const path = try resolve(findings.arena, file.path, import.name);
+        const target = partOf(path) orelse continue;
+        if (!std.mem.eql(u8, target, part) or std.mem.startsWith(u8, path, row.room)) continue;
+        for (row.may_import) |room| if (std.mem.startsWith(u8, path, room)) continue :imports;
+        try findings.add(file.path, import.line_index, "'{s}' may not import '{s}'", .{
+            row.room, path,
+        });
+    }
+}
+
+test "rooms of a part know each other in one direction" {
+    try expectTidy(checkRooms);
+}
+
+test "an import against the direction of rooms is found" {
+    try expectFinding(checkRooms, "src/trace/integrate/a.zig",
+        \\const a = @import("../../world.zig");
+        \\const b = @import("b.zig");
+        \\const c = @import("../shade/c.zig");
+        \\const d = @import("../../trace.zig");
+    , "src/trace/integrate/a.zig:4: 'src/trace/integrate/' may not import 'src/trace.zig'");
+    try expectFinding(checkRooms, "src/trace/shade/a.zig",
+        \\const a = @import("../traverse/beam/b.zig");
+    , "src/trace/shade/a.zig:1: 'src/trace/shade/' may not import " ++
+        "'src/trace/traverse/beam/b.zig'");
+    const down = "const a = @import(\"trace/shade/a.zig\");";
+    try expectFinding(checkRooms, "src/trace.zig", down, null);
 }
 
 /// Lists the Zig files that no root leads to.

@@ -69,7 +69,7 @@ pub fn Tracer(comptime Kernel: type) type {
                     bundle_file.trace(Kernel, query, geometry, group, tests);
                     continue;
                 }
-                const view = bundle_file.viewOf(Lanes, group);
+                const view = bundle_file.viewOf(Lanes, &geometry.padding, group);
                 raylane.trace.single.traceEach(Kernel, query, geometry, group, &view, tests);
             }
         }
@@ -84,7 +84,7 @@ pub fn Tracer(comptime Kernel: type) type {
             for (&batch.groups, &batch.shares, hits) |*group, *all, hit| {
                 if (hit.none()) continue;
                 const primitive: Lanes.I32 = .select(hit, group.closest.primitive, .zero());
-                const weights = edgeFunctions(tracer.gather(primitive), group.line, hit);
+                const weights = edgeFunctions(tracer.cornersOf(primitive, hit), group.line, hit);
                 const share = Lanes.F32.splat(1).div(weights.sum());
                 const both = [2]Lanes.F32{ weights.b.mul(share), weights.c.mul(share) };
                 for (all, both) |*to, value| {
@@ -102,6 +102,18 @@ pub fn Tracer(comptime Kernel: type) type {
                 const numbers = geometry.triangles[@intCast(primitives[@ctz(hits)])].corner;
                 inline for (numbers) |number| @prefetch(&geometry.positions[number], .{});
             }
+        }
+
+        /// Corners of what was hit: neighbours mostly hit the same.
+        fn cornersOf(tracer: *const Self, primitives: Lanes.I32, hit: Lanes.Mask) [3]Lanes.Vec3 {
+            const one = primitives.lane(@ctz(hit.bits()));
+            if (hit.andNot(primitives.eq(.splat(one))).any()) return tracer.gather(primitives);
+            const geometry = &tracer.world.geometry;
+            var corners: [3]Lanes.Vec3 = undefined;
+            for (&corners, geometry.triangles[@intCast(one)].corner) |*corner, number| {
+                corner.* = .splat(geometry.positions[number]);
+            }
+            return corners;
         }
 
         fn gather(tracer: *const Self, primitives: Lanes.I32) [3]Lanes.Vec3 {
@@ -126,7 +138,8 @@ pub fn Tracer(comptime Kernel: type) type {
             hit: Lanes.Mask,
         ) triangle.EdgeFunctions(Lanes) {
             const axis: ray_file.LongAxis(Lanes) = .of(line.direction);
-            const view: ray_file.ShearedRay(Lanes) = .init(line, axis);
+            const padding = &raylane.world.Padding.init(@splat(0), .empty);
+            const view: ray_file.ShearedRay(Lanes) = .init(line, axis, padding);
             const turned: [3]Lanes.Vec3 = .{
                 axis.turn(corners[0]), axis.turn(corners[1]), axis.turn(corners[2]),
             };

@@ -13,7 +13,7 @@ const trace_file = @import("../trace.zig");
 const variant_file = @import("../variant.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Identity = @import("../identity.zig").Identity;
-const Image = @import("../image.zig").Image;
+const Film = @import("../film.zig").Film;
 const World = @import("../world.zig").World;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -38,15 +38,15 @@ pub const Stages = struct {
     diagnostic: *Diagnostic,
     meter: ?*energy.Meter,
     progress: std.Progress.Node,
-    image: Image,
+    film: Film,
     world: ?World = null,
     triangle_count: u64 = 0,
     /// By variant; tests depend on traversal and lanes alone.
     counts: [variant_file.compiled.len]?statistics.TestCounts = @splat(null),
 
-    pub const Error = parse.Error || prepare_file.Error;
+    pub const Error = parse.Error || prepare_file.Error || trace_file.Error;
 
-    /// Takes memory for the image.
+    /// Takes memory for the film.
     pub fn init(
         gpa: Allocator,
         io: Io,
@@ -62,13 +62,13 @@ pub const Stages = struct {
             .diagnostic = diagnostic,
             .meter = meter,
             .progress = progress,
-            .image = try .init(gpa, settings.width, settings.height),
+            .film = try .init(gpa, settings.width, settings.height, .init(.{ .color = true })),
         };
     }
 
     pub fn deinit(stages: *Stages) void {
         if (stages.world) |*world| world.deinit();
-        stages.image.deinit(stages.gpa);
+        stages.film.deinit(stages.gpa);
         stages.* = undefined;
     }
 
@@ -100,16 +100,16 @@ pub const Stages = struct {
     }
 
     /// Traces the image by a variant for whose width the tree was built.
-    pub fn trace(stages: *Stages, variant: usize, thread_count: usize) rounds.Traced {
+    pub fn trace(stages: *Stages, variant: usize, thread_count: usize) Error!rounds.Traced {
         const start_ns = stages.now();
         const frame = stages.world.?.frame();
         const settings = stages.traceSettings(thread_count);
-        const traced = trace_file.trace(variant, &frame, &stages.image, settings);
+        const traced = try trace_file.trace(stages.gpa, variant, &frame, &stages.film, settings);
         return .{ .trace_ns = stages.now() - start_ns, .rays = traced.rays };
     }
 
     /// Tests of boxes and triangles, by a pass that is not timed.
-    pub fn count(stages: *Stages, variant: usize) statistics.TestCounts {
+    pub fn count(stages: *Stages, variant: usize) Error!statistics.TestCounts {
         const compiled = variant_file.compiled;
         for (compiled, stages.counts) |other, counted| {
             if (other.traversal != compiled[variant].traversal) continue;
@@ -118,7 +118,8 @@ pub const Stages = struct {
         }
         const frame = stages.world.?.frame();
         const settings = stages.traceSettings(stages.settings.thread_count);
-        const traced = trace_file.traceCounting(variant, &frame, &stages.image, settings);
+        const traced = try trace_file
+            .traceCounting(stages.gpa, variant, &frame, &stages.film, settings);
         stages.counts[variant] = traced.tests;
         return traced.tests.?;
     }
@@ -132,7 +133,7 @@ pub const Stages = struct {
     }
 
     pub fn hash(stages: *const Stages) u64 {
-        return stages.image.hash();
+        return stages.film.image.hash();
     }
 
     /// A clock that never goes back, in nanoseconds.

@@ -2,19 +2,19 @@
 //!
 //! Kernels are compiled by themselves, and what they share with the program are Zig's structures,
 //! whose layout is the compiler's choice. So the name of a kernel's symbol ends with a hash of all
-//! layouts that can be reached from `Render`: where the two sides do not agree, linking fails.
+//! layouts that its functions lead to: where the two sides do not agree, linking fails.
 
 const std = @import("std");
 const Variant = @import("../variant.zig").Variant;
 
-/// Name of the symbol behind which a variant does its share of a picture.
-pub fn workSymbol(
-    comptime Render: type,
+/// Name of the symbol of a variant's `Face`, through which it is called.
+pub fn symbolOf(
+    comptime Face: type,
     comptime variant: Variant,
     comptime counting: bool,
 ) [:0]const u8 {
-    return std.fmt.comptimePrint("rl_work_{s}{s}_{x:0>16}", .{
-        variant.name(), if (counting) "_counting" else "", layoutOf(Render),
+    return std.fmt.comptimePrint("rl_{s}{s}_{x:0>16}", .{
+        variant.name(), if (counting) "_counting" else "", layoutOf(Face),
     });
 }
 
@@ -50,7 +50,12 @@ const Layout = struct {
         const info = @typeInfo(T);
         layout.mixText(@tagName(info));
         switch (info) {
-            .@"fn", .@"opaque" => return,
+            .@"opaque" => return,
+            .@"fn" => |function| {
+                for (function.param_types) |Parameter| if (Parameter) |Known| layout.add(Known);
+                if (function.return_type) |Result| layout.add(Result);
+                return;
+            },
             .pointer => |pointer| layout.add(pointer.child),
             .optional => |optional| layout.add(optional.child),
             .array => |array| layout.add(array.child),

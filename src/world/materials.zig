@@ -14,8 +14,8 @@ pub const Material = struct {
     dielectric_f0: f32,
     ior: f32,
     transmission: f32,
-    /// Beer-Lambert absorption inside, per metre; 0 outside of volumes.
-    absorption: Vec3,
+    /// Beer-Lambert absorption coefficient inside, per metre; 0 outside of volumes.
+    sigma_a: Vec3,
     /// Alpha below it is a hole; -1 for materials without holes.
     alpha_cutoff: f32,
     /// 1: alpha blends, 0: alpha counts as 1.

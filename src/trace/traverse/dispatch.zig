@@ -51,7 +51,7 @@ pub fn anyHit(
 ) void {
     if (Kernel.variant.traversal != .beam)
         return bySelf(Kernel, .any_hit, geometry, bundle, counts);
-    switch (coherence) {
+    switch (if (light.from_receiver) .none else coherence) {
         .none => byInterval(Kernel, .any_hit, geometry, bundle, counts),
         .all => shadow.trace(Kernel, geometry, light, bundle, counts),
     }

@@ -1,7 +1,8 @@
 //! Depth-first, front-to-back traversal of the wide BVH, generic over what is searched for.
 //!
 //! In: a search, which knows what it looks for (a ray: single.zig; rays in lanes: bundle.zig; a
-//! packet: interval_packet.zig; a beam: beam/traverse.zig). Out: whether it found anything. The hits are the search's own.
+//! packet: interval_packet.zig; a beam: beam/traverse.zig). Out: whether it found anything. The
+//! hits are the search's own.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -16,6 +17,8 @@ pub const Query = enum {
     closest_hit,
     /// Whether there is a hit; which one is found depends on the tree.
     any_hit,
+    /// The first few hits in that order, unless something stops the ray: multi_hit.zig.
+    multi_hit,
 };
 
 /// Searches the whole tree, or until `search.isDone()`. Of a search it needs

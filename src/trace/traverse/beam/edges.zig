@@ -28,7 +28,6 @@
 //! for what is of second order.
 
 const std = @import("std");
-const world_file = @import("../../../world.zig");
 
 /// Half a unit in the last place of 1.
 pub const unit_roundoff: f32 = 0x1p-24;
@@ -53,14 +52,7 @@ pub const turning_roundings = 64.0;
 /// Outside of this range of L^2 and R, in metres, products may leave the range of floats.
 pub const length_squared_min = 0x1p-80;
 /// See `length_squared_min`.
-const reach_limit = 1e11;
-
-/// The largest R for which bounds hold: boxes are grown for rays of no more than a certain length
-/// (`Geometry.pad`), so that the exact test accepts whatever is surely inside the edges.
-pub fn reachMax(geometry: *const world_file.Geometry) f32 {
-    const covered = geometry.pad / world_file.pad_relative;
-    return if (covered < reach_limit) covered else reach_limit;
-}
+pub const reach_max = 1e11;
 
 /// Triangles of a pack in lanes, turned so that edge functions are positive within.
 pub fn Edges(comptime Lanes: type) type {
@@ -77,11 +69,7 @@ pub fn Edges(comptime Lanes: type) type {
 
         /// Sets up the triangles of a pack. Bounds do not hold for those with a corner farther
         /// away than `reach_max`.
-        pub inline fn init(
-            corners: [3]Vec3,
-            origin: Vec3,
-            reach_max: f32,
-        ) Self {
+        pub inline fn init(corners: [3]Vec3, origin: Vec3) Self {
             const a = corners[0].sub(origin);
             const b = corners[1].sub(origin);
             const c = corners[2].sub(origin);

@@ -64,7 +64,7 @@ pub fn meet(
 ) triangle.WeightedIntersection(Kernel.Rays) {
     @branchHint(.cold);
     const corners = splat(Kernel, geometry.tree.get(Kernel.width), slot);
-    return triangle.intersect(Kernel.Rays, corners, group.line, geometry.pad);
+    return triangle.intersect(Kernel.Rays, corners, group.line, &geometry.padding);
 }
 
 /// Of rays that hit the triangle in `slot` at `t`, those whose own triangles in `others` do not
@@ -84,7 +84,7 @@ pub fn comeFirst(
     if (met.none()) return rays;
     const tree = geometry.tree.get(Kernel.width);
     const gathered = gather(Kernel, tree, others);
-    const other = triangle.intersect(Rays, gathered.corners, group.line, geometry.pad);
+    const other = triangle.intersect(Rays, gathered.corners, group.line, &geometry.padding);
     assert(met.andNot(other.mask).none());
     const number: Rays.I32 = .splat(primitiveAt(Kernel.width, tree, slot));
     const first = t.lt(other.t).bitOr(t.eq(other.t).bitAnd(gathered.primitive.gt(number)));

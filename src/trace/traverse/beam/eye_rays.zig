@@ -80,8 +80,12 @@ fn EyeRays(comptime Kernel: type) type {
             const along = grid.depthNormal() orelse return false;
             set.geometry = geometry;
             set.bundle = bundle;
-            set.projection = .init(grid, edges_file.reachMax(geometry));
-            set.frustum = .init(grid.origin, sides, along, frustum_file.slackOf(geometry));
+            set.projection = .init(grid);
+            set.frustum = .init(grid.origin, sides, along, .{
+                .apart = frustum_file.apartOf(&geometry.padding, grid.origin),
+                .by_depth = frustum_file.by_distance * grid.longest() +
+                    edges_file.unit_roundoff * grid.deviation_roundings,
+            });
             set.dual = .of(grid);
             set.buffer.clear(bundle);
             return true;

@@ -2,23 +2,35 @@
 //! Algorithms for Bounding Boxes"): four planes around a beam against all children of a node.
 //!
 //! In: normals that point inward. Out: which children the beam may meet, and the least depth at
-//! which. Conservative: planes stand off by `slack_pads` times `Geometry.pad`, which covers the
-//! rounding of boxes, of ray directions and of the planes themselves. Of a box only the corner
+//! which. Conservative: planes stand off the rays and lean away from them (`Slack`), which covers
+//! the rounding of boxes, of ray directions and of the planes themselves. Of a box only the corner
 //! farthest along a plane's normal counts.
 
 const std = @import("std");
 const world_file = @import("../../../world.zig");
+const vec3 = @import("../../../math.zig").vec3;
+const ray_file = @import("../ray.zig");
 const assert = std.debug.assert;
 
-/// `Geometry.pad` is at least 32 u R and 4 u X for distances R and coordinates X (`pad.zig`). A
-/// fused plane equation in coordinates of the scene is off by at most 6 u (2 X + R) of the length
-/// of its normal; directions that are linear in the pixel up to 24 u put a ray off by 24 u R.
-const slack_pads = 8.0;
+/// By how much, over the distance R from the rays' origin, what a ray meets may lie beside it: 6 u
+/// by the exact test, 6 u by the rounding of normals. A fused plane equation in coordinates of the
+/// scene is off by 3 u of those of the point and 6 u of those of the origin: 3 u R and 9 u of the
+/// latter, see `apartOf`. 64 is four times that.
+pub const by_distance = 64 * 0x1p-24;
 
-/// How far, in metres, planes stand off the rays.
-pub fn slackOf(geometry: *const world_file.Geometry) f32 {
-    return slack_pads * geometry.pad;
+/// How far, in metres, what a ray from this origin meets may lie beside it at any distance.
+pub fn apartOf(padding: *const world_file.Padding, origin: [3]f32) f32 {
+    return 8 * padding.shiftOf(ray_file.Single, .splat(origin)).lane(0);
 }
+
+/// How far, in metres of the maximum norm, what is met may lie beside the rays.
+pub const Slack = struct {
+    apart: f32,
+    /// And so much more for each unit of depth: from the origin on,
+    by_depth: f32,
+    /// or up to this depth, where parallel rays end.
+    ends_at: ?f32 = null,
+};
 
 /// Components of a normal are at least this long, so that infinite corners of empty boxes never
 /// meet a zero.
@@ -89,14 +101,28 @@ pub fn Frustum(comptime Lanes: type) type {
 
         const Self = @This();
 
-        /// Planes that stand off `origin` by `slack` metres. Depth is counted along `depth_normal`
-        /// from there.
-        pub fn init(origin: [3]f32, normals: [4][3]f32, depth_normal: [3]f32, slack: f32) Self {
+        /// Planes through `origin`, but for the slack. Depth is counted along `depth_normal` from
+        /// there.
+        pub fn init(
+            origin: [3]f32,
+            normals: [4][3]f32,
+            depth_normal: [3]f32,
+            slack: Slack,
+        ) Self {
+            const parallel = slack.ends_at != null;
+            const shrink = if (parallel) 1 else 1 - slack.by_depth * vec3.length1(depth_normal);
+            const along = vec3.scale(depth_normal, shrink);
             var frustum: Self = .{
                 .sides = undefined,
-                .depth = .init(depth_normal, origin, -slack),
+                .depth = .init(along, origin, -slack.apart),
             };
-            for (&frustum.sides, normals) |*side, normal| side.* = .init(normal, origin, slack);
+            for (&frustum.sides, normals) |*side, normal| {
+                const lean = slack.by_depth * vec3.length1(normal);
+                const toward = if (parallel) -lean else lean;
+                const leaning = vec3.add(normal, vec3.scale(depth_normal, toward));
+                side.* = .init(leaning, origin, slack.apart);
+                if (slack.ends_at) |depth| side.offset += lean * depth;
+            }
             return frustum;
         }
 

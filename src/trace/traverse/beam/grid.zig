@@ -34,7 +34,7 @@ pub const Grid = struct {
         return vec3.add(grid.corner, vec3.add(vec3.scale(grid.right, x), vec3.scale(grid.down, y)));
     }
 
-    /// Inward normals of the pyramid around the rays, or null where these are too far apart for one.
+    /// Inward normals of the pyramid around the rays; null where these are too far apart for one.
     pub fn sides(grid: *const Grid) ?[4][3]f32 {
         if (!(grid.spread() <= 0.5 * vec3.length1(grid.corner))) return null;
         const corners = [4][3]f32{

@@ -70,8 +70,9 @@ pub const Dual = struct {
         facet: *const edges_file.Facet(Lanes),
     ) struct { PixelWindow(Lanes.I32), Lanes.Mask } {
         const F32 = Lanes.F32;
+        const end: Lanes.I32 = .splat(side - 1);
         var window: PixelWindow(Lanes.I32) =
-            .{ .first_x = .zero(), .first_y = .zero(), .last_x = .splat(side - 1), .last_y = .splat(side - 1) };
+            .{ .first_x = .zero(), .first_y = .zero(), .last_x = end, .last_y = end };
         const small = facet.length.mul(.splat(dual.gain)).lt(facet.reach.mul(.splat(side)));
         if (small.none()) return .{ window, .splat(true) };
         const inf: F32 = .splat(std.math.inf(f32));
@@ -95,28 +96,26 @@ pub const Dual = struct {
             .mul(.splat(16 * edges_file.unit_roundoff * dual.gain));
         // Also where |t| is so small that rounding may have turned its sign.
         const bounded = least_t.gt(.zero()).bitAnd(margin.lt(.splat(side)));
-        const first = [2]Lanes.I32{ firstOf(Lanes, low[0], margin), firstOf(Lanes, low[1], margin) };
-        const last = [2]Lanes.I32{ lastOf(Lanes, high[0], margin), lastOf(Lanes, high[1], margin) };
         window = .{
-            .first_x = .select(bounded, first[0], window.first_x),
-            .first_y = .select(bounded, first[1], window.first_y),
-            .last_x = .select(bounded, last[0], window.last_x),
-            .last_y = .select(bounded, last[1], window.last_y),
+            .first_x = .select(bounded, firstOf(Lanes, low[0].sub(margin)), .zero()),
+            .first_y = .select(bounded, firstOf(Lanes, low[1].sub(margin)), .zero()),
+            .last_x = .select(bounded, lastOf(Lanes, high[0].add(margin)), end),
+            .last_y = .select(bounded, lastOf(Lanes, high[1].add(margin)), end),
         };
         const empty = window.first_x.gt(window.last_x).bitOr(window.first_y.gt(window.last_y));
         return .{ window, empty.bitNot() };
     }
 
-    /// The first whole number of the tile from `low` less a margin on.
-    inline fn firstOf(comptime Lanes: type, low: Lanes.F32, margin: Lanes.F32) Lanes.I32 {
+    /// The first whole number of the tile from here on.
+    inline fn firstOf(comptime Lanes: type, low: Lanes.F32) Lanes.I32 {
         // Just below 1, so that a whole number stays what it is.
         const up: Lanes.F32 = .splat(1 - 0x1p-10);
-        return low.sub(margin).add(up).maxFast(.zero()).minFast(.splat(side)).toI32();
+        return low.add(up).maxFast(.zero()).minFast(.splat(side)).toI32();
     }
 
-    /// The last whole number of the tile up to `high` and a margin.
-    inline fn lastOf(comptime Lanes: type, high: Lanes.F32, margin: Lanes.F32) Lanes.I32 {
-        const past = high.add(margin).add(.splat(1)).maxFast(.zero()).minFast(.splat(side));
+    /// The last whole number of the tile up to here.
+    inline fn lastOf(comptime Lanes: type, high: Lanes.F32) Lanes.I32 {
+        const past = high.add(.splat(1)).maxFast(.zero()).minFast(.splat(side));
         return past.toI32().sub(.splat(1));
     }
 };

@@ -24,7 +24,8 @@ pub fn Linear(comptime Value: type) type {
 
         /// In lanes, times a factor.
         pub inline fn scale(form: @This(), factor: Value) @This() {
-            return .{ .u = form.u.mul(factor), .v = form.v.mul(factor), .one = form.one.mul(factor) };
+            const one = form.one.mul(factor);
+            return .{ .u = form.u.mul(factor), .v = form.v.mul(factor), .one = one };
         }
 
         /// A form of numbers, at places in lanes.
@@ -39,8 +40,6 @@ pub const ErrorScale = struct {
     /// Of edge functions and of nearness.
     edge: f32,
     nearness: f32,
-    /// See `edges.reachMax`.
-    reach_max: f32,
 };
 
 /// Triangles of a pack in lanes.
@@ -75,14 +74,13 @@ pub const GridProjection = struct {
 
     /// Of directions no longer than |D| that the grid has within d: that moves an edge function by
     /// 2 R L d, 1/t by L^2 / |det| d.
-    pub fn init(grid: *const Grid, reach_max: f32) GridProjection {
+    pub fn init(grid: *const Grid) GridProjection {
         const longest = grid.longest();
         const off = 2 * grid.deviation_roundings;
         return .{ .grid = grid.*, .scale = .{
             .edge = unit * (edges_file.edge_roundings * longest +
                 edges_file.step_roundings * grid.spread() + off),
             .nearness = unit * (edges_file.inverse_roundings * longest + off),
-            .reach_max = reach_max,
         } };
     }
 
@@ -93,7 +91,7 @@ pub const GridProjection = struct {
         corners: [3]Lanes.Vec3,
     ) ProjectedTriangle(Lanes) {
         const origin: Lanes.Vec3 = .splat(projection.grid.origin);
-        const edges: edges_file.Edges(Lanes) = .init(corners, origin, projection.scale.reach_max);
+        const edges: edges_file.Edges(Lanes) = .init(corners, origin);
         var projected: ProjectedTriangle(Lanes) = .{
             .edge = undefined,
             .slack = edges.slack.mul(.splat(projection.scale.edge)),
@@ -151,14 +149,14 @@ pub const LightProjection = struct {
     scale: ErrorScale = undefined,
 
     /// Of rays whose slopes are at most so much along each axis.
-    pub fn bound(projection: *LightProjection, slope_max: f32, reach_max: f32) void {
+    pub fn bound(projection: *LightProjection, slope_max: f32) void {
         const stretch = @sqrt(1 + 2 * slope_max * slope_max);
         const parallel = projection.slope != null;
         projection.stretch = stretch;
         projection.scale = .{
             .edge = unit * stretch * edges_file.edge_roundings * if (parallel) stretch else 1,
-            .nearness = if (parallel) unit * stretch else unit * stretch * edges_file.inverse_roundings,
-            .reach_max = reach_max,
+            .nearness = unit * stretch *
+                if (parallel) @as(f32, 1) else edges_file.inverse_roundings,
         };
     }
 
@@ -193,7 +191,7 @@ pub const LightProjection = struct {
     ) ProjectedTriangle(Lanes) {
         if (projection.slope) |slope| return projection.projectParallel(Lanes, corners, slope);
         const origin: Lanes.Vec3 = .splat(projection.origin);
-        const edges: edges_file.Edges(Lanes) = .init(corners, origin, projection.scale.reach_max);
+        const edges: edges_file.Edges(Lanes) = .init(corners, origin);
         var projected: ProjectedTriangle(Lanes) = .{
             .edge = undefined,
             .slack = edges.slack.mul(.splat(projection.scale.edge)),
@@ -253,7 +251,7 @@ pub const LightProjection = struct {
                     reach.mul(.splat(projection.stretch)),
                     length_squared,
                     length,
-                ).bitAnd(reach.lt(.splat(projection.scale.reach_max))),
+                ).bitAnd(reach.lt(.splat(edges_file.reach_max))),
                 .reach = reach,
                 .length = length,
                 .corner = a,
@@ -262,7 +260,8 @@ pub const LightProjection = struct {
                 .det = area,
             },
         };
-        inline for (&projected.edge, sides, [3]Vec3{ c.add(b), a.add(c), b.add(a) }) |*to, by, sum| {
+        const sums = [3]Vec3{ c.add(b), a.add(c), b.add(a) };
+        inline for (&projected.edge, sides, sums) |*to, by, sum| {
             const u = by.x.sub(by.z.mul(along.x)).mul(flip);
             const v = by.y.sub(by.z.mul(along.y)).mul(flip);
             const middle_u = sum.x.sub(sum.z.mul(along.x)).mul(.splat(0.5));

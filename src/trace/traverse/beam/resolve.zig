@@ -88,7 +88,7 @@ fn apart(
         if (there.none()) continue;
         const tree = geometry.tree.get(Kernel.width);
         const gathered = exact.gather(Kernel, tree, own);
-        const hit = triangle.intersect(Rays, gathered.corners, group.line, geometry.pad);
+        const hit = triangle.intersect(Rays, gathered.corners, group.line, &geometry.padding);
         assert(there.andNot(hit.mask).none());
         group.closest = .{
             .t = .select(there, hit.t, group.closest.t),
@@ -111,17 +111,23 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
             lower: Vec3,
             upper: Vec3,
 
-            /// Minima and maxima are those of `triangle.locate`.
-            inline fn of(pad: f32, corners: [3]Vec3, origin: [3]f32) Placed {
-                const grow: Vec3 = .splat(@splat(pad));
+            inline fn of(
+                padding: *const world_file.Padding,
+                corners: [3]Vec3,
+                origin: [3]f32,
+                shift_length: f32,
+            ) Placed {
                 const from: Vec3 = .splat(origin);
+                const shift: Vec3 = .splat(@splat(shift_length));
                 const a = turn(corners[0]);
                 const b = turn(corners[1]);
                 const c = turn(corners[2]);
+                const center: Vec3 = .splat(turned(padding.center));
+                const lower, const upper = triangle.boundsOf(Rays, .{ a, b, c }, padding, center);
                 return .{
                     .offsets = .{ a.sub(from), b.sub(from), c.sub(from) },
-                    .lower = c.min(b.min(a)).sub(grow).sub(from),
-                    .upper = c.max(b.max(a)).add(grow).sub(from),
+                    .lower = lower.sub(from.add(shift)),
+                    .upper = upper.sub(from.sub(shift)),
                 };
             }
         };
@@ -134,7 +140,9 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
             buffer: *TileDepthBuffer(Kernel),
             bundle: *bundle_file.Bundle(Kernel),
         ) void {
+            const padding = &geometry.padding;
             const origin = turned(grid.origin);
+            const shift = padding.shiftOf(ray_file.Single, .splat(grid.origin)).lane(0);
             const down = turned(course.negative);
             var last: Last = .{};
             for (0..Kernel.subtile_count) |subtile| {
@@ -151,7 +159,7 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
                         if (slot == exact.no_slot) continue;
                         if (slot != last.slot) last = .{
                             .slot = slot,
-                            .placed = .of(geometry.pad, exact.splat(Kernel, tree, slot), origin),
+                            .placed = .of(padding, exact.splat(Kernel, tree, slot), origin, shift),
                             .primitive = .splat(exact.primitiveAt(Kernel.width, tree, slot)),
                         };
                         const hit = intersect(group, &last.placed, down, .splat(true));
@@ -160,7 +168,7 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
                     }
                     const there = lanes.gt(.splat(exact.no_slot));
                     const gathered = exact.gather(Kernel, tree, own);
-                    const each: Placed = .of(geometry.pad, gathered.corners, origin);
+                    const each: Placed = .of(padding, gathered.corners, origin, shift);
                     const hit = intersect(group, &each, down, there);
                     assert(there.andNot(hit.mask).none());
                     group.closest = .{
@@ -216,9 +224,9 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
                 .weights = weights,
             };
             const negative = [3]Rays.Mask{ .splat(down[0]), .splat(down[1]), .splat(down[2]) };
-            const near = triangle.select3(Rays, negative, placed.upper, placed.lower);
-            const far = triangle.select3(Rays, negative, placed.lower, placed.upper);
-            const range = box.slabOffsets(Rays, near, far, .{
+            const near = box.select3(Rays, negative, placed.upper, placed.lower);
+            const far = box.select3(Rays, negative, placed.lower, placed.upper);
+            const range = box.slab(Rays, near, far, .{
                 .x = one.div(direction.x),
                 .y = one.div(direction.y),
                 .z = depth_inv,

@@ -52,7 +52,7 @@ pub fn place(
         @max(@abs(slope[0]), @abs(slope[1]))
     else
         steepest.reduceMax();
-    set.projection.bound(slope_max, edges_file.reachMax(set.geometry));
+    set.projection.bound(slope_max);
     set.basis = if (hasCorners(Kernel, members)) chooseBasis(Kernel, set) else .{};
     const roundings = 64 * edges_file.unit_roundoff * (1 + 2 * slope_max);
     const margin = roundings * set.basis.norm() *
@@ -341,8 +341,12 @@ pub fn encloseRays(comptime Kernel: type, set: *ShadowReceivers(Kernel)) void {
     }
     var along: [3]f32 = @splat(0);
     along[projection.axis] = projection.sign;
-    const slack = frustum_file.slackOf(set.geometry);
-    set.frustum = .init(projection.origin, normals, along, slack);
+    const apart = frustum_file.apartOf(&set.geometry.padding, projection.origin);
+    set.frustum = .init(projection.origin, normals, along, .{
+        .apart = apart + 2 * frustum_file.by_distance * projection.reach,
+        .by_depth = frustum_file.by_distance * projection.stretch,
+        .ends_at = if (projection.slope == null) null else bounds.depth,
+    });
     if (projection.slope != null) {
         for (&set.frustum.sides, rows) |*plane, row| plane.offset += row[2];
     }

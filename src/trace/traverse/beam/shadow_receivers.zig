@@ -291,7 +291,8 @@ pub fn ShadowReceivers(comptime Kernel: type) type {
         pub inline fn boundSubtile(set: *Self, subtile: u32) void {
             const first = subtile * Kernel.subtile_groups;
             var least = set.lower(first);
-            inline for (1..Kernel.subtile_groups) |row| least = least.minFast(set.lower(first + row));
+            inline for (1..Kernel.subtile_groups) |row|
+                least = least.minFast(set.lower(first + row));
             if (least.lt(.splat(inf)).any()) return;
             set.live &= ~(@as(u32, 1) << @intCast(subtile));
             for (0..2) |end| {

@@ -38,8 +38,8 @@ pub fn TileDepthBuffer(comptime Kernel: type) type {
     const lanes = Kernel.ray_count;
     const subtile_groups = Kernel.subtile_groups;
     return struct {
-        /// Subtiles that one triangle fills, or none, a bit each: `subtile_slot` and `depth` tell of
-        /// these. Others have it by pixel.
+        /// Subtiles that one triangle fills, or none, a bit each: `subtile_slot` and `depth` tell
+        /// of these. Others have it by pixel.
         whole: u32,
         subtile_slot: [subtile_count]exact.Slot align(64),
         depth: Depth([subtile_count]f32) align(64),
@@ -67,7 +67,8 @@ pub fn TileDepthBuffer(comptime Kernel: type) type {
             var places: [subtile_count]f32 = undefined;
             for (&places, 0..) |*to, subtile| {
                 const across = side / subtile_side;
-                to.* = @floatFromInt(subtile_side * (if (rows) subtile / across else subtile % across));
+                const place = if (rows) subtile / across else subtile % across;
+                to.* = @floatFromInt(subtile_side * place);
             }
             return places;
         }
@@ -152,7 +153,8 @@ pub fn TileDepthBuffer(comptime Kernel: type) type {
             inline for (depth_names) |name| {
                 @field(depth, name) = @field(buffer.depth, name)[subtile];
             }
-            const base = depth.base + subtile_x[subtile] * depth.right + subtile_y[subtile] * depth.down;
+            const base = depth.base + subtile_x[subtile] * depth.right +
+                subtile_y[subtile] * depth.down;
             var value: F32 = .splat(base);
             if (Kernel.group_height > 1)
                 value = F32.fromArray(Kernel.lane_y).mulAdd(.splat(depth.down), value);
@@ -187,7 +189,8 @@ pub fn TileDepthBuffer(comptime Kernel: type) type {
         pub inline fn depthMax(buffer: *Self) f32 {
             var least: F32 = .loadAligned(buffer.ofSubtiles("subtile_lower", 0));
             inline for (1..subtile_count / lanes) |part| {
-                least = least.minFast(.loadAligned(buffer.ofSubtiles("subtile_lower", part * lanes)));
+                const lowest = buffer.ofSubtiles("subtile_lower", part * lanes);
+                least = least.minFast(.loadAligned(lowest));
             }
             buffer.tile_lower = least.reduceMin();
             if (buffer.tile_lower == 0) return inf;
