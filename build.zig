@@ -100,6 +100,7 @@ fn variantOptions(b: *std.Build) [2]Package.Options {
     options.extent = extent orelse .few;
     var all = options;
     all.extent = extent orelse .all;
+    all.shows_searches = true;
     return .{ options, all };
 }
 

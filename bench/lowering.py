@@ -69,6 +69,7 @@ CONFIG = """
 pub const variants: []const []const u8 = &.{"vector-single-4"};
 pub const counting: []const []const u8 = &.{"vector-single-4"};
 pub const are_all = false;
+pub const shows_searches = false;
 """
 
 # What a call costs and inlined code does not: returns, frames, and moves between two registers.

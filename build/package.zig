@@ -20,6 +20,7 @@ optimize: std.lang.Optimize,
 headers: LazyPath,
 /// The library, `@import("raylane")`.
 raylane: *Module,
+shows_searches: bool,
 /// The variants of its programs, the default one first, and those of them that count.
 held: []const Variant,
 counting: []const Variant,
@@ -35,6 +36,8 @@ pub const Options = struct {
     /// Null: what the target's registers hold.
     lanes: ?u8,
     extent: variants.Extent,
+    /// Whether kernels show their searches, for tests of traversal.
+    shows_searches: bool = false,
 };
 
 const own_c_flags: []const []const u8 = &.{
@@ -64,6 +67,7 @@ pub fn init(
         .target = target,
         .optimize = optimize,
         .headers = headers,
+        .shows_searches = options.shows_searches,
         .held = held,
         .counting = counting,
         .raylane = undefined,
@@ -111,6 +115,7 @@ fn configOf(
     options.addOption([]const []const u8, "variants", package.names(held));
     options.addOption([]const []const u8, "counting", package.names(counting));
     options.addOption(bool, "are_all", are_all);
+    options.addOption(bool, "shows_searches", package.shows_searches);
     return options.createModule();
 }
 

@@ -19,6 +19,11 @@ const integrator: trace.Integrator = .of(trace.Whitted(Kernel));
 comptime {
     const symbol = trace.link.symbolOf(trace.Integrator, kernel_variant, is_counting);
     @export(&integrator, .{ .name = symbol });
+    if (config.shows_searches and !is_counting) {
+        const Searches = trace.searches.Searches(Kernel);
+        const name = trace.link.symbolOf(Searches, kernel_variant, false);
+        @export(&Searches.of, .{ .name = name });
+    }
 }
 
 /// The program's: what prints a trace of the stack is large and has state.

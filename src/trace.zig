@@ -50,11 +50,19 @@ pub const beam = struct {
     pub const shadow_plane = @import("trace/traverse/beam/shadow_plane.zig");
     pub const shadow_receivers = @import("trace/traverse/beam/shadow_receivers.zig");
 };
+/// What tests of traversal ask of a kernel.
+pub const searches = @import("trace/traverse/searches.zig");
 /// A bundle in the variant's own way.
 pub const dispatch = @import("trace/traverse/dispatch.zig");
 
 /// Bounces at most.
 pub const depth_limit = path.depth_limit;
+
+/// The searches of a kernel, where the build has kernels show them.
+pub fn searchesOf(comptime Kernel: type) *const searches.Searches(Kernel) {
+    const Face = searches.Searches(Kernel);
+    return @extern(*const Face, .{ .name = link.symbolOf(Face, Kernel.variant, false) });
+}
 
 /// A kernel's face.
 pub const Integrator = tiles.Integrator;
