@@ -9,19 +9,16 @@ const config = @import("config");
 const trace = @import("trace.zig");
 const variant = @import("variant.zig");
 
-/// Of this kernel; `trace/link.zig` tells kernels from programs by it.
-pub const kernel_variant = variant.default;
-
 const is_counting = config.counting.len > 0;
-const Kernel = trace.kernel.Kernel(kernel_variant, is_counting);
+const Kernel = trace.kernel.Kernel(variant.default, is_counting);
 const integrator: trace.Integrator = .of(trace.Whitted(Kernel));
 
 comptime {
-    const symbol = trace.link.symbolOf(trace.Integrator, kernel_variant, is_counting);
+    const symbol = trace.link.symbolOf(trace.Integrator, variant.default, is_counting);
     @export(&integrator, .{ .name = symbol });
     if (config.shows_searches and !is_counting) {
         const Searches = trace.searches.Searches(Kernel);
-        const name = trace.link.symbolOf(Searches, kernel_variant, false);
+        const name = trace.link.symbolOf(Searches, variant.default, false);
         @export(&Searches.of, .{ .name = name });
     }
 }

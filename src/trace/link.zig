@@ -21,12 +21,8 @@ pub fn symbolOf(
 /// Ends the program with a message; exported by the program, for its kernels.
 pub extern fn rl_kernel_panic(message: [*]const u8, byte_count: usize, address: usize) noreturn;
 
-comptime {
-    const is_kernel = @hasDecl(@import("root"), "kernel_variant");
-    if (!is_kernel) @export(&panicOfKernel, .{ .name = "rl_kernel_panic" });
-}
-
-fn panicOfKernel(message: [*]const u8, byte_count: usize, _: usize) callconv(.c) noreturn {
+/// `rl_kernel_panic` as programs export it.
+pub fn panicOfKernel(message: [*]const u8, byte_count: usize, _: usize) callconv(.c) noreturn {
     @panic(message[0..byte_count]);
 }
 
