@@ -24,8 +24,6 @@ filters: []const []const u8,
 pub const Target = struct {
     name: []const u8,
     package: Package,
-    /// Of the program whose command line is tested.
-    command: Package,
     /// The program, with its arguments, that runs foreign executables here; empty for this machine.
     emulator: []const []const u8,
 };
@@ -152,7 +150,7 @@ fn commandLine(tests: Tests, target: Target) LazyPath {
         const command = std.mem.join(b.allocator, " ", target.emulator) catch @panic("OOM");
         run.addArg(b.fmt("--env=RAYLANE_EMULATOR={s}", .{command}));
     }
-    run.addArtifactArg2(target.command.program(), .{
+    run.addArtifactArg2(target.package.program(), .{
         .prefix = "--env=RAYLANE_PROGRAM=",
         .make_absolute = true,
     });
@@ -162,7 +160,9 @@ fn commandLine(tests: Tests, target: Target) LazyPath {
 }
 
 fn unitProgram(tests: Tests, target: Target) *Compile {
-    return tests.program("unit", target.package.raylane);
+    const root = target.package.library();
+    target.package.addKernels(root);
+    return tests.program("unit", root);
 }
 
 fn integrationProgram(tests: Tests, target: Target) *Compile {
@@ -175,6 +175,7 @@ fn integrationProgram(tests: Tests, target: Target) *Compile {
         .imports = &.{.{ .name = "raylane", .module = target.package.raylane }},
     });
     libraries.stb_image.addTo(root, target.package.headers);
+    target.package.addKernels(root);
     return tests.program("integration", root);
 }
 

@@ -93,6 +93,11 @@ fn bench(
         });
         return .usage;
     }
+    if (!raylane.variant.are_all and !options.quiet) say(
+        io,
+        "raylane: this program holds {d} of the variants; zig build -Dvariants=all builds all\n",
+        .{raylane.variant.names.len},
+    );
     // Before the work, so that a place that cannot be written is an error in the first second.
     var target = openJson(io, options.json, diagnostic) catch {
         const text = diagnostic.message.text();

@@ -30,6 +30,10 @@ pub const trace = @import("trace.zig");
 pub const variant = @import("variant.zig");
 pub const world = @import("world.zig");
 
+comptime {
+    @export(&trace.link.panicOfKernel, .{ .name = "rl_kernel_panic" });
+}
+
 test {
     std.testing.refAllDecls(@This());
 }
