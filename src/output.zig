@@ -4,6 +4,7 @@
 //! all. Encoded by all threads; the bytes depend on the frame and the settings alone.
 
 const std = @import("std");
+const choices = @import("settings.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Image = @import("image.zig").Image;
@@ -13,35 +14,22 @@ const png = @import("output/png.zig");
 const ppm = @import("output/ppm.zig");
 const target_file = @import("output/target.zig");
 const tonemap = @import("output/tonemap.zig");
-const assert = std.debug.assert;
 
 pub const Target = target_file.Target;
 /// What a target fails with.
 pub const TargetError = target_file.Error;
 pub const discardPending = target_file.discardPending;
 
-/// File formats.
-pub const Format = enum { png, ppm, pfm };
-
-/// How radiance becomes brightness.
-pub const Exposure = union(enum) {
-    /// Stops: radiance 2^-ev is white.
-    ev: f32,
-    /// 95 % of the pixels are no brighter than 0.8.
-    auto,
-};
-
 pub const Settings = struct {
-    format: Format = .png,
-    exposure: Exposure = .{ .ev = 0 },
+    format: choices.Format = .png,
+    exposure: choices.Exposure = .{ .ev = 0 },
     /// Keep alpha, where the format has it; otherwise the picture is over black.
     transparent: bool = false,
-    /// 1..`parallel.thread_count_max`. The bytes do not depend on it.
-    thread_count: usize = 1,
+    pool: *parallel.Pool,
 };
 
-/// The diagnostic says why.
-pub const Error = error{ OutOfMemory, InputOutput };
+/// The diagnostic says why, unless the pool's work was cancelled.
+pub const Error = error{ OutOfMemory, InputOutput } || parallel.Error;
 
 /// Encodes the frame and moves it to its place. Closes the target in any case.
 pub fn write(
@@ -52,7 +40,6 @@ pub fn write(
     diagnostic: *Diagnostic,
 ) Error!void {
     defer target.abandon();
-    assert(settings.thread_count >= 1 and settings.thread_count <= parallel.thread_count_max);
     const has_alpha = settings.transparent and settings.format == .png;
     const rows: tonemap.Rows = .{
         .image = image,
@@ -78,28 +65,10 @@ fn encode(
     target: *Target,
     diagnostic: *Diagnostic,
 ) Error!void {
-    var encoder: Encoder = try .init(gpa, rows, settings.thread_count);
+    var encoder: Encoder = try .init(gpa, rows, settings.pool.thread_count);
     defer encoder.deinit(gpa);
-    var work: Work(Encoder) = .{ .encoder = &encoder };
-    const thread_count = @min(settings.thread_count, encoder.threadCount());
-    parallel.share(thread_count, &work, Work(Encoder).run);
+    try settings.pool.forEach(encoder.stretch_count, &encoder, Encoder.encodeStretch);
     return target.finish(encoder.finish(), diagnostic);
-}
-
-/// Stretches of a file, each to one thread.
-fn Work(comptime Encoder: type) type {
-    return struct {
-        encoder: *Encoder,
-        next: std.atomic.Value(u32) = .init(0),
-
-        fn run(work: *@This(), thread_index: usize) void {
-            while (true) {
-                const index = work.next.fetchAdd(1, .monotonic);
-                if (index >= work.encoder.stretch_count) return;
-                work.encoder.encodeStretch(index, thread_index);
-            }
-        }
-    };
 }
 
 test {
@@ -114,13 +83,21 @@ test {
     _ = tonemap;
 }
 
+const TestSettings = struct {
+    format: choices.Format = .png,
+    exposure: choices.Exposure = .{ .ev = 0 },
+    transparent: bool = false,
+};
+
 /// What `write` leaves in a file called `name`; the caller frees it.
 fn writeForTest(
     folder: std.Io.Dir,
     name: []const u8,
     image: *const Image,
-    settings: Settings,
+    settings: TestSettings,
 ) ![]u8 {
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
     const gpa = std.testing.allocator;
     const io = std.testing.io;
     var path_buffer: [std.fs.max_path_bytes]u8 = undefined;
@@ -129,7 +106,12 @@ fn writeForTest(
     defer gpa.free(path);
     var diagnostic: Diagnostic = .{};
     var target: Target = try .openFile(io, path, &diagnostic);
-    try write(gpa, image, settings, &target, &diagnostic);
+    try write(gpa, image, .{
+        .format = settings.format,
+        .exposure = settings.exposure,
+        .transparent = settings.transparent,
+        .pool = &pool,
+    }, &target, &diagnostic);
     return folder.readFileAlloc(io, name, gpa, .unlimited);
 }
 
@@ -179,13 +161,15 @@ test "memory that runs out leaves no file, whenever it does" {
     const folder_path = path_buffer[0..try folder.dir.realPath(io, &path_buffer)];
     const path = try std.fs.path.join(std.testing.allocator, &.{ folder_path, "a" });
     defer std.testing.allocator.free(path);
-    for (std.enums.values(Format)) |format| {
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    for (std.enums.values(choices.Format)) |format| {
         var failing: std.testing.FailingAllocator = .init(std.testing.allocator, .{
             .fail_index = 0,
         });
         var diagnostic: Diagnostic = .{};
         var target: Target = try .openFile(io, path, &diagnostic);
-        const settings: Settings = .{ .format = format, .exposure = .auto };
+        const settings: Settings = .{ .format = format, .exposure = .auto, .pool = &pool };
         const result = write(failing.allocator(), &image, settings, &target, &diagnostic);
         try std.testing.expectError(error.OutOfMemory, result);
         var entries = folder.dir.iterate();

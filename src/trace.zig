@@ -1,10 +1,12 @@
 //! Stage 3: World -> Image. Rays are traced by all threads, a tile at a time.
 //!
 //! In: the world, which nothing changes meanwhile, and settings. Out: every pixel of the image, and
-//! how many rays it took. Nothing is allocated and no lock is taken; the tile counter is the only
-//! synchronisation. The picture is the same bits for every variant, thread count and tile size.
+//! how many rays it took. Each thread's state is allocated before the first ray, nothing after; the
+//! tile counter is the only synchronisation. The picture is the same bits for every variant, thread
+//! count and tile size.
 
 const std = @import("std");
+const choices = @import("settings.zig");
 const world_file = @import("world.zig");
 const statistics = @import("statistics.zig");
 const parallel = @import("parallel.zig");
@@ -13,6 +15,7 @@ const Image = @import("image.zig").Image;
 const whitted = @import("trace/integrate/whitted.zig");
 const Tiles = @import("trace/integrate/tiles.zig");
 const assert = std.debug.assert;
+const Allocator = std.mem.Allocator;
 const World = world_file.World;
 
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
@@ -40,22 +43,21 @@ pub const Grid = @import("trace/traverse/beam/grid.zig").Grid;
 /// A bundle in the variant's own way.
 pub const dispatch = @import("trace/traverse/dispatch.zig");
 
-/// Bounces at most.
-pub const depth_limit = whitted.depth_limit;
-
-/// What the options say about tracing.
+/// How a frame is traced, and who does the work.
 pub const Settings = struct {
-    thread_count: usize,
+    pool: *parallel.Pool,
     /// Samples a pixel, at least 1.
-    sample_count: u32 = 1,
-    /// Bounces after the primary ray, at most `depth_limit`.
-    depth_max: u32 = 6,
+    sample_count: u32 = choices.sample_count.default,
+    /// Bounces after the primary ray, at most `settings.depth.max`.
+    depth_max: u32 = choices.depth.default,
     /// Side of a tile in pixels, at least 1.
-    tile_size: u32 = 32,
+    tile_size: u32 = choices.tile_size.default,
     /// Leave the background clear instead of filling it.
     transparent: bool = false,
     /// Told of every finished tile.
     progress: std.Progress.Node = .none,
+    /// Looked at between tiles: once it is set, the rest of the picture is left undefined.
+    cancel: ?*const std.atomic.Value(bool) = null,
 };
 
 /// What the frame took.
@@ -70,38 +72,41 @@ pub const Statistics = struct {
 /// Traces the picture with variant `variant_index` of `variant.compiled`. Asserts that the image
 /// has the world's size and the tree the variant's width.
 pub fn trace(
+    gpa: Allocator,
     variant_index: usize,
     world: *const World,
     image: *Image,
     settings: Settings,
-) Statistics {
-    return run(false, variant_index, world, image, settings);
+) error{OutOfMemory}!Statistics {
+    return run(false, gpa, variant_index, world, image, settings);
 }
 
 /// The same with boxes and triangles counted, which takes longer: for a second pass, untimed.
 pub fn traceCounting(
+    gpa: Allocator,
     variant_index: usize,
     world: *const World,
     image: *Image,
     settings: Settings,
-) Statistics {
-    return run(true, variant_index, world, image, settings);
+) error{OutOfMemory}!Statistics {
+    return run(true, gpa, variant_index, world, image, settings);
 }
 
 fn run(
     comptime counting: bool,
+    gpa: Allocator,
     variant_index: usize,
     world: *const World,
     image: *Image,
     settings: Settings,
-) Statistics {
+) error{OutOfMemory}!Statistics {
     assert(image.width == world.width and image.height == world.height);
-    assert(settings.sample_count >= 1 and settings.depth_max <= depth_limit);
+    assert(settings.sample_count >= 1 and choices.depth.holds(settings.depth_max));
     inline for (variant_file.compiled, 0..) |variant, index| {
         if (index == variant_index) {
             comptime var chosen = variant;
             if (counting) chosen.backend = variant_file.counting_backend;
-            return Frame(kernel.Kernel(chosen, counting)).run(world, image, settings);
+            return Frame(kernel.Kernel(chosen, counting)).run(gpa, world, image, settings);
         }
     }
     unreachable; // Asserts that the index is one of `compiled`.
@@ -114,50 +119,58 @@ fn Frame(comptime Kernel: type) type {
         image: *Image,
         settings: Settings,
         tiles: Tiles,
-        by_thread: [parallel.thread_count_max]Statistics,
+        /// By thread: a megabyte or two each, which is no size for a stack.
+        tracers: []Tracer,
 
-        fn run(world: *const World, image: *Image, settings: Settings) Statistics {
+        const Tracer = whitted.Whitted(Kernel);
+
+        fn run(
+            gpa: Allocator,
+            world: *const World,
+            image: *Image,
+            settings: Settings,
+        ) error{OutOfMemory}!Statistics {
+            const tiles: Tiles = .init(image.width, image.height, settings.tile_size);
+            const tracers = try gpa.alloc(Tracer, settings.pool.threadsFor(tiles.count));
+            defer gpa.free(tracers);
+            for (tracers) |*tracer| tracer.* = .{
+                .world = world,
+                .settings = .{
+                    .sample_count = settings.sample_count,
+                    .depth_max = settings.depth_max,
+                    .transparent = settings.transparent,
+                },
+            };
             var frame: @This() = .{
                 .world = world,
                 .image = image,
                 .settings = settings,
-                .tiles = .init(image.width, image.height, settings.tile_size),
-                .by_thread = @splat(.{}),
+                .tiles = tiles,
+                .tracers = tracers,
             };
-            parallel.share(settings.thread_count, &frame, work);
+            settings.pool.share(tiles.count, &frame, work);
             var total: Statistics = .{};
             var tests: statistics.TestCounts = .{};
-            for (frame.by_thread[0..settings.thread_count]) |part| {
-                total.rays.add(part.rays);
-                total.non_finite_count += part.non_finite_count;
-                if (part.tests) |counts| tests.add(counts);
+            for (tracers) |*tracer| {
+                total.rays.add(tracer.rays);
+                total.non_finite_count += tracer.non_finite_count;
+                tests.add(tracer.tests);
             }
             if (Kernel.counts_tests) total.tests = tests;
             return total;
         }
 
         fn work(frame: *@This(), thread_index: usize) void {
-            var tracer: whitted.Whitted(Kernel) = .{
-                .world = frame.world,
-                .settings = .{
-                    .sample_count = frame.settings.sample_count,
-                    .depth_max = frame.settings.depth_max,
-                    .transparent = frame.settings.transparent,
-                },
-            };
+            const tracer = &frame.tracers[thread_index];
             while (frame.tiles.take()) |tile| {
-                renderTile(&tracer, tile, frame.image);
+                if (frame.settings.cancel) |cancel| if (cancel.load(.monotonic)) return;
+                renderTile(tracer, tile, frame.image);
                 frame.settings.progress.completeOne();
             }
-            frame.by_thread[thread_index] = .{
-                .rays = tracer.rays,
-                .tests = if (Kernel.counts_tests) tracer.tests else null,
-                .non_finite_count = tracer.non_finite_count,
-            };
         }
 
         fn renderTile(
-            tracer: *whitted.Whitted(Kernel),
+            tracer: *Tracer,
             tile: whitted.Rectangle,
             image: *Image,
         ) void {

@@ -44,15 +44,22 @@ const Decoded = struct {
     }
 };
 
+const Settings = struct {
+    format: raylane.settings.Format = .png,
+    exposure: raylane.settings.Exposure = .{ .ev = 0 },
+    transparent: bool = false,
+    thread_count: usize = 1,
+};
+
 /// Writes the image as a PNG and decodes it.
-fn roundTrip(image: *const Image, settings: raylane.output.Settings) !Decoded {
+fn roundTrip(image: *const Image, settings: Settings) !Decoded {
     const file = try written(image, settings);
     defer testing.allocator.free(file);
     return .init(file);
 }
 
 /// The file that the image becomes; the caller frees it.
-fn written(image: *const Image, settings: raylane.output.Settings) ![]u8 {
+fn written(image: *const Image, settings: Settings) ![]u8 {
     const gpa = testing.allocator;
     const io = testing.io;
     var folder = testing.tmpDir(.{});
@@ -64,7 +71,14 @@ fn written(image: *const Image, settings: raylane.output.Settings) ![]u8 {
 
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
     var target: raylane.output.Target = try .openFile(io, path, &diagnostic);
-    try raylane.output.write(gpa, image, settings, &target, &diagnostic);
+    var pool: raylane.parallel.Pool = .init(settings.thread_count);
+    defer pool.deinit();
+    try raylane.output.write(gpa, image, .{
+        .format = settings.format,
+        .exposure = settings.exposure,
+        .transparent = settings.transparent,
+        .pool = &pool,
+    }, &target, &diagnostic);
     return folder.dir.readFileAlloc(io, "a.png", gpa, .unlimited);
 }
 
@@ -108,7 +122,7 @@ test "an opaque PNG holds the encoded colours" {
 test "the bytes do not depend on the number of threads" {
     var image = try testImage(testing.allocator, 500, 400);
     defer image.deinit(testing.allocator);
-    for (std.enums.values(raylane.output.Format)) |format| {
+    for (std.enums.values(raylane.settings.Format)) |format| {
         const alone = try written(&image, .{ .format = format });
         defer testing.allocator.free(alone);
         for ([_]usize{ 2, 7, 256 }) |thread_count| {

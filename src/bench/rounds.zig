@@ -109,8 +109,8 @@ const PerFrame = struct {
 /// Measures the scene of a subject of type `Subject`, which has
 ///
 ///     fn prepare(*Subject, variant: usize) !Prepared
-///     fn trace(*Subject, variant: usize, thread_count: usize) Traced
-///     fn count(*Subject, variant: usize) statistics.TestCounts
+///     fn trace(*Subject, variant: usize, thread_count: usize) !Traced
+///     fn count(*Subject, variant: usize) !statistics.TestCounts
 ///     fn hash(*Subject) u64
 ///     fn now(*Subject) u64
 ///     fn mark(*Subject) ?Mark                  null: energy is not measured
@@ -175,10 +175,10 @@ pub fn Rounds(comptime Subject: type) type {
             const subject = rounds.subject;
             for (rounds.plan.variants, rounds.series) |variant, *one| {
                 _ = try subject.prepare(variant);
-                const traced = subject.trace(variant, rounds.plan.thread_count);
+                const traced = try subject.trace(variant, rounds.plan.thread_count);
                 try rounds.check(variant, rounds.plan.thread_count);
                 rounds.rays = traced.rays;
-                one.tests = subject.count(variant);
+                one.tests = try subject.count(variant);
                 try rounds.check(variant, rounds.plan.thread_count);
                 subject.step();
             }
@@ -215,7 +215,7 @@ pub fn Rounds(comptime Subject: type) type {
             const start_ns = subject.now();
             while (frame_count == 0 or subject.now() - start_ns < window_ns) : (frame_count += 1) {
                 const prepared = try subject.prepare(variant);
-                const traced = subject.trace(variant, thread_count);
+                const traced = try subject.trace(variant, thread_count);
                 sums.parse += prepared.parse_ns;
                 sums.prepare += prepared.prepare_ns;
                 sums.build += prepared.bvh_build_ns;
@@ -240,7 +240,7 @@ pub fn Rounds(comptime Subject: type) type {
             const start = subject.mark();
             const start_ns = subject.now();
             while (frame_count == 0 or subject.now() - start_ns < subject.windowNs()) {
-                _ = subject.trace(variant, rounds.plan.thread_count);
+                _ = try subject.trace(variant, rounds.plan.thread_count);
                 frame_count += 1;
             }
             const energy = rounds.since(start, frame_count);
@@ -295,7 +295,7 @@ pub fn Rounds(comptime Subject: type) type {
                 for (scaled_variants, 0..) |variant, variant_index| {
                     _ = try subject.prepare(variant);
                     for (thread_counts, 0..) |thread_count, count_index| {
-                        const traced = subject.trace(variant, thread_count);
+                        const traced = try subject.trace(variant, thread_count);
                         try rounds.check(variant, thread_count);
                         subject.step();
                         const list = &lists[variant_index * thread_counts.len + count_index];
@@ -358,8 +358,8 @@ const Fake = struct {
         return .{ .parse_ns = 1_000_000, .prepare_ns = 2_000_000, .bvh_build_ns = 3_000_000 };
     }
 
-    pub fn trace(fake: *Fake, variant: usize, thread_count: usize) Traced {
-        fake.order.append(testing.allocator, @intCast(variant)) catch @panic("OOM");
+    pub fn trace(fake: *Fake, variant: usize, thread_count: usize) error{OutOfMemory}!Traced {
+        try fake.order.append(testing.allocator, @intCast(variant));
         fake.frame_count += 1;
         const noise = fake.noise * (2 * fake.random.random().float(f64) - 1);
         const time_ms = fake.trace_ms[variant] * (1 + noise) /
@@ -370,7 +370,7 @@ const Fake = struct {
         };
     }
 
-    pub fn count(_: *Fake, variant: usize) statistics.TestCounts {
+    pub fn count(_: *Fake, variant: usize) error{}!statistics.TestCounts {
         return .{ .box_issued = variant + 10 };
     }
 

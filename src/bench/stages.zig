@@ -5,134 +5,114 @@
 
 const std = @import("std");
 const energy = @import("../energy.zig");
-const parse = @import("../parse.zig");
-const prepare_file = @import("../prepare.zig");
 const rounds = @import("rounds.zig");
+const settings_file = @import("../settings.zig");
 const statistics = @import("../statistics.zig");
-const trace_file = @import("../trace.zig");
 const variant_file = @import("../variant.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
-const Image = @import("../image.zig").Image;
-const World = @import("../world.zig").World;
+const Session = @import("../session.zig").Session;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
 
 /// What is the same for all variants.
 pub const Settings = struct {
     scene: []const u8,
-    allow_outside: bool,
-    width: u32,
-    height: u32,
-    thread_count: usize,
+    load: settings_file.Load,
+    tree_quality: settings_file.TreeQuality,
+    view: settings_file.View,
     sample_count: u32,
     depth: u32,
-    tree_quality: prepare_file.TreeQuality,
 };
 
 pub const Stages = struct {
-    gpa: Allocator,
-    io: Io,
+    session: Session,
     settings: Settings,
-    diagnostic: *Diagnostic,
     meter: ?*energy.Meter,
     progress: std.Progress.Node,
-    image: Image,
-    world: ?World = null,
-    triangle_count: u64 = 0,
     /// By variant; tests depend on traversal and lanes alone.
     counts: [variant_file.compiled.len]?statistics.TestCounts = @splat(null),
 
-    pub const Error = parse.Error || prepare_file.Error;
+    pub const Error = Session.Error;
 
-    /// Takes memory for the image.
+    /// Must stay where it is.
     pub fn init(
         gpa: Allocator,
         io: Io,
         settings: Settings,
+        thread_count: usize,
         diagnostic: *Diagnostic,
         meter: ?*energy.Meter,
         progress: std.Progress.Node,
-    ) error{OutOfMemory}!Stages {
+    ) Stages {
         return .{
-            .gpa = gpa,
-            .io = io,
+            .session = .init(gpa, io, thread_count, diagnostic),
             .settings = settings,
-            .diagnostic = diagnostic,
             .meter = meter,
             .progress = progress,
-            .image = try .init(gpa, settings.width, settings.height),
         };
     }
 
     pub fn deinit(stages: *Stages) void {
-        if (stages.world) |*world| world.deinit();
-        stages.image.deinit(stages.gpa);
+        stages.session.deinit();
         stages.* = undefined;
     }
 
     /// Reads the scene and builds the tree of a variant's width.
     pub fn prepare(stages: *Stages, variant: usize) Error!rounds.Prepared {
+        const session = &stages.session;
         const settings = &stages.settings;
-        if (stages.world) |*world| world.deinit();
-        stages.world = null;
-        var times: statistics.StageTimes = .{};
-        const start_ns = stages.now();
-        var scene = try parse.parse(stages.gpa, stages.io, settings.scene, .{
-            .allow_outside = settings.allow_outside,
-        }, stages.diagnostic);
-        defer scene.deinit();
-        stages.triangle_count = scene.triangleCount();
-        const parsed_ns = stages.now();
-        stages.world = try prepare_file.prepare(stages.gpa, stages.io, &scene, .{
+        try session.load(settings.scene, settings.load);
+        try session.pose(.{
             .lanes = variant_file.compiled[variant].lanes,
-            .thread_count = settings.thread_count,
             .tree_quality = settings.tree_quality,
-            .resolution = .{ settings.width, settings.height },
-        }, stages.diagnostic, &times);
+        });
+        try session.view(settings.view);
+        session.dropScene();
         return .{
-            .parse_ns = parsed_ns - start_ns,
-            .prepare_ns = times.prepare_ns,
-            .bvh_build_ns = times.bvh_build_ns,
+            .parse_ns = session.times.parse_ns,
+            .prepare_ns = session.times.prepare_ns,
+            .bvh_build_ns = session.times.bvh_build_ns,
         };
     }
 
     /// Traces the image by a variant for whose width the tree was built.
-    pub fn trace(stages: *Stages, variant: usize, thread_count: usize) rounds.Traced {
-        const start_ns = stages.now();
-        const settings = stages.traceSettings(thread_count);
-        const traced = trace_file.trace(variant, &stages.world.?, &stages.image, settings);
-        return .{ .trace_ns = stages.now() - start_ns, .rays = traced.rays };
+    pub fn trace(stages: *Stages, variant: usize, thread_count: usize) Error!rounds.Traced {
+        const session = &stages.session;
+        const all_count = session.pool.thread_count;
+        session.pool.thread_count = thread_count;
+        defer session.pool.thread_count = all_count;
+        try session.render(stages.renderSettings(variant));
+        return .{ .trace_ns = session.times.trace_ns, .rays = session.traced.rays };
     }
 
     /// Tests of boxes and triangles, by a pass that is not timed.
-    pub fn count(stages: *Stages, variant: usize) statistics.TestCounts {
+    pub fn count(stages: *Stages, variant: usize) Error!statistics.TestCounts {
         const compiled = variant_file.compiled;
         for (compiled, stages.counts) |other, counted| {
             if (other.traversal != compiled[variant].traversal) continue;
             if (other.lanes != compiled[variant].lanes) continue;
             if (counted) |tests| return tests;
         }
-        const settings = stages.traceSettings(stages.settings.thread_count);
-        const traced = trace_file.traceCounting(variant, &stages.world.?, &stages.image, settings);
-        stages.counts[variant] = traced.tests;
-        return traced.tests.?;
+        const tests = try stages.session.countTests(stages.renderSettings(variant));
+        stages.counts[variant] = tests;
+        return tests;
     }
 
-    fn traceSettings(stages: *const Stages, thread_count: usize) trace_file.Settings {
+    fn renderSettings(stages: *const Stages, variant: usize) settings_file.Render {
         return .{
-            .thread_count = thread_count,
+            .variant = variant,
             .sample_count = stages.settings.sample_count,
-            .depth_max = stages.settings.depth,
+            .depth = stages.settings.depth,
         };
     }
 
     pub fn hash(stages: *const Stages) u64 {
-        return stages.image.hash();
+        return stages.session.image.?.hash();
     }
 
     /// A clock that never goes back, in nanoseconds.
     pub fn now(stages: *const Stages) u64 {
-        return @intCast(Io.Clock.awake.now(stages.io).nanoseconds);
+        return @intCast(Io.Clock.awake.now(stages.session.io).nanoseconds);
     }
 
     pub fn mark(stages: *const Stages) ?energy.Mark {

@@ -82,11 +82,6 @@ pub const Encoder = struct {
         encoder.* = undefined;
     }
 
-    /// Threads at most that are of use.
-    pub fn threadCount(encoder: *const Encoder) usize {
-        return encoder.workspaces.len;
-    }
-
     /// Filters and compresses one stretch with the memory of the thread.
     pub fn encodeStretch(encoder: *Encoder, stretch_index: usize, thread_index: usize) void {
         const workspace = &encoder.workspaces[thread_index];

@@ -36,11 +36,6 @@ pub const Encoder = struct {
         encoder.* = undefined;
     }
 
-    /// Threads at most that are of use.
-    pub fn threadCount(encoder: *const Encoder) usize {
-        return encoder.stretch_count;
-    }
-
     /// Encodes one row.
     pub fn encodeStretch(encoder: *Encoder, stretch_index: usize, thread_index: usize) void {
         _ = thread_index;

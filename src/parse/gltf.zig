@@ -23,7 +23,7 @@ const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Document = @import("gltf/document.zig");
 const Meshes = @import("gltf/meshes.zig");
 const Scene = scene_data.Scene;
-const Settings = @import("settings.zig").Settings;
+const Settings = @import("../settings.zig").Load;
 const Skins = @import("gltf/skins.zig");
 const Source = @import("gltf/source.zig");
 

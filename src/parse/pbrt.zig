@@ -13,7 +13,7 @@ const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Input = @import("pbrt/input.zig");
 const Reader = @import("pbrt/reader.zig");
 const Scene = @import("../scene.zig").Scene;
-const Settings = @import("settings.zig").Settings;
+const Settings = @import("../settings.zig").Load;
 
 /// See parse.zig.
 pub const Error = Input.Error;

@@ -20,8 +20,8 @@ const Grid = @import("../traverse/beam/grid.zig").Grid;
 const assert = std.debug.assert;
 const World = world_file.World;
 
-/// Bounces at most, whatever the options say.
-pub const depth_limit = 32;
+/// Bounces at most.
+const depth_limit = @import("../../settings.zig").depth.max;
 
 /// Surfaces that one ray goes on through without a bounce (holes, blended or culled ones).
 const layer_max = 255;
