@@ -660,7 +660,8 @@ test "numbers keep to their ranges" {
 test "values arrive as they were meant" {
     try std.testing.expectEqual(7, (try optionsForTest(&.{"--camera=7"})).view.camera.index);
     try std.testing.expectEqual(.auto, (try optionsForTest(&.{"--camera=auto"})).view.camera);
-    try std.testing.expectEqualStrings("7a", (try optionsForTest(&.{"--camera=7a"})).view.camera.name);
+    const named = (try optionsForTest(&.{"--camera=7a"})).view.camera;
+    try std.testing.expectEqualStrings("7a", named.name);
     const background = (try optionsForTest(&.{"--background=#FF8001"})).view.background;
     try std.testing.expectEqual([3]u8{ 255, 128, 1 }, background.srgb);
     const linear = (try optionsForTest(&.{"--background=0,0.5,2"})).view.background;
@@ -681,7 +682,8 @@ test "values arrive as they were meant" {
 }
 
 test "the last of several options counts, around --thesis too" {
-    try std.testing.expectEqual(2, (try optionsForTest(&.{ "--spp=1", "--spp=2" })).render.sample_count);
+    const twice = try optionsForTest(&.{ "--spp=1", "--spp=2" });
+    try std.testing.expectEqual(2, twice.render.sample_count);
     const thesis = try optionsForTest(&.{ "--depth=9", "-t7", "--thesis" });
     try std.testing.expectEqual([2]u32{ 1024, 1024 }, thesis.view.resolution.?);
     try std.testing.expectEqual(3, thesis.render.depth);
@@ -694,12 +696,17 @@ test "the last of several options counts, around --thesis too" {
 }
 
 test "the format follows the name, unless said otherwise" {
-    try std.testing.expectEqual(.pfm, (try optionsForTest(&.{"-oa.pfm"})).write.format);
-    try std.testing.expectEqual(.ppm, (try optionsForTest(&.{"-oA.PPM"})).write.format);
-    try std.testing.expectEqual(.png, (try optionsForTest(&.{ "-o", "-" })).write.format);
-    try std.testing.expectEqual(.ppm, (try optionsForTest(&.{ "-o", "-", "--format=ppm" })).write.format);
-    try std.testing.expectEqual(.pfm, (try optionsForTest(&.{ "--format=pfm", "-oa.dat" })).write.format);
-    try std.testing.expectEqual(.pfm, (try optionsForTest(&.{ "--format=pfm", "-oa" })).write.format);
+    const Case = struct { settings.Format, []const [:0]const u8 };
+    for ([_]Case{
+        .{ .pfm, &.{"-oa.pfm"} },
+        .{ .ppm, &.{"-oA.PPM"} },
+        .{ .png, &.{ "-o", "-" } },
+        .{ .ppm, &.{ "-o", "-", "--format=ppm" } },
+        .{ .pfm, &.{ "--format=pfm", "-oa.dat" } },
+        .{ .pfm, &.{ "--format=pfm", "-oa" } },
+    }) |case| {
+        try std.testing.expectEqual(case[0], (try optionsForTest(case[1])).write.format);
+    }
     try expectUsage("contradicts", &.{ "--format=pfm", "-oa.png", "s" });
     try expectUsage("'a.tiff' ends in none of", &.{ "-oa.tiff", "s" });
 }
@@ -717,7 +724,11 @@ test outputName {
         defer gpa.free(name);
         try std.testing.expectEqualStrings(case[1], name);
     }
-    const given = try outputName(gpa, &.{ .scene = "a.glb", .output = "b/c.ppm", .write = .{ .format = .ppm } });
+    const given = try outputName(gpa, &.{
+        .scene = "a.glb",
+        .output = "b/c.ppm",
+        .write = .{ .format = .ppm },
+    });
     defer gpa.free(given);
     try std.testing.expectEqualStrings("b/c.ppm", given);
     const pfm = try outputName(gpa, &.{ .scene = "a.glb", .write = .{ .format = .pfm } });

@@ -7,7 +7,8 @@
 //! Threads are started once, when first asked for, and kept until the pool is stopped: building a
 //! tree of 200,000 triangles asks a dozen times, and starting and joining one thread took a tenth
 //! of its time. In between they wait for a word of their own to change, at first by looking at it,
-//! then asleep in the kernel (a futex). Nothing is allocated and no lock is taken after the start.
+//! then asleep in the kernel (a futex). No lock is taken, and nothing is allocated but the room for
+//! the threads.
 
 const std = @import("std");
 const builtin = @import("builtin");
@@ -41,7 +42,8 @@ pub const Pool = struct {
     look_count: std.atomic.Value(u32) = .init(0),
     /// Workers that are still at the job; `caller_asleep` on top where the caller sleeps meanwhile.
     busy_count: std.atomic.Value(u32) align(std.atomic.cache_line) = .init(0),
-    workers: [thread_count_max - 1]Worker = @splat(.{}),
+    /// Room for all that there may be, taken when the first is started.
+    workers: []Worker = &.{},
 
     const caller_asleep = 1 << 31;
 
@@ -62,6 +64,7 @@ pub const Pool = struct {
         const workers = pool.workers[0..pool.started_count];
         for (workers) |*worker| worker.wakeUp();
         for (workers) |*worker| worker.thread.join();
+        std.heap.page_allocator.free(pool.workers);
         pool.* = undefined;
     }
 
@@ -181,6 +184,10 @@ pub const Pool = struct {
     /// Starts workers until there are `worker_count`, or as many as the system allows.
     fn startWorkers(pool: *Pool, worker_count: usize) void {
         if (pool.started_count >= worker_count) return;
+        if (pool.workers.len == 0) {
+            pool.workers = std.heap.page_allocator.alloc(Worker, thread_count_max - 1) catch return;
+            @memset(pool.workers, .{});
+        }
         // More threads than processors would only take turns at looking.
         const cpu_count = std.Thread.getCpuCount() catch 1;
         pool.look_count.store(if (worker_count < cpu_count) look_count_max else 0, .monotonic);

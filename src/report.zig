@@ -1,7 +1,7 @@
 //! What a frame cost, as text for people and as JSON for programs.
 //!
-//! In: plain values that the session collects from the stages. Out: a few aligned lines, or one JSON
-//! object in one line. Keys of the JSON grow in number but never change their meaning.
+//! In: plain values that the session collects. Out: a few aligned lines, or one JSON object in one
+//! line. Keys of the JSON grow in number but never change their meaning.
 
 const std = @import("std");
 const Writer = std.Io.Writer;

@@ -49,8 +49,9 @@ pub fn helpOf(comptime Id: type, comptime sections: []const Section(Id)) []const
         for (sections) |section| {
             text = text ++ "\n" ++ section.title ++ "\n";
             for (section.flags) |flag| {
-                const short = if (flag.short == 0) "      " else .{ ' ', ' ', '-', flag.short, ',', ' ' };
-                var left: []const u8 = short ++ flag.long;
+                const letters: []const u8 = &.{ '-', flag.short, ',', ' ' };
+                const short = if (flag.short == 0) "    " else letters;
+                var left: []const u8 = "  " ++ short ++ flag.long;
                 if (flag.value.len > 0) left = left ++ " " ++ flag.value;
                 var lines = std.mem.splitScalar(u8, flag.help, '\n');
                 while (lines.next()) |line| {

@@ -514,7 +514,8 @@ fn sampler(reader: *Reader) Error!void {
         @as(i64, across.?) * down.?
     else
         parameters.integer("pixelsamples") orelse return;
-    reader.sample_count = @intCast(std.math.clamp(asked, choices.sample_count.min, choices.sample_count.max));
+    const range = choices.sample_count;
+    reader.sample_count = @intCast(std.math.clamp(asked, range.min, range.max));
 }
 
 /// All integrators are Whitted's here; "maxdepth" counts rays in his and in direct lighting,
