@@ -127,7 +127,7 @@ const Bench = struct {
         if (options.image) |path| try bench.writeImage(path);
         try bench.print(&.{
             .scene = std.fs.path.basename(options.scene),
-            .triangles = base.triangles.len,
+            .triangles = base.geometry.triangles.len,
             .size = options.size,
             .depth = options.depth,
             .threads = options.thread_count,
@@ -225,8 +225,8 @@ const Bench = struct {
     fn reportOfTree(bench: *Bench, tree: *TimedTree) report_file.Build {
         const options = bench.options;
         const spread: Spread = .of(tree.times_ms[0..options.repetition_count]);
-        const facts = &tree.world.tree_statistics;
-        const triangle_count: f64 = @floatFromInt(tree.world.triangles.len);
+        const facts = &tree.world.facts.tree;
+        const triangle_count: f64 = @floatFromInt(tree.world.geometry.triangles.len);
         return .{
             .bvh = tree.quality,
             .lanes = tree.lanes,
@@ -236,7 +236,7 @@ const Bench = struct {
             .bytes_per_triangle = @as(f64, @floatFromInt(facts.bytes)) / triangle_count,
             .sah_cost = facts.sah_cost,
             .nodes = facts.node_count,
-            .blocks = switch (tree.world.tree) {
+            .blocks = switch (tree.world.geometry.tree) {
                 inline else => |*wide| wide.packs.len,
             },
         };
@@ -364,7 +364,13 @@ const Bench = struct {
         var image: raylane.image.Image = try .init(bench.gpa, size, size);
         defer image.deinit(bench.gpa);
         for (image.pixels, bench.pixels) |*pixel, grey| pixel.* = .{ grey, grey, grey, 1 };
-        var target = try raylane.output.Target.openFile(bench.io, path, bench.diagnostic);
+        var temporaries: raylane.output.TemporaryFiles = .{};
+        var target: raylane.output.Target = try .openFile(
+            bench.io,
+            &temporaries,
+            path,
+            bench.diagnostic,
+        );
         defer target.abandon();
         try raylane.output.write(bench.gpa, &image, .{
             .format = .pfm,

@@ -60,10 +60,12 @@ fn Tracer(comptime structure: Structure, comptime traversal: Traversal) type {
                 },
             } else switch (traversal) {
                 .single => {
-                    _ = raylane.trace.single.trace(SingleKernel, query, world, group, &counts);
+                    _ = raylane.trace.single
+                        .trace(SingleKernel, query, &world.geometry, group, &counts);
                 },
                 .packet => {
-                    raylane.trace.bundle.trace(PacketKernel, query, world, group, &counts);
+                    raylane.trace.bundle
+                        .trace(PacketKernel, query, &world.geometry, group, &counts);
                 },
             }
         }
@@ -206,7 +208,7 @@ fn buildAll(
     markBuild(options, tags[0]);
     worlds.binary = worlds.wide;
     const narrow = try binary.build(arena, &worlds.wide, try arena.dupe(cost.Reference, list));
-    worlds.binary.tree = .{ .w4 = narrow };
+    worlds.binary.geometry.tree = .{ .w4 = narrow };
     markBuild(options, tags[1]);
     try raylane.prepare.buildTree(gpa, arena, &worlds.wide, .{
         .lanes = cost.width,
@@ -216,7 +218,7 @@ fn buildAll(
     worlds.kd = try kd.build(arena, gpa, &worlds.wide, list);
     markBuild(options, null);
 
-    const wide = &worlds.wide.tree.w4;
+    const wide = &worlds.wide.geometry.tree.w4;
     return arena.dupe(Build, &.{
         buildOf("bvh2", tags[0], narrow.nodes, narrow.packs),
         buildOf("bvh4", tags[1], wide.nodes, wide.packs),
@@ -288,7 +290,7 @@ fn print(
     if (options.json) {
         try writer.print("{f}\n", .{std.json.fmt(.{
             .scene = options.scene,
-            .triangles = worlds.wide.triangles.len,
+            .triangles = worlds.wide.geometry.triangles.len,
             .size = options.size,
             .depth = 1,
             .builds = builds,

@@ -50,7 +50,7 @@ pub const expected_resolution = std.fmt.comptimePrint("WxH, each {s}, 2^{d} pixe
 /// How to render one scene.
 pub const Options = struct {
     scene: []const u8,
-    /// Null: the scene's name in the working directory; "-": standard output.
+    /// Null: the scene's name in the working directory. See `isStdout`.
     output: ?[]const u8 = null,
     /// Null: as many as the system has CPUs.
     thread_count: ?u32 = null,
@@ -67,9 +67,17 @@ pub const Options = struct {
 
     /// Whether the image goes to standard output.
     pub fn toStdout(options: *const Options) bool {
-        return std.mem.eql(u8, options.output orelse return false, "-");
+        return isStdout(options.output orelse return false);
     }
 };
+
+/// Whether a name for a file to write stands for standard output.
+pub fn isStdout(name: []const u8) bool {
+    for ([_][]const u8{ "-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1" }) |other| {
+        if (std.mem.eql(u8, name, other)) return true;
+    }
+    return false;
+}
 
 /// Where the image goes: as given, else the scene's file name in the working directory with the
 /// format's extension instead of its own. The caller frees it.
@@ -289,7 +297,7 @@ pub const help: []const u8 = "raylane " ++ version ++
 ++ arguments_file.helpOf(Id, sections) ++
     \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
-    \\supported, 130 interrupted.
+    \\supported, 128 + N ended by signal N.
     \\
 ;
 

@@ -6,6 +6,7 @@
 const std = @import("std");
 const raylane = @import("raylane");
 const cli = raylane.cli;
+const signals = @import("signals.zig");
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
 const assert = std.debug.assert;
@@ -26,12 +27,11 @@ const ExitCode = enum(u8) {
     invalid = 3,
     /// Images that must be the same are not.
     differ = 4,
-    interrupted = 130,
 };
 
 pub fn main(init: std.process.Init) u8 {
     holdStandardFiles();
-    catchSignals();
+    signals.catchAll();
     _ = raylane.simd.setFlushToZero();
     return @backingInt(run(init));
 }
@@ -39,10 +39,8 @@ pub fn main(init: std.process.Init) u8 {
 fn run(init: std.process.Init) ExitCode {
     const io = init.io;
     var diagnostic: Diagnostic = .{};
-    const arguments = init.minimal.args.toSlice(init.arena.allocator()) catch {
-        say(io, "raylane: out of memory\n", .{});
-        return .failed;
-    };
+    const arguments = init.minimal.args.toSlice(init.arena.allocator()) catch
+        return outOfMemory(io);
     const own_arguments = arguments[@min(1, arguments.len)..];
     const names = raylane.variant.names;
     const command = cli.parse(own_arguments, names, &diagnostic) catch {
@@ -70,7 +68,7 @@ fn bench(
     diagnostic: *Diagnostic,
 ) ExitCode {
     const io = init.io;
-    const settings = benchSettings(options);
+    var settings = benchSettings(options);
     if (std.mem.findScalar(bool, &settings.wanted, true) == null) {
         say(io, "raylane: no variant's name contains {f}; --list-variants names them\n", .{
             raylane.diagnostic.quote(options.variants.?),
@@ -84,6 +82,7 @@ fn bench(
         return .failed;
     };
     defer target.abandon();
+    settings.output = target.replaces;
     var run_of: raylane.bench.Bench = .{
         .arena = init.arena.allocator(),
         .gpa = init.gpa,
@@ -104,10 +103,11 @@ fn bench(
         const text = if (err == error.OutOfMemory) "out of memory" else diagnostic.message.text();
         say(io, "raylane: {f}: {s}\n", .{ printable(placeOf(diagnostic, run_of.scene)), text });
         return switch (err) {
-            error.OutOfMemory, error.InputOutput, error.Canceled => .failed,
+            error.OutOfMemory, error.InputOutput => .failed,
             error.CameraUnknown => .usage,
             error.InvalidInput, error.SceneTooLarge => .invalid,
             error.ImagesDiffer => .differ,
+            error.Canceled => unreachable, // Nobody does.
         };
     };
     return printBench(init.gpa, io, options, &results, &target, diagnostic);
@@ -155,7 +155,7 @@ fn printBench(
     raylane.bench.writeTables(results, &text.writer) catch return outOfMemory(io);
     if (options.json) |path| {
         raylane.bench.writeJson(results, &json.writer) catch return outOfMemory(io);
-        if (std.mem.eql(u8, path, "-")) return print(io, json.written());
+        if (cli.isStdout(path)) return print(io, json.written());
         target.finish(&.{json.written()}, diagnostic) catch {
             _ = print(io, text.written()); // Minutes of work: show what was found.
             say(io, "raylane: {f}: {s}\n", .{ printable(path), diagnostic.message.text() });
@@ -172,8 +172,8 @@ fn openJson(
     diagnostic: *Diagnostic,
 ) raylane.output.TargetError!Target {
     const name = path orelse return .openStdout(io);
-    if (std.mem.eql(u8, name, "-")) return .openStdout(io);
-    return .openFile(io, name, diagnostic);
+    if (cli.isStdout(name)) return .openStdout(io);
+    return .openFile(io, &signals.temporary_files, name, diagnostic);
 }
 
 /// Where an error of a scene is: a place in its text, or the file as a whole.
@@ -254,7 +254,9 @@ const Job = struct {
         // Before the work, so that a place that cannot be written is an error in the first second.
         var target = try job.openTarget();
         defer target.abandon();
-        try session.load(options.scene, options.load);
+        var load = options.load;
+        load.output = target.replaces;
+        try session.load(options.scene, load);
         try session.pose(.{
             .lanes = raylane.variant.compiled[options.render.variant].lanes,
             .tree_quality = options.tree_quality,
@@ -283,7 +285,9 @@ const Job = struct {
 
     fn openTarget(job: *Job) error{OutputFailed}!Target {
         if (job.options.toStdout()) return .openStdout(job.io);
-        return Target.openFile(job.io, job.output_name, job.diagnostic) catch error.OutputFailed;
+        const temporaries = &signals.temporary_files;
+        return Target.openFile(job.io, temporaries, job.output_name, job.diagnostic) catch
+            error.OutputFailed;
     }
 
     /// Says the warnings that have not been said yet.
@@ -299,18 +303,18 @@ const Job = struct {
     /// With `--verbose`: what was chosen where the user did not.
     fn sayFacts(job: *Job, world: *const World) void {
         if (!job.options.verbose) return;
-        if (world.camera_is_default) job.sayOfScene("view: framed on all there is", .{});
-        if (world.lights_are_default) {
+        if (world.facts.camera_is_default) job.sayOfScene("view: framed on all there is", .{});
+        if (world.facts.lights_are_default) {
             job.sayOfScene("lights: three directional ones fixed to the camera", .{});
         } else {
             job.sayOfScene("lights: {d}", .{world.lights.len});
         }
-        job.sayOfScene("ambient radiance: {d}", .{world.surroundings.ambient});
+        job.sayOfScene("ambient radiance: {d}", .{world.environment.ambient});
         job.sayOfScene("tracer: {s}, {d} threads", .{
             raylane.variant.names[job.options.render.variant], job.session.pool.thread_count,
         });
-        if (world.degenerate_count > 0) {
-            job.sayOfScene("{d} triangles without area left out", .{world.degenerate_count});
+        if (world.facts.degenerate_count > 0) {
+            job.sayOfScene("{d} triangles without area left out", .{world.facts.degenerate_count});
         }
     }
 
@@ -339,14 +343,17 @@ const Job = struct {
             .text => raylane.report.writeText(&report, &text.writer),
             .json => raylane.report.writeJson(&report, &text.writer),
         };
-        written catch |err| switch (err) {
-            error.WriteFailed => {
-                say(job.io, "raylane: out of memory\n", .{});
-                return .failed;
-            },
-        };
-        if (to_stdout) return print(job.io, text.written());
-        say(job.io, "{s}", .{text.written()});
+        written catch return outOfMemory(job.io);
+        if (!to_stdout) {
+            say(job.io, "{s}", .{text.written()});
+            return .ok;
+        }
+        // The picture is written. That goes for success where the report was not asked for.
+        if (options.stats != null) return print(job.io, text.written());
+        writeToStdout(job.io, text.written(), diagnostic) catch
+            say(job.io, "raylane: warning: no report, standard output: {s}\n", .{
+                diagnostic.message.text(),
+            });
         return .ok;
     }
 };
@@ -354,12 +361,20 @@ const Job = struct {
 /// Prints what was asked for to standard output.
 fn print(io: Io, text: []const u8) ExitCode {
     var diagnostic: Diagnostic = .{};
-    var target: Target = .openStdout(io);
-    target.finish(&.{text}, &diagnostic) catch {
+    writeToStdout(io, text, &diagnostic) catch {
         say(io, "raylane: standard output: {s}\n", .{diagnostic.message.text()});
         return .failed;
     };
     return .ok;
+}
+
+fn writeToStdout(
+    io: Io,
+    text: []const u8,
+    diagnostic: *Diagnostic,
+) raylane.output.TargetError!void {
+    var target: Target = .openStdout(io);
+    return target.finish(&.{text}, diagnostic);
 }
 
 /// Writes to standard error, beside the progress that may be shown there. When that fails there is
@@ -379,28 +394,4 @@ fn holdStandardFiles() void {
         if (std.c.fcntl(@intCast(file), std.c.F.GETFD) >= 0) continue;
         _ = std.c.open("/dev/null", .{ .ACCMODE = .RDONLY });
     }
-}
-
-/// Makes signals that end the program remove the unfinished output, and a file size limit an error
-/// of writing.
-fn catchSignals() void {
-    const interrupt: std.posix.Sigaction = .{
-        .handler = .{ .handler = interrupted },
-        .mask = std.posix.sigemptyset(),
-        .flags = 0,
-    };
-    std.posix.sigaction(.INT, &interrupt, null);
-    std.posix.sigaction(.TERM, &interrupt, null);
-    const ignore: std.posix.Sigaction = .{
-        .handler = .{ .handler = std.posix.SIG.IGN },
-        .mask = std.posix.sigemptyset(),
-        .flags = 0,
-    };
-    std.posix.sigaction(.XFSZ, &ignore, null);
-}
-
-/// Only async-signal-safe calls are made here.
-fn interrupted(_: std.posix.SIG) callconv(.c) void {
-    raylane.output.discardPending();
-    std.c._exit(@backingInt(ExitCode.interrupted));
 }

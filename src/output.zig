@@ -18,7 +18,8 @@ const tonemap = @import("output/tonemap.zig");
 pub const Target = target_file.Target;
 /// What a target fails with.
 pub const TargetError = target_file.Error;
-pub const discardPending = target_file.discardPending;
+/// What targets create until they are in place.
+pub const TemporaryFiles = @import("output/temporary.zig").TemporaryFiles;
 
 pub const Settings = struct {
     format: choices.Format = .png,
@@ -80,6 +81,7 @@ test {
     _ = png;
     _ = ppm;
     _ = target_file;
+    _ = @import("output/temporary.zig");
     _ = tonemap;
 }
 
@@ -105,7 +107,8 @@ fn writeForTest(
     const path = try std.fs.path.join(gpa, &.{ folder_path, name });
     defer gpa.free(path);
     var diagnostic: Diagnostic = .{};
-    var target: Target = try .openFile(io, path, &diagnostic);
+    var temporaries: TemporaryFiles = .{};
+    var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
     try write(gpa, image, .{
         .format = settings.format,
         .exposure = settings.exposure,
@@ -168,7 +171,8 @@ test "memory that runs out leaves no file, whenever it does" {
             .fail_index = 0,
         });
         var diagnostic: Diagnostic = .{};
-        var target: Target = try .openFile(io, path, &diagnostic);
+        var temporaries: TemporaryFiles = .{};
+        var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
         const settings: Settings = .{ .format = format, .exposure = .auto, .pool = &pool };
         const result = write(failing.allocator(), &image, settings, &target, &diagnostic);
         try std.testing.expectError(error.OutOfMemory, result);

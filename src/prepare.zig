@@ -20,7 +20,6 @@ const check = @import("prepare/bvh/check.zig");
 const flatten = @import("prepare/flatten.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
-const pad = @import("prepare/pad.zig");
 const pose = @import("prepare/pose.zig");
 const view = @import("prepare/view.zig");
 const assert = std.debug.assert;
@@ -91,8 +90,9 @@ noinline fn placeAll(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!World {
-    const maps = try pose.worldMaps(gpa, from.nodes);
-    defer gpa.free(maps);
+    const posed = try pose.compose(gpa, from);
+    defer posed.deinit(gpa);
+    const maps = posed.maps;
     const materials = try material.convertAll(arena, from.materials);
     const surface = try flatten.flatten(gpa, arena, from, maps, settings.pool, diagnostic);
     const seen = try view.choose(
@@ -104,12 +104,12 @@ noinline fn placeAll(
         settings.resolution,
         diagnostic,
     );
-    var lights = try light.place(arena, from.lights, maps, diagnostic);
+    const padding: world.Padding = .init(pose.round(posed.center), surface.bounds);
+    var lights = try light.place(arena, from.lights, &posed, &padding, diagnostic);
     // What shines from everywhere is a light too.
     const lights_are_default = lights.len == 0 and from.ambient == null;
     if (lights_are_default) lights = try light.placeRig(arena, &seen.camera);
 
-    const pads = pad.choose(surface.bounds, &seen.camera, lights);
     var has_transparency = false;
     var has_holes = false;
     for (from.instances) |instance| {
@@ -119,32 +119,35 @@ noinline fn placeAll(
     }
     return .{
         .arena = undefined,
-        .tree = undefined,
-        .tree_statistics = undefined,
-        .positions = surface.positions,
-        .normals = surface.normals,
-        .colors = surface.colors,
-        .triangles = surface.triangles,
-        .middles_twice = surface.middles_twice,
-        .materials = materials,
+        .geometry = .{
+            .tree = undefined,
+            .positions = surface.positions,
+            .normals = surface.normals,
+            .colors = surface.colors,
+            .triangles = surface.triangles,
+            .centroid_bounds = surface.centroid_bounds,
+            .padding = padding,
+            .size = @floatCast(posed.size),
+        },
+        .materials = .{
+            .all = materials,
+            .has_transparency = has_transparency,
+            .has_holes = has_holes,
+        },
         .lights = lights,
-        .camera = seen.camera,
-        .surroundings = light.surroundings(
+        .environment = light.environment(
             lights_are_default,
             from.ambient,
             settings.ambient,
             settings.background orelse from.background,
         ),
-        .width = seen.width,
-        .height = seen.height,
-        .camera_is_default = seen.camera_is_default,
-        .lights_are_default = lights_are_default,
-        .pad = pads.triangle,
-        .node_margin = pads.node_margin,
-        .fused_reach = pads.fused_reach,
-        .degenerate_count = surface.dropped_count,
-        .has_transparency = has_transparency,
-        .has_holes = has_holes,
+        .view = .{ .camera = seen.camera, .width = seen.width, .height = seen.height },
+        .facts = .{
+            .tree = undefined,
+            .camera_is_default = seen.camera_is_default,
+            .lights_are_default = lights_are_default,
+            .degenerate_count = surface.dropped_count,
+        },
     };
 }
 
@@ -156,17 +159,17 @@ pub noinline fn buildTree(
     result: *World,
     settings: Settings,
 ) Error!void {
+    const geometry = &result.geometry;
     const input: bvh_wide.Input = .{
-        .positions = result.positions,
-        .triangles = result.triangles,
-        .middles_twice = result.middles_twice,
-        .pad = result.pad,
-        .node_margin = result.node_margin,
+        .positions = geometry.positions,
+        .triangles = geometry.triangles,
+        .centroid_bounds = geometry.centroid_bounds,
+        .padding = geometry.padding,
         .pool = settings.pool,
         .quality = settings.tree_quality,
     };
-    const facts = &result.tree_statistics;
-    result.tree = switch (settings.lanes) {
+    const facts = &result.facts.tree;
+    geometry.tree = switch (settings.lanes) {
         4 => .{ .w4 = try bvh_wide.build(gpa, arena, &input, 4, facts) },
         8 => .{ .w8 = try bvh_wide.build(gpa, arena, &input, 8, facts) },
         16 => .{ .w16 = try bvh_wide.build(gpa, arena, &input, 16, facts) },
@@ -246,22 +249,22 @@ fn testThreads(from: *const Scene, lanes: u8, quality: TreeQuality) !usize {
         settings.thread_count = thread_count;
         var other = try testPrepare(from, settings);
         defer other.deinit();
-        try expectSameBytes(reference.positions, other.positions);
-        try expectSameBytes(reference.triangles, other.triangles);
+        try expectSameBytes(reference.geometry.positions, other.geometry.positions);
+        try expectSameBytes(reference.geometry.triangles, other.geometry.triangles);
         switch (lanes) {
             inline 4, 8, 16 => |width| {
-                const a = reference.tree.get(width);
-                const b = other.tree.get(width);
+                const a = reference.geometry.tree.get(width);
+                const b = other.geometry.tree.get(width);
                 try expectSameBytes(a.nodes, b.nodes);
                 try expectSameBytes(a.packs, b.packs);
             },
             else => unreachable,
         }
-        try std.testing.expectEqual(reference.tree_statistics, other.tree_statistics);
-        try std.testing.expectEqual(reference.pad, other.pad);
-        try std.testing.expectEqual(reference.camera, other.camera);
+        try std.testing.expectEqual(reference.facts.tree, other.facts.tree);
+        try std.testing.expectEqual(reference.geometry.padding, other.geometry.padding);
+        try std.testing.expectEqual(reference.view.camera, other.view.camera);
     }
-    return reference.triangles.len;
+    return reference.geometry.triangles.len;
 }
 
 fn expectSameBytes(a: anytype, b: @TypeOf(a)) !void {
@@ -276,9 +279,9 @@ test "an empty scene has one node, a camera and the default lights" {
     try std.testing.expectEqual(0, try testEverywhere(&from));
     var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
     defer result.deinit();
-    try std.testing.expectEqual(1, result.tree.w4.nodes.len);
-    try std.testing.expectEqual(0, result.tree_statistics.depth);
-    try std.testing.expect(result.camera_is_default and result.lights_are_default);
+    try std.testing.expectEqual(1, result.geometry.tree.w4.nodes.len);
+    try std.testing.expectEqual(0, result.facts.tree.depth);
+    try std.testing.expect(result.facts.camera_is_default and result.facts.lights_are_default);
     try std.testing.expectEqual(3, result.lights.len);
 }
 
@@ -289,10 +292,10 @@ test "one triangle is a root with one leaf" {
     try std.testing.expectEqual(1, try testEverywhere(&from));
     var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
     defer result.deinit();
-    try std.testing.expectEqual(1, result.tree_statistics.depth);
-    try std.testing.expectEqual(2, result.tree_statistics.sah_cost);
-    try std.testing.expectEqual(128 + 160, result.tree_statistics.bytes);
-    try std.testing.expectEqual(@as(u32, 0), result.tree.w4.packs[0].primitive[0]);
+    try std.testing.expectEqual(1, result.facts.tree.depth);
+    try std.testing.expectEqual(2, result.facts.tree.sah_cost);
+    try std.testing.expectEqual(128 + 160, result.facts.tree.bytes);
+    try std.testing.expectEqual(@as(u32, 0), result.geometry.tree.w4.packs[0].primitive[0]);
 }
 
 test "random soups of all sizes, in all widths, by any number of threads" {
@@ -371,7 +374,7 @@ test "more care, less cost" {
             };
             var made = try testPrepare(&from, settings);
             defer made.deinit();
-            costs.set(quality, made.tree_statistics.sah_cost);
+            costs.set(quality, made.facts.tree.sah_cost);
         }
         try std.testing.expect(costs.get(.high) < 0.97 * costs.get(.default));
         try std.testing.expect(costs.get(.default) < 1.02 * costs.get(.fast));
@@ -422,8 +425,8 @@ test "triangles without area or a finite place are counted, not drawn" {
     try std.testing.expectEqual(1, try testEverywhere(&from));
     var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 2 });
     defer result.deinit();
-    try std.testing.expectEqual(4, result.degenerate_count);
-    try std.testing.expectEqual(@as(u32, 14), result.triangles[0].corner[2]);
+    try std.testing.expectEqual(4, result.facts.degenerate_count);
+    try std.testing.expectEqual(@as(u32, 14), result.geometry.triangles[0].corner[2]);
     // A node that throws everything beyond all numbers leaves nothing.
     from.nodes = &.{.{ .parent = scene.none, .local = .{
         .x = .{ 3e38, 3e38, 0 },
@@ -457,20 +460,20 @@ test "a mirroring node keeps fronts and normals outward" {
     defer result.deinit();
     // Mirrored across x = 0, the front still faces +z; across z = 0, it faces -z.
     for ([_]f32{ 1, -1, 1 }, 0..) |sign, index| {
-        const corner = result.triangles[index].corner;
-        const a = result.positions[corner[0]];
+        const corner = result.geometry.triangles[index].corner;
+        const a = result.geometry.positions[corner[0]];
         const normal = math.vec3.cross(
-            math.vec3.sub(result.positions[corner[1]], a),
-            math.vec3.sub(result.positions[corner[2]], a),
+            math.vec3.sub(result.geometry.positions[corner[1]], a),
+            math.vec3.sub(result.geometry.positions[corner[2]], a),
         );
         try std.testing.expect(normal[2] * sign > 0);
-        try std.testing.expect(result.normals[3 * index][2] * sign > 0);
-        try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, result.normals[3 * index + 2]);
+        try std.testing.expect(result.geometry.normals[3 * index][2] * sign > 0);
+        try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, result.geometry.normals[3 * index + 2]);
     }
     // The tilted normal stays perpendicular to the stretched surface it belongs to.
-    const tilted = result.normals[1];
+    const tilted = result.geometry.normals[1];
     try std.testing.expectApproxEqRel(@as(f32, -0.6 / 0.8 / 2.0), tilted[0] / tilted[2], 1e-6);
-    try std.testing.expectEqual(math.Vec3{ 7, 0, 0 }, result.positions[1]);
+    try std.testing.expectEqual(math.Vec3{ 7, 0, 0 }, result.geometry.positions[1]);
 }
 
 test "colours are white where a mesh has none" {
@@ -478,7 +481,7 @@ test "colours are white where a mesh has none" {
     var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
     defer from.deinit();
     var plain = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
-    try std.testing.expectEqual(0, plain.colors.len);
+    try std.testing.expectEqual(0, plain.geometry.colors.len);
     plain.deinit();
     var meshes = [_]scene.Mesh{ from.meshes[0], from.meshes[0] };
     meshes[1].colors = &.{ .{ 1, 0, 0, 1 }, .{ 0, 1, 0, 1 }, .{ 0, 0, 1, 0.5 } };
@@ -486,8 +489,8 @@ test "colours are white where a mesh has none" {
     from.instances = &.{ .{ .mesh = 0, .node = 0 }, .{ .mesh = 1, .node = 0 } };
     var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
     defer result.deinit();
-    try std.testing.expectEqual([4]f32{ 1, 1, 1, 1 }, result.colors[2]);
-    try std.testing.expectEqual([4]f32{ 0, 0, 1, 0.5 }, result.colors[5]);
+    try std.testing.expectEqual([4]f32{ 1, 1, 1, 1 }, result.geometry.colors[2]);
+    try std.testing.expectEqual([4]f32{ 0, 0, 1, 0.5 }, result.geometry.colors[5]);
 }
 
 test "many instances keep their order over many chunks, gaps closed" {
@@ -520,12 +523,12 @@ test "many instances keep their order over many chunks, gaps closed" {
         var result = try testPrepare(&from, .{ .lanes = 8, .thread_count = thread_count });
         defer result.deinit();
         const shown_count = count - count / 5;
-        try std.testing.expectEqual(2 * shown_count, result.triangles.len);
-        try std.testing.expectEqual(shown_count, result.degenerate_count);
-        for (result.triangles, 0..) |triangle, index| {
+        try std.testing.expectEqual(2 * shown_count, result.geometry.triangles.len);
+        try std.testing.expectEqual(shown_count, result.facts.degenerate_count);
+        for (result.geometry.triangles, 0..) |triangle, index| {
             const shown = index / 2; // Four in five, from node 1 on.
             const at: f32 = @floatFromInt(shown + shown / 4 + 1);
-            const corner = result.positions[triangle.corner[1]];
+            const corner = result.geometry.positions[triangle.corner[1]];
             try std.testing.expectEqual(math.Vec3{ at + 1, 0, @floatFromInt(index % 2) }, corner);
         }
     }
@@ -541,9 +544,9 @@ test "a mesh brings only the vertices from its first to its last" {
     defer from.deinit();
     var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
     defer result.deinit();
-    try std.testing.expectEqual(3, result.positions.len);
-    try std.testing.expectEqual([3]u32{ 0, 2, 1 }, result.triangles[0].corner);
-    try std.testing.expectEqual(math.Vec3{ 1, 0, 5 }, result.positions[2]);
+    try std.testing.expectEqual(3, result.geometry.positions.len);
+    try std.testing.expectEqual([3]u32{ 0, 2, 1 }, result.geometry.triangles[0].corner);
+    try std.testing.expectEqual(math.Vec3{ 1, 0, 5 }, result.geometry.positions[2]);
 }
 
 test "memory that runs out is an error that leaks nothing" {
@@ -588,7 +591,6 @@ test {
     _ = flatten;
     _ = light;
     _ = material;
-    _ = pad;
     _ = pose;
     _ = view;
     _ = @import("prepare/framing.zig");

@@ -1,6 +1,6 @@
 //! Raylane as a library: `@import("raylane")`.
 //!
-//! The way of the data, parse -> Scene -> prepare -> World -> trace -> Image -> output, with one
+//! The way of the data, parse -> Scene -> prepare -> World -> trace -> Film -> output, with one
 //! declaration for each top-level file. Programs, tests and tools import this root and nothing
 //! below it; its test block pulls in the tests of every file.
 
@@ -11,7 +11,9 @@ pub const builtin = @import("builtin.zig");
 pub const cli = @import("cli.zig");
 pub const diagnostic = @import("diagnostic.zig");
 pub const energy = @import("energy.zig");
+pub const film = @import("film.zig");
 pub const huge_pages = @import("huge_pages.zig");
+pub const identity = @import("identity.zig");
 pub const image = @import("image.zig");
 pub const math = @import("math.zig");
 pub const output = @import("output.zig");

@@ -7,7 +7,7 @@
 const std = @import("std");
 const math = @import("math.zig");
 const assert = std.debug.assert;
-const Affine = math.Affine;
+const AffineD = math.AffineD;
 const Vec3 = math.Vec3;
 
 /// Index that stands for "none".
@@ -18,7 +18,7 @@ pub const Node = struct {
     /// Index of the parent, always lower than the node's own, or `none` for a root.
     parent: u32,
     /// Map from this node's space into its parent's.
-    local: Affine,
+    local: AffineD,
 };
 
 /// Triangles with one material, in the space of the node that shows them.

@@ -18,7 +18,8 @@ const statistics = @import("statistics.zig");
 const trace = @import("trace.zig");
 const variant = @import("variant.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
-const Image = @import("image.zig").Image;
+const film_file = @import("film.zig");
+const Film = film_file.Film;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
@@ -70,7 +71,7 @@ pub const Session = struct {
     posed: ?Pose = null,
     seen: settings.View = .{},
     world: ?World = null,
-    image: ?Image = null,
+    film: ?Film = null,
     traced: trace.Statistics = .{},
 
     pub const Error = LoadError || prepare.Error;
@@ -101,7 +102,7 @@ pub const Session = struct {
     pub fn deinit(session: *Session) void {
         session.dropWorld();
         session.dropScene();
-        if (session.image) |*image| image.deinit(session.gpa);
+        if (session.film) |*film| film.deinit(session.gpa);
         session.pool.deinit();
         session.* = undefined;
     }
@@ -174,18 +175,16 @@ pub const Session = struct {
 
     /// Traces the picture. Asserts that there is a view, and a tree of the variant's width.
     pub fn render(session: *Session, choices: settings.Render) Error!void {
-        const image = try session.sizedImage();
+        const film = try session.sizedFilm();
         const start = Io.Clock.awake.now(session.io);
-        const world = &session.world.?;
         session.traced = try trace.trace(
             session.gpa,
             choices.variant,
-            world,
-            image,
+            &session.world.?.frame(),
+            film,
             session.traceSettings(choices),
         );
         session.times.trace_ns = session.since(start);
-        if (session.pool.cancelled.load(.monotonic)) return error.Canceled;
         if (session.traced.non_finite_count > 0) session.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
@@ -197,11 +196,10 @@ pub const Session = struct {
         const counted = try trace.traceCounting(
             session.gpa,
             choices.variant,
-            &session.world.?,
-            &session.image.?,
+            &session.world.?.frame(),
+            &session.film.?,
             session.traceSettings(choices),
         );
-        if (session.pool.cancelled.load(.monotonic)) return error.Canceled;
         session.traced.tests = counted.tests;
         return counted.tests.?;
     }
@@ -214,7 +212,7 @@ pub const Session = struct {
         choices: settings.Write,
     ) output.Error!void {
         const start = Io.Clock.awake.now(session.io);
-        try output.write(session.gpa, &session.image.?, .{
+        try output.write(session.gpa, &session.film.?.image, .{
             .format = choices.format,
             .exposure = choices.exposure,
             .transparent = session.seen.background == .transparent,
@@ -226,8 +224,8 @@ pub const Session = struct {
 
     /// What the picture took; what the user called things is the caller's to fill in.
     pub fn report(session: *const Session, choices: settings.Render) Report {
-        const image = &session.image.?;
-        const tree = &session.world.?.tree_statistics;
+        const image = &session.film.?.image;
+        const tree = &session.world.?.facts.tree;
         return .{
             .triangle_count = session.facts.triangle_count,
             .width = image.width,
@@ -265,22 +263,25 @@ pub const Session = struct {
             .sample_count = session.sampleCount(choices),
             .depth_max = session.depthOf(choices),
             .tile_size = choices.tile_size,
-            .transparent = session.seen.background == .transparent,
             .progress = session.progress,
             .cancel = &session.pool.cancelled,
         };
     }
 
-    /// The image, of the view's size.
-    fn sizedImage(session: *Session) error{OutOfMemory}!*Image {
-        const world = &session.world.?;
-        if (session.image) |*image| {
-            if (image.width == world.width and image.height == world.height) return image;
-            image.deinit(session.gpa);
-            session.image = null;
+    /// A film of the view's size, with alpha where the background is to be seen through.
+    fn sizedFilm(session: *Session) error{OutOfMemory}!*Film {
+        const view_size = &session.world.?.view;
+        const has_alpha = session.seen.background == .transparent;
+        const layers: film_file.Layers = .init(.{ .color = true, .alpha = has_alpha });
+        if (session.film) |*film| {
+            film.layers = layers;
+            const image = &film.image;
+            if (image.width == view_size.width and image.height == view_size.height) return film;
+            film.deinit(session.gpa);
+            session.film = null;
         }
-        session.image = try .init(session.gpa, world.width, world.height);
-        return &session.image.?;
+        session.film = try .init(session.gpa, view_size.width, view_size.height, layers);
+        return &session.film.?;
     }
 
     fn since(session: *const Session, start: Io.Timestamp) u64 {
@@ -339,7 +340,7 @@ test "a scene that is loaded once gives each view the picture it has alone" {
         try session.view(view);
         session.dropScene();
         try session.render(.{});
-        hash.* = session.image.?.hash();
+        hash.* = session.film.?.image.hash();
     }
     try testing.expectEqual(hashes[0], hashes[2]);
     try testing.expect(hashes[0] != hashes[1]);
@@ -351,11 +352,11 @@ test "a scene that is loaded once gives each view the picture it has alone" {
         // The same picture again needs nothing before it.
         for (0..2) |_| {
             try session.render(.{});
-            try testing.expectEqual(hash, session.image.?.hash());
+            try testing.expectEqual(hash, session.film.?.image.hash());
         }
     }
     const tests = try session.countTests(.{});
-    try testing.expect(tests.box_issued > 0 and session.image.?.hash() == hashes[2]);
+    try testing.expect(tests.box_issued > 0 and session.film.?.image.hash() == hashes[2]);
     const made = session.report(.{ .depth = 2 });
     try testing.expectEqual(2, made.depth);
     try testing.expectEqual(24 * 16, made.rays.primary);
@@ -374,7 +375,8 @@ test "every stage ends when it is cancelled, and no file is left" {
     var diagnostic: Diagnostic = .{};
     var session: Session = .init(testing.allocator, io, 2, &diagnostic);
     defer session.deinit();
-    var target: output.Target = try .openFile(io, path, &diagnostic);
+    var temporaries: output.TemporaryFiles = .{};
+    var target: output.Target = try .openFile(io, &temporaries, path, &diagnostic);
     defer target.abandon();
     try openForTest(&session);
     try session.view(.{ .resolution = .{ 512, 512 } });
@@ -385,7 +387,7 @@ test "every stage ends when it is cancelled, and no file is left" {
             cancelled.cancel();
         }
     };
-    const image = try session.sizedImage();
+    const image = &(try session.sizedFilm()).image;
     @memset(image.pixels, @splat(std.math.nan(f32)));
     const first: *const volatile f32 = &image.pixels[0][3];
     const canceller = try std.Thread.spawn(.{}, Canceller.run, .{ &session, first });

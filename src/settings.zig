@@ -4,6 +4,7 @@
 //! session hands them to the stages; help, messages and checks take their numbers from here.
 
 const std = @import("std");
+const Identity = @import("identity.zig").Identity;
 
 /// Whole numbers to choose from.
 pub const Range = struct {
@@ -110,6 +111,8 @@ pub const Load = struct {
     allow_outside: bool = false,
     /// Within `tessellation`.
     tessellation: u32 = tessellation.default,
+    /// A file that is about to be replaced: a scene that is read from it is refused.
+    output: ?Identity = null,
 };
 
 /// What is seen of a scene, and by what light.

@@ -1,292 +1,73 @@
 //! Data 2: what rays meet, as immutable aligned arrays.
 //!
 //! `prepare` fills it, `trace` reads it; nothing in it changes while rays are traced, so threads
-//! share it without locks. World space, right-handed, y up.
-//!
-//! Culling is exact by construction. The box of a triangle is the box of its three vertices grown
-//! by `World.pad`; the box of a node is the union of its triangles' boxes, grown once more by
-//! `World.node_margin`. A slab test is monotone in the box even in floats, so whatever the triangle
-//! test accepts within its own grown box no node above it can cull, in any order of traversal.
-//! `pad` itself only has to be large enough that a ray which passes a triangle by rounding alone
-//! still meets the grown box: it decides whether shared edges are watertight, not whether variants
-//! agree.
-//!
-//! The margin is for tests of nodes that round otherwise than the triangle test: bound * inverse -
-//! origin * inverse, in one multiply-add. Nodes contain by a margin what the triangle's own box, in
-//! the exact expression, accepts, so that those do not cull it either (`World.fused_reach`).
+//! share it without locks. World space, right-handed, y up. Its parts change at different times:
+//! geometry with the pose, the view with the camera, the others with neither.
 
 const std = @import("std");
-const math = @import("math.zig");
-const assert = std.debug.assert;
-const Vec3 = math.Vec3;
-const Box3 = math.Box3;
+const geometry_file = @import("world/geometry.zig");
+const materials_file = @import("world/materials.zig");
+const view_file = @import("world/view.zig");
 
-/// Index that stands for "none": no primitive, no child.
-pub const none: u32 = std.math.maxInt(u32);
+pub const AnyTree = geometry_file.AnyTree;
+pub const Camera = view_file.Camera;
+pub const Child = geometry_file.Child;
+pub const Environment = @import("world/environment.zig").Environment;
+pub const Geometry = geometry_file.Geometry;
+pub const Light = @import("world/light.zig").Light;
+pub const Material = materials_file.Material;
+pub const Materials = materials_file.Materials;
+pub const Node = geometry_file.Node;
+pub const Padding = @import("world/padding.zig").Padding;
+pub const Tree = geometry_file.Tree;
+pub const TreeStatistics = geometry_file.TreeStatistics;
+pub const Triangle = geometry_file.Triangle;
+pub const TrianglePack = geometry_file.TrianglePack;
+pub const View = view_file.View;
+pub const cache_line_bytes = geometry_file.cache_line_bytes;
+pub const none = geometry_file.none;
+pub const tree_depth_max = geometry_file.tree_depth_max;
 
-/// Levels of a tree at most; the builder keeps to it, traversal stacks are sized by it.
-pub const tree_depth_max = 64;
-
-/// Bytes that nodes and triangle packs are aligned to: a cache line.
-pub const cache_line_bytes = 64;
-
-/// A child of a node. One word, since stacks write and read it as a whole: two stores that one load
-/// reads back make processors wait.
-pub const Child = packed struct(u64) {
-    /// Number of a node, or of the first triangle pack; `none` if there is no child.
-    target: u32,
-    /// 0: a node; else that many packs.
-    pack_count: u32,
-
-    pub const missing: Child = .{ .target = none, .pack_count = 0 };
-    pub const root: Child = .{ .target = 0, .pack_count = 0 };
-
-    /// The numbers of its packs, from the first to before the last; equal for a node.
-    pub inline fn packs(child: Child) [2]usize {
-        return .{ child.target, @as(usize, child.target) + child.pack_count };
-    }
-};
-
-/// A node with `width` children, structure of arrays.
-///
-///     width 4, bytes   0..47   bounds[0]  lower x x x x | y y y y | z z z z
-///                     48..95   bounds[1]  upper x x x x | y y y y | z z z z
-///                     96..127  child      two words each, see `Child`
-///
-/// A missing child has the empty box (+inf, -inf).
-pub fn Node(comptime width: comptime_int) type {
-    return extern struct {
-        /// [lower, upper][axis][child].
-        bounds: [2][3][width]f32 align(cache_line_bytes),
-        child: [width]Child,
-
-        const Self = @This();
-
-        /// A node without children.
-        pub const empty: Self = .{
-            .bounds = .{ @splat(@splat(std.math.inf(f32))), @splat(@splat(-std.math.inf(f32))) },
-            .child = @splat(.missing),
-        };
-
-        /// The box of one child.
-        pub fn childBox(node: *const Self, index: usize) Box3 {
-            var box: Box3 = undefined;
-            for (0..3) |axis| {
-                box.lower[axis] = node.bounds[0][axis][index];
-                box.upper[axis] = node.bounds[1][axis][index];
-            }
-            return box;
-        }
-
-        comptime {
-            assert(@sizeOf(Self) == 32 * width);
-            assert(@alignOf(Self) == cache_line_bytes);
-        }
-    };
-}
-
-/// `width` triangles, structure of arrays: corners as they are in the scene, so that triangles that
-/// share one see it at the same place from any origin.
-///
-///     width 4, bytes   0..143  corner[3]: x x x x | y y y y | z z z z each
-///                    144..159  primitive
-///
-/// Padding lanes have `primitive = none` and three corners at the origin, which no ray hits: but
-/// every test of edges is in doubt about them, so that they are left out first.
-pub fn TrianglePack(comptime width: comptime_int) type {
-    return extern struct {
-        /// [corner][axis][lane].
-        corner: [3][3][width]f32 align(16),
-        /// Index into `World.triangles`.
-        primitive: [width]u32,
-
-        /// A pack without triangles.
-        pub const empty: @This() = .{
-            .corner = @splat(@splat(@splat(0))),
-            .primitive = @splat(none),
-        };
-
-        comptime {
-            assert(@sizeOf(@This()) == 40 * width);
-        }
-    };
-}
-
-/// A bounding volume hierarchy of one width. Node 0 is the root.
-pub fn Tree(comptime width: comptime_int) type {
-    return struct {
-        nodes: []align(cache_line_bytes) const Node(width),
-        packs: []align(cache_line_bytes) const TrianglePack(width),
-
-        /// Asks memory for a child's node or first pack, to be there when somebody comes to it.
-        pub inline fn prefetch(tree: *const @This(), child: Child) void {
-            const start: [*]const u8 = if (child.pack_count == 0)
-                @ptrCast(&tree.nodes[child.target])
-            else
-                @ptrCast(&tree.packs[child.target]);
-            const bytes = @max(@sizeOf(Node(width)), @sizeOf(TrianglePack(width)));
-            comptime var at = 0;
-            inline while (at < bytes) : (at += cache_line_bytes) @prefetch(start + at, .{});
-        }
-    };
-}
-
-/// The tree in the width of the variant that traces it.
-pub const AnyTree = union(enum) {
-    w4: Tree(4),
-    w8: Tree(8),
-    w16: Tree(16),
-
-    /// The tree of the given width. Asserts that it has this width.
-    pub fn get(tree: *const AnyTree, comptime width: comptime_int) *const Tree(width) {
-        return switch (width) {
-            4 => &tree.w4,
-            8 => &tree.w8,
-            16 => &tree.w16,
-            else => @compileError("trees are 4, 8 or 16 wide"),
-        };
-    }
-};
-
-/// Three corners and a material; its index in `World.triangles` is the primitive number.
-pub const Triangle = extern struct {
-    /// Indices into `World.positions` and the other arrays by vertex, counter-clockwise in front.
-    corner: [3]u32,
-    /// Index into `World.materials`.
-    material: u32,
-
-    comptime {
-        assert(@sizeOf(Triangle) == 16);
-    }
-};
-
-/// A material as shading wants it: f32 throughout so that lanes can gather any of its fields.
-pub const Material = struct {
-    /// Linear RGB and alpha.
-    base_color: [4]f32,
-    emissive: Vec3,
-    metallic: f32,
-    roughness: f32,
-    /// Reflectance at normal incidence of the dielectric part, ((n - 1) / (n + 1))^2.
-    dielectric_f0: f32,
-    ior: f32,
-    transmission: f32,
-    /// Beer-Lambert absorption inside, per metre; 0 outside of volumes.
-    absorption: Vec3,
-    /// Alpha below it is a hole; -1 for materials without holes.
-    alpha_cutoff: f32,
-    /// 1: alpha blends, 0: alpha counts as 1.
-    blend: f32,
-    /// 1: back faces are seen too, 0: they are culled from view (they still cast shadows).
-    double_sided: f32,
-    /// 1: shown without light.
-    unlit: f32,
-    /// 1: bounds a volume, rays bend; 0: thin, they go straight on.
-    volume: f32,
-
-    /// Whether no light passes, wherever a surface of it is hit.
-    pub fn stopsLight(material: *const Material) bool {
-        const clear = material.transmission * (1 - material.metallic);
-        return clear == 0 and material.blend == 0 and material.alpha_cutoff < 0;
-    }
-};
-
-/// A light source in world space.
-pub const Light = struct {
-    pub const Kind = enum { point, spot, directional };
-
-    kind: Kind,
-    /// Of point and spot lights.
-    position: Vec3,
-    /// Unit vector the way the light travels; spot and directional.
-    direction: Vec3,
-    /// Linear RGB in candela (point, spot) or lux (directional).
-    intensity: Vec3,
-    /// 1 / range^2, 0 without a range.
-    range_inv_squared: f32,
-    /// Cone of a spot: clamp(cosine * scale + offset, 0, 1)^2; 0 and 1 for the others.
-    cone_scale: f32,
-    cone_offset: f32,
-};
-
-/// A view. The ray of the image point (x, y), both in -1..1 with y up, has
-///
-///     perspective:  origin,                  direction forward + x right + y up
-///     orthographic: origin + x right + y up, direction forward
-///
-/// `right` and `up` carry the half extents of the picture; directions are not normalised.
-pub const Camera = struct {
-    orthographic: bool,
-    origin: Vec3,
-    right: Vec3,
-    up: Vec3,
-    forward: Vec3,
-};
-
-/// What a ray that leaves the scene sees, and the light that comes from everywhere.
-pub const Surroundings = struct {
-    /// Constant radiance from all sides, gray.
-    ambient: f32,
-    /// What primary rays see where there is nothing, linear RGB.
-    background: Vec3,
-};
-
-/// Facts about the tree, for the report.
-pub const TreeStatistics = struct {
-    node_count: u32,
-    /// Levels of nodes, 1 for a root alone, 0 without triangles.
-    depth: u32,
-    /// Expected cost of a random ray: node visits plus packs tested, weighted by area over
-    /// the root's.
-    sah_cost: f64,
-    /// Nodes and triangle packs.
-    bytes: u64,
-};
-
-/// Everything that tracing needs.
-pub const World = struct {
-    arena: std.heap.ArenaAllocator,
-    tree: AnyTree,
-    tree_statistics: TreeStatistics,
-    /// By vertex, world space.
-    positions: []const Vec3,
-    /// By vertex, not normalised; a zero normal stands for the triangle's own. Same length.
-    normals: []const Vec3,
-    /// By vertex, linear RGBA; empty where no mesh has colours.
-    colors: []const [4]f32,
-    triangles: []const Triangle,
-    /// Box of twice the middles of the triangles' boxes, empty without any.
-    middles_twice: Box3,
-    materials: []const Material,
+/// All that tracing a picture takes.
+pub const Frame = struct {
+    geometry: *const Geometry,
+    materials: *const Materials,
     lights: []const Light,
-    camera: Camera,
-    surroundings: Surroundings,
-    /// Picture size in pixels.
-    width: u32,
-    height: u32,
+    environment: *const Environment,
+    view: *const View,
+};
+
+/// What was found on the way, for messages and the report; tracing does not read it.
+pub const Facts = struct {
+    tree: TreeStatistics,
     /// No camera of the file was used: the view was framed on what there is.
     camera_is_default: bool,
     /// The file has no light that shines: the lights are three fixed to the camera.
     lights_are_default: bool,
-    /// By how much triangle boxes are grown: a bound for the rounding of the triangle test, in
-    /// metres. It is `pad_relative` times the largest distance that a ray can span, and a little
-    /// for the rounding of the coordinates themselves.
-    pad: f32,
-    /// By how much boxes of nodes and leaves are grown beyond the union of the triangle boxes below
-    /// them, in metres: `node_margin_relative` times `fused_reach`.
-    node_margin: f32,
-    /// Rays that start where all |coordinates| are below it may be tested against nodes by
-    /// mulAdd(bound, inverse, -(origin * inverse)), fused or not: it culls nothing that
-    /// (bound - origin) * inverse accepts for a triangle's box, nor does it overflow. All points on
-    /// surfaces qualify, and the camera and lights unless they are absurdly far away; 0 in scenes
-    /// too large for it.
-    fused_reach: f32,
     /// Triangles left out because they have no area or no finite place.
     degenerate_count: u64,
-    /// Some material lets shadow rays through in part (blend or transmission).
-    has_transparency: bool,
-    /// Some material has holes (mask).
-    has_holes: bool,
+};
+
+/// Everything that tracing needs, and its memory.
+pub const World = struct {
+    arena: std.heap.ArenaAllocator,
+    geometry: Geometry,
+    materials: Materials,
+    lights: []const Light,
+    environment: Environment,
+    view: View,
+    facts: Facts,
+
+    /// What tracing takes; the world has to stay where it is meanwhile.
+    pub fn frame(world: *const World) Frame {
+        return .{
+            .geometry = &world.geometry,
+            .materials = &world.materials,
+            .lights = world.lights,
+            .environment = &world.environment,
+            .view = &world.view,
+        };
+    }
 
     /// Frees everything.
     pub fn deinit(world: *World) void {
@@ -295,19 +76,7 @@ pub const World = struct {
     }
 };
 
-/// `World.pad` over the largest distance between a ray's origin and a corner. In units of 2^-24 of
-/// that distance a corner that is sheared into a ray's view (`trace/triangle.zig`) is off by 1 for
-/// the difference to the origin, 2 for the slope times the depth and 1 for the sum, in each of two
-/// axes; t of the plane by about 8. 32 leaves a factor of two.
-pub const pad_relative: f32 = 32.0 / 16_777_216.0;
-
-/// `World.node_margin` over the largest |coordinate| of a bound or an origin. In units of 2^-24 and
-/// as shifts of the bound, (bound - origin) * inverse is off by 2 |bound - origin|, and
-/// bound * inverse - origin * inverse by |origin|, |bound| where it is not fused, and
-/// |bound - origin|: 4 (|bound| + |origin|) together, 8 of the largest. 16 leaves a factor of two.
-pub const node_margin_relative: f32 = 16.0 / 16_777_216.0;
-
-test "an empty child's box is empty" {
-    const node: Node(4) = .empty;
-    for (0..4) |child| try std.testing.expect(node.childBox(child).isEmpty());
+test {
+    _ = geometry_file;
+    _ = Padding;
 }

@@ -37,7 +37,7 @@ pub const Builder = struct {
     /// A root node.
     pub fn addNode(builder: *Builder, local: Affine) !u32 {
         const parent = raylane.scene.none;
-        try builder.nodes.append(builder.arena(), .{ .parent = parent, .local = local });
+        try builder.nodes.append(builder.arena(), .{ .parent = parent, .local = .of(local) });
         return @intCast(builder.nodes.items.len - 1);
     }
 
@@ -208,9 +208,11 @@ pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options)
 
 /// Traces what a session sees. The image is the session's.
 pub fn trace(session: *Session, options: Options) !*Image {
-    if (session.image == null) session.image = try .init(gpa, options.width, options.height);
+    const layers: raylane.film.Layers = .init(.{ .color = true });
+    if (session.film == null)
+        session.film = try .init(gpa, options.width, options.height, layers);
     // Every pixel must be written.
-    @memset(session.image.?.pixels, @splat(std.math.nan(f32)));
+    @memset(session.film.?.image.pixels, @splat(std.math.nan(f32)));
     try session.render(.{
         .variant = options.variant,
         .sample_count = options.sample_count,
@@ -218,7 +220,7 @@ pub fn trace(session: *Session, options: Options) !*Image {
         .tile_size = options.tile_size,
     });
     try std.testing.expectEqual(0, session.traced.non_finite_count);
-    return &session.image.?;
+    return &session.film.?.image;
 }
 
 /// The picture of a scene.
@@ -227,7 +229,7 @@ pub fn render(scene: *const Scene, options: Options) !Image {
     var session: Session = .init(gpa, std.testing.io, options.thread_count, &diagnostic);
     defer session.deinit();
     try view(&session, scene, raylane.variant.compiled[options.variant].lanes, options);
-    defer session.image = null; // The caller's now.
+    defer session.film = null; // The caller's now.
     return (try trace(&session, options)).*;
 }
 

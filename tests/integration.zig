@@ -15,6 +15,7 @@ test {
     _ = @import("pbrt.zig");
     _ = @import("samples.zig");
     _ = @import("beams.zig");
+    _ = @import("bounds.zig");
     _ = @import("soup.zig");
     _ = @import("variants.zig");
 }

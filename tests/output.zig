@@ -70,7 +70,8 @@ fn written(image: *const Image, settings: Settings) ![]u8 {
     defer gpa.free(path);
 
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
-    var target: raylane.output.Target = try .openFile(io, path, &diagnostic);
+    var temporaries: raylane.output.TemporaryFiles = .{};
+    var target: raylane.output.Target = try .openFile(io, &temporaries, path, &diagnostic);
     var pool: raylane.parallel.Pool = .init(settings.thread_count);
     defer pool.deinit();
     try raylane.output.write(gpa, image, .{

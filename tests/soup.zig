@@ -44,13 +44,13 @@ pub const Hit = struct { t: f32, primitive: i32 };
 pub fn bruteForce(world: *const World, query: Query) Hit {
     const triangle = raylane.trace.triangle;
     var ray = query.ray();
-    for (world.triangles, 0..) |corners, number| {
+    for (world.geometry.triangles, 0..) |corners, number| {
         const p: [3]Single.Vec3 = .{
-            .splat(world.positions[corners.corner[0]]),
-            .splat(world.positions[corners.corner[1]]),
-            .splat(world.positions[corners.corner[2]]),
+            .splat(world.geometry.positions[corners.corner[0]]),
+            .splat(world.geometry.positions[corners.corner[1]]),
+            .splat(world.geometry.positions[corners.corner[2]]),
         };
-        const hit = triangle.intersect(Single, p, ray.line, world.pad);
+        const hit = triangle.intersect(Single, p, ray.line, &world.geometry.padding);
         const primitive: Single.I32 = .splat(@intCast(number));
         const accepted = hit.mask
             .bitAnd(ray.tnear.isBefore(hit.t, primitive))
@@ -84,17 +84,72 @@ fn expectVariant(
         const found = raylane.trace.single.trace(
             Kernel,
             .closest_hit,
-            world,
+            &world.geometry,
             &ray,
             &counts,
         );
         try expectHit(hit, ray.closest.t.lane(0), ray.closest.primitive.lane(0));
         try std.testing.expectEqual(hit.primitive != ray_file.no_primitive, found);
         var shadow = query.ray();
-        const blocked = raylane.trace.single.trace(Kernel, .any_hit, world, &shadow, &counts);
+        const blocked = raylane.trace.single
+            .trace(Kernel, .any_hit, &world.geometry, &shadow, &counts);
         try std.testing.expectEqual(found, blocked);
     }
+    const size = Kernel.group_count * Kernel.ray_count;
+    var first: usize = 0;
+    while (first < queries.len) : (first += size) {
+        const end = @min(first + size, queries.len);
+        try expectMultiHit(Kernel, world, queries[first..end], expected[first..end]);
+    }
     if (Kernel.ray_count > 1) try expectBundles(Kernel, world, queries, expected);
+}
+
+/// One way through the tree finds the first hits in order, or that one of them stops all light.
+fn expectMultiHit(
+    comptime Kernel: type,
+    world: *const World,
+    queries: []const Query,
+    expected: []const Hit,
+) !void {
+    const lists = try gpa.create(raylane.trace.multi_hit.HitLists(Kernel));
+    defer gpa.destroy(lists);
+    var material = std.mem.zeroes(raylane.world.Material);
+    material.alpha_cutoff = -1;
+    lists.geometry = &world.geometry;
+    lists.materials = (&material)[0..1];
+    for ([_]f32{ 0, 1 }) |transmission| {
+        material.transmission = transmission;
+        var counts: raylane.statistics.TestCounts = .{};
+        var bundle = makeBundle(Kernel, queries);
+        lists.trace(&bundle, &counts);
+        for (queries, expected, 0..) |query, hit, index| {
+            if (!isActive(index)) continue;
+            const group = index / Kernel.ray_count;
+            const lane = index % Kernel.ray_count;
+            const stopped = lists.stopped[group] >> @intCast(lane) & 1 == 1;
+            const met = hit.primitive != ray_file.no_primitive;
+            try std.testing.expectEqual(transmission == 0 and met, stopped);
+            // Brute force takes its time.
+            if (transmission == 0 or index % 8 != 0) continue;
+            const list = lists.hits[group][lane][0..lists.counts[group][lane]];
+            try expectList(world, query, list);
+        }
+    }
+}
+
+/// The hits of a ray are those that brute force finds one behind the other.
+fn expectList(
+    world: *const World,
+    query: Query,
+    list: []const raylane.trace.multi_hit.Hit,
+) !void {
+    var next = query;
+    for (list) |hit| {
+        next.tnear = bruteForce(world, next);
+        try expectHit(next.tnear, hit.t, hit.primitive);
+    }
+    if (list.len == raylane.trace.multi_hit.hits_max) return;
+    try std.testing.expectEqual(ray_file.no_primitive, bruteForce(world, next).primitive);
 }
 
 fn expectBundles(
@@ -103,6 +158,9 @@ fn expectBundles(
     queries: []const Query,
     expected: []const Hit,
 ) !void {
+    const dispatch = raylane.trace.dispatch;
+    const interval_packet = raylane.trace.interval_packet;
+    const geometry = &world.geometry;
     var counts: raylane.statistics.TestCounts = .{};
     const size = Kernel.group_count * Kernel.ray_count;
     var first: usize = 0;
@@ -111,16 +169,15 @@ fn expectBundles(
         var bundle = makeBundle(Kernel, part);
         var shadows = bundle;
         if (Kernel.variant.traversal == .beam) for ([_]i32{ 0, 1, 3, 12 }) |balance| {
-            // Without budget all go as sets; with little, companies run out of it on their way.
+            // Without budget all go as streams; with little, packets run out of it on their way.
             var poor = bundle;
-            var budget: raylane.trace.interval_packet.PacketBudget = .{ .balance = balance };
-            raylane.trace.interval_packet.trace(Kernel, .any_hit, world, &poor, &budget, &counts);
+            var budget: interval_packet.PacketBudget = .{ .balance = balance };
+            interval_packet.trace(Kernel, .any_hit, geometry, &poor, &budget, &counts);
             try expectBlocked(Kernel, &poor, expected[first..][0..part.len]);
         };
-        const coherence = raylane.trace.dispatch
-            .closestHit(Kernel, world, &bundle, null, null, &counts);
+        const coherence = dispatch.closestHit(Kernel, geometry, &bundle, null, &counts);
         try std.testing.expect(coherence == .none);
-        raylane.trace.dispatch.anyHit(Kernel, world, &shadows, &no_light, &coherence, &counts);
+        dispatch.anyHit(Kernel, geometry, &shadows, &no_light, coherence, &counts);
         try expectBlocked(Kernel, &shadows, expected[first..][0..part.len]);
         for (0..part.len) |index| {
             if (!isActive(index)) continue;
@@ -196,7 +253,20 @@ fn inLanes(comptime Rays: type, v: [3][Rays.count]f32) Rays.Vec3 {
 pub const Corners = std.ArrayList([3]f32);
 
 /// Kinds of triangles that break careless code.
-pub const Soup = enum { uniform, tiny_and_huge, coplanar, slivers, stacked, far_away, grid };
+pub const Soup = enum {
+    uniform,
+    tiny_and_huge,
+    coplanar,
+    slivers,
+    stacked,
+    /// Many, and some that are 1e5 away.
+    far_away,
+    grid,
+    /// One corner far away on one side.
+    stray,
+    /// Triangles of millimetres among some of a hundred kilometres.
+    mixed_scales,
+};
 
 /// Appends three corners for each triangle.
 pub fn addTriangles(soup: Soup, corners: *Corners, random: std.Random, count: usize) !void {
@@ -217,8 +287,16 @@ pub fn addTriangles(soup: Soup, corners: *Corners, random: std.Random, count: us
                 .stacked => if (index % 4 != 0) {
                     p = corners.items[corners.items.len - 3];
                 },
-                .far_away => for (&p) |*x| {
+                .far_away => if (index % 8 < 3) for (&p) |*x| {
                     x.* += 1e5;
+                },
+                .stray => if (index == 5 and corners.items.len % 3 == 1) {
+                    p = .{ 1e4, 0, 0 };
+                },
+                .mixed_scales => {
+                    const size: f32 = if (index % 8 == 0) 1e5 else 1e-3;
+                    const place: f32 = @floatFromInt(index % 3);
+                    for (&p) |*x| x.* = x.* * size + place;
                 },
                 .grid => for (&p) |*x| {
                     x.* = @round(x.* * 2);
@@ -239,6 +317,8 @@ fn addQueries(soup: Soup, queries: []Query, corners: []const [3]f32, random: std
         // The first half starts at one point, as primary rays do.
         if (index >= queries.len / 2) for (&query.origin) |*x| {
             x.* = center + random.floatNorm(f32) * 4;
+            // Some of the others a thousand kilometres away.
+            if (index % 16 == 0) x.* = random.floatNorm(f32) * 1e6;
         };
         // And every other block's rays go much the same way from much the same place.
         const led = index % 32 < 16 and index % 16 > 0;
@@ -366,6 +446,8 @@ test "a closed surface stops every ray that aims at its edges and corners, near 
         var builder: fixture.Builder = try .init();
         const center: [3]f32 = .{ distance, -distance, distance };
         try builder.addSphere(fixture.matte(.{ 1, 1, 1 }), center, 1, 12);
+        // Most of the scene is elsewhere, so that it stays where it is.
+        try builder.addSphere(fixture.matte(.{ 1, 1, 1 }), .{ 0, 0, 0 }, 1, 14);
         try builder.addCamera(.{ 0, 0, 7 }, 1);
         var scene = builder.finish();
         defer scene.deinit();
@@ -401,7 +483,7 @@ test "a closed surface stops every ray that aims at its edges and corners, near 
             const hit = raylane.trace.single.trace(
                 Kernel,
                 .closest_hit,
-                &world,
+                &world.geometry,
                 &ray,
                 &counts,
             );

@@ -26,15 +26,15 @@ pub fn write(
     defer file.deinit();
     const writer = &file.writer;
     try writer.writeAll("RAYLANE1");
-    try writer.writeInt(u32, @intCast(world.triangles.len), .little);
+    try writer.writeInt(u32, @intCast(world.geometry.triangles.len), .little);
     try writer.writeInt(u32, setup.size, .little);
     const vectors = [_]raylane.math.Vec3{
         setup.eye, setup.corner, setup.across, setup.down, setup.light,
     };
     for (vectors) |vector| try writeFloats(writer, &vector);
     try writeFloats(writer, &.{setup.offset});
-    for (world.triangles) |triangle| for (triangle.corner) |vertex| {
-        try writeFloats(writer, &world.positions[vertex]);
+    for (world.geometry.triangles) |triangle| for (triangle.corner) |vertex| {
+        try writeFloats(writer, &world.geometry.positions[vertex]);
     };
     for (setup.normals[1..]) |normal| try writeFloats(writer, &normal);
     try std.Io.Dir.cwd().writeFile(io, .{ .sub_path = path, .data = file.written() });

@@ -35,18 +35,18 @@ pub fn placeCamera(
     const arena = scene.arena.allocator();
     const first: u32 = @intCast(scene.nodes.len);
     scene.nodes = try std.mem.concat(arena, raylane.scene.Node, &.{ scene.nodes, &.{
-        .{ .parent = raylane.scene.none, .local = .{
+        .{ .parent = raylane.scene.none, .local = .of(raylane.math.Affine{
             .x = right,
             .y = vec3.cross(back, right),
             .z = back,
             .translation = view.eye,
-        } },
-        .{ .parent = raylane.scene.none, .local = .{
+        }) },
+        .{ .parent = raylane.scene.none, .local = .of(raylane.math.Affine{
             .x = .{ 1, 0, 0 },
             .y = .{ 0, 1, 0 },
             .z = .{ 0, 0, 1 },
             .translation = view.light,
-        } },
+        }) },
     } });
     scene.cameras = try arena.dupe(raylane.scene.Camera, &.{.{
         .name = "",
@@ -121,19 +121,19 @@ pub fn setUp(
     world: *const World,
     diagnostic: *Diagnostic,
 ) Error!Setup {
-    const camera = &world.camera;
+    const camera = &world.view.camera;
     if (camera.orthographic) return diagnostic.fail(
         error.InvalidInput,
         "the camera is orthographic; --camera gives another",
         .{},
     );
-    assert(world.width == world.height);
-    const pixel_share = 2 / @as(f32, @floatFromInt(world.width));
+    assert(world.view.width == world.view.height);
+    const pixel_share = 2 / @as(f32, @floatFromInt(world.view.width));
     const across = vec3.scale(camera.right, pixel_share);
     const down = vec3.scale(camera.up, -pixel_share);
     const upper_left = vec3.add(vec3.sub(camera.forward, camera.right), camera.up);
     return .{
-        .size = world.width,
+        .size = world.view.width,
         .eye = camera.origin,
         .corner = vec3.add(upper_left, vec3.scale(vec3.add(across, down), 0.5)),
         .across = across,
@@ -150,26 +150,26 @@ fn lightOf(world: *const World) Vec3 {
         .point, .spot => return light.position,
         .directional => {},
     };
-    return world.camera.origin;
+    return world.view.camera.origin;
 }
 
 fn diagonal(world: *const World) f32 {
     var lower: Vec3 = @splat(std.math.inf(f32));
     var upper: Vec3 = @splat(-std.math.inf(f32));
-    for (world.triangles) |triangle| for (triangle.corner) |vertex| {
-        lower = vec3.min(lower, world.positions[vertex]);
-        upper = vec3.max(upper, world.positions[vertex]);
+    for (world.geometry.triangles) |triangle| for (triangle.corner) |vertex| {
+        lower = vec3.min(lower, world.geometry.positions[vertex]);
+        upper = vec3.max(upper, world.geometry.positions[vertex]);
     };
-    return if (world.triangles.len == 0) 0 else vec3.length(vec3.sub(upper, lower));
+    return if (world.geometry.triangles.len == 0) 0 else vec3.length(vec3.sub(upper, lower));
 }
 
 fn normalsOf(arena: std.mem.Allocator, world: *const World) Error![]align(16) const [4]f32 {
-    const normals = try arena.alignedAlloc([4]f32, .@"16", world.triangles.len + 1);
+    const normals = try arena.alignedAlloc([4]f32, .@"16", world.geometry.triangles.len + 1);
     normals[0] = .{ 0, 0, 0, 0 };
-    for (normals[1..], world.triangles) |*normal, triangle| {
-        const a = world.positions[triangle.corner[0]];
-        const b = world.positions[triangle.corner[1]];
-        const c = world.positions[triangle.corner[2]];
+    for (normals[1..], world.geometry.triangles) |*normal, triangle| {
+        const a = world.geometry.positions[triangle.corner[0]];
+        const b = world.geometry.positions[triangle.corner[1]];
+        const c = world.geometry.positions[triangle.corner[2]];
         const unit = vec3.normalize(vec3.cross(vec3.sub(b, a), vec3.sub(c, a)));
         normal[0..3].* = unit orelse .{ 0, 0, 0 };
         normal[3] = 0;

@@ -23,10 +23,6 @@ pub fn Tracer(comptime Kernel: type) type {
         /// The benchmark's point light.
         light: raylane.world.Light,
         tests: raylane.statistics.TestCounts = .{},
-        /// Which rays of the last batch went as beams.
-        coherence: Coherence = .none,
-
-        const Coherence = dispatch.Coherence(Kernel);
         const Self = @This();
 
         /// Nearest hits of rays from the eye, one through each pixel of a tile, all active.
@@ -37,14 +33,13 @@ pub fn Tracer(comptime Kernel: type) type {
         /// Whether rays from the light hit anything on the way to their ends, which are what the
         /// eye sees or, after a bounce, anywhere.
         pub fn occluded(tracer: *Self, batch: *Batch, bounced: bool) void {
-            const world = tracer.world;
+            const geometry = &tracer.world.geometry;
             const tests = &tracer.tests;
             const light = &tracer.light;
             switch (Kernel.variant.traversal) {
                 .beam => {
-                    const coherence: *const Coherence =
-                        if (bounced) &tracer.coherence else &.all;
-                    dispatch.anyHit(Kernel, world, batch.bundle(), light, coherence, tests);
+                    const coherence: dispatch.Coherence = if (bounced) .none else .all;
+                    dispatch.anyHit(Kernel, geometry, batch.bundle(), light, coherence, tests);
                 },
                 .packet2x2, .single => tracer.traceEach(.any_hit, batch),
             }
@@ -56,44 +51,40 @@ pub fn Tracer(comptime Kernel: type) type {
         }
 
         fn nearest(tracer: *Self, batch: *Batch, grid: ?*const Grid) void {
-            const world = tracer.world;
+            const geometry = &tracer.world.geometry;
             const tests = &tracer.tests;
             switch (Kernel.variant.traversal) {
-                .beam => tracer.coherence = dispatch
-                    .closestHit(Kernel, world, batch.bundle(), grid, &batch.shares, tests),
+                .beam => _ = dispatch.closestHit(Kernel, geometry, batch.bundle(), grid, tests),
                 .packet2x2, .single => tracer.traceEach(.closest_hit, batch),
             }
-            if (tracer.coherence != .all) tracer.weighHits(batch);
+            tracer.weighHits(batch);
         }
 
         /// Group by group, each by itself.
         fn traceEach(tracer: *Self, comptime query: Query, batch: *Batch) void {
-            const world = tracer.world;
+            const geometry = &tracer.world.geometry;
             const tests = &tracer.tests;
             for (&batch.groups) |*group| {
                 if (Kernel.variant.traversal == .packet2x2) {
-                    bundle_file.trace(Kernel, query, world, group, tests);
+                    bundle_file.trace(Kernel, query, geometry, group, tests);
                     continue;
                 }
-                const view = bundle_file.viewOf(Lanes, group);
-                raylane.trace.single.traceEach(Kernel, query, world, group, &view, tests);
+                const view = bundle_file.viewOf(Lanes, &geometry.padding, group);
+                raylane.trace.single.traceEach(Kernel, query, geometry, group, &view, tests);
             }
         }
 
-        /// Barycentric weights of the nearest hits, by the edge functions that decided them; those
-        /// of beams are there already.
+        /// Barycentric weights of the nearest hits, by the edge functions that decided them.
         fn weighHits(tracer: *const Self, batch: *Batch) void {
             var hits: [Batch.group_count]Lanes.Mask = undefined;
-            for (&hits, &batch.groups, 0..) |*hit, *group, index| {
+            for (&hits, &batch.groups) |*hit, *group| {
                 hit.* = group.active.andNot(group.closest.primitive.lt(.zero()));
-                if (Kernel.variant.traversal == .beam and tracer.coherence == .some)
-                    hit.* = hit.andNot(tracer.coherence.some[index]);
                 if (hit.any()) tracer.prefetchCorners(group.closest.primitive, hit.bits());
             }
             for (&batch.groups, &batch.shares, hits) |*group, *all, hit| {
                 if (hit.none()) continue;
                 const primitive: Lanes.I32 = .select(hit, group.closest.primitive, .zero());
-                const weights = edgeFunctions(tracer.gather(primitive), group.line, hit);
+                const weights = edgeFunctions(tracer.cornersOf(primitive, hit), group.line, hit);
                 const share = Lanes.F32.splat(1).div(weights.sum());
                 const both = [2]Lanes.F32{ weights.b.mul(share), weights.c.mul(share) };
                 for (all, both) |*to, value| {
@@ -107,17 +98,30 @@ pub fn Tracer(comptime Kernel: type) type {
             const primitives = primitive.toArray();
             var hits = lanes;
             while (hits != 0) : (hits &= hits - 1) {
-                const numbers = tracer.world.triangles[@intCast(primitives[@ctz(hits)])].corner;
-                inline for (numbers) |number| @prefetch(&tracer.world.positions[number], .{});
+                const geometry = &tracer.world.geometry;
+                const numbers = geometry.triangles[@intCast(primitives[@ctz(hits)])].corner;
+                inline for (numbers) |number| @prefetch(&geometry.positions[number], .{});
             }
+        }
+
+        /// Corners of what was hit: neighbours mostly hit the same.
+        fn cornersOf(tracer: *const Self, primitives: Lanes.I32, hit: Lanes.Mask) [3]Lanes.Vec3 {
+            const one = primitives.lane(@ctz(hit.bits()));
+            if (hit.andNot(primitives.eq(.splat(one))).any()) return tracer.gather(primitives);
+            const geometry = &tracer.world.geometry;
+            var corners: [3]Lanes.Vec3 = undefined;
+            for (&corners, geometry.triangles[@intCast(one)].corner) |*corner, number| {
+                corner.* = .splat(geometry.positions[number]);
+            }
+            return corners;
         }
 
         fn gather(tracer: *const Self, primitives: Lanes.I32) [3]Lanes.Vec3 {
             var arrays: [3][3][Lanes.count]f32 = undefined;
             for (primitives.toArray(), 0..) |primitive, lane| {
-                const numbers = tracer.world.triangles[@intCast(primitive)].corner;
+                const numbers = tracer.world.geometry.triangles[@intCast(primitive)].corner;
                 inline for (&arrays, numbers) |*corner, number| {
-                    const position = tracer.world.positions[number];
+                    const position = tracer.world.geometry.positions[number];
                     inline for (corner, position) |*axis, coordinate| axis[lane] = coordinate;
                 }
             }
@@ -134,7 +138,8 @@ pub fn Tracer(comptime Kernel: type) type {
             hit: Lanes.Mask,
         ) triangle.EdgeFunctions(Lanes) {
             const axis: ray_file.LongAxis(Lanes) = .of(line.direction);
-            const view: ray_file.ShearedRay(Lanes) = .init(line, axis);
+            const padding = &raylane.world.Padding.init(@splat(0), .empty);
+            const view: ray_file.ShearedRay(Lanes) = .init(line, axis, padding);
             const turned: [3]Lanes.Vec3 = .{
                 axis.turn(corners[0]), axis.turn(corners[1]), axis.turn(corners[2]),
             };

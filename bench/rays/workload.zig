@@ -119,6 +119,7 @@ pub fn Workload(comptime Kernel: type) type {
                 .shared = workload,
                 .tracer = .{ .world = workload.world, .light = .{
                     .kind = .point,
+                    .from_receiver = false,
                     .position = workload.setup.light,
                     .direction = .{ 0, 0, -1 },
                     .intensity = .{ 1, 1, 1 },

@@ -21,13 +21,15 @@ pub const block_cost: f32 = 2;
 /// A triangle by its number, within its box.
 pub const Reference = struct { box: Box3, number: u32 };
 
-/// All triangles of a world, within their boxes grown as `World.pad` and `World.node_margin` ask.
+/// All triangles of a world, within their boxes grown as nodes are.
 pub fn references(arena: Allocator, world: *const World) error{OutOfMemory}![]Reference {
-    const list = try arena.alloc(Reference, world.triangles.len);
-    for (list, world.triangles, 0..) |*reference, triangle, number| {
+    const list = try arena.alloc(Reference, world.geometry.triangles.len);
+    for (list, world.geometry.triangles, 0..) |*reference, triangle, number| {
         var box: Box3 = .empty;
-        for (triangle.corner) |corner| box = box.include(world.positions[corner]);
-        const grown = box.grow(world.pad + world.node_margin);
+        for (triangle.corner) |corner| box = box.include(world.geometry.positions[corner]);
+        const padding = &world.geometry.padding;
+        const padded = box.grow(padding.ofBox(box));
+        const grown = padded.grow(padding.marginOfBox(padded));
         reference.* = .{ .box = grown, .number = @intCast(number) };
     }
     return list;
@@ -59,8 +61,9 @@ pub fn appendBlocks(
         if (lane == 0) try blocks.append(arena, .empty);
         const block = &blocks.items[blocks.items.len - 1];
         block.primitive[lane] = reference.number;
-        for (world.triangles[reference.number].corner, 0..) |corner, place| {
-            for (0..3) |axis| block.corner[place][axis][lane] = world.positions[corner][axis];
+        for (world.geometry.triangles[reference.number].corner, 0..) |corner, place| {
+            const position = world.geometry.positions[corner];
+            for (0..3) |axis| block.corner[place][axis][lane] = position[axis];
         }
     }
     return @intCast(blocks.items.len - first);

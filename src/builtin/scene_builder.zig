@@ -8,6 +8,7 @@ const math = @import("../math.zig");
 const geometry = @import("geometry.zig");
 const scene_data = @import("../scene.zig");
 const Affine = math.Affine;
+const AffineD = math.AffineD;
 const Point = geometry.Point;
 const Scene = scene_data.Scene;
 const Allocator = std.mem.Allocator;
@@ -74,7 +75,7 @@ pub fn addPointLight(
 ) Allocator.Error!void {
     var place: Affine = .identity;
     place.translation = geometry.toVec3(position);
-    const node = try builder.addNode(place);
+    const node = try builder.addNode(.of(place));
     const light: scene_data.Light =
         .{ .kind = .point, .node = node, .color = color, .intensity = intensity };
     try builder.lights.append(builder.arena(), light);
@@ -87,7 +88,7 @@ pub fn addDirectionalLight(
     color: math.Vec3,
     intensity: f32,
 ) Allocator.Error!void {
-    const node = try builder.addNode(lookAt(.{ 0, 0, 0 }, -toward_light));
+    const node = try builder.addNode(.of(lookAt(.{ 0, 0, 0 }, -toward_light)));
     const light: scene_data.Light =
         .{ .kind = .directional, .node = node, .color = color, .intensity = intensity };
     try builder.lights.append(builder.arena(), light);
@@ -102,7 +103,7 @@ pub fn setAmbient(builder: *SceneBuilder, radiance: f32) void {
 /// Adds a camera and makes the first one the default.
 pub fn addCamera(builder: *SceneBuilder, view: View) Allocator.Error!void {
     assert(view.y_fov_deg > 0 and view.y_fov_deg < 180 and view.aspect > 0);
-    const node = try builder.addNode(lookAt(view.eye, view.target - view.eye));
+    const node = try builder.addNode(.of(lookAt(view.eye, view.target - view.eye)));
     try builder.cameras.append(builder.arena(), .{
         .name = view.name,
         .node = node,
@@ -129,7 +130,7 @@ pub fn finish(builder: *SceneBuilder) Allocator.Error!Scene {
 }
 
 /// Adds a root node and returns its index.
-fn addNode(builder: *SceneBuilder, local: Affine) Allocator.Error!u32 {
+fn addNode(builder: *SceneBuilder, local: AffineD) Allocator.Error!u32 {
     try builder.nodes.append(builder.arena(), .{ .parent = scene_data.none, .local = local });
     return @intCast(builder.nodes.items.len - 1);
 }

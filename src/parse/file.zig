@@ -13,6 +13,7 @@
 
 const std = @import("std");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const Identity = @import("../identity.zig").Identity;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
 
@@ -22,12 +23,14 @@ pub const Error = error{ OutOfMemory, InputOutput, NotRegular, TooLarge };
 /// Longest path of a file that a scene may name.
 pub const path_bytes_max = Io.Dir.max_path_bytes;
 
-/// Opens `path`, relative to `folder`, for reading. The caller closes it. Asserts that the path
-/// holds no NUL. On an error `reason` says what is wrong, without the path.
+/// Opens `path`, relative to `folder`, for reading, unless it is the file that the `output`
+/// replaces. The caller closes it. Asserts that the path holds no NUL. On an error `reason` says
+/// what is wrong, without the path.
 pub fn open(
     io: Io,
     folder: Io.Dir,
     path: []const u8,
+    output: ?Identity,
     reason: *[]const u8,
 ) error{ InputOutput, NotRegular }!Io.File {
     std.debug.assert(std.mem.findScalar(u8, path, 0) == null);
@@ -42,6 +45,10 @@ pub fn open(
     };
     const file: Io.File = .{ .handle = handle, .flags = .{ .nonblocking = true } };
     errdefer file.close(io);
+    if (Identity.eql(output, .of(handle))) {
+        reason.* = "would be overwritten by the output";
+        return error.InputOutput;
+    }
     const stat = file.stat(io) catch |err| {
         reason.* = explain(err);
         return error.InputOutput;
@@ -128,17 +135,22 @@ test "regular files only, and the reason in words" {
     try temporary.dir.writeFile(io, .{ .sub_path = "a", .data = "hello" });
     var reason: []const u8 = "";
 
-    const file = try open(io, temporary.dir, "a", &reason);
+    const file = try open(io, temporary.dir, "a", null, &reason);
     defer file.close(io);
     const bytes = try read(gpa, io, file, 5, &reason);
     defer gpa.free(bytes);
     try std.testing.expectEqualStrings("hello", bytes);
     try std.testing.expectError(error.TooLarge, read(gpa, io, file, 4, &reason));
 
-    try std.testing.expectError(error.NotRegular, open(io, temporary.dir, ".", &reason));
+    const output: ?Identity = .of(file.handle);
+    try std.testing.expectError(error.InputOutput, open(io, temporary.dir, "a", output, &reason));
+    try std.testing.expectEqualStrings("would be overwritten by the output", reason);
+
+    try std.testing.expectError(error.NotRegular, open(io, temporary.dir, ".", null, &reason));
     try std.testing.expectEqualStrings("is a folder", reason);
-    try std.testing.expectError(error.NotRegular, open(io, temporary.dir, "/dev/null", &reason));
-    try std.testing.expectError(error.InputOutput, open(io, temporary.dir, "b", &reason));
+    const device = open(io, temporary.dir, "/dev/null", null, &reason);
+    try std.testing.expectError(error.NotRegular, device);
+    try std.testing.expectError(error.InputOutput, open(io, temporary.dir, "b", null, &reason));
     try std.testing.expectEqualStrings("does not exist", reason);
-    try std.testing.expectError(error.InputOutput, open(io, temporary.dir, "a/b", &reason));
+    try std.testing.expectError(error.InputOutput, open(io, temporary.dir, "a/b", null, &reason));
 }

@@ -38,7 +38,7 @@ pub fn parse(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!Scene {
-    const bytes = try readFile(gpa, io, path, diagnostic);
+    const bytes = try readFile(gpa, io, path, settings, diagnostic);
     defer gpa.free(bytes);
     const folder_path = std.fs.path.dirname(path) orelse ".";
     const folder = std.Io.Dir.cwd().openDir(io, folder_path, .{}) catch
@@ -47,9 +47,15 @@ pub fn parse(
     return parseBytes(gpa, io, bytes, folder, settings, diagnostic);
 }
 
-fn readFile(gpa: Allocator, io: std.Io, path: []const u8, diagnostic: *Diagnostic) Error![]u8 {
+fn readFile(
+    gpa: Allocator,
+    io: std.Io,
+    path: []const u8,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error![]u8 {
     var reason: []const u8 = "";
-    const opened = file.open(io, .cwd(), path, &reason) catch
+    const opened = file.open(io, .cwd(), path, settings.output, &reason) catch
         return diagnostic.fail(error.InputOutput, "{s}", .{reason});
     defer opened.close(io);
     return file.read(gpa, io, opened, limits.file_bytes_max, &reason) catch |err| switch (err) {
@@ -75,14 +81,19 @@ pub fn parseBytes(
     const parts = try container.open(bytes, diagnostic);
     const simplified = try escapes.simplifyEscapes(gpa, parts.json);
     defer if (simplified) |copy| gpa.free(copy);
-    var document = try parseDocument(gpa, simplified orelse parts.json, diagnostic);
+    const text = simplified orelse parts.json;
+    const checked = try json.check(text, &schema.document, diagnostic);
+    var document = try parseDocument(gpa, text, checked.lengths, diagnostic);
     defer document.deinit();
+    const doubles = try json.readDoubles(gpa, text, &schema.document, &checked);
+    defer gpa.free(doubles);
     var scene: Scene = .init(gpa);
     errdefer scene.deinit();
     var source: Source = .{
         .gpa = gpa,
         .arena = scene.arena.allocator(),
         .data = document.data,
+        .doubles = doubles,
         .diagnostic = diagnostic,
     };
     defer source.deinit();
@@ -91,6 +102,7 @@ pub fn parseBytes(
         .io = io,
         .folder = folder,
         .allow_outside = settings.allow_outside,
+        .output = settings.output,
         .binary = parts.binary,
     }, diagnostic);
     defer buffers.deinit();
@@ -104,9 +116,13 @@ pub fn parseBytes(
     return scene;
 }
 
-/// Checks the JSON text and has cgltf parse it.
-fn parseDocument(gpa: Allocator, text: []const u8, diagnostic: *Diagnostic) Error!Document {
-    const lengths = try json.check(text, &schema.document, diagnostic);
+/// Has cgltf parse a JSON text that has been checked.
+fn parseDocument(
+    gpa: Allocator,
+    text: []const u8,
+    lengths: json.Lengths,
+    diagnostic: *Diagnostic,
+) Error!Document {
     return Document.parse(gpa, text) catch |err| switch (err) {
         error.OutOfMemory => error.OutOfMemory,
         error.TooLarge => diagnostic.fail(

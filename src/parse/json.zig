@@ -39,6 +39,8 @@ pub const Rule = union(enum) {
     reference: Reference,
     /// An array of this many numbers.
     vector: u8,
+    /// The same, kept in double precision.
+    doubles: Doubles,
     array: Array,
     object: *const Object,
 };
@@ -56,6 +58,19 @@ pub const Reference = struct {
         /// It has no parent.
         root,
     };
+};
+
+/// An array of numbers of an element of a counted list, of which the first has this slot.
+pub const Doubles = struct { length: u8, slot: u8 };
+
+/// A number that single precision does not hold: of which element of its counted list, which slot.
+pub const Double = struct { element: u32, slot: u8, value: f64 };
+
+/// What is known of a document that `check` has passed.
+pub const Checked = struct {
+    lengths: Lengths,
+    /// As many `Double`s as it has.
+    double_count: usize,
 };
 
 /// An array of any length up to `list_length_max`.
@@ -82,9 +97,9 @@ pub const Field = struct {
 /// Lengths of the counted lists.
 pub const Lengths = [list_count_max]u64;
 
-/// Checks a whole document and returns the lengths of its counted lists. References are not
-/// compared with them.
-pub fn check(text: []const u8, rule: *const Rule, said: *Diagnostic) error{InvalidInput}!Lengths {
+/// Checks a whole document and counts its lists and doubles. References are not compared with the
+/// lists' lengths.
+pub fn check(text: []const u8, rule: *const Rule, said: *Diagnostic) error{InvalidInput}!Checked {
     if (!std.unicode.utf8ValidateSlice(text)) return said.fail(
         error.InvalidInput,
         "the JSON text is not UTF-8",
@@ -92,7 +107,7 @@ pub fn check(text: []const u8, rule: *const Rule, said: *Diagnostic) error{Inval
     );
     var scanner: Scanner = .{ .text = text, .said = said };
     try scanner.run(rule);
-    return scanner.lengths;
+    return .{ .lengths = scanner.lengths, .double_count = scanner.double_count };
 }
 
 /// Looks again at a document that `check` has passed, for references that lead nowhere and for
@@ -130,6 +145,22 @@ pub fn checkReferences(
     );
 }
 
+/// The doubles of a document that `check` has passed, in their order; the caller frees them.
+pub fn readDoubles(
+    gpa: Allocator,
+    text: []const u8,
+    rule: *const Rule,
+    checked: *const Checked,
+) error{OutOfMemory}![]Double {
+    const doubles = try gpa.alloc(Double, checked.double_count);
+    if (doubles.len == 0) return doubles;
+    var unheard: Diagnostic = .{}; // The warnings have been given.
+    var scanner: Scanner = .{ .text = text, .said = &unheard, .doubles = doubles };
+    scanner.run(rule) catch unreachable; // It has been passed.
+    assert(scanner.double_count == doubles.len);
+    return doubles;
+}
+
 /// What the second look compares with.
 const References = struct {
     lengths: Lengths,
@@ -143,6 +174,8 @@ const Frame = struct {
     object: *const Object = &.{},
     item: *const Rule = &.any,
     list: ?u8 = null,
+    /// Of the first of the numbers that are kept.
+    slot: ?u8 = null,
     length_max: u64 = std.math.maxInt(u64),
     length_min: u64 = 0,
     /// Known keys met so far, as bits.
@@ -160,6 +193,9 @@ const Scanner = struct {
     stack: [depth_max]Frame = undefined,
     depth: usize = 0,
     lengths: Lengths = @splat(0),
+    double_count: usize = 0,
+    /// Where doubles go, if they are kept.
+    doubles: ?[]Double = null,
 
     fn run(scanner: *Scanner, rule: *const Rule) error{InvalidInput}!void {
         scanner.skipSpace();
@@ -234,6 +270,13 @@ const Scanner = struct {
             },
             '[' => switch (rule.*) {
                 .any => try scanner.push(.{ .is_object = false }),
+                .doubles => |doubles| try scanner.push(.{
+                    .is_object = false,
+                    .item = &.number,
+                    .slot = doubles.slot,
+                    .length_max = doubles.length,
+                    .length_min = doubles.length,
+                }),
                 .array => |array| try scanner.push(.{
                     .is_object = false,
                     .item = array.item,
@@ -314,12 +357,36 @@ const Scanner = struct {
                 "{f}: {s} is not above 0, ignored",
                 .{ Path{ .scanner = scanner }, digits },
             );
+            scanner.keepDouble(digits, float);
             return;
         }
         const whole = numbers.parseInteger(digits) orelse
             return scanner.wrong("{s} is not a whole number from 0 to 2^53 - 1", .{digits});
         if (whole > std.math.maxInt(usize)) return scanner.wrong("{d} is too large", .{whole});
         if (rule.* == .reference) try scanner.resolve(rule.reference, whole);
+    }
+
+    /// Counts a number that is asked for in double precision, and keeps it the second time.
+    fn keepDouble(scanner: *Scanner, digits: []const u8, single: f32) void {
+        if (scanner.depth == 0) return;
+        const frame = &scanner.stack[scanner.depth - 1];
+        const slot = frame.slot orelse return;
+        const double = numbers.parseDouble(digits) orelse return;
+        if (double == single) return;
+        scanner.double_count += 1;
+        const doubles = scanner.doubles orelse return;
+        var depth = scanner.depth;
+        while (depth > 0) : (depth -= 1) {
+            const above = &scanner.stack[depth - 1];
+            if (above.list == null) continue;
+            doubles[scanner.double_count - 1] = .{
+                .element = @intCast(above.count - 1),
+                .slot = slot + @as(u8, @intCast(frame.count - 1)),
+                .value = double,
+            };
+            return;
+        }
+        unreachable; // A rule for doubles stands within a counted list.
     }
 
     fn resolve(scanner: *Scanner, reference: Reference, index: u64) error{InvalidInput}!void {
@@ -444,7 +511,7 @@ const Scanner = struct {
             .string, .word => "a string",
             .number, .positive => "a number",
             .whole, .reference => "a whole number",
-            .vector, .array => "a list",
+            .vector, .doubles, .array => "a list",
             .object => "an object",
         }});
     }
@@ -568,7 +635,7 @@ test "a rule is held, and the message names the place" {
     }
     var said: Diagnostic = .{};
     const text = "{\"size\":400e-2,\"list\":[{\"x\":{}},{}],\"mode\":\"C\",\"range\":0}";
-    const lengths = try check(text, &test_rule, &said);
+    const lengths = (try check(text, &test_rule, &said)).lengths;
     try std.testing.expectEqual(2, lengths[3]);
     try std.testing.expectEqualStrings("mode: 'C' is not known, ignored", said.warnings[0].text());
     try std.testing.expectEqualStrings("range: 0 is not above 0, ignored", said.warnings[1].text());
@@ -587,7 +654,7 @@ test checkReferences {
     };
     for (cases) |case| {
         var said: Diagnostic = .{};
-        const lengths = try check(case[0], &test_rule, &said);
+        const lengths = (try check(case[0], &test_rule, &said)).lengths;
         if (checkReferences(gpa, case[0], &test_rule, lengths, "node", &said)) {
             try std.testing.expectEqualStrings("", case[1]);
         } else |err| {

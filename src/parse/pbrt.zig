@@ -10,6 +10,7 @@ const limits = @import("pbrt/limits.zig");
 const Allocator = std.mem.Allocator;
 const Assembly = @import("pbrt/assembly.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const Identity = @import("../identity.zig").Identity;
 const Input = @import("pbrt/input.zig");
 const Reader = @import("pbrt/reader.zig");
 const Scene = @import("../scene.zig").Scene;
@@ -27,12 +28,11 @@ pub fn parse(
     diagnostic: *Diagnostic,
 ) Error!Scene {
     var reason: []const u8 = "";
-    const opened = file.open(io, .cwd(), path, &reason) catch
+    const opened = file.open(io, .cwd(), path, settings.output, &reason) catch
         return diagnostic.fail(error.InputOutput, "{s}", .{reason});
     const loaded = load: {
         defer opened.close(io);
-        const identity = Input.identityOf(io, opened) catch
-            return diagnostic.fail(error.InputOutput, "cannot be read", .{});
+        const identity: ?Identity = .of(opened.handle);
         const limit = limits.file_bytes_max;
         const bytes = file.readTerminated(gpa, io, opened, limit, &reason) catch |err|
             return switch (err) {
@@ -56,7 +56,7 @@ pub fn parse(
 }
 
 /// A text to start from. `read` takes over the bytes.
-const Text = struct { name: []const u8, bytes: [:0]u8, identity: u64 };
+const Text = struct { name: []const u8, bytes: [:0]u8, identity: ?Identity };
 
 /// Reads a text that is in memory; what it names is looked for in `folder`.
 pub fn parseBytes(
@@ -68,7 +68,7 @@ pub fn parseBytes(
     diagnostic: *Diagnostic,
 ) Error!Scene {
     const copy = try gpa.dupeSentinel(u8, bytes, 0);
-    const text: Text = .{ .name = "text", .bytes = copy, .identity = 0 };
+    const text: Text = .{ .name = "text", .bytes = copy, .identity = null };
     return read(gpa, io, text, folder, "", settings, diagnostic);
 }
 

@@ -15,7 +15,9 @@ const bvh_split = @import("bvh/split.zig");
 const huge_pages = @import("../huge_pages.zig");
 const assert = std.debug.assert;
 const vec3 = math.vec3;
+const pose_file = @import("pose.zig");
 const Affine = math.Affine;
+const AffineD = math.AffineD;
 const Box3 = math.Box3;
 const Vec3 = math.Vec3;
 
@@ -44,7 +46,7 @@ pub const Surface = struct {
     /// Box of the triangles' corners, empty without triangles.
     bounds: Box3,
     /// Box of twice the middles of the triangles' boxes, empty without triangles.
-    middles_twice: Box3,
+    centroid_bounds: Box3,
     /// Triangles left out.
     dropped_count: u64,
 };
@@ -52,7 +54,7 @@ pub const Surface = struct {
 /// One instance: where its vertices and triangles come from and go to.
 const Draw = struct {
     mesh: *const scene.Mesh,
-    map: Affine,
+    map: AffineD,
     normal_map: Affine,
     /// The map turns fronts into backs.
     mirrored: bool,
@@ -69,7 +71,7 @@ const ChunkResult = struct {
     kept_count: u32 = 0,
     outside_count: u32 = 0,
     bounds: Box3 = .empty,
-    middles_twice: Box3 = .empty,
+    centroid_bounds: Box3 = .empty,
 };
 
 /// Flattens the whole scene. `maps` holds a world map for each node. The surface's arrays come from
@@ -78,7 +80,7 @@ pub fn flatten(
     gpa: std.mem.Allocator,
     arena: std.mem.Allocator,
     from: *const scene.Scene,
-    maps: []const Affine,
+    maps: []const AffineD,
     pool: *parallel.Pool,
     diagnostic: *Diagnostic,
 ) Error!Surface {
@@ -115,7 +117,7 @@ fn chunkCount(count: usize) usize {
 fn plan(
     gpa: std.mem.Allocator,
     from: *const scene.Scene,
-    maps: []const Affine,
+    maps: []const AffineD,
     draws: []Draw,
     diagnostic: *Diagnostic,
 ) Error!Size {
@@ -136,7 +138,7 @@ fn plan(
         draw.* = .{
             .mesh = mesh,
             .map = map,
-            .normal_map = normalMap(map, mirrored),
+            .normal_map = normalMap(.of(map), mirrored),
             .mirrored = mirrored,
             .vertex_source = range.first,
             .vertex_count = range.count,
@@ -242,7 +244,7 @@ const Work = struct {
         const source = draw.vertex_source + (from - draw.vertex_target);
         const count = to - from;
         for (work.positions[from..to], draw.mesh.positions[source..][0..count]) |*to_p, p| {
-            to_p.* = draw.map.point(p);
+            to_p.* = pose_file.round(draw.map.point(pose_file.widen(p)));
         }
         if (draw.mesh.normals) |normals| {
             for (work.normals[from..to], normals[source..][0..count]) |*to_n, n| {
@@ -306,7 +308,7 @@ const Work = struct {
                 result.kept_count += 1;
                 const box = Box3.empty.include(a).include(b).include(c);
                 result.bounds = result.bounds.join(box);
-                result.middles_twice = result.middles_twice.include(box.centerTwice());
+                result.centroid_bounds = result.centroid_bounds.include(box.centerTwice());
             }
         }
     }
@@ -316,7 +318,7 @@ const Work = struct {
         var kept_count: usize = 0;
         var outside_count: u64 = 0;
         var bounds: Box3 = .empty;
-        var middles_twice: Box3 = .empty;
+        var centroid_bounds: Box3 = .empty;
         for (work.chunks, 0..) |chunk, index| {
             const begin = index * chunk_size;
             assert(kept_count <= begin);
@@ -328,7 +330,7 @@ const Work = struct {
             kept_count += chunk.kept_count;
             outside_count += chunk.outside_count;
             bounds = bounds.join(chunk.bounds);
-            middles_twice = middles_twice.join(chunk.middles_twice);
+            centroid_bounds = centroid_bounds.join(chunk.centroid_bounds);
         }
         if (outside_count > 0) diagnostic.warn(
             "{d} triangles left out: they reach farther than 2^40 m from the origin",
@@ -340,7 +342,7 @@ const Work = struct {
             .colors = work.colors,
             .triangles = work.triangles[0..kept_count],
             .bounds = bounds,
-            .middles_twice = middles_twice,
+            .centroid_bounds = centroid_bounds,
             .dropped_count = work.triangles.len - kept_count,
         };
     }

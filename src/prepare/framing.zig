@@ -277,7 +277,7 @@ const TestShape = struct {
             .colors = &.{},
             .triangles = shape.triangles,
             .bounds = bounds,
-            .middles_twice = .empty,
+            .centroid_bounds = .empty,
             .dropped_count = 0,
         };
     }

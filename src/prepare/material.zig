@@ -41,7 +41,7 @@ fn convert(from: *const scene.Material) world.Material {
         .dielectric_f0 = f0_root * f0_root,
         .ior = from.ior,
         .transmission = from.transmission,
-        .absorption = if (from.volume) absorption(from) else .{ 0, 0, 0 },
+        .sigma_a = if (from.volume) absorption(from) else .{ 0, 0, 0 },
         .alpha_cutoff = if (from.alpha_mode == .mask) from.alpha_cutoff else -1,
         .blend = flag(from.alpha_mode == .blend),
         .double_sided = flag(from.double_sided),
@@ -108,16 +108,16 @@ test "white light turns to the attenuation colour after the attenuation distance
         .attenuation_distance = 2,
     };
     const result = convert(&from);
-    try std.testing.expectEqual(0, result.absorption[0]);
-    try std.testing.expectApproxEqRel(@as(f32, 0.34657359), result.absorption[1], 1e-6);
-    try std.testing.expectApproxEqRel(@as(f32, 4.6051702), result.absorption[2], 1e-6);
+    try std.testing.expectEqual(0, result.sigma_a[0]);
+    try std.testing.expectApproxEqRel(@as(f32, 0.34657359), result.sigma_a[1], 1e-6);
+    try std.testing.expectApproxEqRel(@as(f32, 4.6051702), result.sigma_a[2], 1e-6);
     var thin = from;
     thin.volume = false;
-    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, convert(&thin).absorption);
+    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, convert(&thin).sigma_a);
     var clear = from;
     clear.attenuation_distance = std.math.inf(f32);
-    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, convert(&clear).absorption);
+    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, convert(&clear).sigma_a);
     var dense = from;
     dense.attenuation_distance = std.math.floatMin(f32);
-    try std.testing.expect(math.vec3.isFinite(convert(&dense).absorption));
+    try std.testing.expect(math.vec3.isFinite(convert(&dense).sigma_a));
 }

@@ -11,6 +11,7 @@ const escapes = @import("../json/escapes.zig");
 const uri = @import("../uri.zig");
 const diagnostic = @import("../../diagnostic.zig");
 const Source = @import("source.zig");
+const Identity = @import("../../identity.zig").Identity;
 const Allocator = std.mem.Allocator;
 const Diagnostic = diagnostic.Diagnostic;
 const Error = Source.Error;
@@ -28,6 +29,8 @@ pub const Origin = struct {
     /// The folder of the scene.
     folder: std.Io.Dir,
     allow_outside: bool,
+    /// See parse/settings.zig.
+    output: ?Identity,
     /// The GLB's BIN chunk.
     binary: ?[]const u8,
 };
@@ -150,7 +153,7 @@ fn loadFile(
     };
     defer gpa.free(path);
     var reason: []const u8 = "";
-    const opened = file.open(origin.io, origin.folder, path, &reason) catch |err|
+    const opened = file.open(origin.io, origin.folder, path, origin.output, &reason) catch |err|
         return fileError(err, index, name, reason, said);
     defer opened.close(origin.io);
     if (!origin.allow_outside) try checkBelow(opened, index, name, origin, said);

@@ -88,7 +88,7 @@ const Reader = struct {
             float_max,
         );
         var emissive = math.vec3.scale(factor, strength);
-        for (&emissive) |*value| value.* = math.vec3.flushDenormal(value.*);
+        for (&emissive) |*value| value.* = math.flushDenormal(value.*);
         return emissive;
     }
 
@@ -100,7 +100,7 @@ const Reader = struct {
     fn readVolume(reader: Reader, raw: *const c.cgltf_volume, material: *scene.Material) void {
         material.volume = raw.thickness_factor > 0;
         material.attenuation_color = reader.color3("attenuationColor", raw.attenuation_color);
-        const distance = math.vec3.flushDenormal(raw.attenuation_distance);
+        const distance = math.flushDenormal(raw.attenuation_distance);
         if (distance > 0) {
             // cgltf says FLT_MAX where the file says nothing.
             const endless = distance == float_max;
@@ -128,7 +128,7 @@ const Reader = struct {
     }
 
     fn clamp(reader: Reader, name: []const u8, value: f32, low: f32, high: f32) f32 {
-        if (value >= low and value <= high) return math.vec3.flushDenormal(value);
+        if (value >= low and value <= high) return math.flushDenormal(value);
         reader.source.warn(
             "material {d}: {s} {d} is not in {d}..{d}, clamped",
             .{ reader.index, name, value, low, high },

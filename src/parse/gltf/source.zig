@@ -5,6 +5,7 @@
 
 const std = @import("std");
 const c = @import("cgltf");
+const json = @import("../json.zig");
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
 const Allocator = std.mem.Allocator;
 const assert = std.debug.assert;
@@ -17,6 +18,8 @@ data: *const c.cgltf_data,
 /// Bytes of each buffer, as many as its byteLength says; null where the file gives none.
 buffers: []const ?[]const u8 = &.{},
 diagnostic: *Diagnostic,
+/// Numbers of nodes that are not exact in single precision, by node.
+doubles: []const json.Double = &.{},
 /// Bytes that decoded vertices and triangles may still take, and undrawn ones that are looked at.
 decoded_bytes_left: u64 = 0,
 /// Whether sparse indices are known to be in order and in range.

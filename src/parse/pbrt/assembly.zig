@@ -81,7 +81,7 @@ pub fn clear(assembly: *Assembly) void {
 }
 
 /// Adds a node and returns its index. The first one is the root, whose map `finish` sets.
-pub fn addNode(assembly: *Assembly, parent: u32, local: math.Affine) Allocator.Error!u32 {
+pub fn addNode(assembly: *Assembly, parent: u32, local: math.AffineD) Allocator.Error!u32 {
     if (assembly.nodes.items.len == 0)
         try assembly.nodes.append(assembly.gpa, .{ .parent = scene_data.none, .local = .identity });
     try assembly.nodes.append(assembly.gpa, .{ .parent = parent, .local = local });

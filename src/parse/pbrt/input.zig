@@ -12,6 +12,7 @@ const number = @import("number.zig");
 const uri = @import("../uri.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = diagnostic_file.Diagnostic;
+const Identity = @import("../../identity.zig").Identity;
 const Settings = @import("../../settings.zig").Load;
 const assert = std.debug.assert;
 const printable = diagnostic_file.printable;
@@ -28,8 +29,8 @@ const Text = struct {
     name: []const u8,
     bytes: [:0]const u8,
     cursor: usize = 0,
-    /// Tells files apart, 0 for the first text.
-    identity: u64,
+    /// Tells files apart; null for a text that is none.
+    identity: ?Identity,
 };
 
 gpa: Allocator,
@@ -56,7 +57,7 @@ pub fn deinit(input: *Input) void {
 }
 
 /// Reads from `bytes` next, which it takes over in any case; `name` is copied.
-pub fn push(input: *Input, name: []const u8, bytes: [:0]u8, identity: u64) Error!void {
+pub fn push(input: *Input, name: []const u8, bytes: [:0]u8, identity: ?Identity) Error!void {
     errdefer input.gpa.free(bytes);
     const copy = try input.gpa.dupe(u8, name);
     errdefer input.gpa.free(copy);
@@ -205,10 +206,10 @@ pub fn include(input: *Input, position: usize, path: []const u8) Error!void {
         "over {d} files are included",
         .{limits.include_count_max},
     );
-    var identity: u64 = 0;
+    var identity: ?Identity = null;
     const bytes = try input.readFile(position, path, &identity);
     for (input.texts.items) |text| {
-        if (text.identity != identity) continue;
+        if (!Identity.eql(text.identity, identity)) continue;
         input.gpa.free(bytes);
         return input.fail(position, "{f} includes itself", .{quote(path)});
     }
@@ -222,7 +223,12 @@ pub fn include(input: *Input, position: usize, path: []const u8) Error!void {
 
 /// Reads a file that the scene names at `position`: a regular one within the scene's folder, if
 /// the user does not allow others. The caller frees it. `identity`, where given, tells it apart.
-pub fn readFile(input: *Input, position: usize, path: []const u8, identity: ?*u64) Error![:0]u8 {
+pub fn readFile(
+    input: *Input,
+    position: usize,
+    path: []const u8,
+    identity: ?*?Identity,
+) Error![:0]u8 {
     const name = quote(path);
     if (path.len == 0 or std.mem.findScalar(u8, path, 0) != null)
         return input.fail(position, "{f} is not a valid path", .{name});
@@ -232,7 +238,8 @@ pub fn readFile(input: *Input, position: usize, path: []const u8, identity: ?*u6
         .{name},
     );
     var reason: []const u8 = "";
-    const opened = file_reader.open(input.io, input.folder, path, &reason) catch |err|
+    const output = input.settings.output;
+    const opened = file_reader.open(input.io, input.folder, path, output, &reason) catch |err|
         return input.failFile(position, err, name, reason);
     defer opened.close(input.io);
     if (!input.settings.allow_outside and !input.isBelow(opened)) return input.fail(
@@ -240,8 +247,7 @@ pub fn readFile(input: *Input, position: usize, path: []const u8, identity: ?*u6
         "{f} is a link that leads outside the scene's folder (see --allow-outside)",
         .{name},
     );
-    if (identity) |to| to.* = identityOf(input.io, opened) catch
-        return input.failFile(position, error.InputOutput, name, "cannot be read");
+    if (identity) |to| to.* = .of(opened.handle);
     const bytes = file_reader.readTerminated(
         input.gpa,
         input.io,
@@ -257,13 +263,6 @@ pub fn readFile(input: *Input, position: usize, path: []const u8, identity: ?*u6
         .{limits.text_bytes_max},
     );
     return bytes;
-}
-
-/// What tells an open file from others: device and number.
-pub fn identityOf(io: std.Io, opened: std.Io.File) !u64 {
-    const stat = try opened.stat(io);
-    // 0 stands for a text that is no file.
-    return @as(u64, @intCast(stat.inode)) | 1 << 63;
 }
 
 fn failFile(
@@ -309,7 +308,7 @@ test "white space and comments are passed over, strings end on their line" {
     };
     defer input.deinit();
     const text = " # one \"\n\t\"a b\" word#two\n\"c\\\"d\" \"open\n\" #end";
-    try input.push("x.pbrt", try gpa.dupeSentinel(u8, text, 0), 0);
+    try input.push("x.pbrt", try gpa.dupeSentinel(u8, text, 0), null);
     try std.testing.expectEqual('"', input.peek());
     try std.testing.expectEqualStrings("a b", try input.string());
     try std.testing.expectEqualStrings("word", input.word());

@@ -316,7 +316,7 @@ const TestInput = struct {
             .diagnostic = &state.diagnostic,
         };
         errdefer state.deinit();
-        try state.input.push("x", try gpa.dupeSentinel(u8, text, 0), 0);
+        try state.input.push("x", try gpa.dupeSentinel(u8, text, 0), null);
         try state.parameters.read(&state.input);
     }
 

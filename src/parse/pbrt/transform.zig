@@ -6,7 +6,7 @@
 const std = @import("std");
 const math = @import("../../math.zig");
 const elementary = math.elementary;
-const Affine = math.Affine;
+const AffineD = math.AffineD;
 
 const Transform = @This();
 
@@ -167,12 +167,12 @@ pub fn isFinite(map: *const Transform) bool {
 }
 
 /// In f32, as `toVec3` has it.
-pub fn toAffine(map: *const Transform) Affine {
+pub fn toAffine(map: *const Transform) AffineD {
     return .{
-        .x = toVec3(map.axes[0]),
-        .y = toVec3(map.axes[1]),
-        .z = toVec3(map.axes[2]),
-        .translation = toVec3(map.origin),
+        .x = map.axes[0],
+        .y = map.axes[1],
+        .z = map.axes[2],
+        .translation = map.origin,
     };
 }
 
@@ -182,7 +182,7 @@ pub fn toVec3(vector: Vector) math.Vec3 {
     var result: math.Vec3 = undefined;
     for (vector, &result) |number, *component| {
         const bounded = std.math.clamp(number, -largest, largest);
-        component.* = math.vec3.flushDenormal(@floatCast(bounded));
+        component.* = math.flushDenormal(@floatCast(bounded));
     }
     return result;
 }

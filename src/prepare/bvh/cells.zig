@@ -56,10 +56,10 @@ const Grid = struct {
     const Indices = @Vector(4, i32);
 
     /// 2^`bits` cells that are as near to cubes as halving the longest edge makes them.
-    fn init(middles_twice: Box3, bits: u5) Grid {
-        const lower = middles_twice.lower;
+    fn init(centroid_bounds: Box3, bits: u5) Grid {
+        const lower = centroid_bounds.lower;
         var edges: [3]f32 = undefined;
-        for (&edges, lower, middles_twice.upper) |*edge, from, to| edge.* = to - from;
+        for (&edges, lower, centroid_bounds.upper) |*edge, from, to| edge.* = to - from;
         const whole = edges;
         var axis_bits: [4]u5 = @splat(0);
         for (0..bits) |_| {
@@ -122,7 +122,7 @@ pub const Cells = struct {
         defer gpa.free(boxes);
         var cells: Cells = .{
             .input = input,
-            .grid = .init(input.middles_twice, bits),
+            .grid = .init(input.centroid_bounds, bits),
             .cell_count = cell_count,
             .chunk_count = chunk_count,
             .counts = counts,
@@ -256,20 +256,19 @@ test "every reference ends up in its cell's place, in the order it had" {
     defer gpa.free(triangles);
     var random_state: std.Random.DefaultPrng = .init(2);
     const random = random_state.random();
-    var middles_twice: Box3 = .empty;
+    var centroid_bounds: Box3 = .empty;
     for (positions, triangles, 0..) |*position, *triangle, index| {
         position.* = .{ random.float(f32), 9 * random.float(f32), 3 };
         triangle.* = .{ .corner = @splat(@intCast(index)), .material = 0 };
-        middles_twice = middles_twice.include(math.vec3.scale(position.*, 2));
+        centroid_bounds = centroid_bounds.include(math.vec3.scale(position.*, 2));
     }
     var pool: parallel.Pool = .init(3);
     defer pool.deinit();
     const input: Input = .{
         .positions = positions,
         .triangles = triangles,
-        .middles_twice = middles_twice,
-        .pad = 0.001,
-        .node_margin = 0,
+        .centroid_bounds = centroid_bounds,
+        .padding = .init(@splat(0), .empty),
         .pool = &pool,
     };
     const target = try gpa.alloc(Box, positions.len);

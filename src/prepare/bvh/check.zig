@@ -16,24 +16,22 @@ const World = world.World;
 /// it, which are no larger than they have to be; that padding lanes are empty; that every node and
 /// pack is reached once; and that the tree is no deeper than it says.
 pub fn check(gpa: Allocator, checked: *const World) error{OutOfMemory}!void {
-    const vertex_count = checked.positions.len;
-    assert(checked.normals.len == vertex_count);
-    assert(checked.colors.len == 0 or checked.colors.len == vertex_count);
-    assert(checked.width > 0 and checked.height > 0);
-    assert(checked.pad > 0 and checked.node_margin >= 0 and checked.fused_reach >= 0);
-    assert(checked.node_margin >= checked.fused_reach * world.node_margin_relative * 0.999);
-    for (checked.triangles) |triangle| {
-        assert(triangle.material < checked.materials.len);
+    const vertex_count = checked.geometry.positions.len;
+    assert(checked.geometry.normals.len == vertex_count);
+    assert(checked.geometry.colors.len == 0 or checked.geometry.colors.len == vertex_count);
+    assert(checked.view.width > 0 and checked.view.height > 0);
+    for (checked.geometry.triangles) |triangle| {
+        assert(triangle.material < checked.materials.all.len);
         for (triangle.corner) |vertex| assert(vertex < vertex_count);
     }
-    switch (checked.tree) {
+    switch (checked.geometry.tree) {
         inline else => |*tree| try checkTree(gpa, checked, tree),
     }
 }
 
 fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMemory}!void {
     const Visit = struct { node: u32, depth: u32, box: ?Box3 };
-    const seen = try gpa.alloc(bool, checked.triangles.len);
+    const seen = try gpa.alloc(bool, checked.geometry.triangles.len);
     defer gpa.free(seen);
     @memset(seen, false);
     var stack: std.ArrayList(Visit) = .empty;
@@ -44,7 +42,7 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
     var depth: u32 = 0;
     while (stack.pop()) |visit| {
         node_count += 1;
-        if (checked.triangles.len > 0) depth = @max(depth, visit.depth);
+        if (checked.geometry.triangles.len > 0) depth = @max(depth, visit.depth);
         const node = &tree.nodes[visit.node];
         var joined: Box3 = .empty;
         for (node.child, 0..) |child, index| {
@@ -61,14 +59,17 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
                 checkLeaf(checked, tree.packs[first..end], box, seen);
             }
         }
-        // Boxes are unions, no larger: growing keeps their order.
-        if (visit.box) |box| assert(box.contains(joined) and joined.contains(box));
+        // Boxes are unions, grown once: by no more than their own margin.
+        if (visit.box) |box| {
+            const margin = checked.geometry.padding.marginOfBox(box);
+            assert(box.contains(joined) and joined.grow(margin).contains(box));
+        }
     }
     for (seen) |is_seen| assert(is_seen);
-    assert(node_count == tree.nodes.len and node_count == checked.tree_statistics.node_count);
+    assert(node_count == tree.nodes.len and node_count == checked.facts.tree.node_count);
     assert(pack_count == tree.packs.len);
-    assert(depth == checked.tree_statistics.depth and depth <= world.tree_depth_max);
-    assert(checked.tree_statistics.bytes >= std.mem.sliceAsBytes(tree.packs).len);
+    assert(depth == checked.facts.tree.depth and depth <= world.tree_depth_max);
+    assert(checked.facts.tree.bytes >= std.mem.sliceAsBytes(tree.packs).len);
 }
 
 fn checkLeaf(checked: *const World, packs: anytype, box: Box3, seen: []bool) void {
@@ -82,17 +83,17 @@ fn checkLeaf(checked: *const World, packs: anytype, box: Box3, seen: []bool) voi
                     for (position) |coordinate| assert(coordinate == 0);
                     continue;
                 }
-                const vertex = checked.triangles[primitive].corner[corner_index];
-                for (position, checked.positions[vertex]) |a, b| assert(a == b);
+                const vertex = checked.geometry.triangles[primitive].corner[corner_index];
+                for (position, checked.geometry.positions[vertex]) |a, b| assert(a == b);
                 corners = corners.include(position);
             }
             if (primitive == world.none) continue;
             assert(!seen[primitive]);
             seen[primitive] = true;
-            joined = joined.join(corners.grow(checked.pad));
+            joined = joined.join(corners.grow(checked.geometry.padding.ofBox(corners)));
         }
     }
     assert(!joined.isEmpty());
-    const grown = joined.grow(checked.node_margin);
+    const grown = joined.grow(checked.geometry.padding.marginOfBox(joined));
     assert(box.contains(grown) and grown.contains(box));
 }

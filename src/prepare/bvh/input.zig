@@ -17,22 +17,18 @@ pub const Input = struct {
     positions: []const Vec3,
     triangles: []const world.Triangle,
     /// Box of twice the middles of the triangles' boxes, give or take rounding.
-    middles_twice: Box3,
-    /// `World.pad`.
-    pad: f32,
-    /// `World.node_margin`.
-    node_margin: f32,
+    centroid_bounds: Box3,
+    padding: world.Padding,
     pool: *parallel.Pool,
     quality: TreeQuality = .default,
 
-    /// The reference to a triangle, within its box grown by `pad`.
+    /// The reference to a triangle, within its box grown by its pad.
     pub inline fn reference(input: *const Input, number: usize) split.Box {
         const corner = input.triangles[number].corner;
-        const grown = Box3.empty
+        const box = Box3.empty
             .include(input.positions[corner[0]])
             .include(input.positions[corner[1]])
-            .include(input.positions[corner[2]])
-            .grow(input.pad);
-        return split.reference(grown, @intCast(number));
+            .include(input.positions[corner[2]]);
+        return split.reference(box.grow(input.padding.ofBox(box)), @intCast(number));
     }
 };

@@ -1,48 +1,75 @@
-//! Primary rays of pixels in lanes.
+//! Pinhole and orthographic cameras: from pixels to primary rays, and from lanes back to pixels.
 //!
-//! In: the camera, a sample's place within the pixel. Out: origins and directions, affine in the
-//! pixel's position and not normalised, so that all pixels of a bundle can share work.
+//! In: the view, a bundle's place in the picture. Out: rays, affine in the place and not
+//! normalised, so that all pixels of a bundle can share work; samples on the film.
 
-const std = @import("std");
 const world_file = @import("../../world.zig");
 const vec3 = @import("../../math.zig").vec3;
+const bundle_file = @import("../traverse/bundle.zig");
 const ray_file = @import("../traverse/ray.zig");
+const film_file = @import("../../film.zig");
 const Grid = @import("../traverse/beam/grid.zig").Grid;
-const assert = std.debug.assert;
+const Offset = @import("sampler.zig").Offset;
+const Rectangle = film_file.Rectangle;
 
-/// A sample's place in its pixel, 0..1 from the upper left corner.
-pub const Offset = struct { x: f32, y: f32 };
-
-/// The place of one of `sample_count` samples: the middle for a single one; else the Hammersley
-/// points (x in equal strata, y the radical inverse in base 2), the same for every pixel.
-pub fn sampleOffset(sample: u32, sample_count: u32) Offset {
-    assert(sample < sample_count);
-    const count: f32 = @floatFromInt(sample_count);
-    const index: f32 = @floatFromInt(sample);
-    // @bitReverse of at most 24 significant bits, so that the conversion is exact.
-    const reversed: f32 = @floatFromInt(@bitReverse(sample) >> 8);
-    const radical_inverse = reversed / 16_777_216.0;
-    return .{
-        .x = (index + 0.5) / count,
-        .y = radical_inverse + 0.5 / count,
-    };
+/// The rays through pixels of a bundle, those within the rectangle, at a place in each.
+pub fn primaryRays(
+    comptime Kernel: type,
+    view: *const world_file.View,
+    rectangle: Rectangle,
+    offset: Offset,
+    bundle: *bundle_file.Bundle(Kernel),
+) void {
+    const F32 = Kernel.Rays.F32;
+    const end_column: F32 = .splat(@floatFromInt(rectangle.x1));
+    const end_row: F32 = .splat(@floatFromInt(rectangle.y1));
+    for (&bundle.groups, 0..) |*ray, group| {
+        const first_column: f32 = @floatFromInt(rectangle.x0 + Kernel.pixelX(group, 0));
+        const first_row: f32 = @floatFromInt(rectangle.y0 + Kernel.pixelY(group, 0));
+        // Integers, which floats hold exactly.
+        const column = F32.fromArray(Kernel.lane_x).add(.splat(first_column));
+        const row = F32.fromArray(Kernel.lane_y).add(.splat(first_row));
+        const inside = column.lt(end_column).bitAnd(row.lt(end_row));
+        const x = column.add(.splat(offset.x));
+        const y = row.add(.splat(offset.y));
+        const line = generate(Kernel.Rays, view, x, y);
+        ray.* = .endless(line, .splat(ray_file.no_primitive), inside);
+    }
 }
 
-/// A ray in lanes before it is made ready for traversal.
-pub fn Start(comptime Lanes: type) type {
-    return struct { origin: Lanes.Vec3, direction: Lanes.Vec3 };
+/// Adds a sample of each pixel to the film: its radiance, and the share that saw nothing.
+pub fn expose(
+    comptime Kernel: type,
+    film: *film_file.Film,
+    rectangle: Rectangle,
+    sample: u32,
+    radiance: *const [Kernel.group_count]Kernel.Rays.Vec3,
+    escaped: *const [Kernel.group_count]Kernel.Rays.F32,
+) void {
+    for (radiance, escaped, 0..) |*light, *share, group| {
+        const red = light.x.toArray();
+        const green = light.y.toArray();
+        const blue = light.z.toArray();
+        const clear = share.toArray();
+        for (0..Kernel.ray_count) |lane| {
+            const x = rectangle.x0 + Kernel.pixelX(group, lane);
+            const y = rectangle.y0 + Kernel.pixelY(group, lane);
+            if (x >= rectangle.x1 or y >= rectangle.y1) continue;
+            film.add(x, y, sample, .{ red[lane], green[lane], blue[lane], clear[lane] });
+        }
+    }
 }
 
 /// The rays through points (x, y) of the picture in pixels from its upper left corner.
-pub inline fn generate(
+inline fn generate(
     comptime Lanes: type,
-    world: *const world_file.World,
+    view: *const world_file.View,
     x: Lanes.F32,
     y: Lanes.F32,
-) Start(Lanes) {
-    const camera = &world.camera;
-    const width: f32 = @floatFromInt(world.width);
-    const height: f32 = @floatFromInt(world.height);
+) ray_file.Line(Lanes) {
+    const camera = &view.camera;
+    const width: f32 = @floatFromInt(view.width);
+    const height: f32 = @floatFromInt(view.height);
     const one: Lanes.F32 = .splat(1);
     const across = x.mul(.splat(2 / width)).sub(one);
     const upward = one.sub(y.mul(.splat(2 / height)));
@@ -58,16 +85,18 @@ pub inline fn generate(
         .{ .origin = origin, .direction = point };
 }
 
-/// The directions of the rays around the one through (x, y), pixel by pixel; null where rays do not
-/// share an origin.
-pub fn grid(world: *const world_file.World, x: f32, y: f32) ?Grid {
-    const camera = &world.camera;
+/// The directions of the primary rays of a bundle, pixel by pixel; null where they do not share an
+/// origin.
+pub fn grid(view: *const world_file.View, rectangle: Rectangle, offset: Offset) ?Grid {
+    const camera = &view.camera;
     if (camera.orthographic) return null;
-    const width: f32 = @floatFromInt(world.width);
-    const height: f32 = @floatFromInt(world.height);
+    const width: f32 = @floatFromInt(view.width);
+    const height: f32 = @floatFromInt(view.height);
     const right = vec3.scale(camera.right, 2 / width);
     const down = vec3.scale(camera.up, -2 / height);
-    const start = generate(ray_file.Single, world, .splat(x), .splat(y));
+    const x = @as(f32, @floatFromInt(rectangle.x0)) + offset.x;
+    const y = @as(f32, @floatFromInt(rectangle.y0)) + offset.y;
+    const start = generate(ray_file.Single, view, .splat(x), .splat(y));
     var extent: f32 = 0;
     for (camera.right ++ camera.up ++ camera.forward) |component| extent += @abs(component);
     return .{
@@ -79,22 +108,4 @@ pub fn grid(world: *const world_file.World, x: f32, y: f32) ?Grid {
         // and steps of up to a tile are as many again.
         .deviation_roundings = 12 * extent,
     };
-}
-
-test "one sample is in the middle, many fill every stratum of both axes" {
-    try std.testing.expectEqual(Offset{ .x = 0.5, .y = 0.5 }, sampleOffset(0, 1));
-    inline for (.{ 2, 4, 16, 64 }) |count| {
-        var columns: [count]bool = @splat(false);
-        var rows: [count]bool = @splat(false);
-        for (0..count) |sample| {
-            const offset = sampleOffset(@intCast(sample), count);
-            columns[@intFromFloat(offset.x * count)] = true;
-            rows[@intFromFloat(offset.y * count)] = true;
-        }
-        for (columns, rows) |column, row| try std.testing.expect(column and row);
-    }
-    for (0..7) |sample| {
-        const offset = sampleOffset(@intCast(sample), 7);
-        try std.testing.expect(offset.x > 0 and offset.x < 1 and offset.y > 0 and offset.y < 1);
-    }
 }

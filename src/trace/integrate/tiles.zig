@@ -1,62 +1,319 @@
-//! The picture cut into square tiles, handed out by one atomic counter.
+//! Progressive rendering in square tiles, handed out by one atomic counter.
 //!
-//! In: picture and tile size. Out: rectangles, each to one thread; the counter is all that threads
-//! share while they trace.
+//! In: an integrator's type, the frame, settings. Out: the film, finished. Passes over the samples
+//! come outermost: each visits every tile. Samples of a pixel are added in order all the same: a
+//! thread that comes to a tile whose last pass is under way leaves this one to whoever is at it,
+//! who does both. So nobody waits, and no lock is taken.
+//!
+//! An integrator is a type I with
+//!
+//!     width, height, counts_tests               pixels of a bundle; whether tests are counted
+//!     init(gpa, frame, settings), deinit(gpa)   *I, one a thread
+//!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it
+//!     counts()                                  of all its passes, `Counts`
 
 const std = @import("std");
-const Rectangle = @import("whitted.zig").Rectangle;
+const choices = @import("../../settings.zig");
+const world_file = @import("../../world.zig");
+const statistics = @import("../../statistics.zig");
+const parallel = @import("../../parallel.zig");
+const film_file = @import("../../film.zig");
 const assert = std.debug.assert;
-const Tiles = @This();
+const Allocator = std.mem.Allocator;
+const Film = film_file.Film;
+const Frame = world_file.Frame;
+const Rectangle = film_file.Rectangle;
 
-next: std.atomic.Value(u32) align(std.atomic.cache_line) = .init(0),
-width: u32,
-height: u32,
-size: u32,
-columns: u32,
-count: u32,
+/// How a frame is traced, and who does the work.
+pub const Settings = struct {
+    pool: *parallel.Pool,
+    /// Samples a pixel, at least 1.
+    sample_count: u32 = choices.sample_count.default,
+    /// Bounces after the primary ray, at most `settings.depth.max`.
+    depth_max: u32 = choices.depth.default,
+    /// Side of a tile in pixels, at least 1.
+    tile_size: u32 = choices.tile_size.default,
+    /// Told of every finished tile of a pass.
+    progress: std.Progress.Node = .none,
+    /// Looked at between tiles: set, it ends the work.
+    cancel: ?*const std.atomic.Value(bool) = null,
 
-/// Asserts that no size is 0. A side of `size` pixels is raised where there would be too many tiles
-/// to count.
-pub fn init(width: u32, height: u32, size: u32) Tiles {
-    assert(width > 0 and height > 0 and size > 0);
-    const columns = @divCeil(width, size);
-    const rows = @divCeil(height, size);
-    // Threads overshoot the counter by one each; 2^31 leaves room for them.
-    const count = std.math.mul(u32, columns, rows) catch std.math.maxInt(u32);
-    if (count > 1 << 31) return init(width, height, size * 2);
-    return .{ .width = width, .height = height, .size = size, .columns = columns, .count = count };
+    fn isCancelled(settings: *const Settings) bool {
+        return if (settings.cancel) |cancel| cancel.load(.monotonic) else false;
+    }
+};
+
+/// What an integrator's passes took.
+pub const Counts = struct {
+    rays: statistics.RayCounts,
+    tests: statistics.TestCounts,
+};
+
+/// What the frame took.
+pub const Statistics = struct {
+    rays: statistics.RayCounts = .{},
+    /// Null where they were not counted.
+    tests: ?statistics.TestCounts = null,
+    /// Pixels that came out as not a number and were made black.
+    non_finite_count: u64 = 0,
+};
+
+/// `Canceled`: the film is not finished.
+pub const Error = error{OutOfMemory} || parallel.Error;
+
+/// Traces all samples of all pixels. Memory is taken before the work: where there is too little of
+/// it for all threads, some do without the others.
+pub fn render(
+    comptime I: type,
+    gpa: Allocator,
+    frame: *const Frame,
+    film: *Film,
+    settings: *const Settings,
+) Error!Statistics {
+    var tiles: Tiles = .init(film.image.width, film.image.height, settings);
+    tiles.states = try gpa.alloc(Tiles.State, tiles.count);
+    defer gpa.free(tiles.states);
+    @memset(tiles.states, .{});
+    var integrators: [parallel.thread_count_max]*I = undefined;
+    var job: Job(I) = .{
+        .settings = settings,
+        .tiles = &tiles,
+        .film = film,
+        .integrators = integrators[0..0],
+    };
+    defer for (job.integrators) |integrator| integrator.deinit(gpa);
+    while (job.integrators.len < settings.pool.threadsFor(tiles.count)) {
+        const integrator = I.init(gpa, frame, settings) catch |e| {
+            if (job.integrators.len == 0) return e;
+            break;
+        };
+        integrators[job.integrators.len] = integrator;
+        job.integrators = integrators[0 .. job.integrators.len + 1];
+    }
+    settings.pool.share(job.integrators.len, &job, Job(I).work);
+    if (settings.isCancelled()) return error.Canceled;
+    var total: Statistics = .{ .non_finite_count = tiles.non_finite_count.load(.monotonic) };
+    var tests: statistics.TestCounts = .{};
+    for (job.integrators) |integrator| {
+        const counts = integrator.counts();
+        total.rays.add(counts.rays);
+        tests.add(counts.tests);
+    }
+    if (I.counts_tests) total.tests = tests;
+    return total;
 }
 
-/// The next tile that no thread has yet, or null. Asserts nothing: any thread, any time.
-pub fn take(tiles: *Tiles) ?Rectangle {
-    const index = tiles.next.fetchAdd(1, .monotonic);
-    if (index >= tiles.count) return null;
-    const x0 = (index % tiles.columns) * tiles.size;
-    const y0 = (index / tiles.columns) * tiles.size;
-    return .{
-        .x0 = x0,
-        .y0 = y0,
-        .x1 = x0 + @min(tiles.size, tiles.width - x0),
-        .y1 = y0 + @min(tiles.size, tiles.height - y0),
+/// One frame by one integrator.
+fn Job(comptime I: type) type {
+    return struct {
+        settings: *const Settings,
+        tiles: *Tiles,
+        film: *Film,
+        /// By thread.
+        integrators: []const *I,
+
+        const Self = @This();
+
+        fn work(job: *Self, thread_index: usize) void {
+            while (!job.settings.isCancelled()) {
+                const number = job.tiles.take() orelse return;
+                const state = &job.tiles.states[number];
+                if (state.due.fetchAdd(1, .acquire) > 0) continue;
+                while (true) {
+                    job.passTile(job.integrators[thread_index], number);
+                    job.settings.progress.completeOne();
+                    if (job.settings.isCancelled()) return;
+                    if (state.due.fetchSub(1, .acq_rel) == 1) break;
+                }
+            }
+        }
+
+        /// The next samples of a tile.
+        fn passTile(job: *Self, integrator: *I, number: u32) void {
+            const state = &job.tiles.states[number];
+            const tile = job.tiles.rectangleOf(number);
+            const left = job.settings.sample_count - state.samples_done;
+            const sample_count = @min(left, job.tiles.samples_per_pass);
+            var y = tile.y0;
+            while (y < tile.y1) : (y += I.height) {
+                var x = tile.x0;
+                while (x < tile.x1) : (x += I.width) {
+                    integrator.pass(.{
+                        .x0 = x,
+                        .y0 = y,
+                        .x1 = @min(x + I.width, tile.x1),
+                        .y1 = @min(y + I.height, tile.y1),
+                    }, state.samples_done, sample_count, job.film);
+                }
+            }
+            state.samples_done += sample_count;
+            if (state.samples_done < job.settings.sample_count) return;
+            const non_finite = job.film.finish(tile, job.settings.sample_count);
+            if (non_finite > 0) _ = job.tiles.non_finite_count.fetchAdd(non_finite, .monotonic);
+        }
     };
 }
 
-test "every pixel is in exactly one tile" {
+/// The picture in tiles, each as often as there are passes.
+const Tiles = struct {
+    next: std.atomic.Value(u32) align(std.atomic.cache_line) = .init(0),
+    width: u32,
+    height: u32,
+    size: u32,
+    columns: u32,
+    count: u32,
+    pass_count: u32,
+    samples_per_pass: u32,
+    non_finite_count: std.atomic.Value(usize) = .init(0),
+    /// By tile.
+    states: []State = &.{},
+
+    const State = struct {
+        /// Passes that have been handed out and are not finished. Who makes it 1 has the tile until
+        /// it is 0 again.
+        due: std.atomic.Value(u32) = .init(0),
+        samples_done: u32 = 0,
+    };
+
+    /// Passes of all tiles at most. Threads overshoot the counter by one each.
+    const count_max = 1 << 31;
+
+    /// Asserts that no size is 0. A side of a tile is raised, and passes take more samples than
+    /// one, where there would be too many to count.
+    fn init(width: u32, height: u32, settings: *const Settings) Tiles {
+        const sample_count = settings.sample_count;
+        var size = settings.tile_size;
+        assert(width > 0 and height > 0 and size > 0 and sample_count > 0);
+        while (@as(u64, @divCeil(width, size)) * @divCeil(height, size) > count_max) size *= 2;
+        const columns = @divCeil(width, size);
+        const count = columns * @divCeil(height, size);
+        const samples_per_pass = @divCeil(sample_count, @min(sample_count, count_max / count));
+        return .{
+            .width = width,
+            .height = height,
+            .size = size,
+            .columns = columns,
+            .count = count,
+            .pass_count = @divCeil(sample_count, samples_per_pass),
+            .samples_per_pass = samples_per_pass,
+        };
+    }
+
+    /// The number of the next tile that is due, or null where all passes are handed out.
+    fn take(tiles: *Tiles) ?u32 {
+        const index = tiles.next.fetchAdd(1, .monotonic);
+        return if (index < tiles.count * tiles.pass_count) index % tiles.count else null;
+    }
+
+    fn rectangleOf(tiles: *const Tiles, number: u32) Rectangle {
+        const x0 = (number % tiles.columns) * tiles.size;
+        const y0 = (number / tiles.columns) * tiles.size;
+        return .{
+            .x0 = x0,
+            .y0 = y0,
+            .x1 = x0 + @min(tiles.size, tiles.width - x0),
+            .y1 = y0 + @min(tiles.size, tiles.height - y0),
+        };
+    }
+};
+
+test "every pixel is in exactly one tile, and every tile is due once a pass" {
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
     for ([_][3]u32{ .{ 1, 1, 1 }, .{ 7, 5, 3 }, .{ 64, 64, 16 }, .{ 3, 100, 256 } }) |case| {
         var covered: [100 * 100]u8 = @splat(0);
-        var tiles: Tiles = .init(case[0], case[1], case[2]);
-        while (tiles.take()) |tile| {
+        var tiles: Tiles = .init(case[0], case[1], &.{
+            .pool = &pool,
+            .tile_size = case[2],
+            .sample_count = 3,
+        });
+        while (tiles.take()) |number| {
+            const tile = tiles.rectangleOf(number);
             for (tile.y0..tile.y1) |y| {
                 for (tile.x0..tile.x1) |x| covered[y * case[0] + x] += 1;
             }
         }
         const pixel_count = case[0] * case[1];
-        for (covered[0..pixel_count]) |times| try std.testing.expectEqual(1, times);
+        for (covered[0..pixel_count]) |times| try std.testing.expectEqual(3, times);
         try std.testing.expectEqual(null, tiles.take());
     }
 }
 
 test "huge pictures have a countable number of tiles" {
-    const tiles: Tiles = .init(65536, 65536, 1);
-    try std.testing.expect(tiles.count <= 1 << 31);
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    const tiles: Tiles = .init(65536, 65536, &.{
+        .pool = &pool,
+        .tile_size = 1,
+        .sample_count = 4096,
+    });
+    try std.testing.expect(@as(u64, tiles.count) * tiles.pass_count <= Tiles.count_max);
+    try std.testing.expect(tiles.samples_per_pass * tiles.pass_count >= 4096);
+}
+
+/// Counts samples, and holds that each pixel gets its own in order.
+const TestIntegrator = struct {
+    const width = 4;
+    const height = 2;
+    const counts_tests = false;
+    /// Sets the flag after so many bundles.
+    var bundles_left: std.atomic.Value(i32) = .init(0);
+    var cancel: std.atomic.Value(bool) = .init(false);
+
+    fn init(gpa: Allocator, _: *const Frame, _: *const Settings) error{OutOfMemory}!*@This() {
+        return gpa.create(@This());
+    }
+
+    fn deinit(integrator: *@This(), gpa: Allocator) void {
+        gpa.destroy(integrator);
+    }
+
+    fn counts(_: *const @This()) Counts {
+        return .{ .rays = .{}, .tests = .{} };
+    }
+
+    fn pass(_: *@This(), rectangle: Rectangle, first: u32, count: u32, film: *Film) void {
+        if (bundles_left.fetchSub(1, .monotonic) == 1) cancel.store(true, .monotonic);
+        for (rectangle.y0..rectangle.y1) |y| for (rectangle.x0..rectangle.x1) |x| {
+            for (first..first + count) |sample| {
+                // The sum is right in this order alone: it doubles, and then some.
+                const pixel = film.image.at(@intCast(x), @intCast(y)).*;
+                const before = if (sample == 0) 0 else pixel[0];
+                const value = before + @as(f32, @floatFromInt(sample));
+                film.add(@intCast(x), @intCast(y), @intCast(sample), @splat(value));
+            }
+        };
+    }
+};
+
+test "the samples of each pixel come in order, by however many threads; a flag ends the work" {
+    const gpa = std.testing.allocator;
+    const sample_count = 9;
+    var expected: f32 = 0;
+    for (0..sample_count) |sample| expected += expected + @as(f32, @floatFromInt(sample));
+    const frame: Frame = undefined;
+    for ([_]usize{ 1, 2, 5 }) |thread_count| for ([_]u32{ 1, 3, 40 }) |tile_size| {
+        for ([_]bool{ false, true }) |is_cancelled| {
+            var pool: parallel.Pool = .init(thread_count);
+            defer pool.deinit();
+            var film: Film = try .init(gpa, 21, 17, .init(.{ .color = true }));
+            defer film.deinit(gpa);
+            TestIntegrator.bundles_left.store(if (is_cancelled) 3 else -1, .monotonic);
+            TestIntegrator.cancel.store(false, .monotonic);
+            const result = render(TestIntegrator, gpa, &frame, &film, &.{
+                .pool = &pool,
+                .sample_count = sample_count,
+                .tile_size = tile_size,
+                .cancel = &TestIntegrator.cancel,
+            });
+            if (is_cancelled) {
+                try std.testing.expectError(error.Canceled, result);
+                continue;
+            }
+            _ = try result;
+            for (film.image.pixels) |pixel| {
+                try std.testing.expectEqual(expected / sample_count, pixel[0]);
+            }
+        }
+    };
 }

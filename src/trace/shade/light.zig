@@ -1,14 +1,10 @@
-//! Light that arrives at points in lanes, before anything stands in its way.
+//! Punctual lights (KHR_lights_punctual) at points in lanes, before anything stands in the way.
 //!
 //! In: a light source, points. Out: the direction to it and the irradiance across that direction
-//! (KHR_lights_punctual: inverse square, range window, cone), and the shadow ray that asks
-//! whether it arrives. Shadow rays of point and spot lights run from the light, so that all of
-//! them share an origin.
+//! (inverse square, range window, cone).
 
-const std = @import("std");
 const world_file = @import("../../world.zig");
-const ray_file = @import("../traverse/ray.zig");
-const Surface = @import("interaction.zig").Surface;
+const Interaction = @import("interaction.zig").Interaction;
 const Light = world_file.Light;
 
 /// Light at points.
@@ -23,11 +19,11 @@ pub fn Arrival(comptime Lanes: type) type {
     };
 }
 
-/// What arrives at the surfaces.
+/// What arrives at the points.
 pub fn arrive(
     comptime Lanes: type,
     light: *const Light,
-    surface: *const Surface(Lanes),
+    point: *const Interaction(Lanes),
 ) Arrival(Lanes) {
     const F32 = Lanes.F32;
     const one: F32 = .splat(1);
@@ -36,7 +32,7 @@ pub fn arrive(
         .irradiance = .splat(light.intensity),
         .distance = .zero(),
     };
-    const way = Lanes.Vec3.splat(light.position).sub(surface.position);
+    const way = Lanes.Vec3.splat(light.position).sub(point.position);
     const distance_squared = way.dot(way).max(.splat(1e-20));
     const distance = distance_squared.sqrt();
     const to_light = way.scale(one.div(distance));
@@ -50,28 +46,5 @@ pub fn arrive(
         .to_light = to_light,
         .irradiance = Lanes.Vec3.splat(light.intensity).scale(factor),
         .distance = distance,
-    };
-}
-
-/// The shadow rays of points off surfaces (`Surface.off`), which never hit the triangle whose
-/// surface it is.
-pub fn shadowRay(
-    comptime Lanes: type,
-    light: *const Light,
-    point: Lanes.Vec3,
-    primitive: Lanes.I32,
-    active: Lanes.Mask,
-) ray_file.Ray(Lanes) {
-    const directional = light.kind == .directional;
-    const source: Lanes.Vec3 = .splat(light.position);
-    return .{
-        .line = if (directional)
-            .init(point, Lanes.Vec3.splat(light.direction).neg())
-        else
-            .init(source, point.sub(source)),
-        .tnear = .start(),
-        .closest = .before(.splat(if (directional) std.math.inf(f32) else 1)),
-        .skip = primitive,
-        .active = active,
     };
 }

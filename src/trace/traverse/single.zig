@@ -12,18 +12,18 @@ const bundle_file = @import("bundle.zig");
 const walk = @import("walk.zig");
 const Query = walk.Query;
 const Single = ray_file.Single;
-const World = world_file.World;
+const Geometry = world_file.Geometry;
 
 /// Looks for a hit and keeps it in `ray.closest`. Returns whether there was one.
 pub fn trace(
     comptime Kernel: type,
     comptime query: Query,
-    world: *const World,
+    geometry: *const Geometry,
     ray: *ray_file.Ray(Single),
     counts: *TestCounts,
 ) bool {
-    const view = bundle_file.viewOf(Single, ray);
-    const closest = traceLane(Kernel, query, Single, world, ray, &view, 0, counts) orelse
+    const view = bundle_file.viewOf(Single, &geometry.padding, ray);
+    const closest = traceLane(Kernel, query, Single, geometry, ray, &view, 0, counts) orelse
         return false;
     ray.closest = .{ .t = .splat(closest.t), .primitive = .splat(closest.primitive) };
     return true;
@@ -33,7 +33,7 @@ pub fn trace(
 pub fn traceEach(
     comptime Kernel: type,
     comptime query: Query,
-    world: *const World,
+    geometry: *const Geometry,
     group: anytype,
     view: anytype,
     counts: *TestCounts,
@@ -44,7 +44,7 @@ pub fn traceEach(
     var bits = group.active.bits();
     while (bits != 0) : (bits &= bits - 1) {
         const lane = @ctz(bits);
-        const closest = traceLane(Kernel, query, Rays, world, group, view, lane, counts) orelse
+        const closest = traceLane(Kernel, query, Rays, geometry, group, view, lane, counts) orelse
             continue;
         ts[lane] = closest.t;
         primitives[lane] = closest.primitive;
@@ -59,32 +59,30 @@ fn traceLane(
     comptime Kernel: type,
     comptime query: Query,
     comptime Rays: type,
-    world: *const World,
+    geometry: *const Geometry,
     group: *const ray_file.Ray(Rays),
     view: *const bundle_file.Precalculations(Rays),
     lane: usize,
     counts: *TestCounts,
 ) ?Found {
-    const start = group.line.origin.lane(lane);
-    const reach = @max(@abs(start[0]), @abs(start[1]), @abs(start[2]));
-    if (reach < world.fused_reach) {
+    if (view.fusable.lane(lane)) {
         var ray: traversal_ray.TraversalRay(Kernel) = .of(Rays, true, group, view, lane);
-        return travel(Kernel, query, true, world, &ray, counts);
+        return travel(Kernel, query, true, geometry, &ray, counts);
     }
     var ray: traversal_ray.TraversalRay(Kernel) = .of(Rays, false, group, view, lane);
-    return travel(Kernel, query, false, world, &ray, counts);
+    return travel(Kernel, query, false, geometry, &ray, counts);
 }
 
 inline fn travel(
     comptime Kernel: type,
     comptime query: Query,
     comptime fused: bool,
-    world: *const World,
+    geometry: *const Geometry,
     ray: *traversal_ray.TraversalRay(Kernel),
     counts: *TestCounts,
 ) ?Found {
-    var search: Search(Kernel, query, fused) = .of(ray, world.pad);
-    if (!walk.walk(Kernel, world.tree.get(Kernel.width), &search, counts)) return null;
+    var search: Search(Kernel, query, fused) = .of(ray, &geometry.padding);
+    if (!walk.walk(Kernel, geometry.tree.get(Kernel.width), &search, counts)) return null;
     return .{ .t = ray.limit, .primitive = ray.closest_primitive };
 }
 
@@ -96,14 +94,18 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
         slabs: TraversalRay.Slabs,
         /// That of the ray.
         limit: f32,
-        /// See `World.pad`.
-        pad: f32,
+        padding: *const world_file.Padding,
 
         const Self = @This();
 
         /// Keeps the hit in `ray`.
-        pub inline fn of(ray: *TraversalRay, pad: f32) Self {
-            return .{ .ray = ray, .slabs = ray.slabsOf(), .limit = ray.limit, .pad = pad };
+        pub inline fn of(ray: *TraversalRay, padding: *const world_file.Padding) Self {
+            return .{
+                .ray = ray,
+                .slabs = ray.slabsOf(),
+                .limit = ray.limit,
+                .padding = padding,
+            };
         }
 
         /// See `walk.walk`.
@@ -121,7 +123,7 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
             pack: *const world_file.TrianglePack(Kernel.width),
             counts: *TestCounts,
         ) bool {
-            const found = search.ray.intersect(pack, search.pad, counts);
+            const found = search.ray.intersect(pack, search.padding, counts);
             search.limit = search.ray.limit;
             return found;
         }

@@ -15,11 +15,13 @@ const TestCounts = @import("../../statistics.zig").TestCounts;
 const ray_file = @import("ray.zig");
 const traversal_ray = @import("traversal_ray.zig");
 const bundle_file = @import("bundle.zig");
+const multi_hit = @import("multi_hit.zig");
 const single = @import("single.zig");
 const stack_file = @import("stack.zig");
 const assert = std.debug.assert;
 const Query = @import("walk.zig").Query;
-const World = world_file.World;
+const Geometry = world_file.Geometry;
+const Place = bundle_file.Place;
 
 /// Rays of a set, a bit each.
 const Set = u64;
@@ -27,6 +29,11 @@ const rays_max = @bitSizeOf(Set);
 /// A lane holds a word of a set.
 const word_bits = 32;
 const word_count = rays_max / word_bits;
+
+/// Where hits go that are more than one a ray.
+pub fn Lists(comptime Kernel: type, comptime query: Query) type {
+    return if (query == .multi_hit) *multi_hit.HitLists(Kernel) else void;
+}
 
 /// Collects the rays of a bundle.
 pub fn Stream(comptime Kernel: type, comptime query: Query) type {
@@ -36,19 +43,18 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
     const I32 = Boxes.I32;
     const TraversalRay = traversal_ray.TraversalRay(Kernel);
     return struct {
-        world: *const World,
+        geometry: *const Geometry,
         bundle: *bundle_file.Bundle(Kernel),
+        lists: Lists(Kernel, query),
         rays: [rays_max]TraversalRay,
         places: [rays_max]Place,
         count: usize,
-        /// Those that have a hit.
+        /// Those that have a hit, or of several hits one that stops them.
         found: Set,
 
         const Self = @This();
         const Node = world_file.Node(Kernel.width);
         const Pack = world_file.TrianglePack(Kernel.width);
-        /// Where in the bundle a ray is.
-        const Place = struct { group: u32, lane: u32 };
         /// A child still to be visited, and by whom.
         const Entry = struct { child: world_file.Child, set: Set };
         /// Entries at most: that the next leaves the stack before children of the present one come
@@ -58,11 +64,13 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
         /// For rays of this bundle. In place: it is too large to be handed around.
         pub fn init(
             stream: *Self,
-            world: *const World,
+            geometry: *const Geometry,
             bundle: *bundle_file.Bundle(Kernel),
+            lists: Lists(Kernel, query),
         ) void {
-            stream.world = world;
+            stream.geometry = geometry;
             stream.bundle = bundle;
+            stream.lists = lists;
             stream.count = 0;
             stream.found = 0;
         }
@@ -79,10 +87,8 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
             const groups = stream.bundle.groups[first_group..][0..views.len];
             for (groups, views, first_group..) |*group, *view, number| {
                 if (group.active.none()) continue;
-                const origin = group.line.origin.abs();
-                const reach = origin.x.max(origin.y).max(origin.z);
-                const near = group.active.bitAnd(reach.lt(.splat(stream.world.fused_reach)));
-                var bits = near.bits();
+                const fusable = group.active.bitAnd(view.fusable);
+                var bits = fusable.bits();
                 while (bits != 0) : (bits &= bits - 1) {
                     if (stream.count == rays_max) stream.finish(counts);
                     const lane = @ctz(bits);
@@ -90,10 +96,13 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                     stream.places[stream.count] = .{ .group = @intCast(number), .lane = lane };
                     stream.count += 1;
                 }
-                const far = group.active.andNot(near);
-                if (far.none()) continue;
-                group.active = far;
-                single.traceEach(Kernel, query, stream.world, group, view, counts);
+                const others = group.active.andNot(fusable);
+                if (others.none()) continue;
+                group.active = others;
+                if (query == .multi_hit)
+                    stream.lists.traceEach(stream.bundle, number, view, counts)
+                else
+                    single.traceEach(Kernel, query, stream.geometry, group, view, counts);
             }
         }
 
@@ -101,7 +110,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
         pub fn finish(stream: *Self, counts: *TestCounts) void {
             if (stream.count == 0) return;
             stream.travel(counts);
-            var rest = stream.found;
+            var rest: Set = if (query == .multi_hit) 0 else stream.found;
             while (rest != 0) : (rest &= rest - 1) {
                 const ray = &stream.rays[@ctz(rest)];
                 const place = stream.places[@ctz(rest)];
@@ -117,7 +126,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
         }
 
         fn travel(stream: *Self, counts: *TestCounts) void {
-            const tree = stream.world.tree.get(Kernel.width);
+            const tree = stream.geometry.tree.get(Kernel.width);
             var entries: [entries_max]Entry = undefined;
             var entry_count: usize = 0;
             const all = @as(Set, std.math.maxInt(Set)) >> @intCast(rays_max - stream.count);
@@ -143,7 +152,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                 entry_count.* -= 1;
                 const entry = entries[entry_count.*];
                 if (stream.looking(entry.set) == 0) continue;
-                stream.world.tree.get(Kernel.width).prefetch(entry.child);
+                stream.geometry.tree.get(Kernel.width).prefetch(entry.child);
                 return entry;
             }
             return null;
@@ -151,7 +160,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
 
         /// Those of a set that have not yet found what they look for.
         inline fn looking(stream: *const Self, set: Set) Set {
-            return if (query == .any_hit) set & ~stream.found else set;
+            return if (query == .closest_hit) set else set & ~stream.found;
         }
 
         /// A ray of the set after the other against the triangles of a leaf.
@@ -166,8 +175,13 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                 const number = @ctz(rest);
                 const ray = &stream.rays[number];
                 for (packs) |*pack| {
-                    if (!ray.intersect(pack, stream.world.pad, counts)) continue;
+                    const found = if (query == .multi_hit)
+                        stream.lists.take(stream.places[number], ray, pack, counts)
+                    else
+                        ray.intersect(pack, &stream.geometry.padding, counts);
+                    if (!found) continue;
                     stream.found |= @as(Set, 1) << @intCast(number);
+                    if (query == .multi_hit) break;
                 }
             }
         }

@@ -251,7 +251,7 @@ const Reader = struct {
                 .indices, .other => try reader.pass(property),
                 else => |role| {
                     const value: f32 = @floatCast(try reader.scalar(property.type));
-                    values[@backingInt(role)] = math.vec3.flushDenormal(value);
+                    values[@backingInt(role)] = math.flushDenormal(value);
                 },
             };
             reader.positions[index] = values[0..3].*;

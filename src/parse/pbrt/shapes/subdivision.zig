@@ -96,7 +96,7 @@ pub fn loop(maker: *Maker) Error!Geometry {
 fn finite(position: Vec3) Vec3 {
     if (!vec3.isFinite(position)) return .{ 0, 0, 0 };
     var result = position;
-    for (&result) |*component| component.* = vec3.flushDenormal(component.*);
+    for (&result) |*component| component.* = math.flushDenormal(component.*);
     return result;
 }
 

@@ -1,0 +1,94 @@
+//! The state of paths under way, so that recursion becomes a stack.
+//!
+//! In: what an integrator pushes. Out: rays of a bundle with their throughput, the last pushed
+//! first; and a path's vertex, taken apart for shading.
+
+const std = @import("std");
+const bundle_file = @import("../traverse/bundle.zig");
+const bsdf_file = @import("../shade/bsdf.zig");
+const interaction_file = @import("../shade/interaction.zig");
+const exponential = @import("../shade/exponential.zig");
+const assert = std.debug.assert;
+
+/// Bounces at most.
+pub const depth_limit = @import("../../settings.zig").depth.max;
+
+/// Rays to be traced, and what they are worth.
+pub fn PathState(comptime Kernel: type) type {
+    const Vec3 = Kernel.Rays.Vec3;
+    return struct {
+        bundle: bundle_file.Bundle(Kernel),
+        /// Share of what the ray sees that reaches the pixel.
+        throughput: [Kernel.group_count]Vec3,
+        /// Absorption coefficient of what the ray travels in, per metre.
+        sigma_a: [Kernel.group_count]Vec3,
+        /// Bounces up to here.
+        depth: u32,
+        /// Surfaces that the ray has gone on through without a bounce.
+        transparency_depth: u32,
+
+        /// What is left of a group's throughput at a distance: Beer and Lambert's law.
+        pub fn throughputAt(
+            path: *const @This(),
+            group: usize,
+            distance: Kernel.Rays.F32,
+        ) Vec3 {
+            const Rays = Kernel.Rays;
+            const throughput = path.throughput[group];
+            const sigma_a = path.sigma_a[group];
+            const zero: Rays.F32 = .zero();
+            const clear = sigma_a.x.eq(zero).bitAnd(sigma_a.y.eq(zero)).bitAnd(sigma_a.z.eq(zero));
+            if (clear.all()) return throughput;
+            const way = distance.neg();
+            return throughput.mul(.{
+                .x = exponential.expNegative(Rays, sigma_a.x.mul(way)),
+                .y = exponential.expNegative(Rays, sigma_a.y.mul(way)),
+                .z = exponential.expNegative(Rays, sigma_a.z.mul(way)),
+            });
+        }
+    };
+}
+
+/// Paths that wait, a depth-first order.
+pub fn PathStack(comptime Kernel: type) type {
+    return struct {
+        states: [states_max]PathState(Kernel),
+        count: usize,
+
+        /// At each depth a ray leaves at most the rest of itself, a refraction and a reflection.
+        const states_max = 3 * (depth_limit + 1);
+
+        /// Room for rays of the given depth; the caller fills in the rest.
+        pub fn push(
+            stack: *@This(),
+            depth: u32,
+            transparency_depth: u32,
+        ) *PathState(Kernel) {
+            assert(stack.count < states_max);
+            const path = &stack.states[stack.count];
+            stack.count += 1;
+            path.depth = depth;
+            path.transparency_depth = transparency_depth;
+            return path;
+        }
+
+        /// The last pushed, to be used before the next is; null if none waits.
+        pub fn pop(stack: *@This()) ?*const PathState(Kernel) {
+            if (stack.count == 0) return null;
+            stack.count -= 1;
+            return &stack.states[stack.count];
+        }
+    };
+}
+
+/// One vertex of paths in lanes.
+pub fn Vertex(comptime Lanes: type) type {
+    return struct {
+        point: interaction_file.Interaction(Lanes),
+        bsdf: bsdf_file.Bsdf(Lanes),
+        /// Lanes that have a vertex.
+        seen: Lanes.Mask,
+        /// Throughput of the path up to here, opacity included.
+        throughput: Lanes.Vec3,
+    };
+}

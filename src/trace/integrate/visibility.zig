@@ -1,0 +1,255 @@
+//! Visibility: what rays see, and how much of a light comes through what stands in its way.
+//!
+//! In: bundles of rays. Out: closest hits, the interactions there, the transmittance of shadow rays
+//! in lanes. Integrators ask here and nowhere else. Light goes straight through what transmits or
+//! blends, weakened by each surface in order (`multi_hit.zig`); where no material of a scene lets
+//! light pass, the first hit of any kind decides.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const statistics = @import("../../statistics.zig");
+const ray_file = @import("../traverse/ray.zig");
+const bundle_file = @import("../traverse/bundle.zig");
+const dispatch = @import("../traverse/dispatch.zig");
+const multi_hit = @import("../traverse/multi_hit.zig");
+const triangle = @import("../traverse/triangle.zig");
+const interaction_file = @import("../shade/interaction.zig");
+const material_file = @import("../shade/material.zig");
+const Grid = @import("../traverse/beam/grid.zig").Grid;
+const Frame = world_file.Frame;
+const Light = world_file.Light;
+
+/// Surfaces that one ray goes on through without a bounce (holes, blended or culled ones).
+pub const transparency_depth_max = 255;
+
+/// Surfaces that weaken a shadow ray before the rest counts as opaque.
+const attenuation_count_max = 16;
+
+comptime {
+    // Whoever passes all hits of a search has been weakened too often, unless some were holes.
+    std.debug.assert(multi_hit.hits_max == attenuation_count_max + 1);
+    std.debug.assert(transparency_depth_max % multi_hit.hits_max == 0);
+}
+
+/// One thread's view of a scene.
+pub fn Visibility(comptime Kernel: type) type {
+    const Rays = Kernel.Rays;
+    const F32 = Rays.F32;
+    const Vec3 = Rays.Vec3;
+    const Mask = Rays.Mask;
+    const group_count = Kernel.group_count;
+    const Bundle = bundle_file.Bundle(Kernel);
+    const Coherence = dispatch.Coherence;
+
+    return struct {
+        frame: *const Frame,
+        tests: statistics.TestCounts,
+        hits: multi_hit.HitLists(Kernel),
+
+        const Self = @This();
+
+        /// In place: it is too large to be handed around.
+        pub fn init(visibility: *Self, frame: *const Frame) void {
+            visibility.frame = frame;
+            visibility.tests = .{};
+            visibility.hits.geometry = frame.geometry;
+            visibility.hits.materials = frame.materials.all;
+        }
+
+        /// Finds what the rays of a bundle see first. A grid says that they are primary ones.
+        /// Returns those whose hits are near to each other.
+        pub fn closest(visibility: *Self, bundle: *Bundle, grid: ?*const Grid) Coherence {
+            const geometry = visibility.frame.geometry;
+            return dispatch.closestHit(Kernel, geometry, bundle, grid, &visibility.tests);
+        }
+
+        /// How much of a light comes through along shadow rays (`shadowRay`) of this light, in the
+        /// lanes of active rays; which rays are active is undefined afterwards. Those of the
+        /// coherent ones end near to each other.
+        pub fn transmittance(
+            visibility: *Self,
+            bundle: *Bundle,
+            light: *const Light,
+            coherence: Coherence,
+            passing: *[group_count]Vec3,
+        ) void {
+            const materials = visibility.frame.materials;
+            if (materials.has_transparency or materials.has_holes)
+                visibility.attenuated(bundle, light, coherence, passing)
+            else
+                visibility.occluded(bundle, light, coherence, passing);
+        }
+
+        /// Light is stopped by anything: the quick path of scenes where all is opaque.
+        fn occluded(
+            visibility: *Self,
+            bundle: *Bundle,
+            light: *const Light,
+            coherence: Coherence,
+            passing: *[group_count]Vec3,
+        ) void {
+            const geometry = visibility.frame.geometry;
+            dispatch.anyHit(Kernel, geometry, bundle, light, coherence, &visibility.tests);
+            for (&bundle.groups, passing) |*ray, *share| {
+                if (ray.active.none()) continue;
+                const free = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
+                share.* = .select(free, .splat(.{ 1, 1, 1 }), .splat(.{ 0, 0, 0 }));
+            }
+        }
+
+        /// Light is weakened by what it goes through, from the nearest to the farthest.
+        fn attenuated(
+            visibility: *Self,
+            bundle: *Bundle,
+            light: *const Light,
+            coherence: Coherence,
+            passing: *[group_count]Vec3,
+        ) void {
+            const none: Vec3 = .splat(.{ 0, 0, 0 });
+            passing.* = @splat(.splat(.{ 1, 1, 1 }));
+            const limit = shadowLimit(Rays, light);
+            visibility.occlusionPrepass(bundle, light, coherence, passing);
+            var weakened_counts: [group_count]F32 = @splat(.zero());
+            for (0..transparency_depth_max / multi_hit.hits_max) |_| {
+                for (&bundle.groups) |*ray| ray.closest = limit;
+                visibility.hits.trace(bundle, &visibility.tests);
+                var any_left = false;
+                for (&bundle.groups, passing, &weakened_counts, 0..) |*ray, *share, *count, group| {
+                    if (ray.active.none()) continue;
+                    visibility.attenuate(ray, group, share, count);
+                    any_left = any_left or ray.active.any();
+                }
+                if (!any_left) return;
+            }
+            for (&bundle.groups, passing) |*ray, *share| {
+                share.* = .select(ray.active, none, share.*);
+            }
+        }
+
+        /// Decides the shadow rays that meet nothing, and those that a search for any hit finds to
+        /// meet what no light passes; others stay active. A beam tells quickly; rays by themselves
+        /// would take as long as to find what they meet.
+        fn occlusionPrepass(
+            visibility: *Self,
+            bundle: *Bundle,
+            light: *const Light,
+            coherence: Coherence,
+            passing: *[group_count]Vec3,
+        ) void {
+            if (Kernel.variant.traversal != .beam or coherence == .none) return;
+            const geometry = visibility.frame.geometry;
+            dispatch.anyHit(Kernel, geometry, bundle, light, .all, &visibility.tests);
+            for (&bundle.groups, passing) |*ray, *share| {
+                if (ray.active.none()) continue;
+                const primitive = ray.closest.primitive;
+                const free = ray.active.bitAnd(primitive.eq(.splat(ray_file.no_primitive)));
+                const met = ray.active.andNot(free);
+                const stopped: Mask = .fromBits(visibility.hits.stopping(primitive, met));
+                share.* = .select(stopped, .splat(.{ 0, 0, 0 }), share.*);
+                ray.active = met.andNot(stopped);
+            }
+        }
+
+        /// Takes shadow rays of a group through the surfaces that they hit; those that stay active
+        /// go on.
+        fn attenuate(
+            visibility: *const Self,
+            ray: *ray_file.Ray(Rays),
+            group: usize,
+            share: *Vec3,
+            weakened_count: *F32,
+        ) void {
+            const one: F32 = .splat(1);
+            const none: Vec3 = .splat(.{ 0, 0, 0 });
+            const stopped: Mask = .fromBits(visibility.hits.stopped[group]);
+            share.* = .select(stopped.bitAnd(ray.active), none, share.*);
+            ray.active = ray.active.andNot(stopped);
+            for (0..multi_hit.hits_max) |index| {
+                const next = visibility.hits.at(group, index, ray.active);
+                ray.active = ray.active.andNot(next.primitive.eq(.splat(ray_file.no_primitive)));
+                if (ray.active.none()) return;
+                ray.tnear = next;
+                const through = visibility.attenuationAt(ray, next.primitive);
+                share.* = .select(ray.active, share.mul(through.share), share.*);
+                weakened_count.* =
+                    weakened_count.add(F32.select(through.weakens, one, .zero()));
+                const limit: F32 = .splat(attenuation_count_max);
+                const ended = weakened_count.gt(limit).bitAnd(ray.active);
+                share.* = .select(ended, none, share.*);
+                const dark = share.x.max(share.y).max(share.z).le(.zero());
+                ray.active = ray.active.andNot(ended).andNot(dark);
+            }
+        }
+
+        /// What active rays lose at the triangles that they hit.
+        fn attenuationAt(
+            visibility: *const Self,
+            ray: *const ray_file.Ray(Rays),
+            primitive: Rays.I32,
+        ) material_file.Attenuation(Rays) {
+            const Corners = interaction_file.Corners(Rays);
+            const geometry = visibility.frame.geometry;
+            const all = visibility.frame.materials.all;
+            // Without vertex colours it is the material's alone.
+            if (geometry.colors.len == 0) {
+                const numbers = Corners.materialsOf(geometry, primitive, ray.active);
+                return .of(&.of(all, numbers, ray.active), .white);
+            }
+            const corners: Corners = .of(geometry, primitive, ray.active);
+            const weights = triangle.edgeFunctionsOf(Rays, corners.position, ray.line);
+            const color = corners.colorAt(geometry, weights.barycentrics());
+            return .of(&.of(all, corners.material, ray.active), color);
+        }
+    };
+}
+
+/// The points that rays see. Asserts that some active ray hit something.
+pub fn interactionOf(
+    comptime Lanes: type,
+    frame: *const Frame,
+    ray: *const ray_file.Ray(Lanes),
+) interaction_file.Interaction(Lanes) {
+    const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
+    const hit = ray.active.andNot(missed);
+    std.debug.assert(hit.any());
+    const corners: interaction_file.Corners(Lanes) =
+        .of(frame.geometry, ray.closest.primitive, hit);
+    const weights = triangle.edgeFunctionsOf(Lanes, corners.position, ray.line);
+    return interaction_file.resolve(Lanes, frame, &corners, &.{
+        .mask = hit,
+        .origin = ray.line.origin,
+        .direction = ray.line.direction,
+        .t = ray.closest.t,
+        .barycentrics = weights.barycentrics(),
+    });
+}
+
+/// The shadow rays of points off surfaces (`Interaction.offsetOrigin`), which never hit the
+/// triangle whose surface it is. Those of point and spot lights run from the light, so that all of
+/// them share an origin, but for those of `Light.from_receiver`.
+pub fn shadowRay(
+    comptime Lanes: type,
+    light: *const Light,
+    point: Lanes.Vec3,
+    primitive: Lanes.I32,
+    active: Lanes.Mask,
+) ray_file.Ray(Lanes) {
+    const source: Lanes.Vec3 = .splat(light.position);
+    return .{
+        .line = if (light.kind == .directional)
+            .init(point, Lanes.Vec3.splat(light.direction).neg())
+        else if (light.from_receiver)
+            .init(point, source.sub(point))
+        else
+            .init(source, point.sub(source)),
+        .tnear = .start(),
+        .closest = shadowLimit(Lanes, light),
+        .skip = primitive,
+        .active = active,
+    };
+}
+
+/// Where shadow rays end.
+fn shadowLimit(comptime Lanes: type, light: *const Light) ray_file.Hit(Lanes) {
+    return .before(.splat(if (light.kind == .directional) std.math.inf(f32) else 1));
+}

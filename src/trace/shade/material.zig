@@ -1,0 +1,151 @@
+//! The metallic-roughness material of glTF 2.0 at points in lanes.
+//!
+//! In: the materials' numbers, the vertex colours at the points. Out: the parameters of the BSDF,
+//! and what a surface lets straight through.
+
+const world_file = @import("../../world.zig");
+const Unique = @import("unique.zig").Unique;
+
+/// A material in lanes: fields of `world.Material`, base colour times the vertex colour.
+pub fn Material(comptime Lanes: type) type {
+    return struct {
+        base_color: Lanes.Vec3,
+        emissive: Lanes.Vec3,
+        metallic: Lanes.F32,
+        roughness: Lanes.F32,
+        dielectric_f0: Lanes.F32,
+        ior: Lanes.F32,
+        transmission: Lanes.F32,
+        sigma_a: Lanes.Vec3,
+        unlit: Lanes.Mask,
+        volume: Lanes.Mask,
+    };
+}
+
+/// A vertex colour in lanes, linear.
+pub fn Color(comptime Lanes: type) type {
+    return struct {
+        rgb: Lanes.Vec3,
+        alpha: Lanes.F32,
+
+        /// That of a mesh without colours.
+        pub const white: @This() = .{ .rgb = .splat(.{ 1, 1, 1 }), .alpha = .splat(1) };
+    };
+}
+
+/// Some of a scene's materials, put into lanes a field at a time: mostly there is one for all.
+pub fn Materials(comptime Lanes: type) type {
+    return struct {
+        all: []const world_file.Material,
+        used: Unique(Lanes),
+
+        const Self = @This();
+
+        /// Those with these numbers in the lanes asked for.
+        pub inline fn of(
+            all: []const world_file.Material,
+            numbers: Lanes.I32,
+            asked: Lanes.Mask,
+        ) Self {
+            return .{ .all = all, .used = .of(numbers, asked) };
+        }
+
+        /// A field of one float.
+        pub inline fn float(materials: *const Self, comptime name: []const u8) Lanes.F32 {
+            return materials.pick(name, null);
+        }
+
+        /// A field of three floats, or the first three of more.
+        pub inline fn color(materials: *const Self, comptime name: []const u8) Lanes.Vec3 {
+            return .{
+                .x = materials.pick(name, 0),
+                .y = materials.pick(name, 1),
+                .z = materials.pick(name, 2),
+            };
+        }
+
+        /// A field, or a component of one.
+        inline fn pick(
+            materials: *const Self,
+            comptime name: []const u8,
+            comptime component: ?usize,
+        ) Lanes.F32 {
+            const used = &materials.used;
+            var value: Lanes.F32 = .splat(materials.one(used.numbers[0], name, component));
+            for (used.numbers[1..used.count], used.lanes[1..used.count]) |number, lanes| {
+                value = .select(lanes, .splat(materials.one(number, name, component)), value);
+            }
+            return value;
+        }
+
+        inline fn one(
+            materials: *const Self,
+            number: u32,
+            comptime name: []const u8,
+            comptime component: ?usize,
+        ) f32 {
+            const value = &@field(materials.all[number], name);
+            return if (component) |index| value[index] else value.*;
+        }
+    };
+}
+
+/// All that scattering depends on.
+pub inline fn load(
+    comptime Lanes: type,
+    materials: *const Materials(Lanes),
+    vertex_color: Lanes.Vec3,
+) Material(Lanes) {
+    const zero: Lanes.F32 = .zero();
+    return .{
+        .base_color = materials.color("base_color").mul(vertex_color),
+        .emissive = materials.color("emissive"),
+        .metallic = materials.float("metallic"),
+        .roughness = materials.float("roughness"),
+        .dielectric_f0 = materials.float("dielectric_f0"),
+        .ior = materials.float("ior"),
+        .transmission = materials.float("transmission"),
+        .sigma_a = materials.color("sigma_a"),
+        .unlit = materials.float("unlit").gt(zero),
+        .volume = materials.float("volume").gt(zero),
+    };
+}
+
+/// How much of the light is stopped at a surface, 0..1: 0 in holes, alpha where it blends.
+pub inline fn opacity(
+    comptime Lanes: type,
+    materials: *const Materials(Lanes),
+    vertex_alpha: Lanes.F32,
+) Lanes.F32 {
+    const F32 = Lanes.F32;
+    const alpha = materials.pick("base_color", 3).mul(vertex_alpha);
+    const blends = materials.float("blend").gt(.zero());
+    const cutoff = materials.float("alpha_cutoff");
+    const hole = alpha.lt(cutoff).bitAnd(cutoff.ge(.zero()));
+    const clamped = alpha.max(.zero()).min(.splat(1));
+    const solid = F32.select(hole, .zero(), .splat(1));
+    return F32.select(blends, clamped, solid);
+}
+
+/// What a surface does to light that goes straight through it.
+pub fn Attenuation(comptime Lanes: type) type {
+    return struct {
+        /// Share that comes out.
+        share: Lanes.Vec3,
+        /// Lanes where the surface is there at all: not in holes.
+        weakens: Lanes.Mask,
+
+        /// Past what alpha leaves open, and in the base colour through what transmits.
+        pub inline fn of(materials: *const Materials(Lanes), color: Color(Lanes)) @This() {
+            const one: Lanes.F32 = .splat(1);
+            const stopped = opacity(Lanes, materials, color.alpha);
+            const base = materials.color("base_color").mul(color.rgb);
+            const clear = materials.float("transmission").mul(one.sub(materials.float("metallic")));
+            const rest = one.sub(stopped);
+            return .{
+                .share = base.scale(clear.mul(stopped)).add(.{ .x = rest, .y = rest, .z = rest }),
+                .weakens = stopped.gt(.zero()),
+            };
+        }
+    };
+}

@@ -1,0 +1,45 @@
+//! Materials as shading wants them, in f32 throughout so that lanes can gather any of their fields.
+
+const math = @import("../math.zig");
+const Vec3 = math.Vec3;
+
+/// The metallic-roughness model of glTF 2.0 with transmission and volume.
+pub const Material = struct {
+    /// Linear RGB and alpha.
+    base_color: [4]f32,
+    emissive: Vec3,
+    metallic: f32,
+    roughness: f32,
+    /// Reflectance at normal incidence of the dielectric part, ((n - 1) / (n + 1))^2.
+    dielectric_f0: f32,
+    ior: f32,
+    transmission: f32,
+    /// Beer-Lambert absorption coefficient inside, per metre; 0 outside of volumes.
+    sigma_a: Vec3,
+    /// Alpha below it is a hole; -1 for materials without holes.
+    alpha_cutoff: f32,
+    /// 1: alpha blends, 0: alpha counts as 1.
+    blend: f32,
+    /// 1: back faces are seen too, 0: they are culled from view (they still cast shadows).
+    double_sided: f32,
+    /// 1: shown without light.
+    unlit: f32,
+    /// 1: bounds a volume, rays bend; 0: thin, they go straight on.
+    volume: f32,
+
+    /// Whether no light passes, wherever a surface of it is hit.
+    pub fn stopsLight(material: *const Material) bool {
+        const clear = material.transmission * (1 - material.metallic);
+        return clear == 0 and material.blend == 0 and material.alpha_cutoff < 0;
+    }
+};
+
+/// All materials of a scene.
+pub const Materials = struct {
+    /// `Triangle.material` counts these.
+    all: []const Material,
+    /// Some drawn material lets shadow rays through in part (blend or transmission).
+    has_transparency: bool,
+    /// Some drawn material has holes (mask).
+    has_holes: bool,
+};

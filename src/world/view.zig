@@ -1,0 +1,26 @@
+//! The view: a camera and the size of its picture.
+
+const math = @import("../math.zig");
+const Vec3 = math.Vec3;
+
+/// A camera. The ray of the image point (x, y), both in -1..1 with y up, has
+///
+///     perspective:  origin,                  direction forward + x right + y up
+///     orthographic: origin + x right + y up, direction forward
+///
+/// `right` and `up` carry the half extents of the picture; directions are not normalised.
+pub const Camera = struct {
+    orthographic: bool,
+    origin: Vec3,
+    right: Vec3,
+    up: Vec3,
+    forward: Vec3,
+};
+
+/// A camera and its picture.
+pub const View = struct {
+    camera: Camera,
+    /// Picture size in pixels.
+    width: u32,
+    height: u32,
+};
