@@ -42,7 +42,7 @@ pub const Settings = struct {
     /// At least one.
     scenes: []const []const u8,
     allow_outside: bool = false,
-    /// See parse/settings.zig.
+    /// See `settings.Load`.
     output: ?Identity = null,
     width: u32,
     height: u32,

@@ -28,6 +28,7 @@ pub const version: []const u8 = config.version;
 pub const Command = union(enum) {
     help,
     version,
+    licenses,
     list_variants,
     render: Options,
     bench: Bench,
@@ -52,6 +53,8 @@ pub const Options = struct {
     scene: []const u8,
     /// Null: the scene's name in the working directory. See `isStdout`.
     output: ?[]const u8 = null,
+    /// Bytes of memory that may be allocated at a time; null: as much as there is.
+    memory_max: ?u64 = null,
     /// Null: as many as the system has CPUs.
     thread_count: ?u32 = null,
     tree_quality: settings.TreeQuality = .default,
@@ -102,7 +105,10 @@ const Id = enum {
     exposure,
     format,
     help,
+    jpeg_quality,
+    licenses,
     list_variants,
+    max_memory,
     output,
     quiet,
     resolution,
@@ -125,13 +131,19 @@ const sections: []const Section(Id) = &.{
             .long = "--output",
             .short = 'o',
             .value = "FILE",
-            .help = "name ending in .png, .ppm or .pfm; - is standard\noutput",
+            .help = "name ending in a format; - is standard output",
         },
         .{
             .id = .format,
             .long = "--format",
             .value = "FORMAT",
-            .help = "png, ppm (8 bits) or pfm (linear floats)",
+            .help = "png, jpg, tga, bmp or ppm, or linear: hdr or pfm",
+        },
+        .{
+            .id = .jpeg_quality,
+            .long = "--jpeg-quality",
+            .value = "N",
+            .help = settings.jpeg_quality.textWithDefault(),
         },
         .{
             .id = .resolution,
@@ -249,6 +261,12 @@ const sections: []const Section(Id) = &.{
             .long = "--list-variants",
             .help = "print the names of the variants, the default first",
         },
+        .{
+            .id = .max_memory,
+            .long = "--max-memory",
+            .value = "SIZE",
+            .help = "512M or 2G, say; an error where more is needed",
+        },
     } },
     .{ .title = "Messages", .flags = &.{
         .{
@@ -256,7 +274,8 @@ const sections: []const Section(Id) = &.{
             .long = "--stats",
             .value = "FORM",
             .help = "report as " ++ namesOf(Stats) ++ " (default: text, or none\n" ++
-                "when the image goes to standard output)",
+                "when the image goes to standard output); when it is\n" ++
+                "given, a report that cannot be printed is an error",
         },
         .{
             .id = .count_tests,
@@ -277,6 +296,11 @@ const sections: []const Section(Id) = &.{
         },
         .{ .id = .help, .long = "--help", .short = 'h', .help = "print this" },
         .{ .id = .version, .long = "--version", .help = "print the version" },
+        .{
+            .id = .licenses,
+            .long = "--licenses",
+            .help = "print the licence, and those of the libraries used",
+        },
     } },
 };
 
@@ -370,7 +394,14 @@ const Parser = struct {
         const reader = &parser.reader;
         switch (flag.id) {
             .output => options.output = try reader.text(flag, value, "a file name or -"),
-            .format => parser.format = try reader.choice(flag, value, settings.Format),
+            .format => parser.format = formatOf(value) orelse
+                return reader.bad(flag, value, comptime namesOf(settings.Format)),
+            .jpeg_quality => {
+                options.write.jpeg_quality =
+                    try reader.number(flag, value, settings.jpeg_quality);
+            },
+            .max_memory => options.memory_max = bytesOf(value) orelse
+                return reader.bad(flag, value, "a size such as 512M or 2G"),
             .resolution => options.view.resolution = resolutionOf(value) orelse
                 return reader.bad(flag, value, expected_resolution),
             .threads => {
@@ -419,6 +450,7 @@ const Parser = struct {
             .verbose => options.verbose = true,
             .help => parser.other = .help,
             .version => parser.other = parser.other orelse .version,
+            .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
         }
     }
@@ -442,10 +474,7 @@ const Parser = struct {
         const output = options.output orelse return;
         if (options.toStdout()) return;
         const extension = std.fs.path.extension(output);
-        const implied: ?settings.Format = for (std.enums.values(settings.Format)) |format| {
-            if (extension.len == 0) break null;
-            if (std.ascii.eqlIgnoreCase(extension[1..], @tagName(format))) break format;
-        } else null;
+        const implied = if (extension.len == 0) null else formatOf(extension[1..]);
         if (parser.format) |format| {
             if (implied == null or implied == format) return;
             return parser.reader.fail("'--format {t}' contradicts the name {f}", .{
@@ -453,11 +482,33 @@ const Parser = struct {
             });
         }
         options.write.format = implied orelse return parser.reader.fail(
-            "the name {f} ends in none of .png, .ppm and .pfm, and no --format says which",
+            "the name {f} ends in no image format's extension, and no --format says which",
             .{quote(output)},
         );
     }
 };
+
+/// A format by its extension, in either case; JPEG has two.
+fn formatOf(extension: []const u8) ?settings.Format {
+    if (std.ascii.eqlIgnoreCase(extension, "jpeg")) return .jpg;
+    for (std.enums.values(settings.Format)) |format| {
+        if (std.ascii.eqlIgnoreCase(extension, @tagName(format))) return format;
+    }
+    return null;
+}
+
+/// A number of bytes above 0, or of K, M, G or T, each 1024 times the one before.
+fn bytesOf(text: []const u8) ?u64 {
+    if (text.len == 0) return null;
+    const units = "KMGT";
+    const unit = std.mem.findScalar(u8, units, std.ascii.toUpper(text[text.len - 1]));
+    const digits = if (unit == null) text else text[0 .. text.len - 1];
+    for (digits) |digit| if (!std.ascii.isDigit(digit)) return null;
+    const count = std.fmt.parseInt(u64, digits, 10) catch return null;
+    if (count == 0) return null;
+    const shift: u6 = if (unit) |index| @intCast(10 * (index + 1)) else 0;
+    return std.math.shlExact(u64, count, shift) catch null;
+}
 
 /// A finite decimal number; a denormal one is zero, as everywhere in the renderer.
 fn number(text: []const u8) ?f32 {
@@ -574,6 +625,7 @@ test "help wins over mistakes, the other questions do not" {
     try std.testing.expectEqual(.version, try parseForTest(&.{"--version"}));
     try std.testing.expectEqual(.version, try parseForTest(&.{ "--version", "s.glb" }));
     try std.testing.expectEqual(.list_variants, try parseForTest(&.{"--list-variants"}));
+    try std.testing.expectEqual(.licenses, try parseForTest(&.{"--licenses"}));
     try expectUsage("--no-such", &.{ "--version", "--no-such" });
 }
 
@@ -643,7 +695,17 @@ test "numbers keep to their ranges" {
         .{ .flag = "--tonemap", .good = &.{"linear"}, .bad = &.{ "aces", "" } },
         .{ .flag = "--stats", .good = &.{ "text", "json", "none" }, .bad = &.{ "JSON", "" } },
         .{ .flag = "--bvh", .good = &.{ "fast", "default", "high" }, .bad = &.{ "High", "" } },
-        .{ .flag = "--format", .good = &.{ "png", "ppm", "pfm" }, .bad = &.{ "PNG", "jpg", "" } },
+        .{
+            .flag = "--format",
+            .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr" },
+            .bad = &.{ "tiff", "" },
+        },
+        .{ .flag = "--jpeg-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "", "x" } },
+        .{
+            .flag = "--max-memory",
+            .good = &.{ "1", "64K", "512M", "512m", "2G", "16777215T" },
+            .bad = &.{ "", "0", "M", "0M", "-1G", "1.5G", "1P", "2GB", "16777216T" },
+        },
         .{ .flag = "--variant", .good = test_names, .bad = &.{ "vector", "", "vector-beam-16" } },
         .{ .flag = "--camera", .good = &.{ "auto", "0", "4294967296", "b c" }, .bad = &.{""} },
         .{ .flag = "--output", .good = &.{ "-", "a.png", "b/A.PPM" }, .bad = &.{ "", "png" } },
@@ -684,6 +746,9 @@ test "values arrive as they were meant" {
     const older = try optionsForTest(&.{"--variant=vector-packet-8"});
     try std.testing.expectEqual(0, older.render.variant);
     try expectUsage("did you mean 'vector-beam-8'?", &.{ "--variant=vector-baem-8", "s" });
+    const written = try optionsForTest(&.{ "--jpeg-quality=7", "--max-memory=3M" });
+    try std.testing.expectEqual(7, written.write.jpeg_quality);
+    try std.testing.expectEqual(3 << 20, written.memory_max);
     const switches = try optionsForTest(&.{ "-qv", "--count-tests", "--allow-outside" });
     try std.testing.expect(switches.quiet and switches.verbose);
     try std.testing.expect(switches.count_tests and switches.load.allow_outside);
@@ -712,11 +777,14 @@ test "the format follows the name, unless said otherwise" {
         .{ .ppm, &.{ "-o", "-", "--format=ppm" } },
         .{ .pfm, &.{ "--format=pfm", "-oa.dat" } },
         .{ .pfm, &.{ "--format=pfm", "-oa" } },
+        .{ .jpg, &.{"-oa.JPEG"} },
+        .{ .jpg, &.{ "-oa.jpeg", "--format=jpg" } },
+        .{ .hdr, &.{"-oa.b.hdr"} },
     }) |case| {
         try std.testing.expectEqual(case[0], (try optionsForTest(case[1])).write.format);
     }
     try expectUsage("contradicts", &.{ "--format=pfm", "-oa.png", "s" });
-    try expectUsage("'a.tiff' ends in none of", &.{ "-oa.tiff", "s" });
+    try expectUsage("'a.tiff' ends in no image format", &.{ "-oa.tiff", "s" });
 }
 
 test outputName {

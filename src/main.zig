@@ -9,6 +9,7 @@ const cli = raylane.cli;
 const signals = @import("signals.zig");
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
+const Account = raylane.memory_account.Account;
 const assert = std.debug.assert;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Options = raylane.cli.Options;
@@ -51,12 +52,16 @@ fn run(init: std.process.Init) ExitCode {
         .help => return print(io, cli.help),
         .bench_help => return print(io, cli.bench_help),
         .version => return print(io, "raylane " ++ cli.version ++ "\n"),
+        .licenses => return print(io, raylane.licenses),
         .list_variants => return print(io, comptime list: {
             var list: []const u8 = "";
             for (names) |name| list = list ++ name ++ "\n";
             break :list list;
         }),
-        .render => |*options| return renderAndReport(init.gpa, io, options, &diagnostic),
+        .render => |*options| {
+            var account: Account = .init(init.gpa, options.memory_max);
+            return renderAndReport(&account, io, options, &diagnostic);
+        },
         .bench => |*options| return bench(init, options, &diagnostic),
     }
 }
@@ -75,6 +80,11 @@ fn bench(
         });
         return .usage;
     }
+    if (!raylane.variant.are_all and !options.quiet) say(
+        io,
+        "raylane: this program holds {d} of the variants; zig build -Dvariants=all builds all\n",
+        .{raylane.variant.names.len},
+    );
     // Before the work, so that a place that cannot be written is an error in the first second.
     var target = openJson(io, options.json, diagnostic) catch {
         const text = diagnostic.message.text();
@@ -189,12 +199,17 @@ fn outOfMemory(io: Io) ExitCode {
 
 /// Renders one scene, then says what it cost or why it failed.
 fn renderAndReport(
-    gpa: Allocator,
+    account: *Account,
     io: Io,
     options: *const Options,
     diagnostic: *Diagnostic,
 ) ExitCode {
-    const output_name = cli.outputName(gpa, options) catch return outOfMemory(io);
+    const gpa = account.allocator();
+    const output_name = cli.outputName(gpa, options) catch {
+        account.explain(&diagnostic.message);
+        say(io, "raylane: {s}\n", .{diagnostic.message.text()});
+        return .failed;
+    };
     defer gpa.free(output_name);
     var job: Job = .{
         .io = io,
@@ -219,7 +234,8 @@ fn renderAndReport(
             job.outputTitle()
         else
             placeOf(diagnostic, options.scene);
-        const text = if (err == error.OutOfMemory) "out of memory" else diagnostic.message.text();
+        if (err == error.OutOfMemory) account.explain(&diagnostic.message);
+        const text = diagnostic.message.text();
         assert(text.len > 0);
         say(io, "raylane: {f}: {s}\n", .{ printable(file), text });
         return switch (err) {
@@ -265,6 +281,7 @@ const Job = struct {
         session.dropScene();
         job.sayWarnings();
         job.sayFacts(&session.world.?);
+        session.checkWrite(options.write) catch return error.OutputFailed;
         try session.render(options.render);
         session.write(&target, options.write) catch |err| return switch (err) {
             error.OutOfMemory, error.Canceled => |other| other,

@@ -10,10 +10,11 @@ const gltf = @import("parse/gltf.zig");
 const pbrt = @import("parse/pbrt.zig");
 const Settings = @import("settings.zig").Load;
 const Allocator = std.mem.Allocator;
+const Resources = @import("parse/resource.zig");
 
 /// `InputOutput`: a file is missing or cannot be read. `InvalidInput`: it is read, but it is not
 /// what it should be, or it needs what is not supported.
-pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
+pub const Error = Resources.Error;
 
 /// Reads the scene at `path`. On an error the diagnostic holds one line without the path in it;
 /// what is odd but harmless becomes warnings there. The caller frees the scene with `deinit`.
@@ -24,20 +25,46 @@ pub fn parse(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!Scene {
-    if (std.ascii.endsWithIgnoreCase(path, ".pbrt")) {
-        return pbrt.parse(gpa, io, path, settings, diagnostic);
-    }
-    return gltf.parse(gpa, io, path, settings, diagnostic);
+    var scene = try Resources.open(gpa, io, path, settings, diagnostic);
+    defer scene.close();
+    if (std.ascii.endsWithIgnoreCase(path, ".pbrt"))
+        return pbrt.read(&scene.resources, path, scene.main, diagnostic);
+    return gltf.read(&scene.resources, scene.main.bytes, diagnostic);
 }
 
 /// Reads a glTF file that is in memory, JSON or binary; what it names is looked for in `folder`.
 /// Otherwise like `parse`.
-pub const parseBytes = gltf.parseBytes;
+pub fn parseBytes(
+    gpa: Allocator,
+    io: std.Io,
+    bytes: []const u8,
+    folder: std.Io.Dir,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error!Scene {
+    var resources: Resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings };
+    return gltf.read(&resources, bytes, diagnostic);
+}
 
 /// The same for a PBRT text.
-pub const parsePbrt = pbrt.parseBytes;
+pub fn parsePbrt(
+    gpa: Allocator,
+    io: std.Io,
+    bytes: []const u8,
+    folder: std.Io.Dir,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error!Scene {
+    const copy = try gpa.dupeSentinel(u8, bytes, 0);
+    defer gpa.free(copy);
+    var resources: Resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings };
+    resources.bytes_read = bytes.len;
+    return pbrt.read(&resources, "text", .{ .bytes = copy, .identity = null }, diagnostic);
+}
 
 test {
+    _ = Resources;
+    _ = @import("parse/cgltf.zig");
     _ = gltf;
     _ = pbrt;
 }

@@ -204,6 +204,18 @@ pub const Session = struct {
         return counted.tests.?;
     }
 
+    /// Refuses what a file cannot hold of the view; best asked before `render`.
+    pub fn checkWrite(session: *Session, choices: settings.Write) error{InputOutput}!void {
+        const seen = &session.world.?.view;
+        return output.check(
+            choices.format,
+            session.seen.background == .transparent,
+            seen.width,
+            seen.height,
+            session.diagnostic,
+        );
+    }
+
     /// Encodes the picture and moves it to its place. Closes the target in any case. Asserts that
     /// there is a picture.
     pub fn write(
@@ -216,6 +228,7 @@ pub const Session = struct {
             .format = choices.format,
             .exposure = choices.exposure,
             .transparent = session.seen.background == .transparent,
+            .jpeg_quality = @intCast(choices.jpeg_quality),
             .pool = &session.pool,
         }, target, session.diagnostic);
         session.times.output_ns = session.since(start);

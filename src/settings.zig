@@ -44,6 +44,8 @@ pub const tile_size_step = 4;
 pub const side: Range = .{ .min = 1, .max = 65_536, .default = 1024 };
 /// Pixels of a picture.
 pub const pixel_count_max = 1 << 28;
+/// Quality of a JPEG.
+pub const jpeg_quality: Range = .{ .min = 1, .max = 100, .default = 90 };
 /// Largest exposure either way, in stops.
 pub const exposure_ev_max = 64;
 /// Automatic exposure lets so many of the pixels, in percent, be no brighter than this.
@@ -55,8 +57,19 @@ pub const ambient_default: f32 = 0.35;
 /// Names of scenes that need no file begin with this.
 pub const builtin_prefix = "builtin:";
 
-/// File formats of images.
-pub const Format = enum { png, ppm, pfm };
+/// File formats of images, by their extensions.
+pub const Format = enum {
+    png,
+    jpg,
+    tga,
+    bmp,
+    /// Radiance RGBE: linear, 8 bits and a common exponent.
+    hdr,
+    /// Netpbm's binary format: RGB of 8 bits.
+    ppm,
+    /// Its relative for floats, linear: the picture itself, bit for bit, without alpha.
+    pfm,
+};
 
 /// Care taken over the tree of the scene: time to build it against time to trace rays through it.
 /// The picture is the same in any case.
@@ -141,6 +154,8 @@ pub const Render = struct {
 pub const Write = struct {
     format: Format = .png,
     exposure: Exposure = .{ .ev = 0 },
+    /// Within `jpeg_quality`.
+    jpeg_quality: u32 = jpeg_quality.default,
 };
 
 test Range {

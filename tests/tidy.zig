@@ -28,19 +28,21 @@ const directions = [_]Row{
             "film",    "parallel", "variant", "output",  "report",
         },
     },
+    .{ .part = "kernel", .may_import = &.{ "module:config", "trace", "variant" } },
     .{ .part = "bench", .may_import = &.{ "session", "variant", "energy" } },
     .{ .part = "variant", .may_import = &.{"module:config"} },
     .{ .part = "simd", .may_import = &.{"variant"} },
     .{ .part = "parallel", .may_import = &.{"simd"} },
     .{ .part = "builtin", .may_import = &.{"scene"} },
-    .{ .part = "parse", .may_import = &.{ "scene", "module:cgltf" } },
+    .{ .part = "parse", .may_import = &.{"scene"} },
     .{ .part = "scene", .may_import = &.{} },
     .{ .part = "prepare", .may_import = &.{ "scene", "world", "simd", "parallel" } },
     .{ .part = "world", .may_import = &.{} },
     .{ .part = "trace", .may_import = &.{ "world", "film", "variant", "simd", "parallel" } },
     .{ .part = "film", .may_import = &.{"image"} },
     .{ .part = "image", .may_import = &.{} },
-    .{ .part = "output", .may_import = &.{ "image", "parallel" } },
+    .{ .part = "memory_account", .may_import = &.{} },
+    .{ .part = "output", .may_import = &.{ "image", "memory_account", "parallel" } },
     .{ .part = "report", .may_import = &.{} },
     .{ .part = "energy", .may_import = &.{} },
     .{ .part = "diagnostic", .may_import = &.{} },
@@ -72,6 +74,7 @@ const roots = [_][]const u8{
     "bench/parse.zig",
     "bench/rays.zig",
     "bench/structures.zig",
+    "src/kernel.zig",
     "src/main.zig",
     "src/raylane.zig",
     "scenes/make.zig",
@@ -79,6 +82,7 @@ const roots = [_][]const u8{
     "tests/integration.zig",
     "tests/launch.zig",
     "tests/runner.zig",
+    "tests/stb_image.zig",
     "tests/summary.zig",
     "tests/tidy.zig",
 };
@@ -162,6 +166,7 @@ const File = struct {
 
     /// Programs in any language, as opposed to prose and data.
     fn isCode(file: File) bool {
+        if (std.mem.eql(u8, std.fs.path.basename(file.path), "SHA256SUMS")) return false;
         const extension = std.fs.path.extension(file.path);
         for ([_][]const u8{ ".zig", ".zon", ".c", ".h", ".py", ".sh", "" }) |code| {
             if (std.mem.eql(u8, extension, code)) return true;

@@ -67,8 +67,8 @@ pub fn HitLists(comptime Kernel: type) type {
             bundle: *bundle_file.Bundle(Kernel),
             tests: *TestCounts,
         ) void {
-            const stopped = &lists.stopped;
-            for (&bundle.groups, &lists.counts, stopped, 0..) |*group, *each, *stop, number| {
+            const all = .{ &bundle.groups, &lists.counts, &lists.stopped };
+            for (all[0], all[1], all[2], 0..) |*group, *each, *stop, number| {
                 if (group.active.none()) continue;
                 stop.* = 0;
                 each.* = @splat(0);
