@@ -66,13 +66,10 @@ What to read from it:
 """
 
 CONFIG = """
-pub const Backend = enum { scalar, vector, intrinsics };
-pub const Traversal = enum { single, packet2x2, packet };
-pub const Variants = enum { one, all };
-pub const backend: Backend = .vector;
-pub const traversal: Traversal = .single;
-pub const lanes: u8 = 4;
-pub const variants: Variants = .one;
+pub const variants: []const []const u8 = &.{"vector-single-4"};
+pub const counting: []const []const u8 = &.{"vector-single-4"};
+pub const are_all = false;
+pub const shows_searches = false;
 """
 
 # What a call costs and inlined code does not: returns, frames, and moves between two registers.

@@ -8,6 +8,7 @@ const raylane = @import("raylane");
 const signals = @import("signals.zig");
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
+const Account = raylane.memory_account.Account;
 const assert = std.debug.assert;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Film = raylane.film.Film;
@@ -57,12 +58,16 @@ fn run(init: std.process.Init) ExitCode {
         .help => return print(io, raylane.options.help),
         .bench_help => return print(io, raylane.options.bench_help),
         .version => return print(io, "raylane " ++ raylane.options.version ++ "\n"),
+        .licenses => return print(io, raylane.licenses),
         .list_variants => return print(io, comptime list: {
             var list: []const u8 = "";
             for (names) |name| list = list ++ name ++ "\n";
             break :list list;
         }),
-        .render => |*options| return renderAndReport(init.gpa, io, options, &diagnostic),
+        .render => |*options| {
+            var account: Account = .init(init.gpa, options.memory_max);
+            return renderAndReport(&account, io, options, &diagnostic);
+        },
         .bench => |*options| return bench(init, options, &diagnostic),
     }
 }
@@ -88,6 +93,11 @@ fn bench(
         });
         return .usage;
     }
+    if (!raylane.variant.are_all and !options.quiet) say(
+        io,
+        "raylane: this program holds {d} of the variants; zig build -Dvariants=all builds all\n",
+        .{raylane.variant.names.len},
+    );
     // Before the work, so that a place that cannot be written is an error in the first second.
     var target = openJson(io, options.json, diagnostic) catch {
         const text = diagnostic.message.text();
@@ -213,12 +223,17 @@ fn treeQuality(bvh: raylane.options.Bvh) raylane.prepare.TreeQuality {
 
 /// Renders one scene, then says what it cost or why it failed.
 fn renderAndReport(
-    gpa: Allocator,
+    account: *Account,
     io: Io,
     options: *const Options,
     diagnostic: *Diagnostic,
 ) ExitCode {
-    const output_name = raylane.options.outputName(gpa, options) catch return outOfMemory(io);
+    const gpa = account.allocator();
+    const output_name = raylane.options.outputName(gpa, options) catch {
+        account.explain(&diagnostic.message);
+        say(io, "raylane: {s}\n", .{diagnostic.message.text()});
+        return .failed;
+    };
     defer gpa.free(output_name);
     var job: Job = .{
         .gpa = gpa,
@@ -237,7 +252,8 @@ fn renderAndReport(
             job.outputTitle()
         else
             placeOf(diagnostic, options.scene);
-        const text = if (err == error.OutOfMemory) "out of memory" else diagnostic.message.text();
+        if (err == error.OutOfMemory) account.explain(&diagnostic.message);
+        const text = diagnostic.message.text();
         assert(text.len > 0);
         say(io, "raylane: {f}: {s}\n", .{ printable(file), text });
         return switch (err) {
@@ -316,6 +332,9 @@ const Job = struct {
         const layers: raylane.film.Layers = .init(.{ .color = true, .alpha = has_alpha });
         var film: Film = try .init(gpa, view.width, view.height, layers);
         defer film.deinit(gpa);
+        const output_settings = job.outputSettings();
+        raylane.output.check(output_settings, view.width, view.height, job.diagnostic) catch
+            return error.OutputFailed;
         const trace_start = Io.Clock.awake.now(io);
         const frame = world.frame();
         const settings = job.traceSettings();
@@ -327,7 +346,11 @@ const Job = struct {
         );
 
         const output_start = Io.Clock.awake.now(io);
-        try job.write(&film.image, &target);
+        raylane.output.write(gpa, &film.image, output_settings, &target, job.diagnostic) catch |err|
+            return switch (err) {
+                error.OutOfMemory => error.OutOfMemory,
+                error.InputOutput => error.OutputFailed,
+            };
         times.output_ns = since(io, output_start);
         times.total_ns = since(io, start);
 
@@ -424,8 +447,8 @@ const Job = struct {
         return job.options.thread_count orelse processorCount();
     }
 
-    fn write(job: *Job, image: *const Image, target: *Target) Error!void {
-        raylane.output.write(job.gpa, image, .{
+    fn outputSettings(job: *const Job) raylane.output.Settings {
+        return .{
             .format = switch (job.options.format) {
                 inline else => |format| @field(raylane.output.Format, @tagName(format)),
             },
@@ -434,10 +457,8 @@ const Job = struct {
                 .auto => .auto,
             },
             .transparent = job.options.background == .transparent,
+            .jpeg_quality = job.options.jpeg_quality,
             .thread_count = job.threadCount(),
-        }, target, job.diagnostic) catch |err| return switch (err) {
-            error.OutOfMemory => error.OutOfMemory,
-            error.InputOutput => error.OutputFailed,
         };
     }
 

@@ -82,6 +82,7 @@ pub fn parsePbrt(
 test {
     _ = Resources;
     _ = builtin;
+    _ = @import("parse/cgltf.zig");
     _ = gltf;
     _ = pbrt;
 }

@@ -78,21 +78,15 @@ fn expectVariant(
     expected: []const Hit,
 ) !void {
     const Kernel = raylane.trace.kernel.Kernel(variant, false);
+    const searches = raylane.trace.searchesOf(Kernel);
     var counts: raylane.statistics.TestCounts = .{};
     for (queries, expected) |query, hit| {
         var ray = query.ray();
-        const found = raylane.trace.single.trace(
-            Kernel,
-            .closest_hit,
-            &world.geometry,
-            &ray,
-            &counts,
-        );
+        const found = searches.one_closest(&world.geometry, &ray, &counts);
         try expectHit(hit, ray.closest.t.lane(0), ray.closest.primitive.lane(0));
         try std.testing.expectEqual(hit.primitive != ray_file.no_primitive, found);
         var shadow = query.ray();
-        const blocked = raylane.trace.single
-            .trace(Kernel, .any_hit, &world.geometry, &shadow, &counts);
+        const blocked = searches.one_any(&world.geometry, &shadow, &counts);
         try std.testing.expectEqual(found, blocked);
     }
     const size = Kernel.group_count * Kernel.ray_count;
@@ -121,7 +115,7 @@ fn expectMultiHit(
         material.transmission = transmission;
         var counts: raylane.statistics.TestCounts = .{};
         var bundle = makeBundle(Kernel, queries);
-        lists.trace(&bundle, &counts);
+        raylane.trace.searchesOf(Kernel).hit_lists(lists, &bundle, &counts);
         for (queries, expected, 0..) |query, hit, index| {
             if (!isActive(index)) continue;
             const group = index / Kernel.ray_count;
@@ -131,7 +125,8 @@ fn expectMultiHit(
             try std.testing.expectEqual(transmission == 0 and met, stopped);
             // Brute force takes its time.
             if (transmission == 0 or index % 8 != 0) continue;
-            try expectList(world, query, &lists.lists[group][lane]);
+            const list = lists.hits[group][lane][0..lists.counts[group][lane]];
+            try expectList(world, query, list);
         }
     }
 }
@@ -140,14 +135,14 @@ fn expectMultiHit(
 fn expectList(
     world: *const World,
     query: Query,
-    list: *const raylane.trace.multi_hit.HitList,
+    list: []const raylane.trace.multi_hit.Hit,
 ) !void {
     var next = query;
-    for (list.hits[0..list.count]) |hit| {
+    for (list) |hit| {
         next.tnear = bruteForce(world, next);
         try expectHit(next.tnear, hit.t, hit.primitive);
     }
-    if (list.count == list.hits.len) return;
+    if (list.len == raylane.trace.multi_hit.hits_max) return;
     try std.testing.expectEqual(ray_file.no_primitive, bruteForce(world, next).primitive);
 }
 
@@ -157,8 +152,7 @@ fn expectBundles(
     queries: []const Query,
     expected: []const Hit,
 ) !void {
-    const dispatch = raylane.trace.dispatch;
-    const interval_packet = raylane.trace.interval_packet;
+    const searches = raylane.trace.searchesOf(Kernel);
     const geometry = &world.geometry;
     var counts: raylane.statistics.TestCounts = .{};
     const size = Kernel.group_count * Kernel.ray_count;
@@ -170,13 +164,12 @@ fn expectBundles(
         if (Kernel.variant.traversal == .beam) for ([_]i32{ 0, 1, 3, 12 }) |balance| {
             // Without budget all go as streams; with little, packets run out of it on their way.
             var poor = bundle;
-            var budget: interval_packet.PacketBudget = .{ .balance = balance };
-            interval_packet.trace(Kernel, .any_hit, geometry, &poor, &budget, &counts);
+            var budget: raylane.trace.interval_packet.PacketBudget = .{ .balance = balance };
+            searches.packets_any.?(geometry, &poor, &budget, &counts);
             try expectBlocked(Kernel, &poor, expected[first..][0..part.len]);
         };
-        const coherence = dispatch.closestHit(Kernel, geometry, &bundle, null, &counts);
-        try std.testing.expect(coherence == .none);
-        dispatch.anyHit(Kernel, geometry, &shadows, &no_light, coherence, &counts);
+        try std.testing.expect(!searches.closest_hit(geometry, &bundle, null, &counts));
+        searches.any_hit(geometry, &shadows, &no_light, &.none, &counts);
         try expectBlocked(Kernel, &shadows, expected[first..][0..part.len]);
         for (0..part.len) |index| {
             if (!isActive(index)) continue;
@@ -479,13 +472,8 @@ test "a closed surface stops every ray that aims at its edges and corners, near 
             var ray = (Query{ .origin = origin, .direction = direction }).ray();
             var counts: raylane.statistics.TestCounts = .{};
             const Kernel = raylane.trace.kernel.Kernel(raylane.variant.compiled[0], false);
-            const hit = raylane.trace.single.trace(
-                Kernel,
-                .closest_hit,
-                &world.geometry,
-                &ray,
-                &counts,
-            );
+            const searches = raylane.trace.searchesOf(Kernel);
+            const hit = searches.one_closest(&world.geometry, &ray, &counts);
             lost_count += @intFromBool(!hit);
         }
         if (lost_count > 0) std.debug.print("{d} of {d} lost at {d}\n", .{

@@ -15,13 +15,14 @@ const testing = std.testing;
 const directions = [_]struct { part: []const u8, may_import: []const []const u8 }{
     .{ .part = "main", .may_import = &.{ "raylane", "signals" } },
     .{ .part = "signals", .may_import = &.{"raylane"} },
+    .{ .part = "kernel", .may_import = &.{ "config", "trace", "variant" } },
     .{ .part = "options", .may_import = &.{ "config", "variant" } },
     .{ .part = "variant", .may_import = &.{"config"} },
     .{ .part = "simd", .may_import = &.{"variant"} },
     .{ .part = "huge_pages", .may_import = &.{} },
     .{ .part = "math", .may_import = &.{} },
     .{ .part = "parallel", .may_import = &.{"simd"} },
-    .{ .part = "parse", .may_import = &.{ "scene", "cgltf", "stb_image", "parallel", "builtin" } },
+    .{ .part = "parse", .may_import = &.{ "scene", "parallel", "builtin" } },
     .{ .part = "builtin", .may_import = &.{ "scene", "parallel" } },
     .{ .part = "scene", .may_import = &.{} },
     .{ .part = "prepare", .may_import = &.{ "scene", "world", "simd", "variant", "parallel" } },
@@ -29,7 +30,8 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
     .{ .part = "trace", .may_import = &.{ "world", "film", "variant", "simd", "parallel" } },
     .{ .part = "film", .may_import = &.{"image"} },
     .{ .part = "image", .may_import = &.{} },
-    .{ .part = "output", .may_import = &.{ "image", "parallel" } },
+    .{ .part = "memory_account", .may_import = &.{} },
+    .{ .part = "output", .may_import = &.{ "image", "memory_account", "parallel" } },
     .{ .part = "report", .may_import = &.{ "config", "options", "variant", "world" } },
     .{ .part = "energy", .may_import = &.{} },
     .{
@@ -67,6 +69,7 @@ const roots = [_][]const u8{
     "bench/parse.zig",
     "bench/rays.zig",
     "bench/structures.zig",
+    "src/kernel.zig",
     "src/main.zig",
     "src/raylane.zig",
     "scenes/make.zig",
@@ -74,6 +77,7 @@ const roots = [_][]const u8{
     "tests/integration.zig",
     "tests/launch.zig",
     "tests/runner.zig",
+    "tests/stb_image.zig",
     "tests/summary.zig",
     "tests/tidy.zig",
 };
@@ -107,6 +111,7 @@ const File = struct {
 
     /// Programs in any language, as opposed to prose and data.
     fn isCode(file: File) bool {
+        if (std.mem.eql(u8, std.fs.path.basename(file.path), "SHA256SUMS")) return false;
         const extension = std.fs.path.extension(file.path);
         for ([_][]const u8{ ".zig", ".zon", ".c", ".h", ".py", ".sh", "" }) |code| {
             if (std.mem.eql(u8, extension, code)) return true;

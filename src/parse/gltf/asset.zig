@@ -4,7 +4,7 @@
 //! what is not supported, warnings for what changes the picture but not the shapes.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
 const Source = @import("source.zig");
 const Error = Source.Error;

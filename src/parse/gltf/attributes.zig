@@ -5,7 +5,7 @@
 //! KHR_mesh_quantization; an attribute that is not drawn has to be of its kind as well.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const accessors = @import("../accessor.zig");
 const asset = @import("asset.zig");
 const diagnostic = @import("../../diagnostic.zig");

@@ -4,7 +4,7 @@
 //! bytes as its byteLength says (glTF 2.0, section 3.6.1). Images are not opened.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const limits = @import("limits.zig");
 const escapes = @import("../json/escapes.zig");
 const uri = @import("uri.zig");

@@ -6,7 +6,7 @@
 //! what would be wrong at its full value (metal, glow) counts as absent.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const Source = @import("source.zig");

@@ -5,7 +5,7 @@
 //! vertices, every number is finite; strips and fans are taken apart (section 3.7.2.1).
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const accessors = @import("../accessor.zig");

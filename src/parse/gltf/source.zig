@@ -4,7 +4,7 @@
 //! stays; memory from `gpa` is given back before the reader ends.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const json = @import("../json.zig");
 const scene = @import("../../scene.zig");
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;

@@ -5,7 +5,7 @@
 //! can be clamped is, with a warning; a camera that sees nothing is an error.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const escapes = @import("../json/escapes.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
