@@ -204,7 +204,7 @@ const Bench = struct {
     /// The tree of the last repetition stays.
     fn build(bench: *Bench, arena: Allocator, tree: *TimedTree, repetition: usize) !void {
         const options = bench.options;
-        const settings: raylane.prepare.Settings = .{
+        const settings: raylane.prepare.PoseSettings = .{
             .lanes = tree.lanes,
             .pool = &bench.session.pool,
             .tree_quality = tree.quality,
@@ -216,7 +216,9 @@ const Bench = struct {
         var marks: Marks = .init(if (options.count) .{ .tags = tree.first_tag } else .clock);
         const start = Io.Clock.awake.now(bench.io);
         marks.to(.build);
-        try raylane.prepare.buildTree(bench.gpa, used, tree.world, settings);
+        const geometry = &tree.world.geometry;
+        tree.world.facts.tree =
+            try raylane.prepare.buildTree(bench.gpa, used, geometry, settings);
         marks.to(.other);
         const time_ns = start.untilNow(bench.io, .awake).toNanoseconds();
         tree.times_ms[repetition] = milliseconds(time_ns);

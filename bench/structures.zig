@@ -210,7 +210,7 @@ fn buildAll(
     const narrow = try binary.build(arena, &worlds.wide, try arena.dupe(cost.Reference, list));
     worlds.binary.geometry.tree = .{ .w4 = narrow };
     markBuild(options, tags[1]);
-    try raylane.prepare.buildTree(gpa, arena, &worlds.wide, .{
+    _ = try raylane.prepare.buildTree(gpa, arena, &worlds.wide.geometry, .{
         .lanes = cost.width,
         .pool = pool,
     });

@@ -20,21 +20,26 @@ const check = @import("prepare/bvh/check.zig");
 const flatten = @import("prepare/flatten.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
-const pose = @import("prepare/pose.zig");
-const view = @import("prepare/view.zig");
+const place_file = @import("prepare/pose.zig");
+const view_file = @import("prepare/view.zig");
 const assert = std.debug.assert;
+const Allocator = std.mem.Allocator;
 const Clock = std.Io.Clock;
 const Scene = scene.Scene;
 const StageTimes = statistics.StageTimes;
 const TreeQuality = choices.TreeQuality;
 const World = world.World;
 
-/// What the user may decide, and who does the work.
-pub const Settings = struct {
-    /// Width of the tree's nodes and triangle blocks: 4, 8 or 16.
+/// How the geometry is made ready, and by whom.
+pub const PoseSettings = struct {
+    /// Width of the tree's nodes and triangle packs: 4, 8 or 16.
     lanes: u8,
     pool: *parallel.Pool,
     tree_quality: TreeQuality = .default,
+};
+
+/// What is seen of it, and in what light.
+pub const ViewSettings = struct {
     camera: choices.Camera = .default,
     /// Width and height in pixels, at least 1 each.
     resolution: ?[2]u32 = null,
@@ -44,22 +49,26 @@ pub const Settings = struct {
     background: ?math.Vec3 = null,
 };
 
-/// `CameraUnknown`: no camera has that name or index. `SceneTooLarge`: more than some 2 billion
-/// triangles or vertices.
-pub const Error = error{ OutOfMemory, CameraUnknown, SceneTooLarge } || parallel.Error;
+/// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
+pub const PoseError = error{ OutOfMemory, SceneTooLarge } || parallel.Error;
 
-/// Makes the world of a scene, whose memory comes from `gpa` by way of an arena: its few large
-/// arrays are a block of `gpa` each, of which the arena asks for half as much again but touches
-/// only what is used. Fills `prepare_ns` and `bvh_build_ns` of `times`. With
-/// `error.CameraUnknown` or `error.SceneTooLarge` the diagnostic says more.
-pub fn prepare(
-    gpa: std.mem.Allocator,
+/// `CameraUnknown`: no camera has that name or index; the diagnostic says more.
+pub const ViewError = error{ OutOfMemory, CameraUnknown };
+
+pub const Error = PoseError || ViewError;
+
+/// Places what is in a scene and builds the tree over it: a world in which nothing shines and that
+/// is seen by nobody yet. Its memory comes from `gpa` by way of an arena: its few large arrays are
+/// a block of `gpa` each, of which the arena asks for half as much again but touches only what is
+/// used. Fills `prepare_ns` and `bvh_build_ns` of `times`.
+pub fn pose(
+    gpa: Allocator,
     io: std.Io,
     from: *const Scene,
-    settings: Settings,
+    settings: PoseSettings,
     diagnostic: *Diagnostic,
     times: *StageTimes,
-) Error!World {
+) PoseError!World {
     assert(settings.lanes == 4 or settings.lanes == 8 or settings.lanes == 16);
     const mode = simd.setFlushToZero();
     defer simd.setFloatControl(mode);
@@ -67,13 +76,34 @@ pub fn prepare(
     const start = Clock.awake.now(io);
     var arena: std.heap.ArenaAllocator = .init(gpa);
     errdefer arena.deinit();
-    var result = try placeAll(gpa, arena.allocator(), from, settings, diagnostic);
+    const place = try place_file.compose(arena.allocator(), from);
+    const soup = try flatten
+        .flatten(gpa, arena.allocator(), from, place.maps, settings.pool, diagnostic);
+    var geometry: world.Geometry = .{
+        .tree = world.Geometry.empty.tree,
+        .positions = soup.positions,
+        .normals = soup.normals,
+        .colors = soup.colors,
+        .triangles = soup.triangles,
+        .bounds = soup.bounds,
+        .centroid_bounds = soup.centroid_bounds,
+        .padding = .init(place_file.round(place.center), soup.bounds),
+        .size = @floatCast(place.size),
+    };
+    const materials = try material.convertAll(arena.allocator(), from);
     const tree_start = Clock.awake.now(io);
-    try buildTree(gpa, arena.allocator(), &result, settings);
+    const tree_facts = try buildTree(gpa, arena.allocator(), &geometry, settings);
     const end = Clock.awake.now(io);
     times.prepare_ns = nanoseconds(start.durationTo(tree_start));
     times.bvh_build_ns = nanoseconds(tree_start.durationTo(end));
-    result.arena = arena;
+    const result: World = .{
+        .arena = arena,
+        .view_arena = .init(gpa),
+        .geometry = geometry,
+        .node_maps = place.maps,
+        .materials = materials,
+        .facts = .{ .tree = tree_facts, .degenerate_count = soup.dropped_count },
+    };
     if (builtin.mode == .debug) try check.check(gpa, &result);
     return result;
 }
@@ -82,84 +112,66 @@ fn nanoseconds(duration: std.Io.Duration) u64 {
     return @intCast(@max(duration.toNanoseconds(), 0));
 }
 
-/// Everything but the tree. Not inlined, so that no arithmetic moves before the mode is set.
-noinline fn placeAll(
-    gpa: std.mem.Allocator,
-    arena: std.mem.Allocator,
+/// Chooses camera, size and light of a world that was made of this scene, in place of those that
+/// it had: the tree stays as it is. Adds to `prepare_ns` of `times`.
+pub fn view(
+    seen: *World,
+    io: std.Io,
     from: *const Scene,
-    settings: Settings,
+    settings: ViewSettings,
     diagnostic: *Diagnostic,
-) Error!World {
-    const posed = try pose.compose(gpa, from);
-    defer posed.deinit(gpa);
-    const maps = posed.maps;
-    const materials = try material.convertAll(arena, from.materials);
-    const surface = try flatten.flatten(gpa, arena, from, maps, settings.pool, diagnostic);
-    const seen = try view.choose(
+    times: *StageTimes,
+) ViewError!void {
+    const mode = simd.setFlushToZero();
+    defer simd.setFloatControl(mode);
+    const start = Clock.awake.now(io);
+    try chooseView(seen, from, settings, diagnostic);
+    times.prepare_ns += nanoseconds(start.durationTo(Clock.awake.now(io)));
+}
+
+/// Not inlined, so that no arithmetic moves before the mode is set.
+noinline fn chooseView(
+    seen: *World,
+    from: *const Scene,
+    settings: ViewSettings,
+    diagnostic: *Diagnostic,
+) ViewError!void {
+    const gpa = seen.view_arena.child_allocator;
+    seen.lights = &.{};
+    _ = seen.view_arena.reset(.retain_capacity);
+    const arena = seen.view_arena.allocator();
+    const chosen = try view_file.choose(
         gpa,
         from,
-        maps,
-        &surface,
+        seen.node_maps,
+        &seen.geometry,
         settings.camera,
         settings.resolution,
         diagnostic,
     );
-    const padding: world.Padding = .init(pose.round(posed.center), surface.bounds);
-    var lights = try light.place(arena, from.lights, &posed, &padding, diagnostic);
+    seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };
+    seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
     // What shines from everywhere is a light too.
-    const lights_are_default = lights.len == 0 and from.ambient == null;
-    if (lights_are_default) lights = try light.placeRig(arena, &seen.camera);
-
-    var has_transparency = false;
-    var has_holes = false;
-    for (from.instances) |instance| {
-        const used = &materials[from.meshes[instance.mesh].material];
-        has_transparency = has_transparency or material.isTransparent(used);
-        has_holes = has_holes or used.alpha_cutoff >= 0;
-    }
-    return .{
-        .arena = undefined,
-        .geometry = .{
-            .tree = undefined,
-            .positions = surface.positions,
-            .normals = surface.normals,
-            .colors = surface.colors,
-            .triangles = surface.triangles,
-            .centroid_bounds = surface.centroid_bounds,
-            .padding = padding,
-            .size = @floatCast(posed.size),
-        },
-        .materials = .{
-            .all = materials,
-            .has_transparency = has_transparency,
-            .has_holes = has_holes,
-        },
-        .lights = lights,
-        .environment = light.environment(
-            lights_are_default,
-            from.ambient,
-            settings.ambient,
-            settings.background orelse from.background,
-        ),
-        .view = .{ .camera = seen.camera, .width = seen.width, .height = seen.height },
-        .facts = .{
-            .tree = undefined,
-            .camera_is_default = seen.camera_is_default,
-            .lights_are_default = lights_are_default,
-            .degenerate_count = surface.dropped_count,
-        },
-    };
+    const lights_are_default = seen.lights.len == 0 and from.ambient == null;
+    if (lights_are_default) seen.lights = try light.placeRig(arena, &seen.view.camera);
+    seen.environment = light.environment(
+        lights_are_default,
+        from.ambient,
+        settings.ambient,
+        settings.background orelse from.background,
+    );
+    seen.facts.camera_is_default = chosen.camera_is_default;
+    seen.facts.lights_are_default = lights_are_default;
 }
 
-/// Gives a world that has all else a tree of `settings.lanes`, and the facts about it; its memory
-/// comes from `arena`. For `prepare` and benchmarks of the build.
+/// Gives a geometry that has all else a tree of `settings.lanes`, whose memory comes from `arena`.
+/// Returns facts about it. For `pose` and benchmarks of the build. Not inlined, see `chooseView`.
 pub noinline fn buildTree(
-    gpa: std.mem.Allocator,
-    arena: std.mem.Allocator,
-    result: *World,
-    settings: Settings,
-) Error!void {
-    const geometry = &result.geometry;
+    gpa: Allocator,
+    arena: Allocator,
+    geometry: *world.Geometry,
+    settings: PoseSettings,
+) PoseError!world.TreeStatistics {
     const input: bvh_wide.Input = .{
         .positions = geometry.positions,
         .triangles = geometry.triangles,
@@ -168,13 +180,14 @@ pub noinline fn buildTree(
         .pool = settings.pool,
         .quality = settings.tree_quality,
     };
-    const facts = &result.facts.tree;
+    var facts: world.TreeStatistics = undefined;
     geometry.tree = switch (settings.lanes) {
-        4 => .{ .w4 = try bvh_wide.build(gpa, arena, &input, 4, facts) },
-        8 => .{ .w8 = try bvh_wide.build(gpa, arena, &input, 8, facts) },
-        16 => .{ .w16 = try bvh_wide.build(gpa, arena, &input, 16, facts) },
+        4 => .{ .w4 = try bvh_wide.build(gpa, arena, &input, 4, &facts) },
+        8 => .{ .w8 = try bvh_wide.build(gpa, arena, &input, 8, &facts) },
+        16 => .{ .w16 = try bvh_wide.build(gpa, arena, &input, 16, &facts) },
         else => unreachable, // Asserted at the door.
     };
+    return facts;
 }
 
 /// A scene for tests: one node, one mesh, made in the scene's own arena.
@@ -218,16 +231,23 @@ const TestSettings = struct {
     tree_quality: TreeQuality = .default,
 };
 
-fn testPrepare(from: *const Scene, settings: TestSettings) !World {
+fn prepareForTest(gpa: Allocator, from: *const Scene, settings: PoseSettings) !World {
     var diagnostic: Diagnostic = .{};
     var times: StageTimes = .{};
+    var result = try pose(gpa, std.testing.io, from, settings, &diagnostic, &times);
+    errdefer result.deinit();
+    try view(&result, std.testing.io, from, .{}, &diagnostic, &times);
+    return result;
+}
+
+fn testPrepare(from: *const Scene, settings: TestSettings) !World {
     var pool: parallel.Pool = .init(settings.thread_count);
     defer pool.deinit();
-    return prepare(std.testing.allocator, std.testing.io, from, .{
+    return prepareForTest(std.testing.allocator, from, .{
         .lanes = settings.lanes,
         .pool = &pool,
         .tree_quality = settings.tree_quality,
-    }, &diagnostic, &times);
+    });
 }
 
 /// Prepares and checks in all widths and qualities and with several thread counts, which must all
@@ -470,7 +490,7 @@ test "a mirroring node keeps fronts and normals outward" {
         try std.testing.expect(result.geometry.normals[3 * index][2] * sign > 0);
         try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, result.geometry.normals[3 * index + 2]);
     }
-    // The tilted normal stays perpendicular to the stretched surface it belongs to.
+    // The tilted normal stays perpendicular to the stretched soup it belongs to.
     const tilted = result.geometry.normals[1];
     try std.testing.expectApproxEqRel(@as(f32, -0.6 / 0.8 / 2.0), tilted[0] / tilted[2], 1e-6);
     try std.testing.expectEqual(math.Vec3{ 7, 0, 0 }, result.geometry.positions[1]);
@@ -562,23 +582,13 @@ test "memory that runs out is an error that leaks nothing" {
     defer from.deinit();
     const one = struct {
         fn one(failing: std.mem.Allocator, scene_from: *const Scene) !void {
-            var diagnostic: Diagnostic = .{};
-            var times: StageTimes = .{};
             var pool: parallel.Pool = .init(1);
             defer pool.deinit();
-            const settings: Settings = .{
+            var result = try prepareForTest(failing, scene_from, .{
                 .lanes = 4,
                 .pool = &pool,
                 .tree_quality = .high,
-            };
-            var result = try prepare(
-                failing,
-                std.testing.io,
-                scene_from,
-                settings,
-                &diagnostic,
-                &times,
-            );
+            });
             result.deinit();
         }
     }.one;
@@ -591,8 +601,8 @@ test {
     _ = flatten;
     _ = light;
     _ = material;
-    _ = pose;
-    _ = view;
+    _ = place_file;
+    _ = view_file;
     _ = @import("prepare/framing.zig");
     _ = @import("prepare/bvh/split.zig");
     _ = bvh_input;

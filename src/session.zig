@@ -68,7 +68,6 @@ pub const Session = struct {
     scene: ?Scene = null,
     ownership: Ownership = .owned,
     facts: Facts = .{},
-    posed: ?Pose = null,
     seen: settings.View = .{},
     world: ?World = null,
     film: ?Film = null,
@@ -149,23 +148,22 @@ pub const Session = struct {
         session.world = null;
     }
 
-    /// Places the geometry. Asserts that there is a scene.
+    /// Places the geometry and builds the tree over it. Asserts that there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
-        assert(session.scene != null);
         session.dropWorld();
-        session.posed = chosen;
+        session.world = try prepare.pose(session.gpa, session.io, &session.scene.?, .{
+            .lanes = chosen.lanes,
+            .pool = &session.pool,
+            .tree_quality = chosen.tree_quality,
+        }, session.diagnostic, &session.times);
     }
 
-    /// Chooses what is seen, from where and by what light. Asserts that there is a pose.
+    /// Chooses what is seen, from where and by what light; the tree stays. Asserts that there is a
+    /// pose.
     pub fn view(session: *Session, choices: settings.View) Error!void {
-        const posed = session.posed.?;
-        session.dropWorld();
+        if (session.pool.isCancelled()) return error.Canceled;
         session.seen = choices;
-        // One piece with the geometry: boxes are grown by a bound that depends on the camera.
-        session.world = try prepare.prepare(session.gpa, session.io, &session.scene.?, .{
-            .lanes = posed.lanes,
-            .pool = &session.pool,
-            .tree_quality = posed.tree_quality,
+        try prepare.view(&session.world.?, session.io, &session.scene.?, .{
             .camera = choices.camera,
             .resolution = choices.resolution,
             .ambient = choices.ambient,

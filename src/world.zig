@@ -5,6 +5,7 @@
 //! geometry with the pose, the view with the camera, the others with neither.
 
 const std = @import("std");
+const math = @import("math.zig");
 const geometry_file = @import("world/geometry.zig");
 const materials_file = @import("world/materials.zig");
 const view_file = @import("world/view.zig");
@@ -41,21 +42,25 @@ pub const Frame = struct {
 pub const Facts = struct {
     tree: TreeStatistics,
     /// No camera of the file was used: the view was framed on what there is.
-    camera_is_default: bool,
+    camera_is_default: bool = false,
     /// The file has no light that shines: the lights are three fixed to the camera.
-    lights_are_default: bool,
+    lights_are_default: bool = false,
     /// Triangles left out because they have no area or no finite place.
     degenerate_count: u64,
 };
 
 /// Everything that tracing needs, and its memory.
 pub const World = struct {
+    /// Of all that the view has no part in, and of what it has.
     arena: std.heap.ArenaAllocator,
+    view_arena: std.heap.ArenaAllocator,
     geometry: Geometry,
+    /// Where the nodes of the scene are: for cameras and lights, which are placed by the view.
+    node_maps: []const math.AffineD,
     materials: Materials,
-    lights: []const Light,
-    environment: Environment,
-    view: View,
+    lights: []const Light = &.{},
+    environment: Environment = .{ .ambient = 0, .background = @splat(0) },
+    view: View = .nowhere,
     facts: Facts,
 
     /// What tracing takes; the world has to stay where it is meanwhile.
@@ -72,6 +77,7 @@ pub const World = struct {
     /// Frees everything.
     pub fn deinit(world: *World) void {
         world.arena.deinit();
+        world.view_arena.deinit();
         world.* = undefined;
     }
 };

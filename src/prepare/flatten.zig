@@ -38,7 +38,7 @@ pub const element_count_max = bvh_split.number_limit;
 const chunk_size = 1 << 14;
 
 /// All that there is to hit, in world space.
-pub const Surface = struct {
+pub const TriangleSoup = struct {
     positions: []const Vec3,
     normals: []const Vec3,
     colors: []const [4]f32,
@@ -61,7 +61,7 @@ const Draw = struct {
     /// First vertex of the mesh that a triangle uses, and how many from there.
     vertex_source: u32,
     vertex_count: u32,
-    /// First vertex and triangle in the surface, the latter before any is dropped.
+    /// First vertex and triangle in the soup, the latter before any is dropped.
     vertex_target: u32,
     triangle_target: u32,
 };
@@ -83,7 +83,7 @@ pub fn flatten(
     maps: []const AffineD,
     pool: *parallel.Pool,
     diagnostic: *Diagnostic,
-) Error!Surface {
+) Error!TriangleSoup {
     assert(maps.len == from.nodes.len);
     const draws = try gpa.alloc(Draw, from.instances.len);
     defer gpa.free(draws);
@@ -238,7 +238,7 @@ const Work = struct {
         }
     }
 
-    /// Places the vertices `from`..`to` of the surface, which all belong to `draw`.
+    /// Places the vertices `from`..`to` of the soup, which all belong to `draw`.
     fn placeDrawVertices(work: *Work, draw: *const Draw, from: usize, to: usize) void {
         assert(from >= draw.vertex_target and to - draw.vertex_target <= draw.vertex_count);
         const source = draw.vertex_source + (from - draw.vertex_target);
@@ -314,7 +314,7 @@ const Work = struct {
     }
 
     /// Closes the gaps that dropped triangles left.
-    fn finish(work: *Work, diagnostic: *Diagnostic) Surface {
+    fn finish(work: *Work, diagnostic: *Diagnostic) TriangleSoup {
         var kept_count: usize = 0;
         var outside_count: u64 = 0;
         var bounds: Box3 = .empty;

@@ -9,7 +9,6 @@ const std = @import("std");
 const math = @import("../math.zig");
 const scene = @import("../scene.zig");
 const world = @import("../world.zig");
-const Surface = @import("flatten.zig").Surface;
 const assert = std.debug.assert;
 const vec3 = math.vec3;
 const Vec3 = math.Vec3;
@@ -62,14 +61,14 @@ const Basis = struct { right: Vec3d, up: Vec3d, forward: Vec3d };
 /// The camera. `aspect` is width over height; memory from `gpa` is returned before the end.
 pub fn frame(
     gpa: std.mem.Allocator,
-    surface: *const Surface,
+    geometry: *const world.Geometry,
     materials: []const scene.Material,
     aspect: f64,
 ) error{OutOfMemory}!world.Camera {
     assert(aspect > 0 and aspect < std.math.inf(f64));
     const half = halfTangents(aspect);
-    const basis = basisOf(directions[chooseDirection(surface, materials)]);
-    const points = try usedVertices(gpa, surface, basis);
+    const basis = basisOf(directions[chooseDirection(geometry, materials)]);
+    const points = try usedVertices(gpa, geometry, basis);
     defer gpa.free(points.vertices);
     const place = fit(points.vertices, half);
     var origin = points.center;
@@ -112,20 +111,20 @@ fn basisOf(direction: Direction) Basis {
 
 /// Index of the first direction that shows enough: the area of fronts (and backs, where they are
 /// seen too) projected along it. What stands in front of what is not looked at.
-fn chooseDirection(surface: *const Surface, materials: []const scene.Material) usize {
+fn chooseDirection(geometry: *const world.Geometry, materials: []const scene.Material) usize {
     var toward: [directions.len]Vec3 = undefined;
     for (directions, &toward) |direction, *to| {
         to.* = vec3.neg(vec3d.toSingle(basisOf(direction).forward));
     }
     var visible: [directions.len]f64 = @splat(0);
-    const stride = surface.triangles.len / sample_count_max + 1;
+    const stride = geometry.triangles.len / sample_count_max + 1;
     var index: usize = 0;
-    while (index < surface.triangles.len) : (index += stride) {
-        const triangle = &surface.triangles[index];
-        const a = surface.positions[triangle.corner[0]];
+    while (index < geometry.triangles.len) : (index += stride) {
+        const triangle = &geometry.triangles[index];
+        const a = geometry.positions[triangle.corner[0]];
         const normal = vec3.cross(
-            vec3.sub(surface.positions[triangle.corner[1]], a),
-            vec3.sub(surface.positions[triangle.corner[2]], a),
+            vec3.sub(geometry.positions[triangle.corner[1]], a),
+            vec3.sub(geometry.positions[triangle.corner[2]], a),
         );
         const back: f32 = if (materials[triangle.material].double_sided) -1 else 0;
         for (toward, &visible) |to, *sum| {
@@ -147,17 +146,17 @@ const Points = struct { vertices: []Vec3d, center: Vec3d, size: f64 };
 
 fn usedVertices(
     gpa: std.mem.Allocator,
-    surface: *const Surface,
+    geometry: *const world.Geometry,
     basis: Basis,
 ) error{OutOfMemory}!Points {
-    if (surface.triangles.len == 0) {
+    if (geometry.triangles.len == 0) {
         const vertices = try gpa.alloc(Vec3d, 1);
         vertices[0] = .{ 0, 0, 0 };
         return .{ .vertices = vertices, .center = .{ 0, 0, 0 }, .size = 1 };
     }
-    var used: std.DynamicBitSetUnmanaged = try .initEmpty(gpa, surface.positions.len);
+    var used: std.DynamicBitSetUnmanaged = try .initEmpty(gpa, geometry.positions.len);
     defer used.deinit(gpa);
-    for (surface.triangles) |triangle| {
+    for (geometry.triangles) |triangle| {
         for (triangle.corner) |vertex| used.set(vertex);
     }
     var points: Points = .{
@@ -165,7 +164,7 @@ fn usedVertices(
         .center = undefined,
         .size = 0,
     };
-    for (&points.center, surface.bounds.lower, surface.bounds.upper) |*middle, lower, upper| {
+    for (&points.center, geometry.bounds.lower, geometry.bounds.upper) |*middle, lower, upper| {
         middle.* = (@as(f64, lower) + upper) / 2;
         const extent = @as(f64, upper) - lower;
         points.size = if (extent > points.size) extent else points.size;
@@ -174,7 +173,7 @@ fn usedVertices(
     var iterator = used.iterator(.{});
     for (points.vertices) |*vertex| {
         var relative: Vec3d = undefined;
-        for (&relative, surface.positions[iterator.next().?], points.center) |*to, from, middle| {
+        for (&relative, geometry.positions[iterator.next().?], points.center) |*to, from, middle| {
             to.* = (from - middle) / points.size;
         }
         vertex.* = .{
@@ -257,34 +256,30 @@ const TestShape = struct {
     positions: []const Vec3,
     triangles: []const world.Triangle,
 
-    fn surface(shape: TestShape) Surface {
+    fn geometry(shape: TestShape) world.Geometry {
         var bounds: math.Box3 = .empty;
         for (shape.triangles) |triangle| {
             for (triangle.corner) |vertex| bounds = bounds.include(shape.positions[vertex]);
         }
-        return .{
-            .positions = shape.positions,
-            .normals = &.{},
-            .colors = &.{},
-            .triangles = shape.triangles,
-            .bounds = bounds,
-            .centroid_bounds = .empty,
-            .dropped_count = 0,
-        };
+        var shown: world.Geometry = .empty;
+        shown.positions = shape.positions;
+        shown.triangles = shape.triangles;
+        shown.bounds = bounds;
+        return shown;
     }
 };
 
 const TestView = struct { lowest: [2]f64, highest: [2]f64 };
 
 /// Where the used vertices lie in the picture of `camera`, whose border is at -1 and 1.
-fn project(camera: *const world.Camera, surface: *const Surface) TestView {
+fn project(camera: *const world.Camera, geometry: *const world.Geometry) TestView {
     var view: TestView = .{
         .lowest = @splat(std.math.inf(f64)),
         .highest = @splat(-std.math.inf(f64)),
     };
-    for (surface.triangles) |triangle| {
+    for (geometry.triangles) |triangle| {
         for (triangle.corner) |vertex| {
-            const relative = vec3.sub(surface.positions[vertex], camera.origin);
+            const relative = vec3.sub(geometry.positions[vertex], camera.origin);
             const depth = vec3.dot(relative, camera.forward);
             assert(depth > 0);
             const axes = .{ camera.right, camera.up };
@@ -320,9 +315,9 @@ test "every vertex is inside, one axis touches the margin, both are centred" {
                 }
             }
             const shape: TestShape = .{ .positions = &positions, .triangles = &triangles };
-            const surface = shape.surface();
-            const camera = try frame(gpa, &surface, &materials, aspect);
-            const view = project(&camera, &surface);
+            const geometry = shape.geometry();
+            const camera = try frame(gpa, &geometry, &materials, aspect);
+            const view = project(&camera, &geometry);
             var outermost: f64 = 0;
             for (view.lowest, view.highest) |lowest, highest| {
                 try std.testing.expectApproxEqAbs(-lowest, highest, 1e-4);
@@ -347,7 +342,7 @@ test "a face is seen from its front, at a fair angle, whichever way it looks" {
                     .triangles = &.{.{ .corner = .{ 0, 1, 2 }, .material = 0 }},
                 };
                 const materials = [_]scene.Material{.{ .double_sided = double_sided }};
-                const camera = try frame(gpa, &shape.surface(), &materials, 1);
+                const camera = try frame(gpa, &shape.geometry(), &materials, 1);
                 const cosine = -camera.forward[axis] * @as(f32, if (flipped) -1 else 1);
                 const shown = if (double_sided) @abs(cosine) else cosine;
                 try std.testing.expect(shown > 0.3);
@@ -362,7 +357,7 @@ test "the usual view comes from the front, the right and above" {
         .triangles = &.{.{ .corner = .{ 0, 1, 2 }, .material = 0 }},
     };
     const materials = [_]scene.Material{.{}};
-    const camera = try frame(std.testing.allocator, &shape.surface(), &materials, 1);
+    const camera = try frame(std.testing.allocator, &shape.geometry(), &materials, 1);
     try std.testing.expectApproxEqAbs(@as(f32, -0.4698463), camera.forward[0], 1e-6);
     try std.testing.expectApproxEqAbs(@as(f32, -0.3420201), camera.forward[1], 1e-6);
     try std.testing.expect(camera.right[1] == 0 and camera.up[1] > 0);
@@ -372,7 +367,7 @@ test "the usual view comes from the front, the right and above" {
 
 test "nothing to see still makes a camera" {
     const shape: TestShape = .{ .positions = &.{}, .triangles = &.{} };
-    const camera = try frame(std.testing.allocator, &shape.surface(), &.{}, 1.5);
+    const camera = try frame(std.testing.allocator, &shape.geometry(), &.{}, 1.5);
     try std.testing.expect(vec3.isFinite(camera.origin));
     try std.testing.expectApproxEqRel(@as(f32, 1), vec3.length(camera.forward), 1e-6);
     try std.testing.expect(vec3.length(camera.right) > vec3.length(camera.up));

@@ -33,14 +33,14 @@ const rig = [_]RigLight{
 pub fn place(
     arena: std.mem.Allocator,
     lights: []const scene.Light,
-    posed: *const pose.Pose,
-    padding: *const world.Padding,
+    maps: []const AffineD,
+    geometry: *const world.Geometry,
     diagnostic: *Diagnostic,
 ) error{OutOfMemory}![]world.Light {
     const placed = try arena.alloc(world.Light, lights.len);
     var placed_count: usize = 0;
     for (lights, 0..) |*light, index| {
-        placed[placed_count] = placeOne(light, posed, padding) orelse {
+        placed[placed_count] = placeOne(light, maps[light.node], geometry) orelse {
             diagnostic.warn("light {d} left out: its node leaves it no place or direction", .{
                 index,
             });
@@ -57,10 +57,9 @@ const source_shift_max = 0x1p-10;
 
 fn placeOne(
     light: *const scene.Light,
-    posed: *const pose.Pose,
-    padding: *const world.Padding,
+    map: AffineD,
+    geometry: *const world.Geometry,
 ) ?world.Light {
-    const map = posed.maps[light.node];
     const direction: Vec3 = switch (light.kind) {
         .point => .{ 0, 0, -1 }, // Unused, but a unit vector.
         .spot, .directional => pose.round(vec3d.normalize(vec3d.neg(map.z)) orelse return null),
@@ -70,14 +69,14 @@ fn placeOne(
         .directional => .{ 0, 0, 0 },
     };
     if (!vec3.isFinite(position)) return null;
-    const shift = padding.ofBox(.{ .lower = position, .upper = position });
+    const shift = geometry.padding.ofBox(.{ .lower = position, .upper = position });
     var result: world.Light = .{
         .kind = switch (light.kind) {
             .point => .point,
             .spot => .spot,
             .directional => .directional,
         },
-        .from_receiver = light.kind != .directional and shift > posed.size * source_shift_max,
+        .from_receiver = light.kind != .directional and shift > geometry.size * source_shift_max,
         .position = position,
         .direction = direction,
         .intensity = undefined,
@@ -170,10 +169,9 @@ test "a spot shines along its node's -z from its node's origin, scale aside" {
     var arena_state: std.heap.ArenaAllocator = .init(std.testing.allocator);
     defer arena_state.deinit();
     var diagnostic: Diagnostic = .{};
-    const posed: pose.Pose = .{ .maps = &maps, .center = @splat(0), .size = 1 };
-    const padding: world.Padding = .init(@splat(0), .empty);
-    const placed =
-        try place(arena_state.allocator(), &lights, &posed, &padding, &diagnostic);
+    var geometry: world.Geometry = .empty;
+    geometry.size = 1;
+    const placed = try place(arena_state.allocator(), &lights, &maps, &geometry, &diagnostic);
     // The flattened directional light has no direction; the point light needs none.
     try std.testing.expectEqual(2, placed.len);
     try std.testing.expectEqual(1, diagnostic.warning_count);

@@ -13,18 +13,28 @@ const assert = std.debug.assert;
 /// Darkest attenuation colour: a channel at 0 would absorb without bound.
 const attenuation_color_min = 1e-4;
 
-/// The world's materials in the order of `materials`, from `arena`.
+/// The world's materials in the order of the scene's, from `arena`.
 pub fn convertAll(
     arena: std.mem.Allocator,
-    materials: []const scene.Material,
-) error{OutOfMemory}![]world.Material {
-    const converted = try arena.alloc(world.Material, materials.len);
-    for (materials, converted) |*from, *to| to.* = convert(from);
-    return converted;
+    from: *const scene.Scene,
+) error{OutOfMemory}!world.Materials {
+    const converted = try arena.alloc(world.Material, from.materials.len);
+    for (from.materials, converted) |*original, *to| to.* = convert(original);
+    var materials: world.Materials = .{
+        .all = converted,
+        .has_transparency = false,
+        .has_holes = false,
+    };
+    for (from.instances) |instance| {
+        const used = &converted[from.meshes[instance.mesh].material];
+        materials.has_transparency = materials.has_transparency or isTransparent(used);
+        materials.has_holes = materials.has_holes or used.alpha_cutoff >= 0;
+    }
+    return materials;
 }
 
 /// Whether light passes surfaces of this material in part.
-pub fn isTransparent(material: *const world.Material) bool {
+fn isTransparent(material: *const world.Material) bool {
     return material.blend > 0 or material.transmission > 0;
 }
 

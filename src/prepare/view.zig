@@ -12,7 +12,6 @@ const settings = @import("../settings.zig");
 const world = @import("../world.zig");
 const diagnostic_module = @import("../diagnostic.zig");
 const framing = @import("framing.zig");
-const Surface = @import("flatten.zig").Surface;
 const assert = std.debug.assert;
 const vec3 = math.vec3;
 const pose = @import("pose.zig");
@@ -40,7 +39,7 @@ pub fn choose(
     gpa: std.mem.Allocator,
     from: *const scene.Scene,
     maps: []const AffineD,
-    surface: *const Surface,
+    geometry: *const world.Geometry,
     choice: settings.Camera,
     resolution: ?[2]u32,
     diagnostic: *Diagnostic,
@@ -58,7 +57,7 @@ pub fn choose(
     }
     const size = resolution orelse from.resolution orelse sizeOf(aspect_default);
     return .{
-        .camera = try framing.frame(gpa, surface, from.materials, aspect(size)),
+        .camera = try framing.frame(gpa, geometry, from.materials, aspect(size)),
         .width = size[0],
         .height = size[1],
         .camera_is_default = true,
@@ -169,16 +168,6 @@ const test_camera: scene.Camera = .{
     .projection = .{ .perspective = .{ .y_fov_rad = std.math.pi / 2.0, .aspect = 2 } },
 };
 
-const test_surface: Surface = .{
-    .positions = &.{},
-    .normals = &.{},
-    .colors = &.{},
-    .triangles = &.{},
-    .bounds = .empty,
-    .centroid_bounds = .empty,
-    .dropped_count = 0,
-};
-
 test "size follows the camera's aspect, width follows the picture" {
     const gpa = std.testing.allocator;
     var from: scene.Scene = .init(gpa);
@@ -189,7 +178,7 @@ test "size follows the camera's aspect, width follows the picture" {
     // Mirrored and scaled: neither counts.
     const maps = [_]AffineD{.fromTrs(.{ 1, 2, 3 }, .{ 0, 0, 0, 1 }, .{ -2, 3, 4 })};
     var diagnostic: Diagnostic = .{};
-    const wide = try choose(gpa, &from, &maps, &test_surface, .default, null, &diagnostic);
+    const wide = try choose(gpa, &from, &maps, &.empty, .default, null, &diagnostic);
     try std.testing.expectEqual(1024, wide.width);
     try std.testing.expectEqual(512, wide.height);
     try std.testing.expect(!wide.camera_is_default);
@@ -197,7 +186,7 @@ test "size follows the camera's aspect, width follows the picture" {
     try std.testing.expectApproxEqRel(@as(f32, 1), wide.camera.up[1], 1e-6);
     try std.testing.expectEqual(Vec3{ 1, 2, 3 }, wide.camera.origin);
     try std.testing.expectEqual(-1, wide.camera.forward[2]);
-    const tall = try choose(gpa, &from, &maps, &test_surface, .default, .{ 1, 4 }, &diagnostic);
+    const tall = try choose(gpa, &from, &maps, &.empty, .default, .{ 1, 4 }, &diagnostic);
     try std.testing.expectApproxEqRel(@as(f32, 0.25), tall.camera.right[0], 1e-6);
     try std.testing.expectApproxEqRel(@as(f32, 1), tall.camera.up[1], 1e-6);
 }
@@ -214,7 +203,7 @@ test "orthographic cameras keep their height" {
     var diagnostic: Diagnostic = .{};
     const maps = [_]AffineD{.identity};
     const choice: settings.Camera = .{ .index = 0 };
-    const view = try choose(gpa, &from, &maps, &test_surface, choice, null, &diagnostic);
+    const view = try choose(gpa, &from, &maps, &.empty, choice, null, &diagnostic);
     try std.testing.expect(view.camera.orthographic);
     try std.testing.expectEqual(256, view.width);
     try std.testing.expectEqual(1024, view.height);
@@ -254,7 +243,7 @@ test "a flattened camera gives way to a framing" {
     from.camera_default = 0;
     var diagnostic: Diagnostic = .{};
     const maps = [_]AffineD{.fromTrs(.{ 0, 0, 0 }, .{ 0, 0, 0, 1 }, .{ 1, 1, 0 })};
-    const view = try choose(gpa, &from, &maps, &test_surface, .default, null, &diagnostic);
+    const view = try choose(gpa, &from, &maps, &.empty, .default, null, &diagnostic);
     try std.testing.expect(view.camera_is_default);
     try std.testing.expectEqual(1024, view.width);
     try std.testing.expectEqual(768, view.height);

@@ -169,6 +169,8 @@ pub const Geometry = struct {
     /// By vertex, linear RGBA; empty where no mesh has colours.
     colors: []const [4]f32,
     triangles: []const Triangle,
+    /// Box of the triangles' corners, empty without any.
+    bounds: Box3,
     /// Box of twice the centroids of the triangles' boxes, empty without any.
     centroid_bounds: Box3,
     /// By how much boxes and rays are grown.
@@ -176,6 +178,19 @@ pub const Geometry = struct {
     /// The largest distance between quartiles of the vertices along an axis, in metres: how large
     /// most of the scene is.
     size: f32,
+
+    /// Without anything to hit, and without a tree.
+    pub const empty: Geometry = .{
+        .tree = .{ .w4 = .{ .nodes = &.{}, .packs = &.{} } },
+        .positions = &.{},
+        .normals = &.{},
+        .colors = &.{},
+        .triangles = &.{},
+        .bounds = .empty,
+        .centroid_bounds = .empty,
+        .padding = .init(@splat(0), .empty),
+        .size = 0,
+    };
 };
 
 test "an empty child's box is empty" {

@@ -23,4 +23,17 @@ pub const View = struct {
     /// Picture size in pixels.
     width: u32,
     height: u32,
+
+    /// One pixel, from the origin along -z.
+    pub const nowhere: View = .{
+        .camera = .{
+            .orthographic = false,
+            .origin = .{ 0, 0, 0 },
+            .right = .{ 1, 0, 0 },
+            .up = .{ 0, 1, 0 },
+            .forward = .{ 0, 0, -1 },
+        },
+        .width = 1,
+        .height = 1,
+    };
 };
