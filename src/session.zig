@@ -161,7 +161,7 @@ pub const Session = struct {
     /// Chooses what is seen, from where and by what light; the tree stays. Asserts that there is a
     /// pose.
     pub fn view(session: *Session, choices: settings.View) Error!void {
-        if (session.pool.isCancelled()) return error.Canceled;
+        if (session.pool.cancelled.load(.monotonic)) return error.Canceled;
         session.seen = choices;
         try prepare.view(&session.world.?, session.io, &session.scene.?, .{
             .camera = choices.camera,
