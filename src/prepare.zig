@@ -140,6 +140,10 @@ noinline fn placeAll(
             .all = materials,
             .has_transparency = has_transparency,
             .has_holes = has_holes,
+            .occluders = if (has_transparency or has_holes)
+                try material.occluders(arena, materials, surface.triangles)
+            else
+                &.{},
         },
         .lights = lights,
         .environment = light.environment(

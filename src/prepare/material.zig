@@ -65,6 +65,24 @@ fn absorption(from: *const scene.Material) math.Vec3 {
     return result;
 }
 
+/// See `world.Materials.occluders`.
+pub fn occluders(
+    arena: std.mem.Allocator,
+    materials: []const world.Material,
+    triangles: []const world.Triangle,
+) error{OutOfMemory}![]const u32 {
+    const words = try arena.alloc(u32, @divCeil(triangles.len, 32));
+    for (words, 0..) |*word, index| {
+        word.* = 0;
+        const first = 32 * index;
+        for (triangles[first..@min(first + 32, triangles.len)], 0..) |*triangle, bit| {
+            const stops = materials[triangle.material].stopsLight();
+            word.* |= @as(u32, @intFromBool(stops)) << @intCast(bit);
+        }
+    }
+    return words;
+}
+
 fn flag(condition: bool) f32 {
     return if (condition) 1 else 0;
 }

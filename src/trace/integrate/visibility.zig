@@ -53,7 +53,7 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility.frame = frame;
             visibility.tests = .{};
             visibility.hits.geometry = frame.geometry;
-            visibility.hits.materials = frame.materials.all;
+            visibility.hits.materials = frame.materials;
         }
 
         /// Finds what the rays of a bundle see first. A grid says that they are primary ones.
