@@ -99,7 +99,6 @@ noinline fn placeAll(
 ) Error!World {
     const maps = try pose.worldMaps(gpa, from.nodes);
     defer gpa.free(maps);
-    const materials = try material.convertAll(arena, from.materials);
     const surface = try flatten.flatten(gpa, arena, from, maps, settings.thread_count, diagnostic);
     const seen = try view.choose(
         gpa,
@@ -116,13 +115,6 @@ noinline fn placeAll(
     if (lights_are_default) lights = try light.placeRig(arena, &seen.camera);
 
     const pads = pad.choose(surface.bounds, &seen.camera, lights);
-    var has_transparency = false;
-    var has_holes = false;
-    for (from.instances) |instance| {
-        const used = &materials[from.meshes[instance.mesh].material];
-        has_transparency = has_transparency or material.isTransparent(used);
-        has_holes = has_holes or used.alpha_cutoff >= 0;
-    }
     return .{
         .arena = undefined,
         .geometry = .{
@@ -136,15 +128,7 @@ noinline fn placeAll(
             .node_margin = pads.node_margin,
             .fused_reach = pads.fused_reach,
         },
-        .materials = .{
-            .all = materials,
-            .has_transparency = has_transparency,
-            .has_holes = has_holes,
-            .occluders = if (has_transparency or has_holes)
-                try material.occluders(arena, materials, surface.triangles)
-            else
-                &.{},
-        },
+        .materials = try material.place(arena, from, surface.triangles),
         .lights = lights,
         .environment = light.environment(
             lights_are_default,

@@ -9,22 +9,37 @@ const math = @import("../math.zig");
 const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const assert = std.debug.assert;
+const Allocator = std.mem.Allocator;
 
 /// Darkest attenuation colour: a channel at 0 would absorb without bound.
 const attenuation_color_min = 1e-4;
 
-/// The world's materials in the order of `materials`, from `arena`.
-pub fn convertAll(
-    arena: std.mem.Allocator,
-    materials: []const scene.Material,
-) error{OutOfMemory}![]world.Material {
-    const converted = try arena.alloc(world.Material, materials.len);
-    for (materials, converted) |*from, *to| to.* = convert(from);
-    return converted;
+/// The world's materials in the order of the scene's; `triangles` are the world's.
+pub fn place(
+    arena: Allocator,
+    from: *const scene.Scene,
+    triangles: []const world.Triangle,
+) error{OutOfMemory}!world.Materials {
+    const converted = try arena.alloc(world.Material, from.materials.len);
+    for (from.materials, converted) |*material, *to| to.* = convert(material);
+    var has_transparency = false;
+    var has_holes = false;
+    for (from.instances) |instance| {
+        const used = &converted[from.meshes[instance.mesh].material];
+        has_transparency = has_transparency or isTransparent(used);
+        has_holes = has_holes or used.alpha_cutoff >= 0;
+    }
+    const stops_all = !has_transparency and !has_holes;
+    return .{
+        .all = converted,
+        .has_transparency = has_transparency,
+        .has_holes = has_holes,
+        .occluders = if (stops_all) &.{} else try occluders(arena, converted, triangles),
+    };
 }
 
 /// Whether light passes surfaces of this material in part.
-pub fn isTransparent(material: *const world.Material) bool {
+fn isTransparent(material: *const world.Material) bool {
     return material.blend > 0 or material.transmission > 0;
 }
 
@@ -66,8 +81,8 @@ fn absorption(from: *const scene.Material) math.Vec3 {
 }
 
 /// See `world.Materials.occluders`.
-pub fn occluders(
-    arena: std.mem.Allocator,
+fn occluders(
+    arena: Allocator,
     materials: []const world.Material,
     triangles: []const world.Triangle,
 ) error{OutOfMemory}![]const u32 {

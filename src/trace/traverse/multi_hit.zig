@@ -68,10 +68,10 @@ pub fn HitLists(comptime Kernel: type) type {
             bundle: *bundle_file.Bundle(Kernel),
             tests: *TestCounts,
         ) void {
-            for (&bundle.groups, &lists.counts, &lists.stopped, 0..) |*group, *each, *stop, number| {
+            for (&bundle.groups, 0..) |*group, number| {
                 if (group.active.none()) continue;
-                stop.* = 0;
-                each.* = @splat(0);
+                lists.stopped[number] = 0;
+                lists.counts[number] = @splat(0);
                 if (Kernel.variant.traversal == .beam) continue;
                 const view = bundle_file.viewOf(Rays, group);
                 lists.traceEach(bundle, number, &view, tests);
@@ -108,7 +108,8 @@ pub fn HitLists(comptime Kernel: type) type {
             var bits = asked.bits();
             while (bits != 0) : (bits &= bits - 1) {
                 const lane = @ctz(bits);
-                if (lists.materials.isOccluder(@intCast(numbers[lane]))) stops |= bits & (~bits + 1);
+                const is_stopping = lists.materials.isOccluder(@intCast(numbers[lane]));
+                stops |= @as(u32, @intFromBool(is_stopping)) << @intCast(lane);
             }
             return stops;
         }
@@ -173,7 +174,8 @@ pub fn HitLists(comptime Kernel: type) type {
             tests: *TestCounts,
         ) bool {
             var hit: triangle.Intersection(Rays) = undefined;
-            if (!bundle_file.hitsOfLane(Kernel, group, view, pack, which, tests, &hit)) return false;
+            if (!bundle_file.hitsOfLane(Kernel, group, view, pack, which, tests, &hit))
+                return false;
             var rest = hit.mask.bits();
             const found = hit.t.toArray();
             var ts = group.closest.t.toArray();
