@@ -254,11 +254,12 @@ pub fn Whitted(comptime Kernel: type) type {
                 any_lit = any_lit or arrives.any();
             }
             if (!any_lit) return;
-            var passing: [group_count]Vec3 = undefined;
-            whitted.visibility.transmittance(&bundle, light, coherence, &passing);
-            for (active, passing, unshadowed, 0..) |arrives, share, worth, group| {
+            var transmittances: [group_count]Vec3 = undefined;
+            whitted.visibility.transmittance(&bundle, light, coherence, &transmittances);
+            for (active, transmittances, unshadowed, 0..) |arrives, transmittance, worth, group| {
                 if (arrives.none()) continue;
-                whitted.add(group, .select(arrives, worth.mul(share), .splat(.{ 0, 0, 0 })));
+                const light_seen = worth.mul(transmittance);
+                whitted.add(group, .select(arrives, light_seen, .splat(.{ 0, 0, 0 })));
             }
         }
 
@@ -284,8 +285,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 if (mask.none()) continue;
                 ray.tnear = ray.closest;
                 ray.closest = .before(.splat(std.math.inf(f32)));
-                const share = F32.splat(1).sub(vertex.point.opacity);
-                rest.throughput[group] = path.throughput[group].scale(share);
+                const clear = F32.splat(1).sub(vertex.point.opacity);
+                rest.throughput[group] = path.throughput[group].scale(clear);
             }
         }
 
