@@ -19,7 +19,7 @@ const Boxes = Kernel.Boxes;
 const Node = world.Node(Kernel.width);
 const Block = world.TrianglePack(Kernel.width);
 const Search = raylane.trace.single.Search(Kernel, .closest_hit, true);
-const View = raylane.trace.ray.View(Boxes);
+const View = raylane.trace.ray.ShearedRay(Boxes);
 
 const Ranges = extern struct { near: [Kernel.width]f32, far: [Kernel.width]f32 };
 
@@ -55,12 +55,20 @@ fn triangleCull(view: *const View, block: *const Block) callconv(.c) bool {
 fn triangleHit(
     view: *const View,
     block: *const Block,
-    pad: f32,
+    padding: *const raylane.world.Padding,
     t: *[Kernel.width]f32,
 ) callconv(.c) u32 {
     const seen = seenBy(view, block);
     const weights = triangle.edgeFunctions(Boxes, seen);
-    const hit = triangle.locate(Boxes, seen, weights, cornersOf(block), view, pad);
+    const hit = triangle.locate(
+        Boxes,
+        seen,
+        weights,
+        cornersOf(block),
+        view,
+        padding,
+        .splat(padding.center),
+    );
     t.* = hit.t.toArray();
     return weights.agree().bitAnd(hit.mask).bits();
 }

@@ -362,7 +362,13 @@ const Bench = struct {
         var image: raylane.image.Image = try .init(bench.gpa, size, size);
         defer image.deinit(bench.gpa);
         for (image.pixels, bench.pixels) |*pixel, grey| pixel.* = .{ grey, grey, grey, 1 };
-        var target = try raylane.output.Target.openFile(bench.io, path, bench.diagnostic);
+        var temporaries: raylane.output.TemporaryFiles = .{};
+        var target: raylane.output.Target = try .openFile(
+            bench.io,
+            &temporaries,
+            path,
+            bench.diagnostic,
+        );
         defer target.abandon();
         try raylane.output.write(bench.gpa, &image, .{
             .format = .pfm,

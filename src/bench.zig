@@ -17,6 +17,7 @@ const statistics = @import("bench/statistics.zig");
 const tables = @import("bench/tables.zig");
 const variant_file = @import("variant.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const Identity = @import("identity.zig").Identity;
 const printable = @import("diagnostic.zig").printable;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -41,6 +42,8 @@ pub const Settings = struct {
     /// At least one.
     scenes: []const []const u8,
     allow_outside: bool = false,
+    /// See parse/settings.zig.
+    output: ?Identity = null,
     width: u32,
     height: u32,
     thread_count: usize,
@@ -238,6 +241,7 @@ pub const Bench = struct {
         var stages: Stages = try .init(bench.gpa, bench.io, .{
             .scene = name,
             .allow_outside = settings.allow_outside,
+            .output = settings.output,
             .width = settings.width,
             .height = settings.height,
             .thread_count = settings.thread_count,

@@ -5,8 +5,10 @@
 
 const std = @import("std");
 const raylane = @import("raylane");
+const signals = @import("signals.zig");
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
+const Account = raylane.memory_account.Account;
 const assert = std.debug.assert;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Film = raylane.film.Film;
@@ -32,12 +34,11 @@ const ExitCode = enum(u8) {
     invalid = 3,
     /// Images that must be the same are not.
     differ = 4,
-    interrupted = 130,
 };
 
 pub fn main(init: std.process.Init) u8 {
     holdStandardFiles();
-    catchSignals();
+    signals.catchAll();
     _ = raylane.simd.setFlushToZero();
     return @backingInt(run(init));
 }
@@ -45,10 +46,8 @@ pub fn main(init: std.process.Init) u8 {
 fn run(init: std.process.Init) ExitCode {
     const io = init.io;
     var diagnostic: Diagnostic = .{};
-    const arguments = init.minimal.args.toSlice(init.arena.allocator()) catch {
-        say(io, "raylane: out of memory\n", .{});
-        return .failed;
-    };
+    const arguments = init.minimal.args.toSlice(init.arena.allocator()) catch
+        return outOfMemory(io);
     const own_arguments = arguments[@min(1, arguments.len)..];
     const names = raylane.variant.names;
     const command = raylane.options.parse(own_arguments, names, &diagnostic) catch {
@@ -59,12 +58,16 @@ fn run(init: std.process.Init) ExitCode {
         .help => return print(io, raylane.options.help),
         .bench_help => return print(io, raylane.options.bench_help),
         .version => return print(io, "raylane " ++ raylane.options.version ++ "\n"),
+        .licenses => return print(io, raylane.licenses),
         .list_variants => return print(io, comptime list: {
             var list: []const u8 = "";
             for (names) |name| list = list ++ name ++ "\n";
             break :list list;
         }),
-        .render => |*options| return renderAndReport(init.gpa, io, options, &diagnostic),
+        .render => |*options| {
+            var account: Account = .init(init.gpa, options.memory_max);
+            return renderAndReport(&account, io, options, &diagnostic);
+        },
         .bench => |*options| return bench(init, options, &diagnostic),
     }
 }
@@ -83,13 +86,18 @@ fn bench(
     diagnostic: *Diagnostic,
 ) ExitCode {
     const io = init.io;
-    const settings = benchSettings(options);
+    var settings = benchSettings(options);
     if (std.mem.findScalar(bool, &settings.wanted, true) == null) {
         say(io, "raylane: no variant's name contains {f}; --list-variants names them\n", .{
             raylane.diagnostic.quote(options.variants.?),
         });
         return .usage;
     }
+    if (!raylane.variant.are_all and !options.quiet) say(
+        io,
+        "raylane: this program holds {d} of the variants; zig build -Dvariants=all builds all\n",
+        .{raylane.variant.names.len},
+    );
     // Before the work, so that a place that cannot be written is an error in the first second.
     var target = openJson(io, options.json, diagnostic) catch {
         const text = diagnostic.message.text();
@@ -97,6 +105,7 @@ fn bench(
         return .failed;
     };
     defer target.abandon();
+    settings.output = target.replaces;
     var run_of: raylane.bench.Bench = .{
         .arena = init.arena.allocator(),
         .gpa = init.gpa,
@@ -169,7 +178,7 @@ fn printBench(
     raylane.bench.writeTables(results, &text.writer) catch return outOfMemory(io);
     if (options.json) |path| {
         raylane.bench.writeJson(results, &json.writer) catch return outOfMemory(io);
-        if (std.mem.eql(u8, path, "-")) return print(io, json.written());
+        if (raylane.options.isStdout(path)) return print(io, json.written());
         target.finish(&.{json.written()}, diagnostic) catch {
             _ = print(io, text.written()); // Minutes of work: show what was found.
             say(io, "raylane: {f}: {s}\n", .{ printable(path), diagnostic.message.text() });
@@ -186,8 +195,8 @@ fn openJson(
     diagnostic: *Diagnostic,
 ) raylane.output.TargetError!Target {
     const name = path orelse return .openStdout(io);
-    if (std.mem.eql(u8, name, "-")) return .openStdout(io);
-    return .openFile(io, name, diagnostic);
+    if (raylane.options.isStdout(name)) return .openStdout(io);
+    return .openFile(io, &signals.temporary_files, name, diagnostic);
 }
 
 /// Where an error of a scene is: a place in its text, or the file as a whole.
@@ -214,13 +223,15 @@ fn treeQuality(bvh: raylane.options.Bvh) raylane.prepare.TreeQuality {
 
 /// Renders one scene, then says what it cost or why it failed.
 fn renderAndReport(
-    gpa: Allocator,
+    account: *Account,
     io: Io,
     options: *const Options,
     diagnostic: *Diagnostic,
 ) ExitCode {
+    const gpa = account.allocator();
     const output_name = raylane.options.outputName(gpa, options) catch {
-        say(io, "raylane: out of memory\n", .{});
+        account.explain(&diagnostic.message);
+        say(io, "raylane: {s}\n", .{diagnostic.message.text()});
         return .failed;
     };
     defer gpa.free(output_name);
@@ -241,7 +252,8 @@ fn renderAndReport(
             job.outputTitle()
         else
             placeOf(diagnostic, options.scene);
-        const text = if (err == error.OutOfMemory) "out of memory" else diagnostic.message.text();
+        if (err == error.OutOfMemory) account.explain(&diagnostic.message);
+        const text = diagnostic.message.text();
         assert(text.len > 0);
         say(io, "raylane: {f}: {s}\n", .{ printable(file), text });
         return switch (err) {
@@ -292,6 +304,7 @@ const Job = struct {
         var scene = try raylane.parse.parse(gpa, io, job.options.scene, .{
             .allow_outside = job.options.allow_outside,
             .tessellation = job.options.tessellation,
+            .output = target.replaces,
         }, job.diagnostic);
         const triangle_count = scene.triangleCount();
         job.sample_count = job.options.sample_count orelse scene.sample_count orelse
@@ -319,6 +332,9 @@ const Job = struct {
         const layers: raylane.film.Layers = .init(.{ .color = true, .alpha = has_alpha });
         var film: Film = try .init(gpa, view.width, view.height, layers);
         defer film.deinit(gpa);
+        const output_settings = job.outputSettings();
+        raylane.output.check(output_settings, view.width, view.height, job.diagnostic) catch
+            return error.OutputFailed;
         const trace_start = Io.Clock.awake.now(io);
         const frame = world.frame();
         const settings = job.traceSettings();
@@ -330,7 +346,11 @@ const Job = struct {
         );
 
         const output_start = Io.Clock.awake.now(io);
-        try job.write(&film.image, &target);
+        raylane.output.write(gpa, &film.image, output_settings, &target, job.diagnostic) catch |err|
+            return switch (err) {
+                error.OutOfMemory => error.OutOfMemory,
+                error.InputOutput => error.OutputFailed,
+            };
         times.output_ns = since(io, output_start);
         times.total_ns = since(io, start);
 
@@ -381,7 +401,9 @@ const Job = struct {
 
     fn openTarget(job: *Job) error{OutputFailed}!Target {
         if (job.options.toStdout()) return .openStdout(job.io);
-        return Target.openFile(job.io, job.output_name, job.diagnostic) catch error.OutputFailed;
+        const temporaries = &signals.temporary_files;
+        return Target.openFile(job.io, temporaries, job.output_name, job.diagnostic) catch
+            error.OutputFailed;
     }
 
     fn prepareSettings(job: *const Job) raylane.prepare.Settings {
@@ -425,8 +447,8 @@ const Job = struct {
         return job.options.thread_count orelse processorCount();
     }
 
-    fn write(job: *Job, image: *const Image, target: *Target) Error!void {
-        raylane.output.write(job.gpa, image, .{
+    fn outputSettings(job: *const Job) raylane.output.Settings {
+        return .{
             .format = switch (job.options.format) {
                 inline else => |format| @field(raylane.output.Format, @tagName(format)),
             },
@@ -435,10 +457,8 @@ const Job = struct {
                 .auto => .auto,
             },
             .transparent = job.options.background == .transparent,
+            .jpeg_quality = job.options.jpeg_quality,
             .thread_count = job.threadCount(),
-        }, target, job.diagnostic) catch |err| return switch (err) {
-            error.OutOfMemory => error.OutOfMemory,
-            error.InputOutput => error.OutputFailed,
         };
     }
 
@@ -495,14 +515,17 @@ const Job = struct {
             .text => raylane.report.writeText(&report, &text.writer),
             .json => raylane.report.writeJson(&report, &text.writer),
         };
-        written catch |err| switch (err) {
-            error.WriteFailed => {
-                say(job.io, "raylane: out of memory\n", .{});
-                return .failed;
-            },
-        };
-        if (to_stdout) return print(job.io, text.written());
-        say(job.io, "{s}", .{text.written()});
+        written catch return outOfMemory(job.io);
+        if (!to_stdout) {
+            say(job.io, "{s}", .{text.written()});
+            return .ok;
+        }
+        // The picture is written. That goes for success where the report was not asked for.
+        if (options.stats != null) return print(job.io, text.written());
+        writeToStdout(job.io, text.written(), diagnostic) catch
+            say(job.io, "raylane: warning: no report, standard output: {s}\n", .{
+                diagnostic.message.text(),
+            });
         return .ok;
     }
 };
@@ -514,12 +537,20 @@ fn since(io: Io, start: Io.Timestamp) u64 {
 /// Prints what was asked for to standard output.
 fn print(io: Io, text: []const u8) ExitCode {
     var diagnostic: Diagnostic = .{};
-    var target: Target = .openStdout(io);
-    target.finish(&.{text}, &diagnostic) catch {
+    writeToStdout(io, text, &diagnostic) catch {
         say(io, "raylane: standard output: {s}\n", .{diagnostic.message.text()});
         return .failed;
     };
     return .ok;
+}
+
+fn writeToStdout(
+    io: Io,
+    text: []const u8,
+    diagnostic: *Diagnostic,
+) raylane.output.TargetError!void {
+    var target: Target = .openStdout(io);
+    return target.finish(&.{text}, diagnostic);
 }
 
 /// Writes to standard error, beside the progress that may be shown there. When that fails there is
@@ -539,28 +570,4 @@ fn holdStandardFiles() void {
         if (std.c.fcntl(@intCast(file), std.c.F.GETFD) >= 0) continue;
         _ = std.c.open("/dev/null", .{ .ACCMODE = .RDONLY });
     }
-}
-
-/// Makes signals that end the program remove the unfinished output, and a file size limit an error
-/// of writing.
-fn catchSignals() void {
-    const interrupt: std.posix.Sigaction = .{
-        .handler = .{ .handler = interrupted },
-        .mask = std.posix.sigemptyset(),
-        .flags = 0,
-    };
-    std.posix.sigaction(.INT, &interrupt, null);
-    std.posix.sigaction(.TERM, &interrupt, null);
-    const ignore: std.posix.Sigaction = .{
-        .handler = .{ .handler = std.posix.SIG.IGN },
-        .mask = std.posix.sigemptyset(),
-        .flags = 0,
-    };
-    std.posix.sigaction(.XFSZ, &ignore, null);
-}
-
-/// Only async-signal-safe calls are made here.
-fn interrupted(_: std.posix.SIG) callconv(.c) void {
-    raylane.output.discardPending();
-    std.c._exit(@backingInt(ExitCode.interrupted));
 }

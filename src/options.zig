@@ -22,6 +22,7 @@ pub const version: []const u8 = config.version;
 pub const Command = union(enum) {
     help,
     version,
+    licenses,
     list_variants,
     render: Options,
     bench: Bench,
@@ -34,7 +35,7 @@ pub const Bench = bench.Bench;
 pub const bench_help = bench.help;
 
 /// File formats of images.
-pub const Format = enum { png, ppm, pfm };
+pub const Format = enum { png, jpg, tga, bmp, hdr, ppm, pfm };
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -94,13 +95,19 @@ pub const tile_size_min = 4;
 pub const tile_size_max = 512;
 /// Largest exposure either way, in stops.
 pub const exposure_ev_max = 64;
+/// Quality of a JPEG where the user does not say.
+pub const jpeg_quality_default = 90;
 
 /// How to render one scene.
 pub const Options = struct {
     scene: []const u8,
-    /// Null: the scene's name in the working directory; "-": standard output.
+    /// Null: the scene's name in the working directory. See `isStdout`.
     output: ?[]const u8 = null,
     format: Format = .png,
+    /// 1 to 100.
+    jpeg_quality: u8 = jpeg_quality_default,
+    /// Bytes of memory that may be allocated at a time; null: as much as there is.
+    memory_max: ?u64 = null,
     /// Width and height in pixels; null: the scene's, or its camera's aspect with 1024 on the long
     /// side.
     resolution: ?[2]u32 = null,
@@ -130,9 +137,17 @@ pub const Options = struct {
 
     /// Whether the image goes to standard output.
     pub fn toStdout(options: *const Options) bool {
-        return std.mem.eql(u8, options.output orelse return false, "-");
+        return isStdout(options.output orelse return false);
     }
 };
+
+/// Whether a name for a file to write stands for standard output.
+pub fn isStdout(name: []const u8) bool {
+    for ([_][]const u8{ "-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1" }) |other| {
+        if (std.mem.eql(u8, name, other)) return true;
+    }
+    return false;
+}
 
 /// Where the image goes: as given, else the scene's file name in the working directory with the
 /// format's extension instead of its own. The caller frees it.
@@ -158,7 +173,10 @@ const Id = enum {
     exposure,
     format,
     help,
+    jpeg_quality,
+    licenses,
     list_variants,
+    max_memory,
     output,
     quiet,
     resolution,
@@ -177,6 +195,7 @@ const Id = enum {
 const flags: []const Flag(Id) = &.{
     .{ .id = .output, .long = "--output", .short = 'o' },
     .{ .id = .format, .long = "--format" },
+    .{ .id = .jpeg_quality, .long = "--jpeg-quality" },
     .{ .id = .resolution, .long = "--resolution", .short = 'r' },
     .{ .id = .threads, .long = "--threads", .short = 't' },
     .{ .id = .spp, .long = "--spp" },
@@ -191,6 +210,7 @@ const flags: []const Flag(Id) = &.{
     .{ .id = .bvh, .long = "--bvh" },
     .{ .id = .variant, .long = "--variant" },
     .{ .id = .list_variants, .long = "--list-variants", .has_value = false },
+    .{ .id = .max_memory, .long = "--max-memory" },
     .{ .id = .stats, .long = "--stats" },
     .{ .id = .count_tests, .long = "--count-tests", .has_value = false },
     .{ .id = .tessellation, .long = "--tessellation" },
@@ -199,6 +219,7 @@ const flags: []const Flag(Id) = &.{
     .{ .id = .verbose, .long = "--verbose", .short = 'v', .has_value = false },
     .{ .id = .help, .long = "--help", .short = 'h', .has_value = false },
     .{ .id = .version, .long = "--version", .has_value = false },
+    .{ .id = .licenses, .long = "--licenses", .has_value = false },
 };
 
 /// What `--help` prints.
@@ -214,9 +235,9 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\goes to standard output.
     \\
     \\Image
-    \\  -o, --output FILE        name ending in .png, .ppm or .pfm; - is standard
-    \\                           output
-    \\      --format FORMAT      png, ppm (8 bits) or pfm (linear floats)
+    \\  -o, --output FILE        name ending in a format; - is standard output
+    \\      --format FORMAT      png, jpg, tga, bmp or ppm, or linear: hdr or pfm
+    \\      --jpeg-quality N     1 to 100 (default: 90)
     \\  -r, --resolution WxH     size in pixels (default: the scene's own, or 1024 on
     \\                           the long side, in the camera's aspect)
     \\      --exposure EV|auto   brighten by EV stops, or so that 95 % of the pixels
@@ -245,18 +266,21 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\                           against time to trace; the image is always the same
     \\      --variant NAME       how rays are traced; the image is always the same
     \\      --list-variants      print the names of the variants, the default first
+    \\      --max-memory SIZE    512M or 2G, say; an error where more is needed
     \\
     \\Messages
     \\      --stats FORM         report as text, json or none (default: text, or none
-    \\                           when the image goes to standard output)
+    \\                           when the image goes to standard output); when it is
+    \\                           given, a report that cannot be printed is an error
     \\      --count-tests        count intersection tests, in a second, untimed pass
     \\  -q, --quiet              no warnings, no progress, no report but by --stats
     \\  -v, --verbose            say what was chosen by default
     \\  -h, --help               print this
     \\      --version            print the version
+    \\      --licenses           print the licence, and those of the libraries used
     \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
-    \\supported, 130 interrupted.
+    \\supported, 128 + N ended by signal N.
     \\
 ;
 
@@ -332,8 +356,12 @@ const Parser = struct {
                 if (value.len == 0) return reader.bad(flag, value, "a file name or -");
                 options.output = value;
             },
-            .format => parser.format = std.meta.stringToEnum(Format, value) orelse
-                return reader.bad(flag, value, "png, ppm or pfm"),
+            .format => parser.format = formatOf(value) orelse
+                return reader.bad(flag, value, "png, jpg, tga, bmp, hdr, ppm or pfm"),
+            .jpeg_quality => options.jpeg_quality = integer(u8, value, 1, 100) orelse
+                return reader.bad(flag, value, "1 to 100"),
+            .max_memory => options.memory_max = bytesOf(value) orelse
+                return reader.bad(flag, value, "a size such as 512M or 2G"),
             .resolution => options.resolution = resolutionOf(value) orelse
                 return reader.bad(flag, value, expected_resolution),
             .threads => options.thread_count = integer(u16, value, 1, thread_count_max) orelse
@@ -375,6 +403,7 @@ const Parser = struct {
             .verbose => options.verbose = true,
             .help => parser.other = .help,
             .version => parser.other = parser.other orelse .version,
+            .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
         }
     }
@@ -398,10 +427,7 @@ const Parser = struct {
         const output = options.output orelse return;
         if (options.toStdout()) return;
         const extension = std.fs.path.extension(output);
-        const implied: ?Format = for (std.enums.values(Format)) |format| {
-            if (extension.len == 0) break null;
-            if (std.ascii.eqlIgnoreCase(extension[1..], @tagName(format))) break format;
-        } else null;
+        const implied = if (extension.len == 0) null else formatOf(extension[1..]);
         if (parser.format) |format| {
             if (implied == null or implied == format) return;
             return parser.reader.fail("'--format {t}' contradicts the name {f}", .{
@@ -409,11 +435,31 @@ const Parser = struct {
             });
         }
         options.format = implied orelse return parser.reader.fail(
-            "the name {f} ends in none of .png, .ppm and .pfm, and no --format says which",
+            "the name {f} ends in no image format's extension, and no --format says which",
             .{quote(output)},
         );
     }
 };
+
+/// A format by its extension, in either case; JPEG has two.
+fn formatOf(extension: []const u8) ?Format {
+    if (std.ascii.eqlIgnoreCase(extension, "jpeg")) return .jpg;
+    for (std.enums.values(Format)) |format| {
+        if (std.ascii.eqlIgnoreCase(extension, @tagName(format))) return format;
+    }
+    return null;
+}
+
+/// A number of bytes above 0, or of K, M, G or T, each 1024 times the one before.
+fn bytesOf(text: []const u8) ?u64 {
+    if (text.len == 0) return null;
+    const units = "KMGT";
+    const unit = std.mem.findScalar(u8, units, std.ascii.toUpper(text[text.len - 1]));
+    const digits = if (unit == null) text else text[0 .. text.len - 1];
+    const count = integer(u64, digits, 1, std.math.maxInt(u64)) orelse return null;
+    const shift: u6 = if (unit) |index| @intCast(10 * (index + 1)) else 0;
+    return std.math.shlExact(u64, count, shift) catch null;
+}
 
 /// A decimal integer in minimum..maximum, digits only.
 pub fn integer(comptime Int: type, text: []const u8, minimum: Int, maximum: Int) ?Int {
@@ -537,6 +583,7 @@ test "help wins over mistakes, the other questions do not" {
     try std.testing.expectEqual(.version, try parseForTest(&.{"--version"}));
     try std.testing.expectEqual(.version, try parseForTest(&.{ "--version", "s.glb" }));
     try std.testing.expectEqual(.list_variants, try parseForTest(&.{"--list-variants"}));
+    try std.testing.expectEqual(.licenses, try parseForTest(&.{"--licenses"}));
     try expectUsage("--no-such", &.{ "--version", "--no-such" });
 }
 
@@ -606,7 +653,17 @@ test "numbers keep to their ranges" {
         .{ .flag = "--tonemap", .good = &.{"linear"}, .bad = &.{ "aces", "" } },
         .{ .flag = "--stats", .good = &.{ "text", "json", "none" }, .bad = &.{ "JSON", "" } },
         .{ .flag = "--bvh", .good = &.{ "fast", "default", "high" }, .bad = &.{ "High", "" } },
-        .{ .flag = "--format", .good = &.{ "png", "ppm", "pfm" }, .bad = &.{ "PNG", "jpg", "" } },
+        .{
+            .flag = "--format",
+            .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr" },
+            .bad = &.{ "tiff", "" },
+        },
+        .{ .flag = "--jpeg-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "", "x" } },
+        .{
+            .flag = "--max-memory",
+            .good = &.{ "1", "64K", "512M", "512m", "2G", "16777215T" },
+            .bad = &.{ "", "0", "M", "0M", "-1G", "1.5G", "1P", "2GB", "16777216T" },
+        },
         .{ .flag = "--variant", .good = test_names, .bad = &.{ "vector", "", "vector-beam-16" } },
         .{ .flag = "--camera", .good = &.{ "auto", "0", "4294967296", "b c" }, .bad = &.{""} },
         .{ .flag = "--output", .good = &.{ "-", "a.png", "b/A.PPM" }, .bad = &.{ "", "png" } },
@@ -646,6 +703,9 @@ test "values arrive as they were meant" {
     const older = try optionsForTest(&.{"--variant=vector-packet-8"});
     try std.testing.expectEqual(0, older.variant_index);
     try expectUsage("did you mean 'vector-beam-8'?", &.{ "--variant=vector-baem-8", "s" });
+    try std.testing.expectEqual(90, (try optionsForTest(&.{})).jpeg_quality);
+    try std.testing.expectEqual(7, (try optionsForTest(&.{"--jpeg-quality=7"})).jpeg_quality);
+    try std.testing.expectEqual(3 << 20, (try optionsForTest(&.{"--max-memory=3M"})).memory_max);
     const switches = try optionsForTest(&.{ "-qv", "--count-tests", "--allow-outside" });
     try std.testing.expect(switches.quiet and switches.verbose);
     try std.testing.expect(switches.count_tests and switches.allow_outside);
@@ -672,7 +732,11 @@ test "the format follows the name, unless said otherwise" {
     try std.testing.expectEqual(.pfm, (try optionsForTest(&.{ "--format=pfm", "-oa.dat" })).format);
     try std.testing.expectEqual(.pfm, (try optionsForTest(&.{ "--format=pfm", "-oa" })).format);
     try expectUsage("contradicts", &.{ "--format=pfm", "-oa.png", "s" });
-    try expectUsage("'a.tiff' ends in none of", &.{ "-oa.tiff", "s" });
+    try std.testing.expectEqual(.jpg, (try optionsForTest(&.{"-oa.JPEG"})).format);
+    const jpeg = try optionsForTest(&.{ "-oa.jpeg", "--format=jpg" });
+    try std.testing.expectEqual(.jpg, jpeg.format);
+    try std.testing.expectEqual(.hdr, (try optionsForTest(&.{"-oa.b.hdr"})).format);
+    try expectUsage("'a.tiff' ends in no image format", &.{ "-oa.tiff", "s" });
 }
 
 test outputName {

@@ -1,16 +1,15 @@
 //! Stage 4: `Image` -> file.
 //!
-//! In: a finished frame. Out: a PNG, PPM or PFM, either the whole file in its place or nothing at
-//! all. Encoded by all threads; the bytes depend on the frame and the settings alone.
+//! In: a finished frame. Out: a file in one of seven formats, whole and in its place, or nothing at
+//! all. Colours are made by all threads; the bytes depend on the frame and the settings alone.
 
 const std = @import("std");
 const Allocator = std.mem.Allocator;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Image = @import("image.zig").Image;
+const huge_pages = @import("huge_pages.zig");
 const parallel = @import("parallel.zig");
-const pfm = @import("output/pfm.zig");
-const png = @import("output/png.zig");
-const ppm = @import("output/ppm.zig");
+const stb_image_write = @import("output/stb_image_write.zig");
 const target_file = @import("output/target.zig");
 const tonemap = @import("output/tonemap.zig");
 const assert = std.debug.assert;
@@ -18,10 +17,39 @@ const assert = std.debug.assert;
 pub const Target = target_file.Target;
 /// What a target fails with.
 pub const TargetError = target_file.Error;
-pub const discardPending = target_file.discardPending;
+/// What targets create until they are in place.
+pub const TemporaryFiles = @import("output/temporary.zig").TemporaryFiles;
 
-/// File formats.
-pub const Format = enum { png, ppm, pfm };
+/// File formats, by their extensions.
+pub const Format = enum {
+    png,
+    jpg,
+    tga,
+    bmp,
+    /// Radiance RGBE: linear, 8 bits and a common exponent.
+    hdr,
+    /// Netpbm's binary format: RGB of 8 bits.
+    ppm,
+    /// Its relative for floats, linear: the picture itself, bit for bit, without alpha.
+    pfm,
+
+    /// Pixels on a side at most: two bytes in the file.
+    fn sideMax(format: Format) u32 {
+        return switch (format) {
+            .jpg, .tga => 65_535,
+            else => std.math.maxInt(u31),
+        };
+    }
+
+    fn form(format: Format, transparent: bool) tonemap.Form {
+        return switch (format) {
+            .png, .tga => if (transparent) .rgba else .rgb,
+            .jpg, .bmp, .ppm => .rgb,
+            .hdr => .radiance,
+            .pfm => .linear,
+        };
+    }
+};
 
 /// How radiance becomes brightness.
 pub const Exposure = union(enum) {
@@ -33,15 +61,41 @@ pub const Exposure = union(enum) {
 
 pub const Settings = struct {
     format: Format = .png,
+    /// Of the formats that are not linear.
     exposure: Exposure = .{ .ev = 0 },
     /// Keep alpha, where the format has it; otherwise the picture is over black.
     transparent: bool = false,
+    /// Of JPEG, 1 to 100.
+    jpeg_quality: u8 = 90,
     /// 1..`parallel.thread_count_max`. The bytes do not depend on it.
     thread_count: usize = 1,
 };
 
 /// The diagnostic says why.
 pub const Error = error{ OutOfMemory, InputOutput };
+
+/// Refuses a picture that the format cannot hold; best asked before it is rendered.
+pub fn check(
+    settings: Settings,
+    width: u32,
+    height: u32,
+    diagnostic: *Diagnostic,
+) error{InputOutput}!void {
+    const format = settings.format;
+    if (@max(width, height) > format.sideMax()) return diagnostic.fail(
+        error.InputOutput,
+        "a {t} file has {d} pixels on a side at most",
+        .{ format, format.sideMax() },
+    );
+    const channel_count: u64 = if (format.form(settings.transparent) == .rgba) 4 else 3;
+    const by_library = format != .ppm and format != .pfm;
+    const value_count = (width * channel_count + 1) * height;
+    if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
+        error.InputOutput,
+        "{d}x{d} pixels are too many for a {t} file; .ppm and .pfm hold them",
+        .{ width, height, format },
+    );
+}
 
 /// Encodes the frame and moves it to its place. Closes the target in any case.
 pub fn write(
@@ -52,65 +106,93 @@ pub fn write(
     diagnostic: *Diagnostic,
 ) Error!void {
     defer target.abandon();
-    assert(settings.thread_count >= 1 and settings.thread_count <= parallel.thread_count_max);
-    const has_alpha = settings.transparent and settings.format == .png;
+    try check(settings, image.width, image.height, diagnostic);
+    const format = settings.format;
+    const form = format.form(settings.transparent);
     const rows: tonemap.Rows = .{
         .image = image,
-        .scale = if (settings.format == .pfm) 1 else switch (settings.exposure) {
-            .ev => |ev| tonemap.scaleOf(ev),
-            .auto => try tonemap.autoScale(gpa, image),
+        .form = form,
+        .scale = switch (form) {
+            .linear, .radiance => 1,
+            .rgb, .rgba => switch (settings.exposure) {
+                .ev => |ev| tonemap.scaleOf(ev),
+                .auto => try tonemap.autoScale(gpa, image),
+            },
         },
-        .channel_count = if (has_alpha) 4 else 3,
     };
-    return switch (settings.format) {
-        .png => encode(png.Encoder, gpa, rows, settings, target, diagnostic),
-        .ppm => encode(ppm.Encoder, gpa, rows, settings, target, diagnostic),
-        .pfm => encode(pfm.Encoder, gpa, rows, settings, target, diagnostic),
+    const pixels = try encodeRows(gpa, rows, format == .pfm, settings.thread_count);
+    defer huge_pages.free(gpa, pixels);
+
+    var buffer: [48]u8 = undefined;
+    const size = .{ image.width, image.height };
+    // Two numbers of 10 digits and 10 bytes more fit.
+    return switch (format) {
+        .ppm => target.finish(&.{
+            std.mem.print(&buffer, "P6\n{d} {d}\n255\n", size) catch unreachable, pixels,
+        }, diagnostic),
+        // A negative scale says little-endian.
+        .pfm => target.finish(&.{
+            std.mem.print(&buffer, "PF\n{d} {d}\n-1.0\n", size) catch unreachable, pixels,
+        }, diagnostic),
+        inline .png, .jpg, .tga, .bmp, .hdr => |coded| {
+            const file = try stb_image_write.encode(gpa, @field(
+                stb_image_write.Codec,
+                @tagName(coded),
+            ), .{
+                .width = image.width,
+                .height = image.height,
+                .channel_count = if (form == .rgba) 4 else 3,
+                .pixels = pixels,
+                .quality = settings.jpeg_quality,
+            });
+            defer gpa.free(file);
+            return target.finish(&.{file}, diagnostic);
+        },
     };
 }
 
-/// Encodes by all threads, then writes.
-fn encode(
-    comptime Encoder: type,
+/// All rows, by all threads; the caller frees them.
+fn encodeRows(
     gpa: Allocator,
     rows: tonemap.Rows,
-    settings: Settings,
-    target: *Target,
-    diagnostic: *Diagnostic,
-) Error!void {
-    var encoder: Encoder = try .init(gpa, rows, settings.thread_count);
-    defer encoder.deinit(gpa);
-    var work: Work(Encoder) = .{ .encoder = &encoder };
-    const thread_count = @min(settings.thread_count, encoder.threadCount());
-    parallel.share(thread_count, &work, Work(Encoder).run);
-    return target.finish(encoder.finish(), diagnostic);
-}
-
-/// Stretches of a file, each to one thread.
-fn Work(comptime Encoder: type) type {
-    return struct {
-        encoder: *Encoder,
-        next: std.atomic.Value(u32) = .init(0),
-
-        fn run(work: *@This(), thread_index: usize) void {
-            while (true) {
-                const index = work.next.fetchAdd(1, .monotonic);
-                if (index >= work.encoder.stretch_count) return;
-                work.encoder.encodeStretch(index, thread_index);
-            }
-        }
+    from_bottom: bool,
+    thread_count: usize,
+) error{OutOfMemory}![]align(64) u8 {
+    comptime assert(@import("builtin").cpu.arch.endian() == .little);
+    const byte_count = std.math.mul(usize, rows.byteCount(), rows.image.height) catch
+        return error.OutOfMemory;
+    var work: Work = .{
+        .rows = rows,
+        .from_bottom = from_bottom,
+        .bytes = try huge_pages.alloc(gpa, u8, byte_count),
     };
+    parallel.share(@min(thread_count, rows.image.height), &work, Work.run);
+    return work.bytes;
 }
+
+/// Rows, each to one thread.
+const Work = struct {
+    rows: tonemap.Rows,
+    from_bottom: bool,
+    bytes: []align(64) u8,
+    next: std.atomic.Value(u32) = .init(0),
+
+    fn run(work: *Work, _: usize) void {
+        const row_bytes = work.rows.byteCount();
+        const height = work.rows.image.height;
+        while (true) {
+            const y = work.next.fetchAdd(1, .monotonic);
+            if (y >= height) return;
+            const place: usize = if (work.from_bottom) height - 1 - y else y;
+            work.rows.encode(y, work.bytes[place * row_bytes ..][0..row_bytes]);
+        }
+    }
+};
 
 test {
-    _ = @import("output/checksum.zig");
-    _ = @import("output/deflate.zig");
-    _ = @import("output/filter.zig");
-    _ = @import("output/huffman.zig");
-    _ = pfm;
-    _ = png;
-    _ = ppm;
+    _ = stb_image_write;
     _ = target_file;
+    _ = @import("output/temporary.zig");
     _ = tonemap;
 }
 
@@ -128,7 +210,8 @@ fn writeForTest(
     const path = try std.fs.path.join(gpa, &.{ folder_path, name });
     defer gpa.free(path);
     var diagnostic: Diagnostic = .{};
-    var target: Target = try .openFile(io, path, &diagnostic);
+    var temporaries: TemporaryFiles = .{};
+    var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
     try write(gpa, image, settings, &target, &diagnostic);
     return folder.readFileAlloc(io, name, gpa, .unlimited);
 }
@@ -184,7 +267,8 @@ test "memory that runs out leaves no file, whenever it does" {
             .fail_index = 0,
         });
         var diagnostic: Diagnostic = .{};
-        var target: Target = try .openFile(io, path, &diagnostic);
+        var temporaries: TemporaryFiles = .{};
+        var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
         const settings: Settings = .{ .format = format, .exposure = .auto };
         const result = write(failing.allocator(), &image, settings, &target, &diagnostic);
         try std.testing.expectError(error.OutOfMemory, result);

@@ -11,13 +11,14 @@ const gltf = @import("parse/gltf.zig");
 const pbrt = @import("parse/pbrt.zig");
 const settings_file = @import("parse/settings.zig");
 const Allocator = std.mem.Allocator;
+const Resources = @import("parse/resource.zig");
 
 /// Scenes that need no file.
 pub const builtin = @import("builtin.zig");
 
 /// `InputOutput`: a file is missing or cannot be read. `InvalidInput`: it is read, but it is not
 /// what it should be, or it needs what is not supported.
-pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
+pub const Error = Resources.Error;
 
 /// What the user allows a file to do, and how finely curved shapes are cut.
 pub const Settings = settings_file.Settings;
@@ -41,21 +42,47 @@ pub fn parse(
     if (std.mem.startsWith(u8, path, builtin_prefix)) {
         return builtin.build(gpa, path[builtin_prefix.len..], diagnostic);
     }
-    if (std.ascii.endsWithIgnoreCase(path, ".pbrt")) {
-        return pbrt.parse(gpa, io, path, settings, diagnostic);
-    }
-    return gltf.parse(gpa, io, path, settings, diagnostic);
+    var scene = try Resources.open(gpa, io, path, settings, diagnostic);
+    defer scene.close();
+    if (std.ascii.endsWithIgnoreCase(path, ".pbrt"))
+        return pbrt.read(&scene.resources, path, scene.main, diagnostic);
+    return gltf.read(&scene.resources, scene.main.bytes, diagnostic);
 }
 
 /// Reads a glTF file that is in memory, JSON or binary; what it names is looked for in `folder`.
 /// Otherwise like `parse`.
-pub const parseBytes = gltf.parseBytes;
+pub fn parseBytes(
+    gpa: Allocator,
+    io: std.Io,
+    bytes: []const u8,
+    folder: std.Io.Dir,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error!Scene {
+    var resources: Resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings };
+    return gltf.read(&resources, bytes, diagnostic);
+}
 
 /// The same for a PBRT text.
-pub const parsePbrt = pbrt.parseBytes;
+pub fn parsePbrt(
+    gpa: Allocator,
+    io: std.Io,
+    bytes: []const u8,
+    folder: std.Io.Dir,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error!Scene {
+    const copy = try gpa.dupeSentinel(u8, bytes, 0);
+    defer gpa.free(copy);
+    var resources: Resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings };
+    resources.bytes_read = bytes.len;
+    return pbrt.read(&resources, "text", .{ .bytes = copy, .identity = null }, diagnostic);
+}
 
 test {
+    _ = Resources;
     _ = builtin;
+    _ = @import("parse/cgltf.zig");
     _ = gltf;
     _ = pbrt;
 }

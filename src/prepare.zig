@@ -19,7 +19,6 @@ const check = @import("prepare/bvh/check.zig");
 const flatten = @import("prepare/flatten.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
-const pad = @import("prepare/pad.zig");
 const pose = @import("prepare/pose.zig");
 const view = @import("prepare/view.zig");
 const assert = std.debug.assert;
@@ -97,8 +96,9 @@ noinline fn placeAll(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!World {
-    const maps = try pose.worldMaps(gpa, from.nodes);
-    defer gpa.free(maps);
+    const posed = try pose.compose(gpa, from);
+    defer posed.deinit(gpa);
+    const maps = posed.maps;
     const surface = try flatten.flatten(gpa, arena, from, maps, settings.thread_count, diagnostic);
     const seen = try view.choose(
         gpa,
@@ -109,12 +109,12 @@ noinline fn placeAll(
         settings.resolution,
         diagnostic,
     );
-    var lights = try light.place(arena, from.lights, maps, diagnostic);
+    const padding: world.Padding = .init(pose.round(posed.center), surface.bounds);
+    var lights = try light.place(arena, from.lights, &posed, &padding, diagnostic);
     // What shines from everywhere is a light too.
     const lights_are_default = lights.len == 0 and from.ambient == null;
     if (lights_are_default) lights = try light.placeRig(arena, &seen.camera);
 
-    const pads = pad.choose(surface.bounds, &seen.camera, lights);
     return .{
         .arena = undefined,
         .geometry = .{
@@ -124,9 +124,8 @@ noinline fn placeAll(
             .colors = surface.colors,
             .triangles = surface.triangles,
             .centroid_bounds = surface.centroid_bounds,
-            .pad = pads.triangle,
-            .node_margin = pads.node_margin,
-            .fused_reach = pads.fused_reach,
+            .padding = padding,
+            .size = @floatCast(posed.size),
         },
         .materials = try material.place(arena, from, surface.triangles),
         .lights = lights,
@@ -159,8 +158,7 @@ pub noinline fn buildTree(
         .positions = geometry.positions,
         .triangles = geometry.triangles,
         .centroid_bounds = geometry.centroid_bounds,
-        .pad = geometry.pad,
-        .node_margin = geometry.node_margin,
+        .padding = geometry.padding,
         .thread_count = settings.thread_count,
         .quality = settings.tree_quality,
     };
@@ -245,7 +243,7 @@ fn testThreads(from: *const Scene, lanes: u8, quality: TreeQuality) !usize {
             else => unreachable,
         }
         try std.testing.expectEqual(reference.facts.tree, other.facts.tree);
-        try std.testing.expectEqual(reference.geometry.pad, other.geometry.pad);
+        try std.testing.expectEqual(reference.geometry.padding, other.geometry.padding);
         try std.testing.expectEqual(reference.view.camera, other.view.camera);
     }
     return reference.geometry.triangles.len;
@@ -573,7 +571,6 @@ test {
     _ = flatten;
     _ = light;
     _ = material;
-    _ = pad;
     _ = pose;
     _ = view;
     _ = @import("prepare/framing.zig");

@@ -11,8 +11,12 @@ pub const diagnostic = @import("diagnostic.zig");
 pub const energy = @import("energy.zig");
 pub const film = @import("film.zig");
 pub const huge_pages = @import("huge_pages.zig");
+pub const identity = @import("identity.zig");
 pub const image = @import("image.zig");
+/// The project's licence and those of what a program is made of.
+pub const licenses = @import("licenses").text;
 pub const math = @import("math.zig");
+pub const memory_account = @import("memory_account.zig");
 pub const options = @import("options.zig");
 pub const output = @import("output.zig");
 pub const parallel = @import("parallel.zig");
@@ -25,6 +29,10 @@ pub const statistics = @import("statistics.zig");
 pub const trace = @import("trace.zig");
 pub const variant = @import("variant.zig");
 pub const world = @import("world.zig");
+
+comptime {
+    @export(&trace.link.panicOfKernel, .{ .name = "rl_kernel_panic" });
+}
 
 test {
     std.testing.refAllDecls(@This());

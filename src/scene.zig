@@ -7,8 +7,14 @@
 const std = @import("std");
 const math = @import("math.zig");
 const assert = std.debug.assert;
-const Affine = math.Affine;
+const AffineD = math.AffineD;
 const Vec3 = math.Vec3;
+
+/// Grows a `Scene`.
+pub const Builder = @import("scene/builder.zig");
+
+/// How points in rows become triangles.
+pub const Grid = @import("scene/grid.zig");
 
 /// Index that stands for "none".
 pub const none: u32 = std.math.maxInt(u32);
@@ -18,7 +24,7 @@ pub const Node = struct {
     /// Index of the parent, always lower than the node's own, or `none` for a root.
     parent: u32,
     /// Map from this node's space into its parent's.
-    local: Affine,
+    local: AffineD,
 };
 
 /// Triangles with one material, in the space of the node that shows them.
@@ -34,7 +40,7 @@ pub const Mesh = struct {
     material: u32,
 };
 
-/// One showing of a mesh.
+/// A mesh at a node.
 pub const Instance = struct {
     mesh: u32,
     node: u32,
@@ -174,6 +180,11 @@ pub const Scene = struct {
         assert(scene.camera_default == none or scene.camera_default < scene.cameras.len);
     }
 };
+
+test {
+    _ = Builder;
+    _ = Grid;
+}
 
 test "an empty scene is a scene" {
     var scene: Scene = .init(std.testing.allocator);

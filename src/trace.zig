@@ -10,11 +10,14 @@ const variant_file = @import("variant.zig");
 const path = @import("trace/integrate/path.zig");
 const tiles = @import("trace/integrate/tiles.zig");
 const Film = @import("film.zig").Film;
-const Whitted = @import("trace/integrate/whitted.zig").Whitted;
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Frame = world_file.Frame;
 
+/// How kernels are found.
+pub const link = @import("trace/link.zig");
+/// Whitted's ray tracing, by one kernel.
+pub const Whitted = @import("trace/integrate/whitted.zig").Whitted;
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
 pub const kernel = @import("trace/traverse/kernel.zig");
 /// Rays in lanes.
@@ -35,16 +38,34 @@ pub const interval_packet = @import("trace/traverse/interval_packet.zig");
 pub const walk = @import("trace/traverse/walk.zig");
 /// A bundle of rays through the tree.
 pub const bundle = @import("trace/traverse/bundle.zig");
-/// Rays from one point, or behind it, as a beam.
-pub const primary = @import("trace/traverse/beam/primary.zig");
+/// Rays from one point as a beam.
+pub const eye_rays = @import("trace/traverse/beam/eye_rays.zig");
 /// The directions of a beam's rays.
 pub const Grid = @import("trace/traverse/beam/grid.zig").Grid;
+/// The parts of beams whose bounds are tested.
+pub const beam = struct {
+    pub const frustum = @import("trace/traverse/beam/frustum.zig");
+    pub const members = @import("trace/traverse/beam/members.zig");
+    pub const projected_triangle = @import("trace/traverse/beam/projected_triangle.zig");
+    pub const shadow_plane = @import("trace/traverse/beam/shadow_plane.zig");
+    pub const shadow_receivers = @import("trace/traverse/beam/shadow_receivers.zig");
+};
+/// What tests of traversal ask of a kernel.
+pub const searches = @import("trace/traverse/searches.zig");
 /// A bundle in the variant's own way.
 pub const dispatch = @import("trace/traverse/dispatch.zig");
 
 /// Bounces at most.
 pub const depth_limit = path.depth_limit;
 
+/// The searches of a kernel, where the build has kernels show them.
+pub fn searchesOf(comptime Kernel: type) *const searches.Searches(Kernel) {
+    const Face = searches.Searches(Kernel);
+    return @extern(*const Face, .{ .name = link.symbolOf(Face, Kernel.variant, false) });
+}
+
+/// A kernel's face.
+pub const Integrator = tiles.Integrator;
 pub const Settings = tiles.Settings;
 pub const Statistics = tiles.Statistics;
 pub const Error = tiles.Error;
@@ -82,24 +103,27 @@ fn run(
 ) Error!Statistics {
     assert(film.image.width == frame.view.width and film.image.height == frame.view.height);
     assert(settings.sample_count >= 1 and settings.depth_max <= depth_limit);
-    inline for (variant_file.compiled, 0..) |variant, index| {
-        if (index == variant_index) {
-            comptime var chosen = variant;
-            if (counting) chosen.backend = variant_file.counting_backend;
-            const Integrator = Whitted(kernel.Kernel(chosen, counting));
-            return tiles.render(Integrator, gpa, frame, film, settings);
+    const integrators = comptime integrators: {
+        var list: [variant_file.compiled.len]*const Integrator = undefined;
+        for (&list, variant_file.compiled) |*to, held| {
+            const chosen = if (counting) variant_file.countingOf(held) else held;
+            const symbol = link.symbolOf(Integrator, chosen, counting);
+            to.* = @extern(*const Integrator, .{ .name = symbol });
         }
-    }
-    unreachable; // Asserts that the index is one of `compiled`.
+        break :integrators list;
+    };
+    return tiles.render(integrators[variant_index], gpa, frame, film, settings);
 }
 
 test {
+    _ = link;
     _ = kernel;
     _ = ray;
     _ = triangle;
     _ = single;
     _ = traversal_ray;
     _ = stream;
+    _ = @import("trace/traverse/stack.zig");
     _ = bundle;
     _ = dispatch;
     _ = path;

@@ -18,15 +18,14 @@ pub const Light = @import("world/light.zig").Light;
 pub const Material = materials_file.Material;
 pub const Materials = materials_file.Materials;
 pub const Node = geometry_file.Node;
+pub const Padding = @import("world/padding.zig").Padding;
 pub const Tree = geometry_file.Tree;
 pub const TreeStatistics = geometry_file.TreeStatistics;
 pub const Triangle = geometry_file.Triangle;
 pub const TrianglePack = geometry_file.TrianglePack;
 pub const View = view_file.View;
 pub const cache_line_bytes = geometry_file.cache_line_bytes;
-pub const node_margin_relative = geometry_file.node_margin_relative;
 pub const none = geometry_file.none;
-pub const pad_relative = geometry_file.pad_relative;
 pub const tree_depth_max = geometry_file.tree_depth_max;
 
 /// All that tracing a picture takes.
@@ -79,4 +78,5 @@ pub const World = struct {
 
 test {
     _ = geometry_file;
+    _ = Padding;
 }

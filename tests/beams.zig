@@ -126,8 +126,8 @@ fn expectTile(
     const hits = hitsOf(world, &queries);
     var bundle = bundleOf(Kernel, &queries);
     var counts: raylane.statistics.TestCounts = .{};
-    const traced = raylane.trace.primary
-        .trace(Kernel, &world.geometry, grid, &bundle, null, &counts);
+    const searches = raylane.trace.searchesOf(Kernel);
+    const traced = searches.beam_closest.?(&world.geometry, grid, &bundle, &counts);
     try std.testing.expect(traced);
     for (&bundle.groups, 0..) |*group, index| for (0..Kernel.ray_count) |lane| {
         const x = Kernel.pixelX(index, lane);
@@ -175,6 +175,7 @@ fn expectShadows(
     }
     const light: Light = .{
         .kind = kind,
+        .from_receiver = false,
         .position = place,
         .direction = vec3.sub(grid.origin, place),
         .intensity = .{ 1, 1, 1 },
@@ -185,7 +186,8 @@ fn expectShadows(
     const expected = hitsOf(world, &queries);
     var bundle = bundleOf(Kernel, &queries);
     var counts: raylane.statistics.TestCounts = .{};
-    raylane.trace.dispatch.anyHit(Kernel, &world.geometry, &bundle, &light, &.all, &counts);
+    const searches = raylane.trace.searchesOf(Kernel);
+    searches.any_hit(&world.geometry, &bundle, &light, &.all, &counts);
     for (&bundle.groups, 0..) |*group, index| for (0..Kernel.ray_count) |lane| {
         const x = Kernel.pixelX(index, lane);
         const y = Kernel.pixelY(index, lane);
@@ -194,75 +196,6 @@ fn expectShadows(
         const found = group.closest.primitive.lane(lane) != ray_file.no_primitive;
         try std.testing.expectEqual(blocked, found);
     };
-}
-
-/// What a tile looks like from behind a plane that it meets before, and rays that it is made of.
-const Mirror = struct {
-    /// A point of the plane, and its normal.
-    point: [3]f32,
-    normal: [3]f32,
-    /// How far off starts are, in parts of their distance, and directions, in parts of a step.
-    jitter: f32,
-    kind: Kind,
-
-    const Kind = enum {
-        /// From the plane on; every third ray may meet the triangle that it starts on.
-        plane,
-        /// From the eye, behind what is hit first.
-        rest,
-        /// Two planes, one for each half of the tile, and directions of their own.
-        two,
-    };
-};
-
-fn expectMirror(
-    comptime Kernel: type,
-    world: *const World,
-    grid: *const Grid,
-    mirror: *const Mirror,
-    random: std.Random,
-) !u32 {
-    const vec3 = raylane.math.vec3;
-    const directions = directionsOf(grid);
-    var queries: [side][side]?Query = @splat(@splat(null));
-    for (&queries, directions, 0..) |*row, ways, y| for (row, ways, 0..) |*query, way, x| {
-        if (!isActive(x, y)) continue;
-        const first = soup_file.bruteForce(world, .{ .origin = grid.origin, .direction = way });
-        if (mirror.kind == .rest) {
-            query.* = .{ .origin = grid.origin, .direction = way, .tnear = first };
-            continue;
-        }
-        const second = mirror.kind == .two and x > side / 2;
-        const distance = vec3.dot(mirror.normal, vec3.sub(mirror.point, grid.origin));
-        const t = distance / vec3.dot(mirror.normal, way) * @as(f32, if (second) 0.5 else 1);
-        if (!(t > 0 and t < 4)) continue;
-        var origin = vec3.add(grid.origin, vec3.scale(way, t));
-        var direction = way;
-        const turned: f32 = if (second) -1 else 1;
-        for (&origin, &direction, 0..) |*from, *to, axis| {
-            from.* += random.floatNorm(f32) * mirror.jitter * t * @abs(to.*);
-            to.* += random.floatNorm(f32) * mirror.jitter * @abs(grid.right[axis]);
-            if (axis == 1) to.* *= turned;
-        }
-        query.* = .{ .origin = origin, .direction = direction };
-        if (x % 3 != 0 and @abs(first.t - t) < 1e-3 * t) query.*.?.skip = first.primitive;
-    };
-    const hits = hitsOf(world, &queries);
-    var bundle = bundleOf(Kernel, &queries);
-    var counts: raylane.statistics.TestCounts = .{};
-    const beams = raylane.trace.dispatch
-        .closestHit(Kernel, &world.geometry, &bundle, null, null, &counts);
-    var beam_count: u32 = 0;
-    for (&bundle.groups, 0..) |*group, index| for (0..Kernel.ray_count) |lane| {
-        const x = Kernel.pixelX(index, lane);
-        const y = Kernel.pixelY(index, lane);
-        try std.testing.expectEqual(queries[y][x] != null, group.active.lane(lane));
-        if (beams == .some) beam_count += @intFromBool(beams.some[index].lane(lane));
-        if (queries[y][x] == null) continue;
-        const t = group.closest.t.lane(lane);
-        try soup_file.expectHit(hits[y][x], t, group.closest.primitive.lane(lane));
-    };
-    return beam_count;
 }
 
 /// A soup, and where to look at it from.
@@ -299,56 +232,6 @@ const Stage = struct {
     }
 };
 
-/// Mirrors of all kinds in one soup. Returns the share of rays that went as beams.
-fn expectMirrors(soup: soup_file.Soup, triangle_count: usize, tile_count: usize) !f32 {
-    const vec3 = raylane.math.vec3;
-    var stage: Stage = try .init(soup, 177, triangle_count);
-    defer stage.deinit();
-    const random = stage.generator.random();
-    var scene = try soup_file.makeScene(stage.corners.items);
-    defer scene.deinit();
-    const mode = raylane.simd.setFlushToZero();
-    defer raylane.simd.setFloatControl(mode);
-    var beam_count: u32 = 0;
-    var ray_count: u32 = 0;
-    inline for (.{ 4, 8, 16 }) |lanes| {
-        if (comptime !soup_file.isCompiled(lanes)) continue;
-        var world = try fixture.prepare(&scene, lanes, .{});
-        defer world.deinit();
-        for (0..tile_count) |tile| {
-            const first = random.uintLessThan(usize, stage.corners.items.len / 3) * 3;
-            const corners = stage.corners.items[first..][0..3];
-            const target = stage.target();
-            var origin = stage.place(4);
-            if (tile % 5 == 1) origin[2] = target[2];
-            const grid = aim(origin, target, if (tile % 2 == 0) 1e-3 else 8e-3, random);
-            // Every other mirror is in the plane of a triangle.
-            const edges = [2][3]f32{
-                vec3.sub(corners[1], corners[0]),
-                vec3.sub(corners[2], corners[0]),
-            };
-            var mirror: Mirror = .{
-                .point = corners[0],
-                .normal = vec3.cross(edges[0], edges[1]),
-                .jitter = ([_]f32{ 0, 0, 1e-7, 1e-5, 1e-3 })[tile % 5],
-                .kind = ([_]Mirror.Kind{ .plane, .plane, .rest, .plane, .two })[tile / 2 % 5],
-            };
-            if (tile % 2 == 0) {
-                for (&mirror.normal) |*x| x.* = random.floatNorm(f32);
-                mirror.point = vec3.add(origin, vec3.scale(vec3.sub(target, origin), 0.7));
-            }
-            inline for (raylane.variant.compiled) |variant| {
-                if (comptime variant.lanes == lanes and variant.traversal == .beam) {
-                    const Kernel = raylane.trace.kernel.Kernel(variant, false);
-                    beam_count += try expectMirror(Kernel, &world, &grid, &mirror, random);
-                    ray_count += side * side;
-                }
-            }
-        }
-    }
-    return @as(f32, @floatFromInt(beam_count)) / @as(f32, @floatFromInt(ray_count));
-}
-
 fn expectSoup(soup: soup_file.Soup, triangle_count: usize, tile_count: usize) !void {
     var stage: Stage = try .init(soup, 77, triangle_count);
     defer stage.deinit();
@@ -368,6 +251,8 @@ fn expectSoup(soup: soup_file.Soup, triangle_count: usize, tile_count: usize) !v
             if (tile % 3 == 1) origin[2] = target[2];
             var light = stage.place(5);
             if (tile % 4 == 2) light[2] = target[2];
+            // As far as a lamp in the sky of a scene that is small.
+            if (tile % 8 == 5) light = stage.place(65e3);
             const step: f32 = if (tile % 2 == 0) 1e-3 else 8e-3;
             const grid = aim(origin, target, step, random);
             inline for (raylane.variant.compiled) |variant| {
@@ -389,16 +274,6 @@ test "beams find the hits and shadows of brute force in random and nasty soups" 
     }
 }
 
-test "what a mirror sees is what brute force finds, and mostly a beam" {
-    for (std.enums.values(soup_file.Soup)) |soup| {
-        const share = expectMirrors(soup, 100, 20) catch |err| {
-            std.debug.print("in the soup {t}\n", .{soup});
-            return err;
-        };
-        try std.testing.expect(share > 0.4);
-    }
-}
-
 test "a tile too wide for a beam is declined" {
     var generator = std.Random.DefaultPrng.init(3);
     var corners: soup_file.Corners = .empty;
@@ -414,8 +289,8 @@ test "a tile too wide for a beam is declined" {
         const grid = aim(.{ 0, 0, 7 }, .{ 0, 0, 0 }, 0.1, generator.random());
         var bundle: raylane.trace.bundle.Bundle(Kernel) = undefined;
         var counts: raylane.statistics.TestCounts = .{};
-        const traced = raylane.trace.primary
-            .trace(Kernel, &world.geometry, &grid, &bundle, null, &counts);
+        const searches = raylane.trace.searchesOf(Kernel);
+        const traced = searches.beam_closest.?(&world.geometry, &grid, &bundle, &counts);
         try std.testing.expect(!traced);
     }
 }

@@ -98,18 +98,28 @@ const Sandbox = struct {
     }
 
     /// Expects that the folder holds these files and nothing else.
-    fn expectFiles(sandbox: *Sandbox, names: []const []const u8) !void {
-        var found_count: usize = 0;
-        var iterator = sandbox.folder.dir.iterate();
-        while (try iterator.next(io)) |entry| : (found_count += 1) {
-            for (names) |name| {
-                if (std.mem.eql(u8, name, entry.name)) break;
+    fn expectFiles(sandbox: *Sandbox, expected: []const []const u8) !void {
+        const found = try sandbox.names();
+        for (found) |name| {
+            for (expected) |other| {
+                if (std.mem.eql(u8, other, name)) break;
             } else {
-                std.debug.print("left behind: {s}\n", .{entry.name});
+                std.debug.print("left behind: {s}\n", .{name});
                 return error.UnexpectedFile;
             }
         }
-        try testing.expectEqual(names.len, found_count);
+        try testing.expectEqual(expected.len, found.len);
+    }
+
+    /// What the folder holds.
+    fn names(sandbox: *Sandbox) ![]const []const u8 {
+        const arena = sandbox.arena_state.allocator();
+        var found: std.ArrayList([]const u8) = .empty;
+        var iterator = sandbox.folder.dir.iterate();
+        while (try iterator.next(io)) |entry| {
+            try found.append(arena, try arena.dupe(u8, entry.name));
+        }
+        return found.items;
     }
 
     fn write(sandbox: *Sandbox, name: []const u8, bytes: []const u8) !void {
@@ -211,6 +221,23 @@ test "--version prints one line to stdout" {
     try testing.expectEqualStrings("", ending.stderr);
 }
 
+test "--licenses prints the project's licence and those of all libraries" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const ending = try sandbox.expectExit(0, &.{"--licenses"});
+    try testing.expectEqualStrings("", ending.stderr);
+    try testing.expectStringStartsWith(ending.stdout, "MIT License\n");
+    for ([_][]const u8{
+        "The Raylane authors", "\ncgltf ",             "Johannes Kuhlmann", "Serge A. Zaitsev",
+        "\nlibdeflate ",       "Eric Biggers",         "Google LLC",        "\nstb_image_write ",
+        "Sean Barrett",        "\nmusl as a whole is", "Rich Felker",
+    }) |part| {
+        errdefer std.debug.print("{s}\n", .{part});
+        try testing.expect(std.mem.find(u8, ending.stdout, part) != null);
+    }
+    try sandbox.expectEmpty();
+}
+
 test "an unknown flag is a usage error" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
@@ -227,7 +254,10 @@ test "mistakes on the command line are usage errors in one line" {
         &.{},
         &.{"render"},
         &.{ "builtin:cornell", "builtin:cornell" },
-        &.{ "builtin:cornell", "-o", "a.jpg" },
+        &.{ "builtin:cornell", "-o", "a.tif" },
+        &.{ "builtin:cornell", "--jpeg-quality=0" },
+        &.{ "builtin:cornell", "--jpeg-quality=101" },
+        &.{ "builtin:cornell", "--max-memory=much" },
         &.{ "builtin:cornell", "-o" },
         &.{ "builtin:cornell", "-r", "0x1" },
         &.{ "builtin:cornell", "--threads=0" },
@@ -397,6 +427,43 @@ test "-o - puts the image and nothing else on stdout" {
     try sandbox.expectEmpty();
 }
 
+test "every format by its name or by --format, JPEG smaller with less quality" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    for ([_][2][]const u8{
+        .{ "a.png", "\x89PNG" },    .{ "a.jpg", "\xff\xd8\xff" }, .{ "b.jpeg", "\xff\xd8\xff" },
+        .{ "a.bmp", "BM" },         .{ "a.hdr", "#?RADIANCE\n" }, .{ "a.ppm", "P6\n16 9\n" },
+        .{ "a.pfm", "PF\n16 9\n" }, .{ "a.tga", "\x00\x00\x0a" },
+    }) |case| {
+        errdefer std.debug.print("{s}\n", .{case[0]});
+        _ = try sandbox.expectExit(0, &.{ "builtin:cornell", "-r16x9", "-q", "-o", case[0] });
+        try testing.expectStringStartsWith(try sandbox.read(case[0]), case[1]);
+        try sandbox.folder.dir.deleteFile(io, case[0]);
+    }
+    const to_stdout = [_][]const u8{ "builtin:cornell", "-r64x64", "-o-", "--format=jpeg" };
+    const usual = try sandbox.expectExit(0, &to_stdout);
+    const ninety = try sandbox.expectExit(0, &(to_stdout ++ .{"--jpeg-quality=90"}));
+    try testing.expectEqualSlices(u8, usual.stdout, ninety.stdout);
+    const poor = try sandbox.expectExit(0, &(to_stdout ++ .{"--jpeg-quality=10"}));
+    try testing.expect(poor.stdout.len < usual.stdout.len / 2);
+    _ = try sandbox.expectExit(0, &.{ "builtin:cornell", "-r8x8", "-q", "--format=jpg" });
+    try sandbox.expectFiles(&.{"cornell.jpg"});
+}
+
+test "a picture that the format cannot hold is an error before it is rendered" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    // Enough samples for an hour.
+    const ending = try sandbox.expectExit(1, &.{
+        "builtin:cornell", "-r65536x16", "--spp=4096", "-o", "a.jpg",
+    });
+    try testing.expectEqualStrings(
+        "raylane: a.jpg: a jpg file has 65535 pixels on a side at most\n",
+        ending.stderr,
+    );
+    try sandbox.expectEmpty();
+}
+
 test "background, exposure and transparency reach the pixels" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
@@ -491,9 +558,9 @@ test "an output that cannot be written is an error at once" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
     try sandbox.folder.dir.createDir(io, "folder.png", .default_dir);
-    try sandbox.folder.dir.symLink(io, "/dev/null", "link.png", .{});
+    try sandbox.folder.dir.symLink(io, "folder.png", "link.png", .{});
     const outputs = [_][]const u8{
-        "absent/a.png", "folder.png", "link.png", "folder.png/", "/proc/a.png",
+        "absent/a.png", "folder.png", "link.png", "folder.png/", "/proc/a.png", "/dev/fd/99",
     };
     for (outputs) |output| {
         // Enough samples for a day: the error comes before the work.
@@ -566,6 +633,40 @@ test "closed standard files do not turn the image into a log" {
     try testing.expectEqualSlices(u8, "P6\n1 1\n255\n\x00\x00\x00", try sandbox.read("a.ppm"));
 }
 
+test "--max-memory is kept to in every stage, or is an error in one line" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("empty.gltf", empty_scene);
+    // Memory runs out while a scene is read, while it is prepared, before the picture, after it.
+    for ([_]struct { []const u8, []const u8, []const []const u8, []const u8 }{
+        .{ "builtin:atrium", "-r64x64", &.{ "1", "300K", "1M", "4M", "8M", "14M" }, "256M" },
+        .{ "empty.gltf", "-r1024x1024", &.{ "1M", "16M", "18M", "21M", "23M" }, "64M" },
+    }) |case| {
+        const arguments = [_][]const u8{ case[0], case[1], "-t2", "-q", "-o", "a.png" };
+        for (case[2]) |limit| {
+            errdefer std.debug.print("{s} {s}\n", .{ case[0], limit });
+            const ending = try sandbox.expectExit(1, &(arguments ++ .{ "--max-memory", limit }));
+            try expectOneErrorLine(ending);
+            const count = std.mem.trimEnd(u8, limit, "KM");
+            const unit = limit[count.len..];
+            const expected = try sandbox.arena_state.allocator().print("than the {s} {s}{s} of", .{
+                count, unit, if (unit.len == 0) "bytes" else "iB",
+            });
+            try testing.expect(std.mem.find(u8, ending.stderr, expected) != null);
+            try sandbox.expectFiles(&.{"empty.gltf"});
+        }
+        _ = try sandbox.expectExit(0, &(arguments ++ .{ "--max-memory", case[3] }));
+        const within = try sandbox.read("a.png");
+        _ = try sandbox.expectExit(0, &arguments);
+        try testing.expectEqualSlices(u8, try sandbox.read("a.png"), within);
+        try sandbox.folder.dir.deleteFile(io, "a.png");
+    }
+    const before = try sandbox.run(&.{ "empty.gltf", "-r1024x1024", "--max-memory=8M", "-q" });
+    try testing.expect(std.mem.find(u8, before.stderr, ", 16 MiB more asked for)") != null);
+    const after = try sandbox.run(&.{ "empty.gltf", "-r1024x1024", "--max-memory=18M", "-q" });
+    try testing.expect(std.mem.find(u8, after.stderr, ", 3 MiB more asked for)") != null);
+}
+
 test "exhausted memory is an error in one line" {
     // An emulator needs the address space itself.
     if (testing.environ.getPosix("RAYLANE_EMULATOR") != null) return error.SkipZigTest;
@@ -581,33 +682,229 @@ test "exhausted memory is an error in one line" {
     try sandbox.expectEmpty();
 }
 
+/// Starts a render that does not end by itself, by a script as `runShell` takes it, and waits until
+/// the sandbox holds `file_count` files: its unfinished one shows that it is under way.
+fn startLong(sandbox: *Sandbox, script: []const u8, file_count: usize) !std.process.Child {
+    var child = try std.process.spawn(io, .{
+        .argv = try sandbox.shellCommand(script, &.{
+            "builtin:cornell", "-r512x512", "--spp=4096", "-t2", "-oa.png",
+        }),
+        .cwd = .{ .dir = sandbox.folder.dir },
+        .stdin = .ignore,
+        .stdout = .ignore,
+        .stderr = .ignore,
+    });
+    errdefer child.kill(io);
+    for (0..2000) |_| {
+        if ((try sandbox.names()).len == file_count) return child;
+        try io.sleep(.fromMilliseconds(10), .awake);
+    }
+    return error.NotStarted;
+}
+
+/// Sends the signals and expects that the program exits with 128 and the number of `last`.
+fn expectEndedBy(
+    child: *std.process.Child,
+    earlier: []const std.posix.SIG,
+    last: std.posix.SIG,
+) !void {
+    errdefer child.kill(io);
+    for (earlier) |signal| try std.posix.kill(child.id.?, signal);
+    try std.posix.kill(child.id.?, last);
+    const term = try child.wait(io);
+    const exit_code: u8 = @intCast(128 + @backingInt(last));
+    try testing.expectEqual(std.process.Child.Term{ .exited = exit_code }, term);
+}
+
 test "signals end a long render and leave nothing behind" {
-    for ([_]std.posix.SIG{ .INT, .TERM }) |signal| {
+    // While the scene is read, the tree is built, the picture traced, in some order.
+    for ([_]std.posix.SIG{ .HUP, .INT, .QUIT, .TERM, .XCPU }, 0..) |signal, index| {
+        errdefer std.debug.print("{t}\n", .{signal});
         var sandbox: Sandbox = .init();
         defer sandbox.deinit();
-        // Should the signal not end it, the limit of CPU seconds does.
-        const command = try sandbox.shellCommand("ulimit -t 60; exec \"$@\"", &.{
-            "builtin:cornell", "-r512x512", "--spp=4096", "-t2",
-        });
-        var child = try std.process.spawn(io, .{
-            .argv = command,
-            .cwd = .{ .dir = sandbox.folder.dir },
-            .stdin = .ignore,
-            .stdout = .ignore,
-            .stderr = .ignore,
-        });
-        // Its unfinished file shows that it is under way.
-        const started = for (0..2000) |_| {
-            var iterator = sandbox.folder.dir.iterate();
-            if (try iterator.next(io) != null) break true;
-            try io.sleep(.fromMilliseconds(10), .awake);
-        } else false;
-        try std.posix.kill(child.id.?, signal);
-        const term = try child.wait(io);
-        try testing.expect(started);
-        try testing.expectEqual(std.process.Child.Term{ .exited = 130 }, term);
+        var child = try startLong(&sandbox, "exec \"$@\"", 1);
+        if (index > 0) try io.sleep(.fromMilliseconds(@intCast(20 * index * index)), .awake);
+        try expectEndedBy(&child, &.{}, signal);
         try sandbox.expectEmpty();
     }
+}
+
+test "the limit of CPU time ends a render like a signal" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const ending = try sandbox.runShell("ulimit -S -t 1; exec \"$@\"", &.{
+        "builtin:cornell", "-r512x512", "--spp=4096",
+    });
+    try testing.expectEqual(152, ending.exit_code);
+    try sandbox.expectEmpty();
+}
+
+test "signals that are ignored at the start stay so" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    var child = try startLong(&sandbox, "trap '' HUP INT QUIT; exec \"$@\"", 1);
+    try expectEndedBy(&child, &.{ .HUP, .INT, .QUIT }, .TERM);
+    try sandbox.expectEmpty();
+}
+
+test "a killed run's leftover goes with the next one, nobody else's does" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    var living = try startLong(&sandbox, "exec \"$@\"", 1);
+    const living_name = (try sandbox.names())[0];
+    var killed = startLong(&sandbox, "exec \"$@\"", 2) catch |err| {
+        living.kill(io);
+        return err;
+    };
+    try std.posix.kill(killed.id.?, .KILL);
+    _ = try killed.wait(io);
+    const both = try sandbox.names();
+    try testing.expectEqual(2, both.len);
+    const leftover = both[@intFromBool(std.mem.eql(u8, both[0], living_name))];
+
+    // The same from another machine, whose processes and locks are not to be seen from here.
+    const mark = ".raylane-";
+    const host = std.mem.find(u8, leftover, mark) orelse return error.NotItsName;
+    const foreign = try sandbox.arena_state.allocator().dupe(u8, leftover);
+    const digit = &foreign[host + mark.len];
+    digit.* = if (digit.* == '0') '1' else '0';
+    try sandbox.write(foreign, "");
+
+    _ = try sandbox.expectExit(0, &.{ "builtin:cornell", "-r8x8", "-q", "-ob.png" });
+    try sandbox.expectFiles(&.{ living_name, foreign, "b.png" });
+    try expectEndedBy(&living, &.{}, .TERM);
+    try sandbox.expectFiles(&.{ foreign, "b.png" });
+}
+
+test "a file keeps its permissions, a link its place, a new file those of the process" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const folder = sandbox.folder.dir;
+    const script = "umask 027; : >old.png; chmod 604 old.png; mkdir d; " ++
+        "ln -s ../old.png d/link.png; ln -s new.png dangling.png; exec \"$@\"";
+    const arguments = [_][]const u8{ "builtin:cornell", "-r8x8", "-q", "-o" };
+    const through = try sandbox.runShell(script, &(arguments ++ .{"d/link.png"}));
+    try testing.expectEqual(0, through.exit_code);
+    const dangling = try sandbox.runShell("umask 027; exec \"$@\"", &(arguments ++
+        .{"dangling.png"}));
+    try testing.expectEqual(0, dangling.exit_code);
+    try sandbox.expectFiles(&.{ "old.png", "new.png", "d", "dangling.png" });
+    for ([_]struct { []const u8, u32 }{ .{ "old.png", 0o604 }, .{ "new.png", 0o640 } }) |case| {
+        const stat = try folder.statFile(io, case[0], .{ .follow_symlinks = false });
+        try testing.expectEqual(.file, stat.kind);
+        try testing.expectEqual(case[1], stat.permissions.toMode() & 0o7777);
+        try testing.expectStringStartsWith(try sandbox.read(case[0]), "\x89PNG");
+    }
+    const link = try folder.statFile(io, "d/link.png", .{ .follow_symlinks = false });
+    try testing.expectEqual(.sym_link, link.kind);
+}
+
+test "what is protected against writing is not replaced, but overwritten in a protected folder" {
+    if (std.posix.system.geteuid() == 0) return error.SkipZigTest; // Nothing is forbidden to root.
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const arguments = [_][]const u8{ "builtin:cornell", "-r8x8", "-q", "-od/a.ppm" };
+    const protect = "mkdir d; : >d/a.ppm; chmod 444 d/a.ppm; exec \"$@\"";
+    const file = try sandbox.runShell(protect, &arguments);
+    try testing.expectEqual(1, file.exit_code);
+    try expectOneErrorLine(file);
+    try testing.expectEqual(0, (try sandbox.read("d/a.ppm")).len);
+    const folder = try sandbox.runShell("chmod 644 d/a.ppm; head -c 999 /dev/zero >d/a.ppm; " ++
+        "chmod 555 d; \"$@\"; code=$?; chmod 755 d; exit $code", &arguments);
+    try testing.expectEqual(0, folder.exit_code);
+    const ppm = try sandbox.read("d/a.ppm");
+    try testing.expectStringStartsWith(ppm, "P6\n8 8\n255\n");
+    try testing.expectEqual(11 + 8 * 8 * 3, ppm.len);
+}
+
+test "descriptors, pipes and devices take the picture where they stand" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const arguments = [_][]const u8{ "builtin:cornell", "-r8x8", "--format=ppm", "-o" };
+    const expected = (try sandbox.expectExit(0, &(arguments ++ .{"-"}))).stdout;
+    // Without a report behind it.
+    const stdout = try sandbox.expectExit(0, &(arguments ++ .{"/dev/stdout"}));
+    try testing.expectEqualSlices(u8, expected, stdout.stdout);
+    for ([_]struct { []const u8, []const u8 }{
+        .{ "/dev/fd/7", "exec \"$@\" 7>>got" },
+        .{ "link", "ln -s /dev/fd/7 link; exec \"$@\" 7>>got" },
+        .{ "pipe", "mkfifo pipe; cat pipe >>got & \"$@\"; code=$?; wait; exit $code" },
+        .{ "/dev/null", "exec \"$@\"" },
+    }) |case| {
+        errdefer std.debug.print("{s}\n", .{case[0]});
+        try sandbox.write("got", "before");
+        const ending = try sandbox.runShell(case[1], &(arguments ++ .{ case[0], "-q" }));
+        try testing.expectEqualStrings("", ending.stderr);
+        try testing.expectEqual(0, ending.exit_code);
+        const got = try sandbox.read("got");
+        try testing.expectStringStartsWith(got, "before");
+        const is_lost = std.mem.eql(u8, case[0], "/dev/null");
+        try testing.expectEqualSlices(u8, if (is_lost) "" else expected, got["before".len..]);
+    }
+    try sandbox.expectFiles(&.{ "got", "link", "pipe" });
+}
+
+test "an output over its own input is refused" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const folder = sandbox.folder.dir;
+    const gltf =
+        \\{"asset":{"version":"2.0"},"buffers":[{"byteLength":4,"uri":"b.bin"}]}
+    ;
+    try sandbox.write("s.gltf", gltf);
+    try sandbox.write("b.bin", "1234");
+    try folder.hardLink("b.bin", folder, "hard.png", io, .{});
+    try folder.symLink(io, "s.gltf", "soft.png", .{});
+    try sandbox.write("s.pbrt", "WorldBegin\nInclude \"in.pbrt\"\n");
+    try sandbox.write("in.pbrt", "Shape \"sphere\"\n");
+    for ([_][]const []const u8{
+        &.{ "s.gltf", "--format=png", "-os.gltf" },
+        &.{ "s.gltf", "-osoft.png" },
+        &.{ "s.gltf", "-ohard.png" },
+        &.{ "s.pbrt", "--format=pfm", "-o./s.pbrt" },
+        &.{ "s.pbrt", "--format=png", "-oin.pbrt" },
+        &.{ "bench", "-q", "--json=b.bin", "s.gltf" },
+    }) |arguments| {
+        const ending = try sandbox.expectExit(1, arguments);
+        try expectOneErrorLine(ending);
+        const reason = "would be overwritten by the output\n";
+        try testing.expectStringEndsWith(ending.stderr, reason);
+    }
+    try testing.expectEqualStrings(gltf, try sandbox.read("s.gltf"));
+    try testing.expectEqualStrings("1234", try sandbox.read("b.bin"));
+    try sandbox.expectFiles(&.{ "b.bin", "hard.png", "in.pbrt", "s.gltf", "s.pbrt", "soft.png" });
+}
+
+test "a report that is lost spoils the picture only where it was asked for" {
+    const arguments = [_][]const u8{ "builtin:cornell", "-r8x8", "-oa.png" };
+    for ([_][]const u8{ "exec \"$@\" >/dev/full", "exec \"$@\" >&-" }) |script| {
+        var sandbox: Sandbox = .init();
+        defer sandbox.deinit();
+        const plain = try sandbox.runShell(script, &arguments);
+        try testing.expectEqual(0, plain.exit_code);
+        try expectOneErrorLine(plain);
+        try testing.expectStringStartsWith(plain.stderr, "raylane: warning: ");
+        try testing.expectStringStartsWith(try sandbox.read("a.png"), "\x89PNG");
+        for ([_][]const u8{ "--stats=json", "--stats=text" }) |stats| {
+            try sandbox.write("a.png", "old");
+            const asked = try sandbox.runShell(script, &(arguments ++ .{stats}));
+            try testing.expectEqual(1, asked.exit_code);
+            try expectOneErrorLine(asked);
+            try testing.expectStringStartsWith(try sandbox.read("a.png"), "\x89PNG");
+        }
+        try sandbox.expectFiles(&.{"a.png"});
+    }
+}
+
+test "the peak of memory is that of the program, not of its launcher" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const launcher = try std.heap.page_allocator.alloc(u8, 256 << 20);
+    defer std.heap.page_allocator.free(launcher);
+    @memset(launcher, 1);
+    const ending = try sandbox.expectExit(0, &.{ "builtin:cornell", "-r8x8", "--stats=json" });
+    const stats = try statsOf(&sandbox, ending.stdout);
+    try testing.expect(stats.memory_peak_bytes < launcher.len);
 }
 
 /// The part of the benchmark's JSON that these tests look at.

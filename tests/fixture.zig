@@ -12,32 +12,19 @@ const World = raylane.world.World;
 const vec3 = raylane.math.vec3;
 const gpa = std.testing.allocator;
 
-/// A scene under construction.
+/// A scene of simple things; node 0 is the world's origin.
 pub const Builder = struct {
-    scene: Scene,
-    nodes: std.ArrayList(raylane.scene.Node) = .empty,
-    meshes: std.ArrayList(raylane.scene.Mesh) = .empty,
-    instances: std.ArrayList(raylane.scene.Instance) = .empty,
-    materials: std.ArrayList(raylane.scene.Material) = .empty,
-    lights: std.ArrayList(raylane.scene.Light) = .empty,
-    cameras: std.ArrayList(raylane.scene.Camera) = .empty,
+    scene: raylane.scene.Builder,
 
-    /// Node 0 is the world's origin.
     pub fn init() !Builder {
         var builder: Builder = .{ .scene = .init(gpa) };
         _ = try builder.addNode(.identity);
         return builder;
     }
 
-    fn arena(builder: *Builder) std.mem.Allocator {
-        return builder.scene.arena.allocator();
-    }
-
     /// A root node.
     pub fn addNode(builder: *Builder, local: Affine) !u32 {
-        const parent = raylane.scene.none;
-        try builder.nodes.append(builder.arena(), .{ .parent = parent, .local = local });
-        return @intCast(builder.nodes.items.len - 1);
+        return builder.scene.addNode(raylane.scene.none, .of(local));
     }
 
     /// Triangles with flat faces, or with the given normals.
@@ -48,16 +35,14 @@ pub const Builder = struct {
         normals: ?[]const [3]f32,
         triangles: []const [3]u32,
     ) !void {
-        const allocator = builder.arena();
-        try builder.materials.append(allocator, material);
-        try builder.meshes.append(allocator, .{
-            .positions = try allocator.dupe([3]f32, positions),
-            .normals = if (normals) |n| try allocator.dupe([3]f32, n) else null,
-            .triangles = try allocator.dupe([3]u32, triangles),
-            .material = @intCast(builder.materials.items.len - 1),
+        const arena = builder.scene.arena();
+        const mesh = try builder.scene.addMesh(.{
+            .positions = try arena.dupe([3]f32, positions),
+            .normals = if (normals) |n| try arena.dupe([3]f32, n) else null,
+            .triangles = try arena.dupe([3]u32, triangles),
+            .material = try builder.scene.addMaterial(material),
         });
-        const mesh: u32 = @intCast(builder.meshes.items.len - 1);
-        try builder.instances.append(allocator, .{ .mesh = mesh, .node = 0 });
+        try builder.scene.addInstance(mesh, 0);
     }
 
     /// The parallelogram center +- across +- upward; its front is across x upward.
@@ -88,7 +73,7 @@ pub const Builder = struct {
         const ring_count = rows - 1;
         var normals: [ring_count * columns + 2][3]f32 = undefined;
         var triangles: std.ArrayList([3]u32) = .empty;
-        const allocator = builder.arena();
+        const arena = builder.scene.arena();
         const elementary = raylane.math.elementary;
         for (0..ring_count) |ring| for (0..columns) |column| {
             const polar = std.math.pi * @as(f64, @floatFromInt(ring + 1)) / rows;
@@ -106,14 +91,14 @@ pub const Builder = struct {
         for (0..columns) |column_index| {
             const column: u32 = @intCast(column_index);
             const next = (column + 1) % columns;
-            try triangles.append(allocator, .{ north, column, next });
+            try triangles.append(arena, .{ north, column, next });
             const last = (ring_count - 1) * columns;
-            try triangles.append(allocator, .{ south, last + next, last + column });
+            try triangles.append(arena, .{ south, last + next, last + column });
             for (0..ring_count - 1) |ring_index| {
                 const upper: u32 = @intCast(ring_index * columns);
                 const lower = upper + columns;
-                try triangles.append(allocator, .{ upper + column, lower + column, lower + next });
-                try triangles.append(allocator, .{ upper + column, lower + next, upper + next });
+                try triangles.append(arena, .{ upper + column, lower + column, lower + next });
+                try triangles.append(arena, .{ upper + column, lower + next, upper + next });
             }
         }
         var positions: [normals.len][3]f32 = undefined;
@@ -125,24 +110,15 @@ pub const Builder = struct {
 
     /// A point light.
     pub fn addPointLight(builder: *Builder, position: [3]f32, intensity: f32) !void {
-        var map: Affine = .identity;
-        map.translation = position;
-        const node = try builder.addNode(map);
-        try builder.lights.append(builder.arena(), .{
-            .kind = .point,
-            .node = node,
-            .intensity = intensity,
-        });
+        const node = try builder.addNode(.translate(position));
+        try builder.scene.addLight(.{ .kind = .point, .node = node, .intensity = intensity });
     }
 
     /// A camera at `eye` that looks along -z with a vertical angle of 2 atan(`half_height`).
     pub fn addCamera(builder: *Builder, eye: [3]f32, half_height: f32) !void {
-        var map: Affine = .identity;
-        map.translation = eye;
-        const node = try builder.addNode(map);
-        try builder.cameras.append(builder.arena(), .{
+        try builder.scene.addCamera(.{
             .name = "",
-            .node = node,
+            .node = try builder.addNode(.translate(eye)),
             .projection = .{ .perspective = .{
                 .y_fov_rad = 2 * std.math.atan(half_height),
                 .aspect = null,
@@ -151,16 +127,10 @@ pub const Builder = struct {
     }
 
     /// The scene, checked; the builder is used up.
-    pub fn finish(builder: *Builder) Scene {
-        builder.scene.nodes = builder.nodes.items;
-        builder.scene.meshes = builder.meshes.items;
-        builder.scene.instances = builder.instances.items;
-        builder.scene.materials = builder.materials.items;
-        builder.scene.lights = builder.lights.items;
-        builder.scene.cameras = builder.cameras.items;
-        if (builder.cameras.items.len > 0) builder.scene.camera_default = 0;
-        builder.scene.check();
-        return builder.scene;
+    pub fn finish(builder: *Builder) !Scene {
+        const scene = try builder.scene.finish();
+        scene.check();
+        return scene;
     }
 };
 
@@ -242,7 +212,7 @@ pub fn flat(color: [3]f32) raylane.scene.Material {
 test "a sphere is closed and faces outward" {
     var builder: Builder = try .init();
     try builder.addSphere(matte(.{ 1, 1, 1 }), .{ 0, 0, 0 }, 1, 6);
-    var scene = builder.finish();
+    var scene = try builder.finish();
     defer scene.deinit();
     const mesh = scene.meshes[0];
     try std.testing.expectEqual(2 * 12 * 5, mesh.triangles.len);

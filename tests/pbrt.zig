@@ -366,13 +366,13 @@ test "ReverseOrientation turns shapes inside out, mirroring transformations do n
 
 /// Where the first instance puts the point (x, y, z), in the world as its camera has it.
 fn placeOf(scene: *const Scene, instance: usize, point: Vec3) Vec3 {
-    var at = point;
+    var at: raylane.math.Vec3d = .{ point[0], point[1], point[2] };
     var node = scene.instances[instance].node;
     while (node != raylane.scene.none) : (node = scene.nodes[node].parent) {
         // The root mirrors z where the camera does not.
         if (scene.nodes[node].parent != raylane.scene.none) at = scene.nodes[node].local.point(at);
     }
-    return at;
+    return .{ @floatCast(at[0]), @floatCast(at[1]), @floatCast(at[2]) };
 }
 
 test "transformations act in the order in which they stand" {
@@ -665,7 +665,7 @@ test "colours as spectra, XYZ, black bodies and names" {
     try expectNear(0.95, scene.lights[2].color[1], 0.02);
     try expectEqual(Vec3{ 2, 4, 6 }, scene.lights[3].color);
     const node = scene.nodes[scene.lights[0].node];
-    try expectEqual(Vec3{ 1, 2, 3 }, node.local.translation);
+    try expectEqual(raylane.math.Vec3d{ 1, 2, 3 }, node.local.translation);
 }
 
 test "lights" {
@@ -685,10 +685,11 @@ test "lights" {
     const spot = scene.lights[0];
     try expectNear(40.0 / 180.0 * std.math.pi, spot.outer_cone_rad, 1e-6);
     try expectNear(30.0 / 180.0 * std.math.pi, spot.inner_cone_rad, 1e-6);
-    try expectNear(1, scene.nodes[spot.node].local.z[1], 1e-6); // Along -z it shines down.
-    try expectEqual(Vec3{ 1, 0, 0 }, scene.nodes[spot.node].local.translation);
+    // Along -z it shines down.
+    try expectNear(1, @floatCast(scene.nodes[spot.node].local.z[1]), 1e-6);
+    try expectEqual(raylane.math.Vec3d{ 1, 0, 0 }, scene.nodes[spot.node].local.translation);
     try expectEqual(.directional, scene.lights[1].kind);
-    try expectNear(1, scene.nodes[scene.lights[1].node].local.z[1], 1e-6);
+    try expectNear(1, @floatCast(scene.nodes[scene.lights[1].node].local.z[1]), 1e-6);
     try expectEqual(.point, scene.lights[2].kind);
     try expectNear(30.0 / 180.0 * std.math.pi, scene.lights[3].outer_cone_rad, 1e-6);
     try expectEqual(Vec3{ 1, 0.5, 2 }, scene.background.?);
@@ -712,7 +713,7 @@ test "area lights are as many points as there is room for, one a shape at least"
             sum += light.intensity;
             try expectEqual(Vec3{ 1, 2, 3 }, light.color);
             // A disk looks along z: its lights, which shine along -z, along -z of their nodes.
-            try expectNear(-1, scene.nodes[light.node].local.z[2], 1e-6);
+            try expectNear(-1, @floatCast(scene.nodes[light.node].local.z[2]), 1e-6);
         }
         try expectNear(case[0] * std.math.pi, sum, 0.01 * case[0] * std.math.pi);
     }

@@ -13,14 +13,16 @@ const testing = std.testing;
 /// What each part of `src` may import besides std, its own folder and `leaves`. A part is a file
 /// of `src` with the folder of the same name; names without a file are modules of the build.
 const directions = [_]struct { part: []const u8, may_import: []const []const u8 }{
-    .{ .part = "main", .may_import = &.{"raylane"} },
+    .{ .part = "main", .may_import = &.{ "raylane", "signals" } },
+    .{ .part = "signals", .may_import = &.{"raylane"} },
+    .{ .part = "kernel", .may_import = &.{ "config", "trace", "variant" } },
     .{ .part = "options", .may_import = &.{ "config", "variant" } },
     .{ .part = "variant", .may_import = &.{"config"} },
     .{ .part = "simd", .may_import = &.{"variant"} },
     .{ .part = "huge_pages", .may_import = &.{} },
     .{ .part = "math", .may_import = &.{} },
     .{ .part = "parallel", .may_import = &.{"simd"} },
-    .{ .part = "parse", .may_import = &.{ "scene", "cgltf", "stb_image", "parallel", "builtin" } },
+    .{ .part = "parse", .may_import = &.{ "scene", "parallel", "builtin" } },
     .{ .part = "builtin", .may_import = &.{ "scene", "parallel" } },
     .{ .part = "scene", .may_import = &.{} },
     .{ .part = "prepare", .may_import = &.{ "scene", "world", "simd", "variant", "parallel" } },
@@ -28,7 +30,8 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
     .{ .part = "trace", .may_import = &.{ "world", "film", "variant", "simd", "parallel" } },
     .{ .part = "film", .may_import = &.{"image"} },
     .{ .part = "image", .may_import = &.{} },
-    .{ .part = "output", .may_import = &.{ "image", "parallel" } },
+    .{ .part = "memory_account", .may_import = &.{} },
+    .{ .part = "output", .may_import = &.{ "image", "memory_account", "parallel" } },
     .{ .part = "report", .may_import = &.{ "config", "options", "variant", "world" } },
     .{ .part = "energy", .may_import = &.{} },
     .{
@@ -39,11 +42,14 @@ const directions = [_]struct { part: []const u8, may_import: []const []const u8 
         },
     },
     .{ .part = "diagnostic", .may_import = &.{} },
+    .{ .part = "identity", .may_import = &.{} },
     .{ .part = "statistics", .may_import = &.{} },
 };
 
 /// Parts that import no other part and that all may import; `raylane` re-exports everything.
-const leaves = [_][]const u8{ "diagnostic", "huge_pages", "math", "statistics", "std", "builtin" };
+const leaves = [_][]const u8{
+    "diagnostic", "huge_pages", "identity", "math", "statistics", "std", "builtin",
+};
 
 /// Folders of a part, and which others of its files each may import besides its own.
 const rooms = [_]struct { room: []const u8, may_import: []const []const u8 }{
@@ -63,6 +69,7 @@ const roots = [_][]const u8{
     "bench/parse.zig",
     "bench/rays.zig",
     "bench/structures.zig",
+    "src/kernel.zig",
     "src/main.zig",
     "src/raylane.zig",
     "scenes/make.zig",
@@ -70,6 +77,7 @@ const roots = [_][]const u8{
     "tests/integration.zig",
     "tests/launch.zig",
     "tests/runner.zig",
+    "tests/stb_image.zig",
     "tests/summary.zig",
     "tests/tidy.zig",
 };
@@ -103,6 +111,7 @@ const File = struct {
 
     /// Programs in any language, as opposed to prose and data.
     fn isCode(file: File) bool {
+        if (std.mem.eql(u8, std.fs.path.basename(file.path), "SHA256SUMS")) return false;
         const extension = std.fs.path.extension(file.path);
         for ([_][]const u8{ ".zig", ".zon", ".c", ".h", ".py", ".sh", "" }) |code| {
             if (std.mem.eql(u8, extension, code)) return true;

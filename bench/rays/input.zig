@@ -35,18 +35,18 @@ pub fn placeCamera(
     const arena = scene.arena.allocator();
     const first: u32 = @intCast(scene.nodes.len);
     scene.nodes = try std.mem.concat(arena, raylane.scene.Node, &.{ scene.nodes, &.{
-        .{ .parent = raylane.scene.none, .local = .{
+        .{ .parent = raylane.scene.none, .local = .of(raylane.math.Affine{
             .x = right,
             .y = vec3.cross(back, right),
             .z = back,
             .translation = view.eye,
-        } },
-        .{ .parent = raylane.scene.none, .local = .{
+        }) },
+        .{ .parent = raylane.scene.none, .local = .of(raylane.math.Affine{
             .x = .{ 1, 0, 0 },
             .y = .{ 0, 1, 0 },
             .z = .{ 0, 0, 1 },
             .translation = view.light,
-        } },
+        }) },
     } });
     scene.cameras = try arena.dupe(raylane.scene.Camera, &.{.{
         .name = "",

@@ -23,10 +23,6 @@ pub fn Tracer(comptime Kernel: type) type {
         /// The benchmark's point light.
         light: raylane.world.Light,
         tests: raylane.statistics.TestCounts = .{},
-        /// Which rays of the last batch went as beams.
-        coherence: Coherence = .none,
-
-        const Coherence = dispatch.Coherence(Kernel);
         const Self = @This();
 
         /// Nearest hits of rays from the eye, one through each pixel of a tile, all active.
@@ -42,8 +38,7 @@ pub fn Tracer(comptime Kernel: type) type {
             const light = &tracer.light;
             switch (Kernel.variant.traversal) {
                 .beam => {
-                    const coherence: *const Coherence =
-                        if (bounced) &tracer.coherence else &.all;
+                    const coherence: dispatch.Coherence = if (bounced) .none else .all;
                     dispatch.anyHit(Kernel, geometry, batch.bundle(), light, coherence, tests);
                 },
                 .packet2x2, .single => tracer.traceEach(.any_hit, batch),
@@ -59,11 +54,10 @@ pub fn Tracer(comptime Kernel: type) type {
             const geometry = &tracer.world.geometry;
             const tests = &tracer.tests;
             switch (Kernel.variant.traversal) {
-                .beam => tracer.coherence = dispatch
-                    .closestHit(Kernel, geometry, batch.bundle(), grid, &batch.shares, tests),
+                .beam => _ = dispatch.closestHit(Kernel, geometry, batch.bundle(), grid, tests),
                 .packet2x2, .single => tracer.traceEach(.closest_hit, batch),
             }
-            if (tracer.coherence != .all) tracer.weighHits(batch);
+            tracer.weighHits(batch);
         }
 
         /// Group by group, each by itself.
@@ -75,25 +69,22 @@ pub fn Tracer(comptime Kernel: type) type {
                     bundle_file.trace(Kernel, query, geometry, group, tests);
                     continue;
                 }
-                const view = bundle_file.viewOf(Lanes, group);
+                const view = bundle_file.viewOf(Lanes, &geometry.padding, group);
                 raylane.trace.single.traceEach(Kernel, query, geometry, group, &view, tests);
             }
         }
 
-        /// Barycentric weights of the nearest hits, by the edge functions that decided them; those
-        /// of beams are there already.
+        /// Barycentric weights of the nearest hits, by the edge functions that decided them.
         fn weighHits(tracer: *const Self, batch: *Batch) void {
             var hits: [Batch.group_count]Lanes.Mask = undefined;
-            for (&hits, &batch.groups, 0..) |*hit, *group, index| {
+            for (&hits, &batch.groups) |*hit, *group| {
                 hit.* = group.active.andNot(group.closest.primitive.lt(.zero()));
-                if (Kernel.variant.traversal == .beam and tracer.coherence == .some)
-                    hit.* = hit.andNot(tracer.coherence.some[index]);
                 if (hit.any()) tracer.prefetchCorners(group.closest.primitive, hit.bits());
             }
             for (&batch.groups, &batch.shares, hits) |*group, *all, hit| {
                 if (hit.none()) continue;
                 const primitive: Lanes.I32 = .select(hit, group.closest.primitive, .zero());
-                const weights = edgeFunctions(tracer.gather(primitive), group.line, hit);
+                const weights = edgeFunctions(tracer.cornersOf(primitive, hit), group.line, hit);
                 const share = Lanes.F32.splat(1).div(weights.sum());
                 const both = [2]Lanes.F32{ weights.b.mul(share), weights.c.mul(share) };
                 for (all, both) |*to, value| {
@@ -111,6 +102,18 @@ pub fn Tracer(comptime Kernel: type) type {
                 const numbers = geometry.triangles[@intCast(primitives[@ctz(hits)])].corner;
                 inline for (numbers) |number| @prefetch(&geometry.positions[number], .{});
             }
+        }
+
+        /// Corners of what was hit: neighbours mostly hit the same.
+        fn cornersOf(tracer: *const Self, primitives: Lanes.I32, hit: Lanes.Mask) [3]Lanes.Vec3 {
+            const one = primitives.lane(@ctz(hit.bits()));
+            if (hit.andNot(primitives.eq(.splat(one))).any()) return tracer.gather(primitives);
+            const geometry = &tracer.world.geometry;
+            var corners: [3]Lanes.Vec3 = undefined;
+            for (&corners, geometry.triangles[@intCast(one)].corner) |*corner, number| {
+                corner.* = .splat(geometry.positions[number]);
+            }
+            return corners;
         }
 
         fn gather(tracer: *const Self, primitives: Lanes.I32) [3]Lanes.Vec3 {
@@ -135,7 +138,8 @@ pub fn Tracer(comptime Kernel: type) type {
             hit: Lanes.Mask,
         ) triangle.EdgeFunctions(Lanes) {
             const axis: ray_file.LongAxis(Lanes) = .of(line.direction);
-            const view: ray_file.ShearedRay(Lanes) = .init(line, axis);
+            const padding = &raylane.world.Padding.init(@splat(0), .empty);
+            const view: ray_file.ShearedRay(Lanes) = .init(line, axis, padding);
             const turned: [3]Lanes.Vec3 = .{
                 axis.turn(corners[0]), axis.turn(corners[1]), axis.turn(corners[2]),
             };

@@ -119,6 +119,7 @@ pub fn Workload(comptime Kernel: type) type {
                 .shared = workload,
                 .tracer = .{ .world = workload.world, .light = .{
                     .kind = .point,
+                    .from_receiver = false,
                     .position = workload.setup.light,
                     .direction = .{ 0, 0, -1 },
                     .intensity = .{ 1, 1, 1 },
@@ -307,7 +308,7 @@ pub fn Workload(comptime Kernel: type) type {
                         const number = numbers[part * 4 + lane];
                         row.* = .loadAligned(@alignCast(&normals[@intCast(number + 1)]));
                     }
-                    const columns = Four.transpose4x4(rows);
+                    const columns = transposed(Four.F32, rows);
                     inline for (&arrays, columns[0..3]) |*axis, column| {
                         column.store(axis[part * 4 ..][0..4]);
                     }
@@ -361,4 +362,18 @@ fn everyOther(code: u32) u32 {
     bits = (bits | bits >> 2) & 0x0f0f_0f0f;
     bits = (bits | bits >> 4) & 0x00ff_00ff;
     return (bits | bits >> 8) & 0x0000_ffff;
+}
+
+/// Rows to columns: lane r of result c is lane c of `rows[r]`.
+inline fn transposed(comptime F32: type, rows: [4]F32) [4]F32 {
+    const even_low = rows[0].interleaveLow(rows[2]);
+    const even_high = rows[0].interleaveHigh(rows[2]);
+    const odd_low = rows[1].interleaveLow(rows[3]);
+    const odd_high = rows[1].interleaveHigh(rows[3]);
+    return .{
+        even_low.interleaveLow(odd_low),
+        even_low.interleaveHigh(odd_low),
+        even_high.interleaveLow(odd_high),
+        even_high.interleaveHigh(odd_high),
+    };
 }

@@ -21,13 +21,15 @@ pub const block_cost: f32 = 2;
 /// A triangle by its number, within its box.
 pub const Reference = struct { box: Box3, number: u32 };
 
-/// All triangles of a world, within their boxes grown as `World.pad` and `World.node_margin` ask.
+/// All triangles of a world, within their boxes grown as nodes are.
 pub fn references(arena: Allocator, world: *const World) error{OutOfMemory}![]Reference {
     const list = try arena.alloc(Reference, world.geometry.triangles.len);
     for (list, world.geometry.triangles, 0..) |*reference, triangle, number| {
         var box: Box3 = .empty;
         for (triangle.corner) |corner| box = box.include(world.geometry.positions[corner]);
-        const grown = box.grow(world.geometry.pad + world.geometry.node_margin);
+        const padding = &world.geometry.padding;
+        const padded = box.grow(padding.ofBox(box));
+        const grown = padded.grow(padding.marginOfBox(padded));
         reference.* = .{ .box = grown, .number = @intCast(number) };
     }
     return list;

@@ -16,6 +16,9 @@ const Reference = cost.Reference;
 const Single = ray_file.Single;
 const TestCounts = raylane.statistics.TestCounts;
 const World = raylane.world.World;
+
+/// Of rays of which nothing is asked that padding has a part in.
+const no_padding: raylane.world.Padding = .init(@splat(0), .empty);
 const assert = std.debug.assert;
 
 const bin_count = 32;
@@ -208,7 +211,7 @@ fn Course(comptime Lanes: type) type {
 
         /// From where rays enter the tree to where they leave it or end.
         inline fn init(tree: *const Tree, ray: *const ray_file.Ray(Lanes)) @This() {
-            const slabs: ray_file.RayInverse(Lanes) = .init(ray.line);
+            const slabs: ray_file.RayInverse(Lanes) = .init(ray.line, &no_padding);
             var course: @This() = .{
                 .origin = .{ slabs.origin.x, slabs.origin.y, slabs.origin.z },
                 .inverse = .{
@@ -246,7 +249,7 @@ pub fn traceSingle(
     ray: *ray_file.Ray(Single),
 ) void {
     var counts: TestCounts = .{};
-    const view = bundle_file.viewOf(Single, ray);
+    const view = bundle_file.viewOf(Single, &world.geometry.padding, ray);
     const TraversalRay = raylane.trace.traversal_ray.TraversalRay(Kernel);
     var traversal_ray: TraversalRay = .of(Single, false, ray, &view, 0);
     const course: Course(Single) = .init(tree, ray);
@@ -282,7 +285,7 @@ pub fn traceSingle(
         if (near <= far) {
             var found = false;
             for (tree.blocks[at.first..][0..at.pack_count]) |*block| {
-                found = traversal_ray.intersect(block, world.geometry.pad, &counts) or found;
+                found = traversal_ray.intersect(block, &world.geometry.padding, &counts) or found;
             }
             if (query == .any_hit and found) break;
         }
@@ -326,7 +329,7 @@ pub fn tracePacket(
 ) void {
     const Rays = Kernel.Rays;
     if (group.active.none()) return;
-    const view = bundle_file.viewOf(Rays, group);
+    const view = bundle_file.viewOf(Rays, &world.geometry.padding, group);
     var is_down: [3]bool = undefined;
     for (&is_down, view.slabs.negative) |*down, negative| {
         down.* = negative.bitAnd(group.active).any();
@@ -394,7 +397,7 @@ inline fn intersectBlock(
         if (block.primitive[lane] == raylane.world.none) break;
         _ = bundle_file.intersectLane(Kernel, query, group, view, block, .{
             .lane = lane,
-            .pad = world.geometry.pad,
+            .padding = &world.geometry.padding,
         }, counts);
     }
 }

@@ -12,6 +12,7 @@ const statistics = @import("../statistics.zig");
 const trace_file = @import("../trace.zig");
 const variant_file = @import("../variant.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const Identity = @import("../identity.zig").Identity;
 const Film = @import("../film.zig").Film;
 const World = @import("../world.zig").World;
 const Allocator = std.mem.Allocator;
@@ -21,6 +22,7 @@ const Io = std.Io;
 pub const Settings = struct {
     scene: []const u8,
     allow_outside: bool,
+    output: ?Identity,
     width: u32,
     height: u32,
     thread_count: usize,
@@ -79,6 +81,7 @@ pub const Stages = struct {
         const start_ns = stages.now();
         var scene = try parse.parse(stages.gpa, stages.io, settings.scene, .{
             .allow_outside = settings.allow_outside,
+            .output = settings.output,
         }, stages.diagnostic);
         defer scene.deinit();
         stages.triangle_count = scene.triangleCount();

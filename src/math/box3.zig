@@ -4,8 +4,8 @@
 //! coordinate never enters a box (comparisons with it are false).
 
 const std = @import("std");
-const vec3 = @import("vec3.zig");
-const Vec3 = vec3.Vec3;
+const Vec3 = [3]f32;
+const vec3 = @import("vec3.zig").Operations(Vec3);
 
 /// The points p with lower <= p <= upper on every axis.
 pub const Box3 = struct {

@@ -1,197 +1,263 @@
-//! Where an image goes: a file that is replaced as a whole, or standard output.
+//! Where an image goes: a file that is replaced as a whole, or something that takes a stream.
 //!
 //! A temporary file is created in the target's folder before anything is rendered, so that an
 //! unwritable place is an error in the first second; it takes the target's name when all of it is
-//! on the disk. Whatever goes wrong, the old file stays and nothing else does, also when a signal
-//! ends the program: its handler calls `discardPending`.
+//! on the disk. Whatever goes wrong, the old file stays and nothing else does (temporary.zig).
+//!
+//! A symbolic link is followed: what it names is replaced, the link stays. A file keeps its
+//! permissions, and one that must not be written is not replaced either. Standard output, open
+//! descriptors (/dev/fd/N), pipes and devices are written where they stand. So is a file whose
+//! folder takes no new ones or does not let it be replaced, such as a single file mounted into a
+//! container: it is overwritten at the end, from memory, and only an error there can spoil it.
 
 const std = @import("std");
-const Io = std.Io;
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const Identity = @import("../identity.zig").Identity;
+const temporary_files = @import("temporary.zig");
+const Io = std.Io;
+const TemporaryFile = temporary_files.TemporaryFile;
+const TemporaryFiles = temporary_files.TemporaryFiles;
 const assert = std.debug.assert;
 
 pub const Error = error{InputOutput};
 
-/// Bytes of a file name at most, as on all usual file systems.
-const name_bytes_max = 255;
-/// Temporary names that are tried; a name is taken only if a crash left a file behind.
-const attempt_count_max = 100;
+const name_bytes_max = temporary_files.name_bytes_max;
+/// As many symbolic links in a row as the system itself follows.
+const link_count_max = 40;
 
-/// What a signal handler has to remove.
-const Pending = struct {
-    /// Whether `folder` and `name` are set; written last, read first.
-    armed: std.atomic.Value(bool) = .init(false),
-    folder: std.posix.fd_t = -1,
-    name: [name_bytes_max:0]u8 = undefined,
-    length: usize = 0,
-
-    fn path(self: *const Pending) []const u8 {
-        return self.name[0..self.length];
-    }
-};
-
-/// Global because a signal handler has no argument to find it by.
-var pending: Pending = .{};
-
-/// Unlinks the temporary file of the open target, if any. Async-signal-safe; the program must end
-/// right after it.
-pub fn discardPending() void {
-    if (!pending.armed.load(.acquire)) return;
-    _ = std.c.unlinkat(pending.folder, &pending.name, 0);
-}
-
-/// An image under way to its place. One at a time may be open.
+/// An image under way to its place.
 pub const Target = struct {
     io: Io,
-    state: State,
-
-    const State = union(enum) {
+    state: union(enum) {
         closed,
-        stdout,
-        file: struct {
-            folder: Io.Dir,
-            /// Name within the folder; the caller's memory.
-            name: []const u8,
-            /// Its name is in `pending`; null once it is closed.
-            temporary: ?Io.File,
-        },
-    };
+        /// Written where it stands.
+        stream: Io.File,
+        file: Place,
+    },
+    /// The file that is there already: nobody should read it while this target is open.
+    replaces: ?Identity,
 
     /// Opens standard output as the target.
     pub fn openStdout(io: Io) Target {
-        return .{ .io = io, .state = .stdout };
+        return .ofStream(io, .stdout());
     }
 
-    /// Creates the temporary file beside `path`, which must outlive the target. Asserts that no
-    /// other file target is open. Errors: the folder does not exist or cannot be written, the
-    /// target exists and is not a regular file, its name is too long.
-    pub fn openFile(io: Io, path: []const u8, diagnostic: *Diagnostic) Error!Target {
-        assert(!pending.armed.load(.monotonic));
-        const name = std.fs.path.basename(path);
-        if (name.len == 0 or path[path.len - 1] == '/') {
-            return diagnostic.fail(error.InputOutput, "cannot write: not a file name", .{});
-        }
-        // `Io.Dir.statFile` holds a name too long for a bug of its caller.
-        if (name.len > name_bytes_max) {
-            return diagnostic.fail(error.InputOutput, "cannot write: name too long", .{});
-        }
-        const folder_path = std.fs.path.dirname(path) orelse ".";
-        const folder = Io.Dir.cwd().openDir(io, folder_path, .{}) catch |err|
-            return diagnostic.fail(error.InputOutput, "no access to its folder: {s}", .{
-                reason(err),
-            });
-        errdefer folder.close(io);
-
-        if (folder.statFile(io, name, .{ .follow_symlinks = false })) |stat| {
-            if (stat.kind != .file) return diagnostic.fail(
-                error.InputOutput,
-                "cannot write: it exists and is not a regular file",
-                .{},
-            );
-        } else |err| if (err != error.FileNotFound) {
-            return diagnostic.fail(error.InputOutput, "cannot write: {s}", .{reason(err)});
-        }
-        return .{ .io = io, .state = .{ .file = .{
-            .folder = folder,
-            .name = name,
-            .temporary = try createTemporary(io, folder, name, diagnostic),
-        } } };
+    fn ofStream(io: Io, file: Io.File) Target {
+        return .{ .io = io, .state = .{ .stream = file }, .replaces = .of(file.handle) };
     }
 
-    /// Writes the parts one after another; a file is then flushed to the disk and renamed to its
-    /// place. Closes the target; on an error it is abandoned.
+    /// Opens the place called `path`, with a file among `temporaries` until the target is closed.
+    /// Errors: its folder does not exist or cannot be written, it is a folder or must not be
+    /// written, its name is too long.
+    pub fn openFile(
+        io: Io,
+        temporaries: *TemporaryFiles,
+        path: []const u8,
+        diagnostic: *Diagnostic,
+    ) Error!Target {
+        var place: Place = .{};
+        errdefer place.close(io);
+        var link_buffer: [Io.Dir.max_path_bytes]u8 = undefined;
+        var rest = path;
+        for (0..link_count_max) |_| {
+            if (descriptorOf(rest)) |descriptor| {
+                const file = duplicate(descriptor) catch |err| return fail(err, diagnostic);
+                place.close(io);
+                return .ofStream(io, file);
+            }
+            try place.enter(io, rest, diagnostic);
+            place.existing = place.folder.openFile(io, place.name(), .{
+                .mode = .write_only,
+                .follow_symlinks = false,
+            }) catch |err| switch (err) {
+                error.FileNotFound => null,
+                error.SymLinkLoop => {
+                    rest = place.follow(io, &link_buffer) catch |why| return fail(why, diagnostic);
+                    continue;
+                },
+                else => return fail(err, diagnostic),
+            };
+            return place.open(io, temporaries) catch |err| fail(err, diagnostic);
+        }
+        return fail(error.SymLinkLoop, diagnostic);
+    }
+
+    /// Writes the parts one after another; a file is then flushed to the disk and put in its place.
+    /// Closes the target; on an error it is abandoned.
     pub fn finish(
         target: *Target,
         parts: []const []const u8,
         diagnostic: *Diagnostic,
     ) Error!void {
-        assert(target.state != .closed);
         defer target.abandon();
-        const io = target.io;
-        const file: Io.File = switch (target.state) {
+        switch (target.state) {
             .closed => unreachable,
-            .stdout => .stdout(),
-            .file => |state| state.temporary.?,
-        };
-        for (parts) |part| writeAll(io, file, part) catch |err|
-            return diagnostic.fail(error.InputOutput, "cannot write: {s}", .{reason(err)});
-        if (target.state == .stdout) return;
-
-        file.sync(io) catch |err|
-            return diagnostic.fail(error.InputOutput, "cannot write: {s}", .{reason(err)});
-        target.state.file.temporary = null;
-        // `Io.File.close` hides the result, which some network file systems say a full disk by.
-        if (std.c.close(file.handle) != 0 and std.posix.errno(-1) != .INTR) {
-            return diagnostic.fail(error.InputOutput, "cannot write: closing failed", .{});
+            .stream => |file| writeAll(target.io, file, parts) catch |err|
+                return fail(err, diagnostic),
+            .file => |*place| place.replace(target.io, parts) catch |err|
+                return fail(err, diagnostic),
         }
-        const folder = target.state.file.folder;
-        folder.rename(pending.path(), folder, target.state.file.name, io) catch |err|
-            return diagnostic.fail(error.InputOutput, "cannot replace: {s}", .{reason(err)});
-        pending.armed.store(false, .release);
-        syncFolder(io, folder);
     }
 
     /// Closes the target and removes what has not taken its place. Does nothing on a closed one.
     pub fn abandon(target: *Target) void {
         switch (target.state) {
-            .closed, .stdout => {},
-            .file => |state| {
-                discardPending();
-                pending.armed.store(false, .release);
-                if (state.temporary) |temporary| temporary.close(target.io);
-                state.folder.close(target.io);
-            },
+            .closed => {},
+            .stream => |file| if (file.handle != Io.File.stdout().handle) file.close(target.io),
+            .file => |*place| place.close(target.io),
         }
         target.state = .closed;
     }
 };
 
-/// Writes all bytes, however few the system takes at a time.
-fn writeAll(io: Io, file: Io.File, bytes: []const u8) Io.File.Writer.Error!void {
-    var rest = bytes;
-    while (rest.len > 0) {
-        const written = file.writeStreaming(io, &.{}, &.{rest}, 1) catch |err| switch (err) {
-            // Somebody gave us a pipe that does not wait by itself.
-            error.WouldBlock => {
-                var writable = [_]std.posix.pollfd{.{
-                    .fd = file.handle,
-                    .events = std.posix.POLL.OUT,
-                    .revents = 0,
-                }};
-                _ = std.posix.poll(&writable, -1) catch return error.WouldBlock;
-                continue;
+/// A name in a folder, whatever has it now, and what shall have it.
+const Place = struct {
+    folder: Io.Dir = .cwd(),
+    name_buffer: [name_bytes_max]u8 = undefined,
+    name_length: usize = 0,
+    /// Open for writing.
+    existing: ?Io.File = null,
+    /// Null: the existing file is overwritten.
+    temporary: ?*TemporaryFile = null,
+
+    fn name(place: *const Place) []const u8 {
+        return place.name_buffer[0..place.name_length];
+    }
+
+    /// Goes on to `path`, from the folder where the place is so far.
+    fn enter(place: *Place, io: Io, path: []const u8, diagnostic: *Diagnostic) Error!void {
+        const last = std.fs.path.basename(path);
+        if (last.len == 0 or path[path.len - 1] == '/') return fail(error.BadPathName, diagnostic);
+        if (last.len > name_bytes_max) return fail(error.NameTooLong, diagnostic);
+        const folder_path = std.fs.path.dirname(path) orelse ".";
+        const folder = place.folder.openDir(io, folder_path, .{}) catch |err|
+            return diagnostic.fail(error.InputOutput, "no access to its folder: {s}", .{
+                reason(err),
+            });
+        place.closeFolder(io);
+        place.folder = folder;
+        @memcpy(place.name_buffer[0..last.len], last);
+        place.name_length = last.len;
+    }
+
+    /// Where a symbolic link leads, unless the system forbids to follow it, as it does with those
+    /// of others in folders that everybody may write.
+    fn follow(place: *const Place, io: Io, buffer: []u8) ![]const u8 {
+        if (place.folder.openFile(io, place.name(), .{ .path_only = true })) |file| {
+            file.close(io);
+        } else |err| if (err != error.FileNotFound) return err;
+        return buffer[0..try place.folder.readLink(io, place.name(), buffer)];
+    }
+
+    fn open(place: *Place, io: Io, temporaries: *TemporaryFiles) !Target {
+        var permissions: Io.File.Permissions = .default_file;
+        var replaces: ?Identity = null;
+        if (place.existing) |file| {
+            const stat = try file.stat(io);
+            if (stat.kind != .file) {
+                place.closeFolder(io);
+                return .ofStream(io, file);
+            }
+            permissions = .fromMode(stat.permissions.toMode() & 0o777);
+            replaces = .of(file.handle);
+        }
+        const created = temporaries.create(io, place.folder, place.name(), permissions);
+        place.temporary = created catch |err| switch (err) {
+            error.AccessDenied, error.PermissionDenied, error.ReadOnlyFileSystem => created: {
+                if (place.existing == null) return err;
+                break :created null;
             },
             else => return err,
         };
-        rest = rest[written..];
+        // The process may withhold some at creation. Not all file systems know permissions.
+        if (place.temporary) |temporary| if (place.existing != null) {
+            temporary.file.setPermissions(io, permissions) catch {};
+        };
+        return .{ .io = io, .state = .{ .file = place.* }, .replaces = replaces };
+    }
+
+    fn replace(place: *Place, io: Io, parts: []const []const u8) !void {
+        if (place.temporary) |temporary| {
+            try writeAll(io, temporary.file, parts);
+            try flush(io, temporary.file);
+            if (temporary.rename(io, place.name())) {
+                place.temporary = null;
+                return syncFolder(io, place.folder);
+            } else |err| if (place.existing == null) return err;
+        }
+        const existing = place.existing.?;
+        try writeAll(io, existing, parts);
+        var length: u64 = 0;
+        for (parts) |part| length += part.len;
+        try existing.setLength(io, length);
+        try flush(io, existing);
+    }
+
+    fn close(place: *Place, io: Io) void {
+        if (place.temporary) |temporary| temporary.discard(io);
+        if (place.existing) |existing| existing.close(io);
+        place.closeFolder(io);
+    }
+
+    fn closeFolder(place: *Place, io: Io) void {
+        if (place.folder.handle != Io.Dir.cwd().handle) place.folder.close(io);
+    }
+};
+
+/// The open descriptor that a path stands for. Its name in the file system would open a file anew,
+/// from the start, and would not open a socket.
+fn descriptorOf(path: []const u8) ?std.posix.fd_t {
+    if (std.mem.eql(u8, path, "/dev/stdout")) return 1;
+    if (std.mem.eql(u8, path, "/dev/stderr")) return 2;
+    for ([_][]const u8{ "/dev/fd/", "/proc/self/fd/" }) |folder| {
+        const digits = std.mem.cutPrefix(u8, path, folder) orelse continue;
+        return std.fmt.parseUnsigned(u31, digits, 10) catch null;
+    }
+    return null;
+}
+
+fn duplicate(descriptor: std.posix.fd_t) !Io.File {
+    const flags = std.c.fcntl(descriptor, std.c.F.GETFL);
+    if (flags < 0) return error.NotOpenForWriting;
+    const access: std.posix.O = @bitCast(flags);
+    if (access.ACCMODE == .RDONLY) return error.NotOpenForWriting;
+    // Not one of the standard three, which are never closed.
+    const handle = std.c.fcntl(descriptor, std.c.F.DUPFD_CLOEXEC, @as(c_int, 3));
+    if (handle < 0) return error.ProcessFdQuotaExceeded;
+    return .{ .handle = handle, .flags = .{ .nonblocking = false } };
+}
+
+/// Writes all bytes, however few the system takes at a time.
+fn writeAll(io: Io, file: Io.File, parts: []const []const u8) Io.File.Writer.Error!void {
+    for (parts) |part| {
+        var rest = part;
+        while (rest.len > 0) {
+            const written = file.writeStreaming(io, &.{}, &.{rest}, 1) catch |err| switch (err) {
+                // Somebody gave us a pipe that does not wait by itself.
+                error.WouldBlock => {
+                    var writable = [_]std.posix.pollfd{.{
+                        .fd = file.handle,
+                        .events = std.posix.POLL.OUT,
+                        .revents = 0,
+                    }};
+                    _ = std.posix.poll(&writable, -1) catch return error.WouldBlock;
+                    continue;
+                },
+                else => return err,
+            };
+            rest = rest[written..];
+        }
     }
 }
 
-/// Creates `.NAME.PID-ATTEMPT.tmp` and arms `pending` with it.
-fn createTemporary(
-    io: Io,
-    folder: Io.Dir,
-    name: []const u8,
-    diagnostic: *Diagnostic,
-) Error!Io.File {
-    const kept = name[0..@min(name.len, name_bytes_max - 40)];
-    pending.folder = folder.handle;
-    var attempt: u32 = 0;
-    while (true) : (attempt += 1) {
-        pending.armed.store(false, .release);
-        const path = std.mem.printSentinel(&pending.name, ".{s}.{d}-{d}.tmp", .{
-            kept, std.c.getpid(), attempt,
-        }, 0) catch unreachable; // 30 bytes at most beside `kept`.
-        pending.length = path.len;
-        // Armed before it exists: there is no moment when a signal would leave it behind.
-        pending.armed.store(true, .release);
-        // Exclusive creation does not follow a symbolic link either.
-        return folder.createFile(io, path, .{ .exclusive = true }) catch |err| {
-            pending.armed.store(false, .release);
-            if (err == error.PathAlreadyExists and attempt + 1 < attempt_count_max) continue;
-            return diagnostic.fail(error.InputOutput, "cannot write: {s}", .{reason(err)});
-        };
-    }
+/// Waits until the file is on the disk.
+fn flush(io: Io, file: Io.File) !void {
+    try file.sync(io);
+    // Some network file systems say a full disk when a file is closed: a duplicate is, for the file
+    // itself keeps its lock.
+    const copy = std.c.dup(file.handle);
+    if (copy < 0 or std.c.close(copy) == 0) return;
+    if (std.posix.errno(-1) != .INTR) return error.InputOutput;
 }
 
 /// Flushes the renaming to the disk. Not all file systems can, and the file is in place by then:
@@ -206,13 +272,16 @@ const reasons: std.StaticStringMap([]const u8) = .initComptime(.{
     .{ "AccessDenied", "permission denied" },
     .{ "BadPathName", "not a file name" },
     .{ "BrokenPipe", "nobody reads it" },
+    .{ "Canceled", "the program is ending" },
     .{ "DeviceBusy", "device busy" },
     .{ "DiskQuota", "disk quota exceeded" },
+    .{ "FileBusy", "it is in use" },
     .{ "FileNotFound", "no such file or directory" },
     .{ "FileTooBig", "file too large" },
     .{ "InputOutput", "input/output error" },
     .{ "IsDir", "it is a directory" },
     .{ "NameTooLong", "name too long" },
+    .{ "NoDevice", "no such device" },
     .{ "NoSpaceLeft", "no space left on the device" },
     .{ "NotDir", "not a directory" },
     .{ "NotOpenForWriting", "it is closed" },
@@ -230,9 +299,16 @@ fn reason(err: anytype) []const u8 {
     return reasons.get(name) orelse name;
 }
 
-/// A folder for a test, and paths into it.
+/// Says why nothing can be written.
+fn fail(err: anytype, diagnostic: *Diagnostic) Error {
+    return diagnostic.fail(error.InputOutput, "cannot write: {s}", .{reason(err)});
+}
+
+/// A folder for a test, paths into it, and its temporary files.
 const TestFolder = struct {
     folder: std.testing.TmpDir,
+    temporaries: TemporaryFiles = .{},
+    diagnostic: Diagnostic = .{},
     buffer: [std.fs.max_path_bytes]u8 = undefined,
 
     fn init() TestFolder {
@@ -245,94 +321,212 @@ const TestFolder = struct {
         return self.buffer[0 .. length + rest.len];
     }
 
+    fn open(self: *TestFolder, name: []const u8) !Target {
+        const full = try self.path(name);
+        return .openFile(std.testing.io, &self.temporaries, full, &self.diagnostic);
+    }
+
     /// Expects exactly one entry, a file with these contents.
     fn expectOnly(self: *TestFolder, name: []const u8, contents: []const u8) !void {
-        const io = std.testing.io;
-        var buffer: [64]u8 = undefined;
-        const found = try self.folder.dir.readFile(io, name, &buffer);
-        try std.testing.expectEqualStrings(contents, found);
+        try self.expectFile(name, contents);
         var entries = self.folder.dir.iterate();
-        while (try entries.next(io)) |entry| try std.testing.expectEqualStrings(name, entry.name);
+        while (try entries.next(std.testing.io)) |entry| {
+            try std.testing.expectEqualStrings(name, entry.name);
+        }
+    }
+
+    fn expectFile(self: *TestFolder, name: []const u8, contents: []const u8) !void {
+        var buffer: [64]u8 = undefined;
+        const found = try self.folder.dir.readFile(std.testing.io, name, &buffer);
+        try std.testing.expectEqualStrings(contents, found);
+    }
+
+    fn expectOpenFails(self: *TestFolder, full: []const u8, needle: []const u8) !void {
+        const io = std.testing.io;
+        const result = Target.openFile(io, &self.temporaries, full, &self.diagnostic);
+        try std.testing.expectError(error.InputOutput, result);
+        const text = self.diagnostic.message.text();
+        errdefer std.debug.print("{s}\n", .{text});
+        try std.testing.expect(std.mem.find(u8, text, needle) != null);
     }
 };
 
-fn expectOpenFails(path: []const u8, needle: []const u8) !void {
-    var diagnostic: Diagnostic = .{};
-    const result = Target.openFile(std.testing.io, path, &diagnostic);
-    try std.testing.expectError(error.InputOutput, result);
-    const text = diagnostic.message.text();
-    errdefer std.debug.print("{s}\n", .{text});
-    try std.testing.expect(std.mem.find(u8, text, needle) != null);
-}
-
 test "a file is replaced as a whole, or not at all" {
     const io = std.testing.io;
-    var test_folder: TestFolder = .init();
-    defer test_folder.folder.cleanup();
-    const dir = test_folder.folder.dir;
-    const path = try test_folder.path("a.png");
-    try dir.writeFile(io, .{ .sub_path = "a.png", .data = "old" });
-    var diagnostic: Diagnostic = .{};
+    var folder: TestFolder = .init();
+    defer folder.folder.cleanup();
+    try folder.folder.dir.writeFile(io, .{ .sub_path = "a.png", .data = "old" });
 
-    var abandoned: Target = try .openFile(io, path, &diagnostic);
+    var abandoned = try folder.open("a.png");
     abandoned.abandon();
     abandoned.abandon();
-    try test_folder.expectOnly("a.png", "old");
+    try folder.expectOnly("a.png", "old");
 
-    var interrupted: Target = try .openFile(io, path, &diagnostic);
-    discardPending();
-    discardPending();
-    try test_folder.expectOnly("a.png", "old");
-    try std.testing.expectError(error.InputOutput, interrupted.finish(&.{"new"}, &diagnostic));
-    try test_folder.expectOnly("a.png", "old");
+    // Several at once, in any order.
+    var first = try folder.open("a.png");
+    var second = try folder.open("a.png");
+    var third = try folder.open("b.png");
+    try first.finish(&.{"first"}, &folder.diagnostic);
+    try folder.expectFile("a.png", "first");
+    third.abandon();
+    try second.finish(&.{ "s", "", "econd" }, &folder.diagnostic);
+    second.abandon();
+    try folder.expectOnly("a.png", "second");
 
-    var finished: Target = try .openFile(io, path, &diagnostic);
-    try finished.finish(&.{ "n", "", "ew" }, &diagnostic);
-    finished.abandon();
-    discardPending();
-    try test_folder.expectOnly("a.png", "new");
+    const long: [name_bytes_max]u8 = @splat('x');
+    var longest = try folder.open(&long);
+    try longest.finish(&.{"long"}, &folder.diagnostic);
+    try folder.expectFile(&long, "long");
+    try folder.folder.dir.deleteFile(io, &long);
+
+    var interrupted = try folder.open("a.png");
+    folder.temporaries.discardAll();
+    folder.temporaries.discardAll();
+    try folder.expectOnly("a.png", "second");
+    try folder.expectOpenFails(try folder.path("b.png"), "the program is ending");
+    try folder.expectOnly("a.png", "second");
+    interrupted.abandon();
+}
+
+test "a new file that lost its temporary is an error" {
+    var folder: TestFolder = .init();
+    defer folder.folder.cleanup();
+    var interrupted = try folder.open("a.png");
+    folder.temporaries.discardAll();
+    const result = interrupted.finish(&.{"new"}, &folder.diagnostic);
+    try std.testing.expectError(error.InputOutput, result);
+    var entries = folder.folder.dir.iterate();
+    try std.testing.expectEqual(null, try entries.next(std.testing.io));
+}
+
+test "a file is known again through links, and keeps its permissions" {
+    const io = std.testing.io;
+    var folder: TestFolder = .init();
+    defer folder.folder.cleanup();
+    const dir = folder.folder.dir;
+    try dir.writeFile(io, .{ .sub_path = "a", .data = "old" });
+    const old = try dir.openFile(io, "a", .{});
+    const identity: ?Identity = .of(old.handle);
+    try old.setPermissions(io, .fromMode(0o620));
+    old.close(io);
+    try dir.createDir(io, "b", .default_dir);
+    try dir.symLink(io, "../a", "b/link", .{});
+    try dir.symLink(io, "b/link", "link", .{});
+    try dir.symLink(io, "new", "dangling", .{});
+
+    var target = try folder.open("link");
+    try std.testing.expect(Identity.eql(identity, target.replaces));
+    try target.finish(&.{"new"}, &folder.diagnostic);
+    try folder.expectFile("a", "new");
+    const permissions = (try dir.statFile(io, "a", .{})).permissions;
+    try std.testing.expectEqual(0o620, permissions.toMode() & 0o7777);
+    for ([_][]const u8{ "link", "b/link" }) |name| {
+        const stat = try dir.statFile(io, name, .{ .follow_symlinks = false });
+        try std.testing.expectEqual(.sym_link, stat.kind);
+    }
+
+    var created = try folder.open("dangling");
+    try std.testing.expectEqual(null, created.replaces);
+    try created.finish(&.{"created"}, &folder.diagnostic);
+    try folder.expectFile("new", "created");
+}
+
+test "an existing file is overwritten where it cannot be replaced" {
+    const io = std.testing.io;
+    var folder: TestFolder = .init();
+    defer folder.folder.cleanup();
+    try folder.folder.dir.writeFile(io, .{ .sub_path = "a", .data = "much longer" });
+    var target = try folder.open("a");
+    // As where the folder is read-only.
+    target.state.file.temporary.?.discard(io);
+    target.state.file.temporary = null;
+    try target.finish(&.{ "ne", "w" }, &folder.diagnostic);
+    try folder.expectOnly("a", "new");
+    // As where another file system is mounted there: the temporary file cannot take the name.
+    var busy = try folder.open("a");
+    try folder.folder.dir.deleteFile(io, busy.state.file.temporary.?.path());
+    try busy.finish(&.{"newest"}, &folder.diagnostic);
+    try folder.expectOnly("a", "newest");
 }
 
 test "places that cannot be written are refused before anything is done" {
     const io = std.testing.io;
-    var test_folder: TestFolder = .init();
-    defer test_folder.folder.cleanup();
-    const dir = test_folder.folder.dir;
+    var folder: TestFolder = .init();
+    defer folder.folder.cleanup();
+    const dir = folder.folder.dir;
     try dir.createDir(io, "folder", .default_dir);
     try dir.symLink(io, "elsewhere", "link", .{});
-    try expectOpenFails(try test_folder.path("folder"), "not a regular file");
-    try expectOpenFails(try test_folder.path("folder/"), "not a file name");
-    try expectOpenFails(try test_folder.path("link"), "not a regular file");
-    try expectOpenFails(try test_folder.path("absent/a.png"), "folder: no such file");
+    try dir.symLink(io, "loop", "loop", .{});
+    try dir.symLink(io, "folder/", "slash", .{});
+    try folder.expectOpenFails(try folder.path("folder"), "it is a directory");
+    try folder.expectOpenFails(try folder.path("folder/"), "not a file name");
+    try folder.expectOpenFails(try folder.path("slash"), "not a file name");
+    try folder.expectOpenFails(try folder.path("loop"), "too many symbolic links");
+    try folder.expectOpenFails(try folder.path("absent/a.png"), "folder: no such file");
     const long: [300]u8 = @splat('x');
-    try expectOpenFails(try test_folder.path(&long), "name too long");
-    try expectOpenFails(try test_folder.path(long ++ "/a.png"), "folder: name too long");
-    try expectOpenFails(try test_folder.path("link/a.png"), "folder: no such file");
-    try expectOpenFails("", "not a file name");
-    try expectOpenFails("/", "not a file name");
-    try expectOpenFails("/dev/null", "not a regular file");
+    try folder.expectOpenFails(try folder.path(&long), "name too long");
+    try folder.expectOpenFails(try folder.path(long ++ "/a.png"), "folder: name too long");
+    try folder.expectOpenFails(try folder.path("link/a.png"), "folder: no such file");
+    try folder.expectOpenFails("", "not a file name");
+    try folder.expectOpenFails("/", "not a file name");
+    try folder.expectOpenFails(".", "it is a directory");
+    try folder.expectOpenFails("/dev/fd/99999", "it is closed");
+    try folder.expectOpenFails("/dev/fd/x", "cannot write");
 }
 
-test "a name as long as may be, and temporary files that a crash left" {
+test "pipes, devices and descriptors are written where they stand" {
     const io = std.testing.io;
-    var test_folder: TestFolder = .init();
-    defer test_folder.folder.cleanup();
-    const dir = test_folder.folder.dir;
-    var diagnostic: Diagnostic = .{};
-    const long: [name_bytes_max]u8 = @splat('x');
-    var target: Target = try .openFile(io, try test_folder.path(&long), &diagnostic);
-    try target.finish(&.{"long"}, &diagnostic);
-    try test_folder.expectOnly(&long, "long");
-    try dir.deleteFile(io, &long);
+    var folder: TestFolder = .init();
+    defer folder.folder.cleanup();
+    const dir = folder.folder.dir;
+    try dir.symLink(io, "/dev/null", "null", .{});
+    var device = try folder.open("null");
+    try device.finish(&.{"lost"}, &folder.diagnostic);
+    try std.testing.expectEqual(.sym_link, (try dir.statFile(io, "null", .{
+        .follow_symlinks = false,
+    })).kind);
+    const stat = try dir.statFile(io, "null", .{});
+    try std.testing.expectEqual(.character_device, stat.kind);
+    var full: Target = try .openFile(io, &folder.temporaries, "/dev/full", &folder.diagnostic);
+    const result = full.finish(&.{"lost"}, &folder.diagnostic);
+    try std.testing.expectError(error.InputOutput, result);
 
-    var first: Target = try .openFile(io, try test_folder.path("a"), &diagnostic);
-    var name_buffer: [name_bytes_max]u8 = undefined;
-    const left = name_buffer[0..pending.length];
-    @memcpy(left, pending.path());
-    first.abandon();
-    try dir.writeFile(io, .{ .sub_path = left, .data = "left" });
-    var second: Target = try .openFile(io, try test_folder.path("a"), &diagnostic);
-    try second.finish(&.{"second"}, &diagnostic);
-    try dir.deleteFile(io, left);
-    try test_folder.expectOnly("a", "second");
+    const file = try dir.createFile(io, "file", .{});
+    defer file.close(io);
+    try writeAll(io, file, &.{"before, "});
+    var name: [32]u8 = undefined;
+    for ([_][]const u8{ "/dev/fd/", "/proc/self/fd/" }) |start| {
+        const path = try std.mem.print(&name, "{s}{d}", .{ start, file.handle });
+        var target: Target = try .openFile(io, &folder.temporaries, path, &folder.diagnostic);
+        try target.finish(&.{"picture, "}, &folder.diagnostic);
+    }
+    try writeAll(io, file, &.{"behind"});
+    try folder.expectFile("file", "before, picture, picture, behind");
+}
+
+test "a small stack is enough" {
+    var folder: TestFolder = .init();
+    defer folder.folder.cleanup();
+    const Thread = struct {
+        result: anyerror!void = error.NotRun,
+
+        fn run(thread: *@This(), test_folder: *TestFolder) void {
+            thread.result = thread.replace(test_folder);
+        }
+
+        fn replace(_: *@This(), test_folder: *TestFolder) !void {
+            for (0..2) |_| {
+                var target = try test_folder.open("a");
+                try target.finish(&.{"new"}, &test_folder.diagnostic);
+            }
+        }
+    };
+    var thread: Thread = .{};
+    // A quarter of `ulimit -s 256`.
+    const handle = try std.Thread.spawn(.{ .stack_size = 64 << 10 }, Thread.run, .{
+        &thread, &folder,
+    });
+    handle.join();
+    try thread.result;
+    try folder.expectOnly("a", "new");
 }

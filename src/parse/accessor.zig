@@ -224,7 +224,7 @@ inline fn readFloat(
     };
     const size = @sizeOf(T);
     const raw = std.mem.readInt(T, bytes[position * size ..][0..size], .little);
-    if (component == .f32) return math.vec3.flushDenormal(@bitCast(raw));
+    if (component == .f32) return math.flushDenormal(@bitCast(raw));
     const value: f32 = @floatFromInt(raw);
     if (!normalized) return value;
     const scaled = value / @as(f32, @floatFromInt(std.math.maxInt(T)));

@@ -15,7 +15,9 @@ const bvh_split = @import("bvh/split.zig");
 const huge_pages = @import("../huge_pages.zig");
 const assert = std.debug.assert;
 const vec3 = math.vec3;
+const pose_file = @import("pose.zig");
 const Affine = math.Affine;
+const AffineD = math.AffineD;
 const Box3 = math.Box3;
 const Vec3 = math.Vec3;
 
@@ -52,7 +54,7 @@ pub const Surface = struct {
 /// One instance: where its vertices and triangles come from and go to.
 const Draw = struct {
     mesh: *const scene.Mesh,
-    map: Affine,
+    map: AffineD,
     normal_map: Affine,
     /// The map turns fronts into backs.
     mirrored: bool,
@@ -78,7 +80,7 @@ pub fn flatten(
     gpa: std.mem.Allocator,
     arena: std.mem.Allocator,
     from: *const scene.Scene,
-    maps: []const Affine,
+    maps: []const AffineD,
     thread_count: usize,
     diagnostic: *Diagnostic,
 ) Error!Surface {
@@ -117,7 +119,7 @@ fn chunkCount(count: usize) usize {
 fn plan(
     gpa: std.mem.Allocator,
     from: *const scene.Scene,
-    maps: []const Affine,
+    maps: []const AffineD,
     draws: []Draw,
     diagnostic: *Diagnostic,
 ) Error!Size {
@@ -138,7 +140,7 @@ fn plan(
         draw.* = .{
             .mesh = mesh,
             .map = map,
-            .normal_map = normalMap(map, mirrored),
+            .normal_map = normalMap(.of(map), mirrored),
             .mirrored = mirrored,
             .vertex_source = range.first,
             .vertex_count = range.count,
@@ -250,7 +252,7 @@ const Work = struct {
         const source = draw.vertex_source + (from - draw.vertex_target);
         const count = to - from;
         for (work.positions[from..to], draw.mesh.positions[source..][0..count]) |*to_p, p| {
-            to_p.* = draw.map.point(p);
+            to_p.* = pose_file.round(draw.map.point(pose_file.widen(p)));
         }
         if (draw.mesh.normals) |normals| {
             for (work.normals[from..to], normals[source..][0..count]) |*to_n, n| {

@@ -7,11 +7,13 @@
 const std = @import("std");
 const math = @import("../math.zig");
 const scene = @import("../scene.zig");
+const pose = @import("pose.zig");
 const world = @import("../world.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const assert = std.debug.assert;
 const vec3 = math.vec3;
-const Affine = math.Affine;
+const vec3d = math.vec3d;
+const AffineD = math.AffineD;
 const Vec3 = math.Vec3;
 
 /// Ambient radiance with the default rig.
@@ -33,13 +35,14 @@ const rig = [_]RigLight{
 pub fn place(
     arena: std.mem.Allocator,
     lights: []const scene.Light,
-    maps: []const Affine,
+    posed: *const pose.Pose,
+    padding: *const world.Padding,
     diagnostic: *Diagnostic,
 ) error{OutOfMemory}![]world.Light {
     const placed = try arena.alloc(world.Light, lights.len);
     var placed_count: usize = 0;
     for (lights, 0..) |*light, index| {
-        placed[placed_count] = placeOne(light, maps[light.node]) orelse {
+        placed[placed_count] = placeOne(light, posed, padding) orelse {
             diagnostic.warn("light {d} left out: its node leaves it no place or direction", .{
                 index,
             });
@@ -51,22 +54,32 @@ pub fn place(
     return placed[0..placed_count];
 }
 
-fn placeOne(light: *const scene.Light, map: Affine) ?world.Light {
+/// Rays start from points and spots as long as padding there is less than this part of the scene.
+const source_shift_max = 0x1p-10;
+
+fn placeOne(
+    light: *const scene.Light,
+    posed: *const pose.Pose,
+    padding: *const world.Padding,
+) ?world.Light {
+    const map = posed.maps[light.node];
     const direction: Vec3 = switch (light.kind) {
         .point => .{ 0, 0, -1 }, // Unused, but a unit vector.
-        .spot, .directional => vec3.normalize(vec3.neg(map.z)) orelse return null,
+        .spot, .directional => pose.round(vec3d.normalize(vec3d.neg(map.z)) orelse return null),
     };
     const position: Vec3 = switch (light.kind) {
-        .point, .spot => map.translation,
+        .point, .spot => pose.round(map.translation),
         .directional => .{ 0, 0, 0 },
     };
     if (!vec3.isFinite(position)) return null;
+    const shift = padding.ofBox(.{ .lower = position, .upper = position });
     var result: world.Light = .{
         .kind = switch (light.kind) {
             .point => .point,
             .spot => .spot,
             .directional => .directional,
         },
+        .from_receiver = light.kind != .directional and shift > posed.size * source_shift_max,
         .position = position,
         .direction = direction,
         .intensity = undefined,
@@ -118,6 +131,7 @@ pub fn placeRig(
         const travel = vec3.add(sideways, vec3.scale(forward, from.travel[2]));
         light.* = .{
             .kind = .directional,
+            .from_receiver = false,
             .position = .{ 0, 0, 0 },
             .direction = vec3.normalize(travel).?,
             .intensity = @splat(from.lux),
@@ -146,7 +160,7 @@ pub fn environment(
 
 test "a spot shines along its node's -z from its node's origin, scale aside" {
     const half = @sqrt(@as(f32, 0.5)); // A quarter turn about y: -z becomes -x.
-    const maps = [_]Affine{
+    const maps = [_]AffineD{
         .fromTrs(.{ 1, 2, 3 }, .{ 0, half, 0, half }, .{ 5, 5, 5 }),
         .fromTrs(.{ 0, 0, 0 }, .{ 0, 0, 0, 1 }, .{ 1, 1, 0 }),
     };
@@ -158,7 +172,10 @@ test "a spot shines along its node's -z from its node's origin, scale aside" {
     var arena_state: std.heap.ArenaAllocator = .init(std.testing.allocator);
     defer arena_state.deinit();
     var diagnostic: Diagnostic = .{};
-    const placed = try place(arena_state.allocator(), &lights, &maps, &diagnostic);
+    const posed: pose.Pose = .{ .maps = &maps, .center = @splat(0), .size = 1 };
+    const padding: world.Padding = .init(@splat(0), .empty);
+    const placed =
+        try place(arena_state.allocator(), &lights, &posed, &padding, &diagnostic);
     // The flattened directional light has no direction; the point light needs none.
     try std.testing.expectEqual(2, placed.len);
     try std.testing.expectEqual(1, diagnostic.warning_count);

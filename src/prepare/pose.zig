@@ -1,22 +1,45 @@
-//! Where the nodes of a scene are in the world.
+//! The pose: where the nodes of a scene are in the world, composed in double precision.
 //!
 //! In: the nodes with their maps into the parent's space, parents first. Out: one map into world
-//! space each. A map may overflow to infinity or NaN; who uses it looks.
+//! space each, and the center of what is drawn. Where all of it is far away for its size, as models
+//! on the globe are, the world's origin is moved near to it, so that single precision is enough
+//! from there on. A map may overflow to infinity or NaN; who uses it looks.
 
 const std = @import("std");
 const math = @import("../math.zig");
 const scene = @import("../scene.zig");
 const assert = std.debug.assert;
-const Affine = math.Affine;
+const vec3d = math.vec3d;
+const AffineD = math.AffineD;
+const Vec3d = math.Vec3d;
 
-/// The map into world space of every node, in the order of `nodes`; the caller frees it. Asserts
-/// that every parent stands before its children.
-pub fn worldMaps(
-    gpa: std.mem.Allocator,
-    nodes: []const scene.Node,
-) error{OutOfMemory}![]Affine {
-    const maps = try gpa.alloc(Affine, nodes.len);
-    for (nodes, maps, 0..) |node, *map, index| {
+/// Farther away than this many times its size, a scene is moved to the origin.
+const sizes_max = 64;
+
+/// Vertices that the center is the median of, at most, evenly spread.
+const sample_count_max = 1023;
+
+/// Where things are.
+pub const Pose = struct {
+    /// By node, into the world.
+    maps: []const AffineD,
+    /// The median of the vertices by coordinate: in the middle of most of them, however far away
+    /// a few are.
+    center: Vec3d,
+    /// The largest distance between quartiles along an axis.
+    size: f64,
+
+    /// Frees the maps.
+    pub fn deinit(pose: *const Pose, gpa: std.mem.Allocator) void {
+        gpa.free(pose.maps);
+    }
+};
+
+/// The pose of a scene's nodes; its memory comes from `gpa`. Asserts that every parent stands
+/// before its children.
+pub fn compose(gpa: std.mem.Allocator, from: *const scene.Scene) error{OutOfMemory}!Pose {
+    const maps = try gpa.alloc(AffineD, from.nodes.len);
+    for (from.nodes, maps, 0..) |node, *map, index| {
         if (node.parent == scene.none) {
             map.* = node.local;
         } else {
@@ -24,7 +47,67 @@ pub fn worldMaps(
             map.* = .compose(maps[node.parent], node.local);
         }
     }
-    return maps;
+    var pose: Pose = .{ .maps = maps, .center = @splat(0), .size = 0 };
+    findCenter(from, &pose);
+    const shift = shiftOf(&pose);
+    for (maps) |*map| map.translation = vec3d.sub(map.translation, shift);
+    pose.center = vec3d.sub(pose.center, shift);
+    return pose;
+}
+
+/// What is subtracted from all places: the center on a grid of a power of two, if it is far away.
+fn shiftOf(pose: *const Pose) Vec3d {
+    const distance = @max(@abs(pose.center[0]), @abs(pose.center[1]), @abs(pose.center[2]));
+    if (!(pose.size > 0 and distance > sizes_max * pose.size)) return @splat(0);
+    const grid = std.math.ldexp(@as(f64, 1), std.math.frexp(pose.size).exponent);
+    var shift: Vec3d = undefined;
+    for (&shift, pose.center) |*to, coordinate| to.* = @round(coordinate / grid) * grid;
+    return shift;
+}
+
+fn findCenter(from: *const scene.Scene, pose: *Pose) void {
+    var coordinates: [3][sample_count_max]f64 = undefined;
+    var vertex_count: u64 = 0;
+    for (from.instances) |instance| vertex_count += from.meshes[instance.mesh].positions.len;
+    const stride = vertex_count / sample_count_max + 1;
+    var count: usize = 0;
+    var next: u64 = 0; // Of the next sample, from the first vertex of the instance on.
+    for (from.instances) |instance| {
+        const positions = from.meshes[instance.mesh].positions;
+        while (next < positions.len) : (next += stride) {
+            const at = pose.maps[instance.node].point(widen(positions[@intCast(next)]));
+            if (!vec3d.isFinite(at)) continue;
+            for (&coordinates, at) |*list, coordinate| list[count] = coordinate;
+            count += 1;
+        }
+        next -= positions.len;
+    }
+    if (count == 0) return;
+    for (&coordinates, &pose.center) |*list, *center| {
+        std.mem.sortUnstable(f64, list[0..count], {}, std.sort.asc(f64));
+        center.* = list[count / 2];
+        pose.size = @max(pose.size, list[count * 3 / 4] - list[count / 4]);
+    }
+}
+
+/// A point in double precision.
+pub inline fn widen(point: math.Vec3) Vec3d {
+    return .{ point[0], point[1], point[2] };
+}
+
+/// A point in single precision: the one rounding of all that is placed in the world.
+pub inline fn round(point: Vec3d) math.Vec3 {
+    return .{ @floatCast(point[0]), @floatCast(point[1]), @floatCast(point[2]) };
+}
+
+fn testPose(nodes: []const scene.Node, positions: []const math.Vec3, node: u32) !Pose {
+    const gpa = std.testing.allocator;
+    var from: scene.Scene = .init(gpa);
+    defer from.deinit();
+    from.nodes = nodes;
+    from.meshes = &.{.{ .positions = positions, .triangles = &.{}, .material = 0 }};
+    from.instances = &.{.{ .mesh = 0, .node = node }};
+    return compose(gpa, &from);
 }
 
 test "a child moves with its parent" {
@@ -34,14 +117,34 @@ test "a child moves with its parent" {
         .{ .parent = scene.none, .local = .identity },
         .{ .parent = 1, .local = .identity },
     };
-    const maps = try worldMaps(std.testing.allocator, &nodes);
-    defer std.testing.allocator.free(maps);
-    try std.testing.expectEqual(math.Vec3{ 3, 8, -8 }, maps[3].point(.{ 1, 1, 4 }));
-    try std.testing.expectEqual(Affine.identity, maps[2]);
+    const pose = try testPose(&nodes, &.{}, 0);
+    defer pose.deinit(std.testing.allocator);
+    try std.testing.expectEqual(Vec3d{ 3, 8, -8 }, pose.maps[3].point(.{ 1, 1, 4 }));
+    try std.testing.expectEqual(AffineD.identity, pose.maps[2]);
 }
 
 test "no nodes, no maps" {
-    const maps = try worldMaps(std.testing.allocator, &.{});
-    defer std.testing.allocator.free(maps);
-    try std.testing.expectEqual(0, maps.len);
+    const pose = try testPose(&.{}, &.{}, 0);
+    defer pose.deinit(std.testing.allocator);
+    try std.testing.expectEqual(0, pose.maps.len);
+}
+
+test "what is far away for its size comes to the origin, whatever strays" {
+    const far: Vec3d = .{ 4_700_000.25, -1, 500 };
+    const nodes = [_]scene.Node{
+        .{ .parent = scene.none, .local = .fromTrs(far, .{ 0, 0, 0, 1 }, .{ 1, 1, 1 }) },
+    };
+    const corners = [_]math.Vec3{
+        .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 }, .{ 1, 1, 0 }, .{ 0, 0, 1 }, .{ 1e6, 1e6, 0 },
+    };
+    const pose = try testPose(&nodes, &corners, 0);
+    defer pose.deinit(std.testing.allocator);
+    for (pose.center) |coordinate| try std.testing.expect(@abs(coordinate) <= 1);
+    const here = pose.maps[0].point(.{ 0, 0, 0 });
+    try std.testing.expectEqual(0.25, here[0] - @floor(here[0]));
+    for (here) |coordinate| try std.testing.expect(@abs(coordinate) <= 2);
+    // Near enough for its size: left where it is.
+    const near = try testPose(&.{.{ .parent = scene.none, .local = .identity }}, &corners, 0);
+    defer near.deinit(std.testing.allocator);
+    try std.testing.expectEqual(AffineD.identity, near.maps[0]);
 }

@@ -14,7 +14,9 @@ const framing = @import("framing.zig");
 const Surface = @import("flatten.zig").Surface;
 const assert = std.debug.assert;
 const vec3 = math.vec3;
-const Affine = math.Affine;
+const pose = @import("pose.zig");
+const vec3d = math.vec3d;
+const AffineD = math.AffineD;
 const Diagnostic = diagnostic_module.Diagnostic;
 const Vec3 = math.Vec3;
 
@@ -50,7 +52,7 @@ pub const View = struct {
 pub fn choose(
     gpa: std.mem.Allocator,
     from: *const scene.Scene,
-    maps: []const Affine,
+    maps: []const AffineD,
     surface: *const Surface,
     choice: CameraChoice,
     resolution: ?[2]u32,
@@ -152,12 +154,13 @@ fn aspect(size: [2]u32) f64 {
 }
 
 /// The camera in the world, or null where its node leaves it no place or direction.
-fn place(camera: *const scene.Camera, map: Affine, width_over_height: f64) ?world.Camera {
-    if (!vec3.isFinite(map.translation)) return null;
-    const forward = vec3.normalize(vec3.neg(map.z)) orelse return null;
-    const up_hint = vec3.normalize(map.y) orelse return null;
-    const right = vec3.normalize(vec3.cross(forward, up_hint)) orelse return null;
-    const up = vec3.cross(right, forward);
+fn place(camera: *const scene.Camera, map: AffineD, width_over_height: f64) ?world.Camera {
+    const origin = pose.round(map.translation);
+    if (!vec3.isFinite(origin)) return null;
+    const forward = vec3d.normalize(vec3d.neg(map.z)) orelse return null;
+    const up_hint = vec3d.normalize(map.y) orelse return null;
+    const right = vec3d.normalize(vec3d.cross(forward, up_hint)) orelse return null;
+    const up = vec3d.cross(right, forward);
     const half_height: f64 = switch (camera.projection) {
         .perspective => |perspective| math.elementary.tan(perspective.y_fov_rad / 2),
         .orthographic => |orthographic| orthographic.half_height,
@@ -166,10 +169,10 @@ fn place(camera: *const scene.Camera, map: Affine, width_over_height: f64) ?worl
     const bounded = std.math.clamp(half_height, 1e-9, 1e9);
     return .{
         .orthographic = camera.projection == .orthographic,
-        .origin = map.translation,
-        .right = vec3.scale(right, @floatCast(bounded * width_over_height)),
-        .up = vec3.scale(up, @floatCast(bounded)),
-        .forward = forward,
+        .origin = origin,
+        .right = pose.round(vec3d.scale(right, bounded * width_over_height)),
+        .up = pose.round(vec3d.scale(up, bounded)),
+        .forward = pose.round(forward),
     };
 }
 
@@ -197,7 +200,7 @@ test "size follows the camera's aspect, width follows the picture" {
     from.cameras = &.{test_camera};
     from.camera_default = 0;
     // Mirrored and scaled: neither counts.
-    const maps = [_]Affine{.fromTrs(.{ 1, 2, 3 }, .{ 0, 0, 0, 1 }, .{ -2, 3, 4 })};
+    const maps = [_]AffineD{.fromTrs(.{ 1, 2, 3 }, .{ 0, 0, 0, 1 }, .{ -2, 3, 4 })};
     var diagnostic: Diagnostic = .{};
     const wide = try choose(gpa, &from, &maps, &test_surface, .default, null, &diagnostic);
     try std.testing.expectEqual(1024, wide.width);
@@ -222,7 +225,7 @@ test "orthographic cameras keep their height" {
         .projection = .{ .orthographic = .{ .half_width = 1, .half_height = 4 } },
     }};
     var diagnostic: Diagnostic = .{};
-    const maps = [_]Affine{.identity};
+    const maps = [_]AffineD{.identity};
     const choice: CameraChoice = .{ .index = 0 };
     const view = try choose(gpa, &from, &maps, &test_surface, choice, null, &diagnostic);
     try std.testing.expect(view.camera.orthographic);
@@ -263,7 +266,7 @@ test "a flattened camera gives way to a framing" {
     from.cameras = &.{test_camera};
     from.camera_default = 0;
     var diagnostic: Diagnostic = .{};
-    const maps = [_]Affine{.fromTrs(.{ 0, 0, 0 }, .{ 0, 0, 0, 1 }, .{ 1, 1, 0 })};
+    const maps = [_]AffineD{.fromTrs(.{ 0, 0, 0 }, .{ 0, 0, 0, 1 }, .{ 1, 1, 0 })};
     const view = try choose(gpa, &from, &maps, &test_surface, .default, null, &diagnostic);
     try std.testing.expect(view.camera_is_default);
     try std.testing.expectEqual(1024, view.width);

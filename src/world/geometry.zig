@@ -1,20 +1,9 @@
 //! A bounding volume hierarchy of wide nodes over triangles in world space, and the vertices' data.
-//!
-//! Culling is exact by construction. The box of a triangle is the box of its three vertices grown
-//! by `Geometry.pad`; the box of a node is the union of its triangles' boxes, grown once more by
-//! `Geometry.node_margin`. A slab test is monotone in the box even in floats, so whatever the
-//! triangle test accepts within its own grown box no node above it can cull, in any order of
-//! traversal. `pad` itself only has to be large enough that a ray which passes a triangle by
-//! rounding alone still meets the grown box: it decides whether shared edges are watertight, not
-//! whether variants agree.
-//!
-//! The margin is for tests of nodes that round otherwise than the triangle test: bound * inverse -
-//! origin * inverse, in one multiply-add. Nodes contain by a margin what the triangle's own box, in
-//! the exact expression, accepts, so that those do not cull it either (`Geometry.fused_reach`).
 
 const std = @import("std");
 const math = @import("../math.zig");
 const assert = std.debug.assert;
+const Padding = @import("padding.zig").Padding;
 const Vec3 = math.Vec3;
 const Box3 = math.Box3;
 
@@ -182,32 +171,12 @@ pub const Geometry = struct {
     triangles: []const Triangle,
     /// Box of twice the centroids of the triangles' boxes, empty without any.
     centroid_bounds: Box3,
-    /// By how much triangle boxes are grown: a bound for the rounding of the triangle test, in
-    /// metres. It is `pad_relative` times the largest distance that a ray can span, and a little
-    /// for the rounding of the coordinates themselves.
-    pad: f32,
-    /// By how much boxes of nodes and leaves are grown beyond the union of the triangle boxes below
-    /// them, in metres: `node_margin_relative` times `fused_reach`.
-    node_margin: f32,
-    /// Rays that start where all |coordinates| are below it may be tested against nodes by
-    /// mulAdd(bound, inverse, -(origin * inverse)), fused or not: it culls nothing that
-    /// (bound - origin) * inverse accepts for a triangle's box, nor does it overflow. All points on
-    /// surfaces qualify, and the camera and lights unless they are absurdly far away; 0 in scenes
-    /// too large for it.
-    fused_reach: f32,
+    /// By how much boxes and rays are grown.
+    padding: Padding,
+    /// The largest distance between quartiles of the vertices along an axis, in metres: how large
+    /// most of the scene is.
+    size: f32,
 };
-
-/// `Geometry.pad` over the largest distance between a ray's origin and a corner. In units of 2^-24
-/// of that distance a corner that is sheared into a ray's view (`trace/traverse/triangle.zig`) is
-/// off by 1 for the difference to the origin, 2 for the slope times the depth and 1 for the sum, in
-/// each of two axes; t of the plane by about 8. 32 leaves a factor of two.
-pub const pad_relative: f32 = 32.0 / 16_777_216.0;
-
-/// `Geometry.node_margin` over the largest |coordinate| of a bound or an origin. In units of 2^-24
-/// and as shifts of the bound, (bound - origin) * inverse is off by 2 |bound - origin|, and bound *
-/// inverse - origin * inverse by |origin|, |bound| where it is not fused, and
-/// |bound - origin|: 4 (|bound| + |origin|) together, 8 of the largest. 16 leaves a factor of two.
-pub const node_margin_relative: f32 = 16.0 / 16_777_216.0;
 
 test "an empty child's box is empty" {
     const node: Node(4) = .empty;

@@ -8,6 +8,10 @@ pub const Light = struct {
     pub const Kind = enum { point, spot, directional };
 
     kind: Kind,
+    /// Shadow rays of a point or spot light run from the light, so that all of them share an
+    /// origin, unless rounding there would be large for the scene: then they run from what they
+    /// light.
+    from_receiver: bool,
     /// Of point and spot lights.
     position: Vec3,
     /// Unit vector the way the light travels; spot and directional.

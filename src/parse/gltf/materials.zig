@@ -1,12 +1,12 @@
 //! glTF's materials: metallic-roughness factors and those of the extensions that are traced.
 //!
 //! In: materials (glTF 2.0, section 3.9; KHR_materials_ior, _transmission, _volume,
-//! _emissive_strength, _unlit). Out: `scene.Material`s with every factor in its range, in the order
-//! of the file. Textures are not read: where one would decide, the factor stands alone, and what
-//! would be wrong at its full value (metal, glow) counts as absent.
+//! _emissive_strength, _unlit). Out: the scene's materials with every factor in its range, in the
+//! order of the file. Textures are not read: where one would decide, the factor stands alone, and
+//! what would be wrong at its full value (metal, glow) counts as absent.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const Source = @import("source.zig");
@@ -18,16 +18,14 @@ const ior_total = 1e6;
 
 const float_max = std.math.floatMax(f32);
 
-/// Reads all materials; `default_added` puts glTF's default material behind them.
-pub fn read(source: *const Source, default_added: bool) Error![]const scene.Material {
-    const count = source.data.materials_count;
-    const list = try source.arena.alloc(scene.Material, count + @intFromBool(default_added));
-    for (list[0..count], 0..) |*material, index| {
+/// Adds all materials to the scene; `default_added` puts glTF's default material behind them.
+pub fn read(source: *const Source, default_added: bool) Error!void {
+    for (0..source.data.materials_count) |index| {
         const reader: Reader = .{ .source = source, .index = index };
-        material.* = reader.read(Source.item(source.data.materials, index));
+        const material = reader.read(Source.item(source.data.materials, index));
+        _ = try source.builder.addMaterial(material);
     }
-    if (default_added) list[count] = .{};
-    return list;
+    if (default_added) _ = try source.builder.addMaterial(.{});
 }
 
 const Reader = struct {
@@ -88,7 +86,7 @@ const Reader = struct {
             float_max,
         );
         var emissive = math.vec3.scale(factor, strength);
-        for (&emissive) |*value| value.* = math.vec3.flushDenormal(value.*);
+        for (&emissive) |*value| value.* = math.flushDenormal(value.*);
         return emissive;
     }
 
@@ -100,7 +98,7 @@ const Reader = struct {
     fn readVolume(reader: Reader, raw: *const c.cgltf_volume, material: *scene.Material) void {
         material.volume = raw.thickness_factor > 0;
         material.attenuation_color = reader.color3("attenuationColor", raw.attenuation_color);
-        const distance = math.vec3.flushDenormal(raw.attenuation_distance);
+        const distance = math.flushDenormal(raw.attenuation_distance);
         if (distance > 0) {
             // cgltf says FLT_MAX where the file says nothing.
             const endless = distance == float_max;
@@ -128,7 +126,7 @@ const Reader = struct {
     }
 
     fn clamp(reader: Reader, name: []const u8, value: f32, low: f32, high: f32) f32 {
-        if (value >= low and value <= high) return math.vec3.flushDenormal(value);
+        if (value >= low and value <= high) return math.flushDenormal(value);
         reader.source.warn(
             "material {d}: {s} {d} is not in {d}..{d}, clamped",
             .{ reader.index, name, value, low, high },

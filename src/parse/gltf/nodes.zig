@@ -1,33 +1,27 @@
 //! The node hierarchy of the shown scene, in an order where parents come before their children.
 //!
-//! In: glTF's nodes and scenes (glTF 2.0, section 3.5). Out: `scene.Node`s, and for each the glTF
-//! node it comes from. Explicit stacks: a chain may be as deep as the file is long. Every node of
-//! the file has to be in a tree, shown or not.
+//! In: glTF's nodes and scenes (glTF 2.0, section 3.5). Out: the scene's nodes, and for each the
+//! glTF node it comes from. Explicit stacks: a chain may be as deep as the file is long. Every node
+//! of the file has to be in a tree, shown or not.
 
 const std = @import("std");
-const c = @import("cgltf");
+const json = @import("../json.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const Source = @import("source.zig");
-const Affine = math.Affine;
+const schema = @import("schema.zig");
+const AffineD = math.AffineD;
+const Vec3d = math.Vec3d;
 const Error = Source.Error;
 const Vec3 = math.Vec3;
 const assert = std.debug.assert;
 
-/// The nodes that the shown scene reaches.
-pub const Nodes = struct {
-    /// In the scene's memory.
-    list: []const scene.Node,
-    /// Index of the glTF node of each; freed by the caller.
-    origins: []const u32,
-};
-
 /// A node that waits for its turn.
 const Pending = struct { origin: u32, parent: u32 };
 
-/// Collects the nodes of the scene that the file shows: `scene`, else the first one, else every
-/// root. The caller frees `origins` with the source's `gpa`.
-pub fn collect(source: *Source) Error!Nodes {
+/// Adds the nodes of the scene that the file shows: `scene`, else the first one, else every root.
+/// Returns the index of the glTF node of each, which the caller frees with the source's `gpa`.
+pub fn collect(source: *const Source) Error![]const u32 {
     const gpa = source.gpa;
     const node_count = source.data.nodes_count;
     try checkTrees(source);
@@ -39,12 +33,10 @@ pub fn collect(source: *Source) Error!Nodes {
 
     var origins: std.ArrayList(u32) = .empty;
     errdefer origins.deinit(gpa);
-    var parents: std.ArrayList(u32) = .empty;
-    defer parents.deinit(gpa);
     while (stack.pop()) |pending| {
-        const index: u32 = @intCast(origins.items.len);
+        const local = try localTransform(source, pending.origin);
+        const index = try source.builder.addNode(pending.parent, local);
         try origins.append(gpa, pending.origin);
-        try parents.append(gpa, pending.parent);
         const node = Source.item(source.data.nodes, pending.origin);
         const children = Source.slice(node.children, node.children_count);
         try stack.ensureUnusedCapacity(gpa, children.len);
@@ -54,12 +46,7 @@ pub fn collect(source: *Source) Error!Nodes {
         });
     }
     assert(origins.items.len <= node_count);
-
-    const list = try source.arena.alloc(scene.Node, origins.items.len);
-    for (list, origins.items, parents.items) |*node, origin, parent| {
-        node.* = .{ .parent = parent, .local = try localTransform(source, origin) };
-    }
-    return .{ .list = list, .origins = try origins.toOwnedSlice(gpa) };
+    return origins.toOwnedSlice(gpa);
 }
 
 /// The roots of the shown scene, the first on top.
@@ -119,17 +106,18 @@ fn checkTrees(source: *const Source) Error!void {
 }
 
 /// A node's map into its parent's space: its matrix, or translation, rotation and scale.
-fn localTransform(source: *const Source, index: u32) Error!Affine {
+fn localTransform(source: *const Source, index: u32) Error!AffineD {
     const node = Source.item(source.data.nodes, index);
-    var local: Affine = undefined;
+    const numbers: Numbers = .of(source, index);
+    var local: AffineD = undefined;
     if (node.has_matrix != 0) {
         const also = node.has_translation != 0 or node.has_rotation != 0 or node.has_scale != 0;
         if (also) source.warn(
             "node {d}: has a matrix, so its other transforms are ignored",
             .{index},
         );
-        const m = node.matrix;
-        for ([4]f32{ m[3], m[7], m[11], m[15] }, [4]f32{ 0, 0, 0, 1 }) |value, wanted| {
+        const m = numbers.matrix;
+        for ([4]f64{ m[3], m[7], m[11], m[15] }, [4]f64{ 0, 0, 0, 1 }) |value, wanted| {
             if (!(@abs(value - wanted) <= 1e-5)) return source.fail(
                 "node {d}: matrix is not affine, its last row is {d} {d} {d} {d}",
                 .{ index, m[3], m[7], m[11], m[15] },
@@ -142,21 +130,51 @@ fn localTransform(source: *const Source, index: u32) Error!Affine {
             .translation = m[12..15].*,
         };
     } else {
-        const rotation = try unitQuaternion(source, index, node.rotation);
-        local = .fromTrs(node.translation, rotation, node.scale);
-    }
-    inline for (.{ &local.x, &local.y, &local.z, &local.translation }) |column| {
-        for (column) |*value| value.* = math.vec3.flushDenormal(value.*);
+        const rotation = try unitQuaternion(source, index, numbers.rotation);
+        local = .fromTrs(numbers.translation, rotation, numbers.scale);
     }
     if (!local.isFinite()) return source.fail("node {d}: transform is not finite", .{index});
     return local;
 }
 
-fn unitQuaternion(source: *const Source, index: u32, rotation: [4]f32) Error![4]f32 {
-    const x: f64 = rotation[0];
-    const y: f64 = rotation[1];
-    const z: f64 = rotation[2];
-    const w: f64 = rotation[3];
+/// A node's numbers in double precision, as the file has them.
+const Numbers = struct {
+    matrix: [16]f64,
+    translation: Vec3d,
+    rotation: [4]f64,
+    scale: Vec3d,
+
+    /// cgltf's in single precision, but for those that are not exact there.
+    fn of(source: *const Source, index: u32) Numbers {
+        const node = Source.item(source.data.nodes, index);
+        var numbers: Numbers = undefined;
+        inline for (.{ "matrix", "translation", "rotation", "scale" }) |name| {
+            for (&@field(numbers, name), @field(node, name)) |*to, from| to.* = from;
+        }
+        const doubles = source.doubles;
+        var at = std.sort.lowerBound(json.Double, doubles, index, orderByElement);
+        while (at < doubles.len and doubles[at].element == index) : (at += 1) {
+            const slot = doubles[at].slot;
+            const to = if (slot < schema.translation_slot)
+                &numbers.matrix[slot]
+            else if (slot < schema.rotation_slot)
+                &numbers.translation[slot - schema.translation_slot]
+            else if (slot < schema.scale_slot)
+                &numbers.rotation[slot - schema.rotation_slot]
+            else
+                &numbers.scale[slot - schema.scale_slot];
+            to.* = doubles[at].value;
+        }
+        return numbers;
+    }
+
+    fn orderByElement(index: u32, double: json.Double) std.math.Order {
+        return std.math.order(index, double.element);
+    }
+};
+
+fn unitQuaternion(source: *const Source, index: u32, rotation: [4]f64) Error![4]f64 {
+    const x, const y, const z, const w = rotation;
     const length = @sqrt(((x * x + y * y) + z * z) + w * w);
     if (!std.math.isFinite(length)) {
         return source.fail("node {d}: rotation is not finite", .{index});
@@ -168,8 +186,5 @@ fn unitQuaternion(source: *const Source, index: u32, rotation: [4]f32) Error![4]
     if (@abs(length - 1) > 1e-3) {
         source.warn("node {d}: rotation is not a unit quaternion, made one", .{index});
     }
-    return .{
-        @floatCast(x / length), @floatCast(y / length),
-        @floatCast(z / length), @floatCast(w / length),
-    };
+    return .{ x / length, y / length, z / length, w / length };
 }

@@ -1,4 +1,4 @@
-//! What glTF 2.0 holds where, as far as this reader and cgltf look at it.
+//! The schema of glTF 2.0: what stands where, as far as this reader and cgltf look at it.
 //!
 //! A table for json.zig: the types of the properties, which of them have to be there, and which
 //! whole numbers name elements of which list. cgltf takes a string for "no index" and loses its
@@ -190,6 +190,12 @@ const primitive: Rule = namedWith(&.{
 
 const attributes: Rule = map(&reference(.accessors));
 
+/// Slots of a node's numbers that are kept in double precision.
+pub const matrix_slot = 0;
+pub const translation_slot = 16;
+pub const rotation_slot = 19;
+pub const scale_slot = 23;
+
 const node: Rule = namedWith(&.{
     optional("camera", reference(.cameras)),
     optional("children", many(&.{ .reference = .{
@@ -197,11 +203,11 @@ const node: Rule = namedWith(&.{
         .role = .child,
     } })),
     optional("skin", reference(.skins)),
-    optional("matrix", .{ .vector = 16 }),
+    optional("matrix", .{ .doubles = .{ .length = 16, .slot = matrix_slot } }),
     optional("mesh", reference(.meshes)),
-    optional("rotation", .{ .vector = 4 }),
-    optional("scale", .{ .vector = 3 }),
-    optional("translation", .{ .vector = 3 }),
+    optional("rotation", .{ .doubles = .{ .length = 4, .slot = rotation_slot } }),
+    optional("scale", .{ .doubles = .{ .length = 3, .slot = scale_slot } }),
+    optional("translation", .{ .doubles = .{ .length = 3, .slot = translation_slot } }),
     optional("weights", many(&.number)),
 }, &.{
     optional("KHR_lights_punctual", object(&.{optional("light", reference(.lights))})),

@@ -1,11 +1,11 @@
-//! Cameras and lights: what a node may carry besides a mesh.
+//! Cameras and punctual lights: what a node may carry besides a mesh.
 //!
 //! In: a glTF camera (glTF 2.0, section 3.10) or a light (KHR_lights_punctual) and the scene node
 //! that carries it. Out: `scene.Camera`, `scene.Light`, every number finite and in its range. What
 //! can be clamped is, with a warning; a camera that sees nothing is an error.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const escapes = @import("../json/escapes.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
@@ -103,7 +103,7 @@ pub fn readLight(
     }
     light.intensity = notNegative(source, index, "intensity", raw.intensity);
     // cgltf says 0 where the file says nothing; the table has warned of what the file says wrong.
-    const range = math.vec3.flushDenormal(raw.range);
+    const range = math.flushDenormal(raw.range);
     if (range > 0) light.range = range;
     if (light.kind == .spot) readCone(source, index, raw, &light);
     return light;
@@ -118,7 +118,7 @@ fn readCone(
     const outer_max: f32 = std.math.pi / 2.0;
     const outer_min: f32 = 1e-3;
     var outer = raw.spot_outer_cone_angle;
-    var inner = math.vec3.flushDenormal(raw.spot_inner_cone_angle);
+    var inner = math.flushDenormal(raw.spot_inner_cone_angle);
     // Half an ulp of rounding in the file is no reason to complain.
     if (outer > outer_max + 1e-6 or !(outer > 0) or !(inner >= 0) or !(inner < outer)) source.warn(
         "light {d}: cone angles {d} and {d} do not fit 0 <= inner < outer <= pi / 2, clamped",
@@ -134,7 +134,7 @@ fn readCone(
 }
 
 fn notNegative(source: *const Source, index: u32, name: []const u8, value: f32) f32 {
-    if (value >= 0) return math.vec3.flushDenormal(value);
+    if (value >= 0) return math.flushDenormal(value);
     source.warn("light {d}: {s} {d} is below 0, taken as 0", .{ index, name, value });
     return 0;
 }

@@ -28,6 +28,11 @@ pub fn parseFloat(text: []const u8) ?f32 {
     return parseFinite(f32, text);
 }
 
+/// The same in double precision.
+pub fn parseDouble(text: []const u8) ?f64 {
+    return parseFinite(f64, text);
+}
+
 fn parseFinite(comptime Float: type, text: []const u8) ?Float {
     for (text) |byte| switch (byte) {
         // std takes words, underscores and hexadecimal digits as well.

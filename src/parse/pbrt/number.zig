@@ -78,7 +78,7 @@ noinline fn slow(text: [:0]const u8, start: *usize) Error!f32 {
     const value = std.fmt.parseFloat(f32, word) catch return error.NotANumber;
     if (!std.math.isFinite(value)) return error.OutOfRange;
     start.* += word.len;
-    return math.vec3.flushDenormal(value);
+    return math.flushDenormal(value);
 }
 
 /// Where the word that starts at `start` ends.

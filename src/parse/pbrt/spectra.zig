@@ -58,7 +58,7 @@ fn finite(rgb: [3]f64) Vec3 {
     var result: Vec3 = undefined;
     for (rgb, &result) |from, *to| {
         const bounded = if (from < largest) if (from > -largest) from else -largest else largest;
-        to.* = math.vec3.flushDenormal(@floatCast(bounded));
+        to.* = math.flushDenormal(@floatCast(bounded));
     }
     return result;
 }

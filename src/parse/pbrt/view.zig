@@ -10,7 +10,9 @@ const quote = @import("../../diagnostic.zig").quote;
 const scene = @import("../../scene.zig");
 const Input = @import("input.zig");
 const Parameters = @import("parameters.zig");
-const Transform = @import("transform.zig");
+const math = @import("../../math.zig");
+const transforms = @import("transform.zig");
+const Transform = math.AffineD;
 const Error = Input.Error;
 
 const View = @This();
@@ -65,7 +67,8 @@ pub fn setCamera(
 ) Error!void {
     const place = to_camera.inverse() orelse
         return input.fail(position, "the camera's transformation has no inverse", .{});
-    if (!place.isFinite()) return input.fail(position, "the camera is too far away", .{});
+    if (!transforms.fitsSingle(&place))
+        return input.fail(position, "the camera is too far away", .{});
     var result: View = .{ .size = view.size, .place = place };
     if (std.mem.eql(u8, name, "orthographic")) {
         result.kind = .orthographic;
@@ -117,7 +120,7 @@ pub fn projection(view: *View, input: *Input) Error!scene.Camera.Projection {
     // Within what a camera can show in the end.
     const half_width = std.math.clamp(0.5 * (window[1] - window[0]), 1e-9, 1e9);
     const half_height = std.math.clamp(0.5 * (window[3] - window[2]), 1e-9, 1e9);
-    const middle: Transform.Vector =
+    const middle: math.Vec3d =
         .{ 0.5 * (window[0] + window[1]), 0.5 * (window[2] + window[3]), 0 };
     if (@abs(half_width / half_height / film - 1) > 0.01) try input.warn(
         0,
@@ -127,7 +130,7 @@ pub fn projection(view: *View, input: *Input) Error!scene.Camera.Projection {
     );
     switch (view.kind) {
         .orthographic => {
-            view.place.?.origin = view.place.?.point(middle);
+            view.place.? = view.place.?.moved(middle);
             return .{ .orthographic = .{
                 .half_width = @floatCast(half_width),
                 .half_height = @floatCast(half_height),

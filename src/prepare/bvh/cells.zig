@@ -278,8 +278,7 @@ test "every reference ends up in its cell's place, in the order it had" {
         .positions = positions,
         .triangles = triangles,
         .centroid_bounds = centroid_bounds,
-        .pad = 0.001,
-        .node_margin = 0,
+        .padding = .init(@splat(0), .empty),
         .thread_count = 3,
     };
     const target = try gpa.alloc(Box, positions.len);

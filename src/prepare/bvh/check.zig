@@ -20,9 +20,6 @@ pub fn check(gpa: Allocator, checked: *const World) error{OutOfMemory}!void {
     assert(checked.geometry.normals.len == vertex_count);
     assert(checked.geometry.colors.len == 0 or checked.geometry.colors.len == vertex_count);
     assert(checked.view.width > 0 and checked.view.height > 0);
-    const geometry = &checked.geometry;
-    assert(geometry.pad > 0 and geometry.node_margin >= 0 and geometry.fused_reach >= 0);
-    assert(geometry.node_margin >= geometry.fused_reach * world.node_margin_relative * 0.999);
     for (checked.geometry.triangles) |triangle| {
         assert(triangle.material < checked.materials.all.len);
         for (triangle.corner) |vertex| assert(vertex < vertex_count);
@@ -62,8 +59,11 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
                 checkLeaf(checked, tree.packs[first..end], box, seen);
             }
         }
-        // Boxes are unions, no larger: growing keeps their order.
-        if (visit.box) |box| assert(box.contains(joined) and joined.contains(box));
+        // Boxes are unions, grown once: by no more than their own margin.
+        if (visit.box) |box| {
+            const margin = checked.geometry.padding.marginOfBox(box);
+            assert(box.contains(joined) and joined.grow(margin).contains(box));
+        }
     }
     for (seen) |is_seen| assert(is_seen);
     assert(node_count == tree.nodes.len and node_count == checked.facts.tree.node_count);
@@ -90,10 +90,10 @@ fn checkLeaf(checked: *const World, packs: anytype, box: Box3, seen: []bool) voi
             if (primitive == world.none) continue;
             assert(!seen[primitive]);
             seen[primitive] = true;
-            joined = joined.join(corners.grow(checked.geometry.pad));
+            joined = joined.join(corners.grow(checked.geometry.padding.ofBox(corners)));
         }
     }
     assert(!joined.isEmpty());
-    const grown = joined.grow(checked.geometry.node_margin);
+    const grown = joined.grow(checked.geometry.padding.marginOfBox(joined));
     assert(box.contains(grown) and grown.contains(box));
 }

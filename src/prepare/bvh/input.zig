@@ -23,21 +23,17 @@ pub const Input = struct {
     triangles: []const world.Triangle,
     /// Box of twice the middles of the triangles' boxes, give or take rounding.
     centroid_bounds: Box3,
-    /// `Geometry.pad`.
-    pad: f32,
-    /// `Geometry.node_margin`.
-    node_margin: f32,
+    padding: world.Padding,
     thread_count: usize,
     quality: Quality = .default,
 
-    /// The reference to a triangle, within its box grown by `pad`.
+    /// The reference to a triangle, within its box grown by its pad.
     pub inline fn reference(input: *const Input, number: usize) split.Box {
         const corner = input.triangles[number].corner;
-        const grown = Box3.empty
+        const box = Box3.empty
             .include(input.positions[corner[0]])
             .include(input.positions[corner[1]])
-            .include(input.positions[corner[2]])
-            .grow(input.pad);
-        return split.reference(grown, @intCast(number));
+            .include(input.positions[corner[2]]);
+        return split.reference(box.grow(input.padding.ofBox(box)), @intCast(number));
     }
 };

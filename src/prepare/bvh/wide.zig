@@ -449,10 +449,12 @@ fn Collapse(comptime width: u32) type {
             target: u32,
             pack_count: u32,
         ) void {
-            const margin = collapse.input.node_margin;
+            const upper = math.vec3.neg(binary.upper_negated);
+            const box: math.Box3 = .{ .lower = binary.lower, .upper = upper };
+            const grown = box.grow(collapse.input.padding.marginOfBox(box));
             for (0..3) |axis| {
-                node.bounds[0][axis][slot] = binary.lower[axis] - margin;
-                node.bounds[1][axis][slot] = margin - binary.upper_negated[axis];
+                node.bounds[0][axis][slot] = grown.lower[axis];
+                node.bounds[1][axis][slot] = grown.upper[axis];
             }
             node.child[slot] = .{ .target = target, .pack_count = pack_count };
         }

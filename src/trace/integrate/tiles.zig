@@ -11,6 +11,8 @@
 //!     init(gpa, frame, settings), deinit(gpa)   *I, one a thread
 //!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it
 //!     counts()                                  of all its passes, `Counts`
+//!
+//! which is compiled in an object of its own: `Integrator` is what its kernel shows of it.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -60,10 +62,72 @@ pub const Statistics = struct {
 /// `Canceled`: the film is not finished.
 pub const Error = error{ OutOfMemory, Canceled };
 
+/// An integrator behind pointers: only data that the program and the kernel agree on passes here,
+/// and no state but what `init` gives.
+pub const Integrator = extern struct {
+    init: *const fn (*const Allocator, *const Frame, *const Settings) callconv(.c) ?*anyopaque,
+    deinit: *const fn (integrator: *anyopaque, gpa: *const Allocator) callconv(.c) void,
+    /// The next samples of a tile, bundle by bundle.
+    pass: *const fn (*anyopaque, *const Rectangle, u32, u32, *Film) callconv(.c) void,
+    counts: *const fn (integrator: *const anyopaque, counts: *Counts) callconv(.c) void,
+    counts_tests: bool,
+
+    /// Of the type I.
+    pub fn of(comptime I: type) Integrator {
+        const erased = struct {
+            fn init(
+                gpa: *const Allocator,
+                frame: *const Frame,
+                settings: *const Settings,
+            ) callconv(.c) ?*anyopaque {
+                return I.init(gpa.*, frame, settings) catch null;
+            }
+
+            fn deinit(integrator: *anyopaque, gpa: *const Allocator) callconv(.c) void {
+                ofErased(integrator).deinit(gpa.*);
+            }
+
+            fn pass(
+                integrator: *anyopaque,
+                tile: *const Rectangle,
+                first_sample: u32,
+                sample_count: u32,
+                film: *Film,
+            ) callconv(.c) void {
+                var y = tile.y0;
+                while (y < tile.y1) : (y += I.height) {
+                    var x = tile.x0;
+                    while (x < tile.x1) : (x += I.width) ofErased(integrator).pass(.{
+                        .x0 = x,
+                        .y0 = y,
+                        .x1 = @min(x + I.width, tile.x1),
+                        .y1 = @min(y + I.height, tile.y1),
+                    }, first_sample, sample_count, film);
+                }
+            }
+
+            fn counts(integrator: *const anyopaque, result: *Counts) callconv(.c) void {
+                result.* = ofErased(@constCast(integrator)).counts();
+            }
+
+            fn ofErased(integrator: *anyopaque) *I {
+                return @ptrCast(@alignCast(integrator));
+            }
+        };
+        return .{
+            .init = erased.init,
+            .deinit = erased.deinit,
+            .pass = erased.pass,
+            .counts = erased.counts,
+            .counts_tests = I.counts_tests,
+        };
+    }
+};
+
 /// Traces all samples of all pixels. Memory is taken before the work: where there is too little of
 /// it for all threads, some do without the others.
 pub fn render(
-    comptime I: type,
+    integrator: *const Integrator,
     gpa: Allocator,
     frame: *const Frame,
     film: *Film,
@@ -73,85 +137,71 @@ pub fn render(
     tiles.states = try gpa.alloc(Tiles.State, tiles.count);
     defer gpa.free(tiles.states);
     @memset(tiles.states, .{});
-    var integrators: [parallel.thread_count_max]*I = undefined;
-    var job: Job(I) = .{
+    var by_thread: [parallel.thread_count_max]*anyopaque = undefined;
+    var job: Job = .{
         .settings = settings,
         .tiles = &tiles,
         .film = film,
-        .integrators = integrators[0..0],
+        .pass = integrator.pass,
+        .by_thread = by_thread[0..0],
     };
-    defer for (job.integrators) |integrator| integrator.deinit(gpa);
-    while (job.integrators.len < @min(settings.thread_count, tiles.count)) {
-        const integrator = I.init(gpa, frame, settings) catch |e| {
-            if (job.integrators.len == 0) return e;
+    defer for (job.by_thread) |one| integrator.deinit(one, &gpa);
+    while (job.by_thread.len < @min(settings.thread_count, tiles.count)) {
+        by_thread[job.by_thread.len] = integrator.init(&gpa, frame, settings) orelse {
+            if (job.by_thread.len == 0) return error.OutOfMemory;
             break;
         };
-        integrators[job.integrators.len] = integrator;
-        job.integrators = integrators[0 .. job.integrators.len + 1];
+        job.by_thread = by_thread[0 .. job.by_thread.len + 1];
     }
-    parallel.share(job.integrators.len, &job, Job(I).work);
+    parallel.share(job.by_thread.len, &job, Job.work);
     if (settings.isCancelled()) return error.Canceled;
     var total: Statistics = .{ .non_finite_count = tiles.non_finite_count.load(.monotonic) };
     var tests: statistics.TestCounts = .{};
-    for (job.integrators) |integrator| {
-        const counts = integrator.counts();
+    for (job.by_thread) |one| {
+        var counts: Counts = undefined;
+        integrator.counts(one, &counts);
         total.rays.add(counts.rays);
         tests.add(counts.tests);
     }
-    if (I.counts_tests) total.tests = tests;
+    if (integrator.counts_tests) total.tests = tests;
     return total;
 }
 
 /// One frame by one integrator.
-fn Job(comptime I: type) type {
-    return struct {
-        settings: *const Settings,
-        tiles: *Tiles,
-        film: *Film,
-        /// By thread.
-        integrators: []const *I,
+const Job = struct {
+    settings: *const Settings,
+    tiles: *Tiles,
+    film: *Film,
+    pass: @FieldType(Integrator, "pass"),
+    by_thread: []const *anyopaque,
 
-        const Self = @This();
-
-        fn work(job: *Self, thread_index: usize) void {
-            while (!job.settings.isCancelled()) {
-                const number = job.tiles.take() orelse return;
-                const state = &job.tiles.states[number];
-                if (state.due.fetchAdd(1, .acquire) > 0) continue;
-                while (true) {
-                    job.passTile(job.integrators[thread_index], number);
-                    job.settings.progress.completeOne();
-                    if (job.settings.isCancelled()) return;
-                    if (state.due.fetchSub(1, .acq_rel) == 1) break;
-                }
-            }
-        }
-
-        /// The next samples of a tile.
-        fn passTile(job: *Self, integrator: *I, number: u32) void {
+    fn work(job: *Job, thread_index: usize) void {
+        while (!job.settings.isCancelled()) {
+            const number = job.tiles.take() orelse return;
             const state = &job.tiles.states[number];
-            const tile = job.tiles.rectangleOf(number);
-            const left = job.settings.sample_count - state.samples_done;
-            const sample_count = @min(left, job.tiles.samples_per_pass);
-            var y = tile.y0;
-            while (y < tile.y1) : (y += I.height) {
-                var x = tile.x0;
-                while (x < tile.x1) : (x += I.width) {
-                    integrator.pass(.{
-                        .x0 = x,
-                        .y0 = y,
-                        .x1 = @min(x + I.width, tile.x1),
-                        .y1 = @min(y + I.height, tile.y1),
-                    }, state.samples_done, sample_count, job.film);
-                }
+            if (state.due.fetchAdd(1, .acquire) > 0) continue;
+            while (true) {
+                job.passTile(job.by_thread[thread_index], number);
+                job.settings.progress.completeOne();
+                if (job.settings.isCancelled()) return;
+                if (state.due.fetchSub(1, .acq_rel) == 1) break;
             }
-            state.samples_done += sample_count;
-            if (state.samples_done < job.settings.sample_count) return;
-            const non_finite = job.film.finish(tile, job.settings.sample_count);
-            if (non_finite > 0) _ = job.tiles.non_finite_count.fetchAdd(non_finite, .monotonic);
         }
-    };
-}
+    }
+
+    /// The next samples of a tile.
+    fn passTile(job: *Job, integrator: *anyopaque, number: u32) void {
+        const state = &job.tiles.states[number];
+        const tile = job.tiles.rectangleOf(number);
+        const left = job.settings.sample_count - state.samples_done;
+        const sample_count = @min(left, job.tiles.samples_per_pass);
+        job.pass(integrator, &tile, state.samples_done, sample_count, job.film);
+        state.samples_done += sample_count;
+        if (state.samples_done < job.settings.sample_count) return;
+        const non_finite = job.film.finish(tile, job.settings.sample_count);
+        if (non_finite > 0) _ = job.tiles.non_finite_count.fetchAdd(non_finite, .monotonic);
+    }
+};
 
 /// The picture in tiles, each as often as there are passes.
 const Tiles = struct {
@@ -293,7 +343,7 @@ test "the samples of each pixel come in order, by however many threads; a flag e
             defer film.deinit(gpa);
             TestIntegrator.bundles_left.store(if (is_cancelled) 3 else -1, .monotonic);
             TestIntegrator.cancel.store(false, .monotonic);
-            const result = render(TestIntegrator, gpa, &frame, &film, &.{
+            const result = render(&.of(TestIntegrator), gpa, &frame, &film, &.{
                 .thread_count = thread_count,
                 .sample_count = sample_count,
                 .tile_size = tile_size,

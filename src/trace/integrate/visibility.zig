@@ -39,7 +39,7 @@ pub fn Visibility(comptime Kernel: type) type {
     const Mask = Rays.Mask;
     const group_count = Kernel.group_count;
     const Bundle = bundle_file.Bundle(Kernel);
-    const Coherence = dispatch.Coherence(Kernel);
+    const Coherence = dispatch.Coherence;
 
     return struct {
         frame: *const Frame,
@@ -60,7 +60,7 @@ pub fn Visibility(comptime Kernel: type) type {
         /// Returns those whose hits are near to each other.
         pub fn closest(visibility: *Self, bundle: *Bundle, grid: ?*const Grid) Coherence {
             const geometry = visibility.frame.geometry;
-            return dispatch.closestHit(Kernel, geometry, bundle, grid, null, &visibility.tests);
+            return dispatch.closestHit(Kernel, geometry, bundle, grid, &visibility.tests);
         }
 
         /// Transmittance of shadow rays (`shadowRay`) of this light, in the lanes of active rays;
@@ -69,7 +69,7 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *Self,
             bundle: *Bundle,
             light: *const Light,
-            coherence: *const Coherence,
+            coherence: Coherence,
             transmittances: *[group_count]Vec3,
         ) void {
             const materials = visibility.frame.materials;
@@ -84,7 +84,7 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *Self,
             bundle: *Bundle,
             light: *const Light,
-            coherence: *const Coherence,
+            coherence: Coherence,
             transmittances: *[group_count]Vec3,
         ) void {
             const geometry = visibility.frame.geometry;
@@ -101,7 +101,7 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *Self,
             bundle: *Bundle,
             light: *const Light,
-            coherence: *const Coherence,
+            coherence: Coherence,
             transmittances: *[group_count]Vec3,
         ) void {
             const none: Vec3 = .splat(.{ 0, 0, 0 });
@@ -132,28 +132,20 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *Self,
             bundle: *Bundle,
             light: *const Light,
-            coherence: *const Coherence,
+            coherence: Coherence,
             transmittances: *[group_count]Vec3,
         ) void {
-            if (Kernel.variant.traversal != .beam) return;
-            var before: bundle_file.Part(Kernel) = undefined;
-            switch (coherence.*) {
-                .none => return,
-                .all => for (&before, &bundle.groups) |*active, *ray| {
-                    active.* = ray.active;
-                },
-                .some => |*part| before = bundle_file.narrow(Kernel, bundle, part, true),
-            }
+            if (Kernel.variant.traversal != .beam or coherence == .none) return;
             const geometry = visibility.frame.geometry;
-            dispatch.anyHit(Kernel, geometry, bundle, light, &.all, &visibility.tests);
-            for (&bundle.groups, before, transmittances) |*ray, active, *value| {
-                if (active.none()) continue;
+            dispatch.anyHit(Kernel, geometry, bundle, light, .all, &visibility.tests);
+            for (&bundle.groups, transmittances) |*ray, *value| {
+                if (ray.active.none()) continue;
                 const primitive = ray.closest.primitive;
                 const free = ray.active.bitAnd(primitive.eq(.splat(ray_file.no_primitive)));
                 const met = ray.active.andNot(free);
                 const stopped: Mask = .fromBits(visibility.hits.stopping(primitive, met));
                 value.* = .select(stopped, .splat(.{ 0, 0, 0 }), value.*);
-                ray.active = active.andNot(free).andNot(stopped);
+                ray.active = met.andNot(stopped);
             }
         }
 
@@ -224,6 +216,7 @@ pub fn interactionOf(
     const weights = triangle.edgeFunctionsOf(Lanes, corners.position, ray.line);
     return interaction_file.resolve(Lanes, frame, &corners, &.{
         .mask = hit,
+        .origin = ray.line.origin,
         .direction = ray.line.direction,
         .t = ray.closest.t,
         .barycentrics = weights.barycentrics(),
@@ -232,7 +225,7 @@ pub fn interactionOf(
 
 /// The shadow rays of points off surfaces (`Interaction.offsetOrigin`), which never hit the
 /// triangle whose surface it is. Those of point and spot lights run from the light, so that all of
-/// them share an origin.
+/// them share an origin, but for those of `Light.from_receiver`.
 pub fn shadowRay(
     comptime Lanes: type,
     light: *const Light,
@@ -244,6 +237,8 @@ pub fn shadowRay(
     return .{
         .line = if (light.kind == .directional)
             .init(point, Lanes.Vec3.splat(light.direction).neg())
+        else if (light.from_receiver)
+            .init(point, source.sub(point))
         else
             .init(source, point.sub(source)),
         .tnear = .start(),

@@ -132,14 +132,14 @@ pub fn Whitted(comptime Kernel: type) type {
             const primary = path.depth == 0 and path.transparency_depth == 0;
             const grid = if (primary and whitted.grid != null) &whitted.grid.? else null;
             const beams = whitted.visibility.closest(&path.bundle, grid);
-            const coherence = if (path.depth == 0) .all else beams;
+            const coherence: dispatch.Coherence = if (path.depth == 0) .all else beams;
             var any_seen = false;
             for (&whitted.vertices, 0..) |*vertex, group| {
                 whitted.addEscaped(group);
                 whitted.find(group, vertex);
                 any_seen = any_seen or vertex.seen.any();
             }
-            if (any_seen) for (whitted.frame.lights) |*light| whitted.addLight(light, &coherence);
+            if (any_seen) for (whitted.frame.lights) |*light| whitted.addLight(light, coherence);
             // The last pushed is traced first: reflection, refraction, the ray's own rest.
             whitted.pushRest();
             if (path.depth == whitted.settings.depth_max or !any_seen) return;
@@ -223,7 +223,7 @@ pub fn Whitted(comptime Kernel: type) type {
         fn addLight(
             whitted: *Self,
             light: *const world_file.Light,
-            coherence: *const dispatch.Coherence(Kernel),
+            coherence: dispatch.Coherence,
         ) void {
             var bundle: bundle_file.Bundle(Kernel) = undefined;
             var unshadowed: [group_count]Vec3 = undefined;
@@ -247,8 +247,7 @@ pub fn Whitted(comptime Kernel: type) type {
                     .bitOr(worth.z.gt(zero)));
                 const primitive = whitted.path.bundle.groups[group].closest.primitive;
                 const away = point.normal_geometric;
-                const pad = whitted.frame.geometry.pad;
-                const end = point.offsetOrigin(away, arrival.distance, pad);
+                const end = point.offsetOrigin(away, arrival.distance);
                 ray.* = visibility_file.shadowRay(Rays, light, end, primitive, arrives.*);
                 whitted.rays.shadow += arrives.popCount();
                 any_lit = any_lit or arrives.any();
@@ -351,7 +350,7 @@ pub fn Whitted(comptime Kernel: type) type {
             direction: Vec3,
         ) void {
             const point = &whitted.vertices[group].point;
-            const origin = point.offsetOrigin(away, .zero(), whitted.frame.geometry.pad);
+            const origin = point.offsetOrigin(away, .zero());
             const from = whitted.path.bundle.groups[group].closest.primitive;
             const ray = &next.bundle.groups[group];
             ray.* = .endless(.init(origin, direction), from, ray.active);

@@ -211,6 +211,7 @@ fn testPoint(view: [3]f32) Interaction(Single) {
         .culled = .splat(false),
         .opacity = .splat(1),
         .error_ulps = .zero(),
+        .offset_max = .zero(),
         .material = .{
             .base_color = .splat(.{ 1, 1, 1 }),
             .emissive = .splat(.{ 0, 0, 0 }),

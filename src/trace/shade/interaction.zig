@@ -17,7 +17,8 @@ pub fn Hit(comptime Lanes: type) type {
     return struct {
         /// Lanes that hit something, one at least.
         mask: Lanes.Mask,
-        /// Of the ray, not normalised.
+        /// Of the rays, the direction not normalised.
+        origin: Lanes.Vec3,
         direction: Lanes.Vec3,
         /// In units of the direction.
         t: Lanes.F32,
@@ -48,6 +49,8 @@ pub fn Interaction(comptime Lanes: type) type {
         opacity: Lanes.F32,
         /// How far off rays have to start, see `offset.errorUlps`.
         error_ulps: Lanes.F32,
+        /// And how far at most.
+        offset_max: Lanes.F32,
         material: material_file.Material(Lanes),
 
         /// The position off the surface by what rounding may do, on the side that `away`, the
@@ -57,9 +60,9 @@ pub fn Interaction(comptime Lanes: type) type {
             point: *const @This(),
             away: Lanes.Vec3,
             other_distance: Lanes.F32,
-            pad: f32,
         ) Lanes.Vec3 {
-            const length = offset.length(Lanes, point.error_ulps, other_distance, pad);
+            const length = offset
+                .length(Lanes, point.error_ulps, other_distance, point.offset_max);
             return point.position.add(away.scale(length));
         }
     };
@@ -185,8 +188,23 @@ pub inline fn resolve(
         .culled = back.andNot(shows_back).andNot(material.volume),
         .opacity = material_file.opacity(Lanes, &materials, color.alpha),
         .error_ulps = offset.errorUlps(Lanes, corners, position, face, plane, distance),
+        .offset_max = padsOf(Lanes, &frame.geometry.padding, corners, hit.origin)
+            .mul(.splat(offset.pads_max)),
         .material = material,
     };
+}
+
+/// What the test that found a hit was padded by: for the triangle and for the ray's origin.
+inline fn padsOf(
+    comptime Lanes: type,
+    padding: *const world_file.Padding,
+    corners: [3]Lanes.Vec3,
+    origin: Lanes.Vec3,
+) Lanes.F32 {
+    const lower = corners[0].min(corners[1]).min(corners[2]);
+    const upper = corners[0].max(corners[1]).max(corners[2]);
+    const pad = padding.ofBoxes(Lanes, lower, upper, .splat(padding.center));
+    return pad.add(padding.shiftOf(Lanes, origin));
 }
 
 inline fn mix(comptime Lanes: type, barycentrics: [3]Lanes.F32, corners: [3]Lanes.Vec3) Lanes.Vec3 {

@@ -41,9 +41,8 @@ const sliver_ulps = 1.5;
 /// Of the tests' part; see above.
 const safety = 2;
 
-/// No offset exceeds this many times `Geometry.pad`: the tree and the beams take for granted that
-/// rays start in the scene, give or take a few pads.
-const pads_max = 8;
+/// No offset exceeds this many times what rounding is padded by at the hit.
+pub const pads_max = 8;
 
 /// The bound as far as the hit alone decides it, in metres over u. `normal` is of unit length,
 /// `plane` across the triangle and twice its area long.
@@ -77,11 +76,11 @@ pub inline fn length(
     comptime Lanes: type,
     error_ulps: Lanes.F32,
     other_distance: Lanes.F32,
-    pad: f32,
+    length_max: Lanes.F32,
 ) Lanes.F32 {
     const sum = error_ulps.add(other_distance.mul(.splat(safety * test_ulps)));
     // Of the smallest triangles the sum is NaN, which `min` turns into the limit.
-    return sum.mul(.splat(unit_roundoff)).min(.splat(pads_max * pad));
+    return sum.mul(.splat(unit_roundoff)).min(length_max);
 }
 
 const Single = simd.Lanes(.scalar, 1);
@@ -93,7 +92,7 @@ fn testLength(size: f32, ray_length: f32, other_distance: f32) f32 {
     const plane: Single.Vec3 = .splat(.{ 0, 0, size * size });
     const up: Single.Vec3 = .splat(.{ 0, 0, 1 });
     const hit = errorUlps(Single, corners, corners[0], up, plane, .splat(ray_length));
-    return length(Single, hit, .splat(other_distance), 1).lane(0);
+    return length(Single, hit, .splat(other_distance), .splat(pads_max)).lane(0);
 }
 
 test "the offset grows with the triangle and the rays, up to the limit, and is a number" {

@@ -3,7 +3,8 @@
 //! In: the near and far faces of boxes, a line, in the same lanes (one ray and many boxes, or many
 //! rays and one box). Out: the range of t within. Every step is monotone in the box, so a larger
 //! box always gives a range that holds the smaller one's, rounding included: culling by it is exact
-//! with respect to `triangle.zig`, which tests the triangle's own box the same way (world.zig).
+//! with respect to `triangle.zig`, which tests the triangle's own box the same way
+//! (world/padding.zig).
 
 const std = @import("std");
 const simd = @import("../../simd.zig");
@@ -22,20 +23,10 @@ pub fn Range(comptime Lanes: type) type {
     };
 }
 
-/// The slab test (Kay and Kajiya 1986). No operand is NaN: corners are finite or, in empty boxes,
-/// infinite, origins finite, inverses finite and not 0. An empty box gives near = +inf.
+/// The range of a box whose faces lie at these offsets from a line's origin. No operand is NaN:
+/// corners are finite or, in empty boxes, infinite, origins finite, inverses finite and not 0. An
+/// empty box gives near = +inf.
 pub inline fn slab(
-    comptime Lanes: type,
-    near_corner: Lanes.Vec3,
-    far_corner: Lanes.Vec3,
-    origin: Lanes.Vec3,
-    direction_inv: Lanes.Vec3,
-) Range(Lanes) {
-    return slabOffsets(Lanes, near_corner.sub(origin), far_corner.sub(origin), direction_inv);
-}
-
-/// The same of corners given from the line's origin.
-pub inline fn slabOffsets(
     comptime Lanes: type,
     near_offset: Lanes.Vec3,
     far_offset: Lanes.Vec3,
@@ -46,6 +37,39 @@ pub inline fn slabOffsets(
     return .{
         .near = near.x.max(near.y).max(near.z),
         .far = far.x.min(far.y).min(far.z),
+    };
+}
+
+/// The range of a box as a ray meets it, its origin's padding included (`ray.RayInverse`).
+pub inline fn padded(
+    comptime Lanes: type,
+    lower: Lanes.Vec3,
+    upper: Lanes.Vec3,
+    ray_inverse: anytype,
+) Range(Lanes) {
+    const length = ray_inverse.shift;
+    const shift: Lanes.Vec3 = .{ .x = length, .y = length, .z = length };
+    const from_lower = lower.sub(ray_inverse.origin.add(shift));
+    const from_upper = upper.sub(ray_inverse.origin.sub(shift));
+    return slab(
+        Lanes,
+        select3(Lanes, ray_inverse.negative, from_upper, from_lower),
+        select3(Lanes, ray_inverse.negative, from_lower, from_upper),
+        ray_inverse.direction_inv,
+    );
+}
+
+/// By component: `a` where the mask is set, else `b`.
+pub inline fn select3(
+    comptime Lanes: type,
+    masks: [3]Lanes.Mask,
+    a: Lanes.Vec3,
+    b: Lanes.Vec3,
+) Lanes.Vec3 {
+    return .{
+        .x = Lanes.F32.select(masks[0], a.x, b.x),
+        .y = Lanes.F32.select(masks[1], a.y, b.y),
+        .z = Lanes.F32.select(masks[2], a.z, b.z),
     };
 }
 
@@ -64,7 +88,7 @@ pub inline fn mayHold(
 /// What is left of the ranges of all three axes between `tnear_t`, which is not negative, and
 /// `closest_t`: `Range.isMet` where there may be a hit. For culling only. The way from node to node
 /// is little but a chain of minima and maxima, so they are the quickest. A far end of -0 may be
-/// missed: boxes are grown (`Geometry.pad`), so that no hit lies at their very end.
+/// missed: boxes are grown (world/padding.zig), so that no hit lies at their very end.
 pub inline fn between(
     comptime Lanes: type,
     near: [3]Lanes.F32,
@@ -80,15 +104,18 @@ pub inline fn between(
 
 const Single = ray.Single;
 
+const test_padding: @import("../../world.zig").Padding = .init(@splat(0), .empty);
+
 fn testSlab(line: ray.RayInverse(Single), near: [3]f32, far: [3]f32) Range(Single) {
-    return slab(Single, .splat(near), .splat(far), line.origin, line.direction_inv);
+    const near_offset = Single.Vec3.splat(near).sub(line.origin);
+    return slab(Single, near_offset, Single.Vec3.splat(far).sub(line.origin), line.direction_inv);
 }
 
 test "an empty box is never entered, a flat one can be, a larger one gives a larger range" {
     const Lanes = Single;
     const inf = std.math.inf(f32);
     const line: ray.RayInverse(Lanes) =
-        .init(.init(.splat(.{ 0, 0, 0 }), .splat(.{ 1, 0, -1e-40 })));
+        .init(.init(.splat(.{ 0, 0, 0 }), .splat(.{ 1, 0, -1e-40 })), &test_padding);
     const empty = testSlab(line, .{ inf, inf, -inf }, .{ -inf, -inf, inf });
     try std.testing.expect(!mayHold(Lanes, empty, .splat(0), .splat(inf)).lane(0));
     const flat = testSlab(line, .{ 2, -1, 1 }, .{ 2, 1, -1 });
@@ -110,7 +137,7 @@ test "an empty box is never entered, a flat one can be, a larger one gives a lar
             origin[axis] = random.random().floatNorm(f32) * 3;
         }
         const up: ray.RayInverse(Lanes) =
-            .init(.init(.splat(origin), .splat(.{ 0.3, 1e-8, 0.7 })));
+            .init(.init(.splat(origin), .splat(.{ 0.3, 1e-8, 0.7 })), &test_padding);
         const inner = testSlab(up, lower, upper);
         for (0..3) |axis| {
             lower[axis] -= random.random().float(f32) * 1e-6;

@@ -21,35 +21,6 @@ pub fn Bundle(comptime Kernel: type) type {
 /// Where in a bundle a ray is.
 pub const Place = struct { group: u32, lane: u32 };
 
-/// Some of a bundle's rays, by group.
-pub fn Part(comptime Kernel: type) type {
-    return [Kernel.group_count]Kernel.Rays.Mask;
-}
-
-/// Leaves those rays active that are in a part, or those that are not. Returns which were active.
-pub fn narrow(
-    comptime Kernel: type,
-    bundle: *Bundle(Kernel),
-    part: *const Part(Kernel),
-    within: bool,
-) Part(Kernel) {
-    var active: Part(Kernel) = undefined;
-    for (&active, &bundle.groups, part) |*before, *group, chosen| {
-        before.* = group.active;
-        group.active = if (within) before.bitAnd(chosen) else before.andNot(chosen);
-    }
-    return active;
-}
-
-/// Makes these rays active.
-pub fn restore(
-    comptime Kernel: type,
-    bundle: *Bundle(Kernel),
-    active: *const Part(Kernel),
-) void {
-    for (&bundle.groups, active) |*group, mask| group.active = mask;
-}
-
 /// How boxes and triangles look to a group.
 pub fn Precalculations(comptime Lanes: type) type {
     return struct {
@@ -57,9 +28,12 @@ pub fn Precalculations(comptime Lanes: type) type {
         pub const Rays = Lanes;
 
         slabs: ray_file.RayInverse(Rays),
-        /// Origin times inverse, negated: what a bound times the inverse has added, where nodes are
-        /// tested by multiply-adds.
-        shift: Rays.Vec3,
+        /// Padded origin times inverse, negated: what a near or far bound times the inverse has
+        /// added, where nodes are tested by multiply-adds.
+        near_shift: Rays.Vec3,
+        far_shift: Rays.Vec3,
+        /// Rays for which nodes may be tested so.
+        fusable: Rays.Mask,
         axis: ray_file.LongAxis(Rays),
         /// The one axis of all active rays, if there is one.
         uniform: ?u2,
@@ -68,17 +42,37 @@ pub fn Precalculations(comptime Lanes: type) type {
 }
 
 /// Views of the active rays of a group.
-pub fn viewOf(comptime Rays: type, group: *const ray_file.Ray(Rays)) Precalculations(Rays) {
+pub fn viewOf(
+    comptime Rays: type,
+    padding: *const world_file.Padding,
+    group: *const ray_file.Ray(Rays),
+) Precalculations(Rays) {
     if (group.active.none()) return undefined;
     const axis: ray_file.LongAxis(Rays) = .of(group.line.direction);
-    const slabs: ray_file.RayInverse(Rays) = .init(group.line);
+    const slabs: ray_file.RayInverse(Rays) = .init(group.line, padding);
+    const ends = nodeOrigins(Rays, padding, slabs.origin);
+    const near = box.select3(Rays, slabs.negative, ends[1], ends[0]);
+    const far = box.select3(Rays, slabs.negative, ends[0], ends[1]);
     return .{
         .slabs = slabs,
-        .shift = slabs.origin.mul(slabs.direction_inv).neg(),
+        .near_shift = near.mul(slabs.direction_inv).neg(),
+        .far_shift = far.mul(slabs.direction_inv).neg(),
+        .fusable = padding.allowsProducts(Rays, slabs.origin, slabs.direction_inv),
         .axis = axis,
         .uniform = axis.uniform(group.active),
-        .view = .init(group.line, axis),
+        .view = .init(group.line, axis, padding),
     };
+}
+
+/// Where lower and upper faces of nodes are met from, their margin included.
+pub inline fn nodeOrigins(
+    comptime Rays: type,
+    padding: *const world_file.Padding,
+    origin: Rays.Vec3,
+) [2]Rays.Vec3 {
+    const length = padding.nodeShiftOf(Rays, origin);
+    const shift: Rays.Vec3 = .{ .x = length, .y = length, .z = length };
+    return .{ origin.add(shift), origin.sub(shift) };
 }
 
 /// Looks for hits of the active rays and keeps them in `closest`. With `Query.any_hit` a ray that
@@ -93,8 +87,8 @@ pub fn trace(
     if (group.active.none()) return;
     var search: Search(Kernel, query) = .{
         .group = group,
-        .view = viewOf(Kernel.Rays, group),
-        .pad = geometry.pad,
+        .view = viewOf(Kernel.Rays, &geometry.padding, group),
+        .padding = &geometry.padding,
     };
     _ = walk.walk(Kernel, geometry.tree.get(Kernel.width), &search, counts);
 }
@@ -105,7 +99,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
     return struct {
         group: *ray_file.Ray(Kernel.Rays),
         view: Precalculations(Kernel.Rays),
-        pad: f32,
+        padding: *const world_file.Padding,
         /// Every ray has its own.
         limit: f32 = inf,
 
@@ -137,7 +131,7 @@ fn Search(comptime Kernel: type, comptime query: Query) type {
                 if (pack.primitive[lane] == world_file.none) break;
                 found = intersectLane(Kernel, query, search.group, &search.view, pack, .{
                     .lane = lane,
-                    .pad = search.pad,
+                    .padding = search.padding,
                 }, counts) or found;
             }
             return found;
@@ -166,9 +160,7 @@ inline fn enter(
         node.bounds[1][0][child], node.bounds[1][1][child], node.bounds[1][2][child],
     };
     const Rays = Kernel.Rays;
-    const near = triangle.select3(Rays, slabs.negative, .splat(upper), .splat(lower));
-    const far = triangle.select3(Rays, slabs.negative, .splat(lower), .splat(upper));
-    const range = box.slab(Rays, near, far, slabs.origin, slabs.direction_inv);
+    const range = box.padded(Rays, .splat(lower), .splat(upper), slabs);
     const held = box.mayHold(Rays, range, group.tnear.t, group.closest.t).bitAnd(group.active);
     if (held.none()) return null;
     return Rays.F32.select(held, range.near, .splat(std.math.inf(f32))).reduceMin();
@@ -181,8 +173,8 @@ pub fn countBoxes(comptime Kernel: type, group: anytype, counts: *TestCounts) vo
     counts.box_useful += group.active.popCount();
 }
 
-/// Which triangle of a pack, and `Geometry.pad`.
-pub const At = struct { lane: usize, pad: f32 };
+/// Which triangle of a pack, and the geometry's padding.
+pub const At = struct { lane: usize, padding: *const world_file.Padding };
 
 /// Tests one triangle of a pack against the active rays of one group. Returns whether any took
 /// the hit.
@@ -228,7 +220,9 @@ pub inline fn hitsOfLane(
     if (weights.mayAgree().bitAnd(group.active).none()) return false;
     const agreeing = weights.agree().bitAnd(group.active);
     const inside = triangle.resolveTies(Rays, seen, &weights, agreeing);
-    const hit = triangle.locate(Rays, seen, weights, corners, &view.view, at.pad);
+    const center = turnedPoint(Rays, at.padding.center, view);
+    const hit = triangle
+        .locate(Rays, seen, weights, corners, &view.view, at.padding, center);
     const primitive: Rays.I32 = .splat(@bitCast(pack.primitive[at.lane]));
     hits.t = hit.t;
     hits.mask = inside.bitAnd(hit.mask)
@@ -246,14 +240,22 @@ inline fn turnedCorners(
     view: *const Precalculations(Rays),
 ) [3]Rays.Vec3 {
     var corners: [3]Rays.Vec3 = undefined;
-    const axis = view.uniform orelse 2;
     inline for (&corners, &pack.corner) |*corner, *components| {
-        corner.* = .splat(.{
-            components[ray_file.turnedIndex(axis, 0)][lane],
-            components[ray_file.turnedIndex(axis, 1)][lane],
-            components[axis][lane],
-        });
-        if (view.uniform == null) corner.* = view.axis.turn(corner.*);
+        const point = [3]f32{ components[0][lane], components[1][lane], components[2][lane] };
+        corner.* = turnedPoint(Rays, point, view);
     }
     return corners;
+}
+
+/// A point, turned as each ray wants it.
+inline fn turnedPoint(
+    comptime Rays: type,
+    point: [3]f32,
+    view: *const Precalculations(Rays),
+) Rays.Vec3 {
+    const axis = view.uniform orelse 2;
+    const turned: Rays.Vec3 = .splat(.{
+        point[ray_file.turnedIndex(axis, 0)], point[ray_file.turnedIndex(axis, 1)], point[axis],
+    });
+    return if (view.uniform == null) view.axis.turn(turned) else turned;
 }

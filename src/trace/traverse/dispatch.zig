@@ -9,41 +9,33 @@ const TestCounts = @import("../../statistics.zig").TestCounts;
 const interval_packet = @import("interval_packet.zig");
 const single = @import("single.zig");
 const bundle_file = @import("bundle.zig");
-const pencil = @import("beam/virtual_origin.zig");
-const primary = @import("beam/primary.zig");
+const eye_rays = @import("beam/eye_rays.zig");
 const Grid = @import("beam/grid.zig").Grid;
 const shadow = @import("beam/shadow.zig");
 const Query = @import("walk.zig").Query;
 
-/// Which rays of a bundle hit what is near to each other, as those of a beam do.
-pub fn Coherence(comptime Kernel: type) type {
-    return union(enum) { none, all, some: bundle_file.Part(Kernel) };
-}
+/// Whether a bundle's rays hit what is near to each other, as those of a beam do.
+pub const Coherence = enum { none, all };
 
 /// Finds the nearest hits of all active rays. With a grid, rays start at its origin along its
-/// directions, leave nothing out and have no limit; else nothing is known of them. Returns those
-/// that went as beams. `shares` is null, or where the barycentric weights of these go: of the
-/// second and the third corner, by group.
+/// directions, leave nothing out and have no limit; else nothing is known of them. Returns whether
+/// they went as a beam.
 pub fn closestHit(
     comptime Kernel: type,
     geometry: *const world_file.Geometry,
     bundle: *bundle_file.Bundle(Kernel),
     grid: ?*const Grid,
-    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
     counts: *TestCounts,
-) Coherence(Kernel) {
+) Coherence {
     if (Kernel.variant.traversal != .beam) {
         bySelf(Kernel, .closest_hit, geometry, bundle, counts);
         return .none;
     }
     if (grid) |known| {
-        if (primary.trace(Kernel, geometry, known, bundle, shares, counts)) return .all;
-        byInterval(Kernel, .closest_hit, geometry, bundle, null, counts);
-        return .none;
+        if (eye_rays.trace(Kernel, geometry, known, bundle, counts)) return .all;
     }
-    const beams = pencil.trace(Kernel, geometry, bundle, shares, counts);
-    byInterval(Kernel, .closest_hit, geometry, bundle, if (beams) |*some| some else null, counts);
-    return if (beams) |some| .{ .some = some } else .none;
+    byInterval(Kernel, .closest_hit, geometry, bundle, counts);
+    return .none;
 }
 
 /// Finds whether all active rays, of this light, have any hit; `interval_packet.trace` says what is
@@ -54,38 +46,27 @@ pub fn anyHit(
     geometry: *const world_file.Geometry,
     bundle: *bundle_file.Bundle(Kernel),
     light: *const world_file.Light,
-    coherence: *const Coherence(Kernel),
+    coherence: Coherence,
     counts: *TestCounts,
 ) void {
     if (Kernel.variant.traversal != .beam)
         return bySelf(Kernel, .any_hit, geometry, bundle, counts);
-    switch (coherence.*) {
-        .none => byInterval(Kernel, .any_hit, geometry, bundle, null, counts),
+    switch (if (light.from_receiver) .none else coherence) {
+        .none => byInterval(Kernel, .any_hit, geometry, bundle, counts),
         .all => shadow.trace(Kernel, geometry, light, bundle, counts),
-        .some => |*some| {
-            const active = bundle_file.narrow(Kernel, bundle, some, true);
-            shadow.trace(Kernel, geometry, light, bundle, counts);
-            bundle_file.restore(Kernel, bundle, &active);
-            byInterval(Kernel, .any_hit, geometry, bundle, some, counts);
-        },
     }
 }
 
-/// All rays but those that are `done`, as interval packets and ray streams.
+/// All rays as interval packets and ray streams.
 fn byInterval(
     comptime Kernel: type,
     comptime query: Query,
     geometry: *const world_file.Geometry,
     bundle: *bundle_file.Bundle(Kernel),
-    done: ?*const bundle_file.Part(Kernel),
     counts: *TestCounts,
 ) void {
     var budget: interval_packet.PacketBudget = .{};
-    const part = done orelse
-        return interval_packet.trace(Kernel, query, geometry, bundle, &budget, counts);
-    const active = bundle_file.narrow(Kernel, bundle, part, false);
     interval_packet.trace(Kernel, query, geometry, bundle, &budget, counts);
-    bundle_file.restore(Kernel, bundle, &active);
 }
 
 /// One group without beams.

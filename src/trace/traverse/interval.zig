@@ -6,30 +6,39 @@
 //! test's result for each ray by itself.
 
 const std = @import("std");
+const bundle_file = @import("bundle.zig");
+const Padding = @import("../../world.zig").Padding;
 
 /// The least and the greatest of what rays have.
 pub const Ends = struct {
+    /// The least from which an upper face of a node is met, the greatest from which a lower one is.
     origin: [3][2]f32,
     inverse: [3][2]f32,
     tnear_t: f32,
     closest_t: f32,
 
     /// Of the active rays of some groups, of which `views` are the views.
-    pub inline fn of(comptime Kernel: type, groups: anytype, views: anytype) Ends {
+    pub inline fn of(
+        comptime Kernel: type,
+        padding: *const Padding,
+        groups: anytype,
+        views: anytype,
+    ) Ends {
         const Rays = Kernel.Rays;
         const inf: Rays.F32 = .splat(std.math.inf(f32));
         var least: [7]Rays.F32 = @splat(inf);
         var greatest: [7]Rays.F32 = @splat(inf.neg());
         for (groups, views) |*group, *view| {
             if (group.active.none()) continue;
-            const origin = group.line.origin;
+            const most, const origin = bundle_file.nodeOrigins(Rays, padding, group.line.origin);
             const inverse = view.slabs.direction_inv;
-            const values = [6]Rays.F32{
+            const lows = [6]Rays.F32{
                 origin.x, origin.y, origin.z, inverse.x, inverse.y, inverse.z,
             };
-            for (values, least[0..6], greatest[0..6]) |value, *low, *high| {
-                low.* = low.minFast(.select(group.active, value, inf));
-                high.* = high.maxFast(.select(group.active, value, inf.neg()));
+            const highs = [6]Rays.F32{ most.x, most.y, most.z, inverse.x, inverse.y, inverse.z };
+            for (lows, highs, least[0..6], greatest[0..6]) |less, more, *low, *high| {
+                low.* = low.minFast(.select(group.active, less, inf));
+                high.* = high.maxFast(.select(group.active, more, inf.neg()));
             }
             least[6] = least[6].minFast(.select(group.active, group.tnear.t, inf));
             const closest: Rays.F32 = .select(group.active, group.closest.t, inf.neg());
@@ -43,13 +52,6 @@ pub const Ends = struct {
         ends.tnear_t = least[6].reduceMin();
         ends.closest_t = greatest[6].reduceMax();
         return ends;
-    }
-
-    /// The largest |coordinate| of an origin.
-    pub fn reach(ends: *const Ends) f32 {
-        var largest: f32 = 0;
-        for (ends.origin) |range| largest = @max(largest, @abs(range[0]), @abs(range[1]));
-        return largest;
     }
 };
 

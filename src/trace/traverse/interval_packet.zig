@@ -10,7 +10,7 @@
 //!
 //! Every step of the slab test is monotone in origin, inverse and bound, rounding included. So
 //! from the ends of intervals come bounds of what the test gives for any ray between, and nothing
-//! is culled that the ray by itself would have found (box.zig; `Geometry.fused_reach` for multiply-
+//! is culled that the ray by itself would have found (box.zig; world/padding.zig for multiply-
 //! adds).
 //!
 //! S. Boulos, I. Wald and P. Shirley, "Geometric and Arithmetic Culling Methods for Entire Ray
@@ -36,11 +36,11 @@ const packet_rays_min = std.EnumArray(Query, u32).initDefault(6, .{ .closest_hit
 /// incoherent, too, and each comparison goes over the whole subtile.
 const incoherent_max = 2;
 /// How far apart the directions of rays are that go together, over their length, and the origins,
-/// over the size of the scene. Both are rough: what they let through costs little more than single
+/// over `Geometry.size`. Both are rough: what they let through costs little more than single
 /// rays, since a child is entered only where a ray is (`Search.meet`).
 const direction_apart_max = 0.06;
 /// See `direction_apart_max`.
-const origin_apart_max = 0.01;
+const origin_apart_max = 0.03;
 
 /// Whether packets of shadow rays pay: every node that a packet visits earns a little, every
 /// child that its intervals meet though none of its rays enters it costs much more. Once all is
@@ -116,7 +116,8 @@ fn traceSubtile(
     var views: [Kernel.subtile_groups]bundle_file.Precalculations(Rays) = undefined;
     for (&active, groups) |*mask, *group| mask.* = group.active;
     if (firstOf(Rays, &active) == null) return;
-    for (&views, groups) |*view, *group| view.* = bundle_file.viewOf(Rays, group);
+    const padding = &stream.geometry.padding;
+    for (&views, groups) |*view, *group| view.* = bundle_file.viewOf(Rays, padding, group);
     var rest = active;
     var incoherent: [Kernel.subtile_groups]Rays.Mask = @splat(.splat(false));
     var incoherent_count: u32 = 0;
@@ -181,7 +182,7 @@ fn CoherentGroup(comptime Rays: type) type {
             return .{
                 .origin = .splat(group.line.origin.lane(lane)),
                 .direction = .splat(direction),
-                .origin_apart = .splat(geometry.pad * (origin_apart_max / world_file.pad_relative)),
+                .origin_apart = .splat(geometry.size * origin_apart_max),
                 .direction_apart = .splat(length * direction_apart_max),
                 .octant = octant,
             };
@@ -220,8 +221,10 @@ fn tracePacket(
     const geometry = stream.geometry;
     const groups = stream.bundle.groups[first_group..][0..Kernel.subtile_groups];
     const tree = geometry.tree.get(Kernel.width);
-    const ends: intervals.Ends = .of(Kernel, groups, views);
-    if (!(ends.reach() < geometry.fused_reach)) return false;
+    for (groups, views) |*group, *view| {
+        if (group.active.andNot(view.fusable).any()) return false;
+    }
+    const ends: intervals.Ends = .of(Kernel, &geometry.padding, groups, views);
     var search: Search(Kernel, query) =
         .init(geometry, groups, views, octant, &ends, budget.*, first_group, stream.lists);
     _ = walk.walk(Kernel, tree, &search, counts);

@@ -37,10 +37,7 @@ pub fn Search(comptime Kernel: type, comptime query: Query) type {
         tnear_t: F32,
         /// The greatest t that matters.
         limit: f32,
-        /// By how much boxes of triangles are grown: more than their own pad and a node's margin.
-        grow: f32,
-        /// See `Geometry.pad`.
-        pad: f32,
+        padding: *const world_file.Padding,
         budget: PacketBudget,
         /// That of `groups` in its bundle.
         first_group: u32,
@@ -78,8 +75,7 @@ pub fn Search(comptime Kernel: type, comptime query: Query) type {
                 .slabs = slabs,
                 .tnear_t = .splat(ends.tnear_t),
                 .limit = ends.closest_t,
-                .grow = geometry.pad + 2 * geometry.node_margin,
-                .pad = geometry.pad,
+                .padding = &geometry.padding,
                 .budget = budget,
                 .first_group = @intCast(first_group),
                 .lists = lists,
@@ -154,12 +150,14 @@ pub fn Search(comptime Kernel: type, comptime query: Query) type {
             const group = &search.groups[index];
             bundle_file.countBoxes(Kernel, group, counts);
             const inverse = search.views[index].slabs.direction_inv;
-            const shift = search.views[index].shift;
+            const near_shift = search.views[index].near_shift;
+            const far_shift = search.views[index].far_shift;
             var first: [3]Rays.F32 = undefined;
             var last: [3]Rays.F32 = undefined;
             inline for (&first, &last, near, far, .{ "x", "y", "z" }) |*a, *b, low, high, axis| {
-                a.* = Rays.F32.splat(low).mulAdd(@field(inverse, axis), @field(shift, axis));
-                b.* = Rays.F32.splat(high).mulAdd(@field(inverse, axis), @field(shift, axis));
+                const factor = @field(inverse, axis);
+                a.* = Rays.F32.splat(low).mulAdd(factor, @field(near_shift, axis));
+                b.* = Rays.F32.splat(high).mulAdd(factor, @field(far_shift, axis));
             }
             const range = box.between(Rays, first, last, group.tnear.t, group.closest.t);
             return range.isMet().bitAnd(group.active);
@@ -208,17 +206,25 @@ pub fn Search(comptime Kernel: type, comptime query: Query) type {
             search: *const Self,
             pack: *const world_file.TrianglePack(Kernel.width),
         ) Met {
-            const grow: F32 = .splat(search.grow);
             var near: [3]F32 = undefined;
             var far: [3]F32 = undefined;
             var lowers: [3]F32 = undefined;
             var uppers: [3]F32 = undefined;
-            inline for (&near, &far, &search.slabs, 0..) |*first, *last, *slab, axis| {
+            inline for (&lowers, &uppers, 0..) |*lower, *upper, axis| {
                 const a: F32 = .load(&pack.corner[0][axis]);
                 const b: F32 = .load(&pack.corner[1][axis]);
                 const c: F32 = .load(&pack.corner[2][axis]);
-                lowers[axis] = a.minFast(b).minFast(c).sub(grow);
-                uppers[axis] = a.maxFast(b).maxFast(c).add(grow);
+                lower.* = a.minFast(b).minFast(c);
+                upper.* = a.maxFast(b).maxFast(c);
+            }
+            const grow = search.padding.marginOfBoxes(
+                Boxes,
+                .{ .x = lowers[0], .y = lowers[1], .z = lowers[2] },
+                .{ .x = uppers[0], .y = uppers[1], .z = uppers[2] },
+            );
+            inline for (&near, &far, &search.slabs, 0..) |*first, *last, *slab, axis| {
+                lowers[axis] = lowers[axis].sub(grow);
+                uppers[axis] = uppers[axis].add(grow);
                 first.* = slab.near(.select(slab.negative, uppers[axis], lowers[axis]));
                 last.* = slab.far(.select(slab.negative, lowers[axis], uppers[axis]));
             }
@@ -260,7 +266,7 @@ pub fn Search(comptime Kernel: type, comptime query: Query) type {
                 const closer = if (query == .multi_hit)
                     search.lists.take(place, &ray, pack, counts) or ray.limit < ts[lane]
                 else
-                    ray.intersect(pack, search.pad, counts);
+                    ray.intersect(pack, search.padding, counts);
                 if (!closer) continue;
                 found |= @as(u32, 1) << @intCast(lane);
                 ts[lane] = if (query == .any_hit) -std.math.inf(f32) else ray.limit;
@@ -284,7 +290,10 @@ pub fn Search(comptime Kernel: type, comptime query: Query) type {
             var found = false;
             var rest = lanes;
             while (rest != 0) : (rest &= rest - 1) {
-                const at: bundle_file.At = .{ .lane = @ctz(rest), .pad = search.pad };
+                const at: bundle_file.At = .{
+                    .lane = @ctz(rest),
+                    .padding = search.padding,
+                };
                 const closer = if (query == .multi_hit)
                     search.lists.takeLane(search.first_group + index, group, view, pack, at, counts)
                 else

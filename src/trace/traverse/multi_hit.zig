@@ -73,7 +73,7 @@ pub fn HitLists(comptime Kernel: type) type {
                 lists.stopped[number] = 0;
                 lists.counts[number] = @splat(0);
                 if (Kernel.variant.traversal == .beam) continue;
-                const view = bundle_file.viewOf(Rays, group);
+                const view = bundle_file.viewOf(Rays, &lists.geometry.padding, group);
                 lists.traceEach(bundle, number, &view, tests);
             }
             if (Kernel.variant.traversal == .beam)
@@ -148,7 +148,7 @@ pub fn HitLists(comptime Kernel: type) type {
             tests: *TestCounts,
         ) bool {
             var hits: triangle.Intersection(Kernel.Boxes) = undefined;
-            if (!ray.hitsOf(pack, lists.geometry.pad, tests, &hits)) return false;
+            if (!ray.hitsOf(pack, &lists.geometry.padding, tests, &hits)) return false;
             const ts = hits.t.toArray();
             var rest = hits.mask.bits();
             while (rest != 0) : (rest &= rest - 1) {

@@ -7,6 +7,7 @@
 
 const std = @import("std");
 const simd = @import("../../simd.zig");
+const Padding = @import("../../world.zig").Padding;
 const assert = std.debug.assert;
 
 /// Primitive number that stands for "none". As a signed lane value it is below every number, so a
@@ -14,7 +15,7 @@ const assert = std.debug.assert;
 pub const no_primitive: i32 = -1;
 
 /// Directions shorter than this along an axis count as this short for boxes: the inverse stays
-/// finite and a box's faces never give 0 times infinity. Far below what any `pad` covers.
+/// finite and a box's faces never give 0 times infinity. Far below what any padding covers.
 const direction_least = 1e-30;
 
 /// Hits in lanes.
@@ -73,13 +74,16 @@ pub fn Line(comptime Lanes: type) type {
 pub fn RayInverse(comptime Lanes: type) type {
     return struct {
         origin: Lanes.Vec3,
+        /// The origin's part of the padding: lower faces are met from the origin plus this, upper
+        /// ones from the origin minus it.
+        shift: Lanes.F32,
         /// 1 / direction, finite and never 0.
         direction_inv: Lanes.Vec3,
         /// Where the direction points down an axis: the upper face of a box is the near one.
         negative: [3]Lanes.Mask,
 
         /// Gathers what tests need.
-        pub inline fn init(line: Line(Lanes)) @This() {
+        pub inline fn init(line: Line(Lanes), padding: *const Padding) @This() {
             const inverse: Lanes.Vec3 = .{
                 .x = invert(line.direction.x),
                 .y = invert(line.direction.y),
@@ -88,6 +92,7 @@ pub fn RayInverse(comptime Lanes: type) type {
             const zero: Lanes.F32 = .zero();
             return .{
                 .origin = line.origin,
+                .shift = padding.shiftOf(Lanes, line.origin),
                 .direction_inv = inverse,
                 .negative = .{ inverse.x.lt(zero), inverse.y.lt(zero), inverse.z.lt(zero) },
             };
@@ -169,6 +174,8 @@ pub fn ShearedRay(comptime Lanes: type) type {
     return struct {
         /// Turned.
         origin: Lanes.Vec3,
+        /// See `RayInverse`.
+        shift: Lanes.F32,
         /// Turned, see `RayInverse`.
         direction_inv: Lanes.Vec3,
         /// Turned, see `RayInverse`.
@@ -176,21 +183,31 @@ pub fn ShearedRay(comptime Lanes: type) type {
         /// Turned direction's x / z, y / z and 1 / z.
         shear: Lanes.Vec3,
 
-        /// The view of a line whose longest axis is the given one.
-        pub inline fn init(line: Line(Lanes), axis: LongAxis(Lanes)) @This() {
+        /// A line whose longest axis is the given one.
+        pub inline fn init(
+            line: Line(Lanes),
+            axis: LongAxis(Lanes),
+            padding: *const Padding,
+        ) @This() {
             const direction = axis.turn(line.direction);
-            const slabs: RayInverse(Lanes) = .init(line);
+            const slabs: RayInverse(Lanes) = .init(line, padding);
             return .{
                 .origin = axis.turn(line.origin),
+                .shift = slabs.shift,
                 .direction_inv = axis.turn(slabs.direction_inv),
                 .negative = axis.turnMasks(slabs.negative),
-                .shear = .{
-                    .x = direction.x.div(direction.z),
-                    .y = direction.y.div(direction.z),
-                    .z = Lanes.F32.splat(1).div(direction.z),
-                },
+                .shear = shearOf(Lanes, direction),
             };
         }
+    };
+}
+
+/// What shears space so that a line in this turned direction runs along z.
+pub inline fn shearOf(comptime Lanes: type, direction: Lanes.Vec3) Lanes.Vec3 {
+    return .{
+        .x = direction.x.div(direction.z),
+        .y = direction.y.div(direction.z),
+        .z = Lanes.F32.splat(1).div(direction.z),
     };
 }
 
@@ -252,6 +269,8 @@ pub fn Ray(comptime Lanes: type) type {
 /// One ray by itself.
 pub const Single = simd.Lanes(.scalar, 1);
 
+const test_padding: Padding = .init(@splat(0), .empty);
+
 test "hits are ordered by t, then by number; limits are strict" {
     const inf = std.math.inf(f32);
     const H = Hit(Single);
@@ -289,7 +308,7 @@ test "the long axis comes last, in cyclic order" {
             try std.testing.expectEqual(direction[turnedIndex(expected, place)], turned[place]);
         }
         const line: Line(Single) = .init(.splat(.{ 7, 8, 9 }), v);
-        const slabs: RayInverse(Single) = .init(line);
+        const slabs: RayInverse(Single) = .init(line, &test_padding);
         const masks = axis.turnMasks(slabs.negative);
         for (masks, turned) |mask, component| {
             try std.testing.expectEqual(component < 0, mask.lane(0));
@@ -301,7 +320,7 @@ test "inverse directions are finite and keep their sign" {
     const directions = [_]f32{ 0, -0.0, 1e-39, -1e-39, 1e-30, -1e-20, 1, -1e18 };
     for (directions) |direction| {
         const slabs: RayInverse(Single) =
-            .init(.init(.splat(.{ 0, 0, 0 }), .splat(@splat(direction))));
+            .init(.init(.splat(.{ 0, 0, 0 }), .splat(@splat(direction))), &test_padding);
         const inverse = slabs.direction_inv.x.lane(0);
         try std.testing.expect(std.math.isFinite(inverse) and inverse != 0);
         try std.testing.expectEqual(std.math.signbit(direction), std.math.signbit(inverse));

@@ -22,7 +22,7 @@ pub fn trace(
     ray: *ray_file.Ray(Single),
     counts: *TestCounts,
 ) bool {
-    const view = bundle_file.viewOf(Single, ray);
+    const view = bundle_file.viewOf(Single, &geometry.padding, ray);
     const closest = traceLane(Kernel, query, Single, geometry, ray, &view, 0, counts) orelse
         return false;
     ray.closest = .{ .t = .splat(closest.t), .primitive = .splat(closest.primitive) };
@@ -65,9 +65,7 @@ fn traceLane(
     lane: usize,
     counts: *TestCounts,
 ) ?Found {
-    const start = group.line.origin.lane(lane);
-    const reach = @max(@abs(start[0]), @abs(start[1]), @abs(start[2]));
-    if (reach < geometry.fused_reach) {
+    if (view.fusable.lane(lane)) {
         var ray: traversal_ray.TraversalRay(Kernel) = .of(Rays, true, group, view, lane);
         return travel(Kernel, query, true, geometry, &ray, counts);
     }
@@ -83,7 +81,7 @@ inline fn travel(
     ray: *traversal_ray.TraversalRay(Kernel),
     counts: *TestCounts,
 ) ?Found {
-    var search: Search(Kernel, query, fused) = .of(ray, geometry.pad);
+    var search: Search(Kernel, query, fused) = .of(ray, &geometry.padding);
     if (!walk.walk(Kernel, geometry.tree.get(Kernel.width), &search, counts)) return null;
     return .{ .t = ray.limit, .primitive = ray.closest_primitive };
 }
@@ -96,14 +94,18 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
         slabs: TraversalRay.Slabs,
         /// That of the ray.
         limit: f32,
-        /// See `Geometry.pad`.
-        pad: f32,
+        padding: *const world_file.Padding,
 
         const Self = @This();
 
         /// Keeps the hit in `ray`.
-        pub inline fn of(ray: *TraversalRay, pad: f32) Self {
-            return .{ .ray = ray, .slabs = ray.slabsOf(), .limit = ray.limit, .pad = pad };
+        pub inline fn of(ray: *TraversalRay, padding: *const world_file.Padding) Self {
+            return .{
+                .ray = ray,
+                .slabs = ray.slabsOf(),
+                .limit = ray.limit,
+                .padding = padding,
+            };
         }
 
         /// See `walk.walk`.
@@ -121,7 +123,7 @@ pub fn Search(comptime Kernel: type, comptime query: Query, comptime fused: bool
             pack: *const world_file.TrianglePack(Kernel.width),
             counts: *TestCounts,
         ) bool {
-            const found = search.ray.intersect(pack, search.pad, counts);
+            const found = search.ray.intersect(pack, search.padding, counts);
             search.limit = search.ray.limit;
             return found;
         }

@@ -87,10 +87,8 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
             const groups = stream.bundle.groups[first_group..][0..views.len];
             for (groups, views, first_group..) |*group, *view, number| {
                 if (group.active.none()) continue;
-                const origin = group.line.origin.abs();
-                const reach = origin.x.max(origin.y).max(origin.z);
-                const near = group.active.bitAnd(reach.lt(.splat(stream.geometry.fused_reach)));
-                var bits = near.bits();
+                const fusable = group.active.bitAnd(view.fusable);
+                var bits = fusable.bits();
                 while (bits != 0) : (bits &= bits - 1) {
                     if (stream.count == rays_max) stream.finish(counts);
                     const lane = @ctz(bits);
@@ -98,9 +96,9 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                     stream.places[stream.count] = .{ .group = @intCast(number), .lane = lane };
                     stream.count += 1;
                 }
-                const far = group.active.andNot(near);
-                if (far.none()) continue;
-                group.active = far;
+                const others = group.active.andNot(fusable);
+                if (others.none()) continue;
+                group.active = others;
                 if (query == .multi_hit)
                     stream.lists.traceEach(stream.bundle, number, view, counts)
                 else
@@ -180,7 +178,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                     const found = if (query == .multi_hit)
                         stream.lists.take(stream.places[number], ray, pack, counts)
                     else
-                        ray.intersect(pack, stream.geometry.pad, counts);
+                        ray.intersect(pack, &stream.geometry.padding, counts);
                     if (!found) continue;
                     stream.found |= @as(Set, 1) << @intCast(number);
                     if (query == .multi_hit) break;

@@ -3,7 +3,7 @@
 //! In: a ray of a group. Out: which children it enters; its nearest hit. It is kept as plain
 //! numbers: little is copied to make it, and a load puts a number into all lanes where a test wants
 //! it. Which hit wins does not depend on the order of the tests (ray.zig), nor does culling change
-//! it (box.zig; `Geometry.fused_reach` for the rounding of multiply-adds).
+//! it (box.zig; world/padding.zig for the rounding of multiply-adds).
 
 const world_file = @import("../../world.zig");
 const TestCounts = @import("../../statistics.zig").TestCounts;
@@ -21,14 +21,18 @@ pub fn TraversalRay(comptime Kernel: type) type {
     return struct {
         /// See `ray.RayInverse.direction_inv`.
         inverse: [3]f32,
-        /// What a bound has added after it is multiplied, or if not fused, subtracted before.
-        shift: [3]f32,
+        /// What a near bound has added after it is multiplied, or if not fused, subtracted before.
+        near_shift: [3]f32,
+        /// The same of a far bound.
+        far_shift: [3]f32,
         /// Where the rows of `Node.bounds` that are the near faces begin, and the far, in bytes.
         near_at: [3]u32,
         far_at: [3]u32,
         /// The longest axis; `View` for what is turned by it.
         axis: u32,
         turned_origin: [3]f32,
+        /// The origin's part of the padding.
+        shift: f32,
         turned_inverse: [3]f32,
         shear: [3]f32,
         tnear_t: f32,
@@ -44,7 +48,7 @@ pub fn TraversalRay(comptime Kernel: type) type {
         const Pack = world_file.TrianglePack(width);
 
         /// The ray in one lane of a group. With `fused`, nodes are tested by multiply-adds: it has
-        /// to start within `Geometry.fused_reach`.
+        /// to be `fusable`.
         pub inline fn of(
             comptime Rays: type,
             comptime fused: bool,
@@ -62,11 +66,19 @@ pub fn TraversalRay(comptime Kernel: type) type {
             }
             return .{
                 .inverse = inverse,
-                .shift = (if (fused) &view.shift else &group.line.origin).laneIn(lane),
+                .near_shift = if (fused)
+                    view.near_shift.laneIn(lane)
+                else
+                    faceOrigin(view, lane, 1),
+                .far_shift = if (fused)
+                    view.far_shift.laneIn(lane)
+                else
+                    faceOrigin(view, lane, -1),
                 .near_at = near_at,
                 .far_at = far_at,
                 .axis = view.uniform orelse view.axis.ofLane(lane),
                 .turned_origin = view.view.origin.laneIn(lane),
+                .shift = view.view.shift.laneIn(lane),
                 .turned_inverse = view.view.direction_inv.laneIn(lane),
                 .shear = view.view.shear.laneIn(lane),
                 .tnear_t = group.tnear.t.laneIn(lane),
@@ -77,10 +89,21 @@ pub fn TraversalRay(comptime Kernel: type) type {
             };
         }
 
+        /// Where near (1) or far (-1) faces are met from.
+        fn faceOrigin(view: anytype, lane: usize, side: f32) [3]f32 {
+            const shift = side * view.view.shift.lane(lane);
+            var from = view.slabs.origin.lane(lane);
+            for (&from, view.slabs.negative) |*coordinate, negative| {
+                coordinate.* += if (negative.lane(lane)) -shift else shift;
+            }
+            return from;
+        }
+
         /// What nodes are tested against, in lanes.
         pub const Slabs = struct {
             inverse: [3]F32,
-            shift: [3]F32,
+            near_shift: [3]F32,
+            far_shift: [3]F32,
             near_at: [3]usize,
             far_at: [3]usize,
             tnear_t: F32,
@@ -98,20 +121,24 @@ pub fn TraversalRay(comptime Kernel: type) type {
                 var near: [3]F32 = undefined;
                 var far: [3]F32 = undefined;
                 inline for (0..3) |axis| {
-                    near[axis] = slabs.along(fused, axis, facesFrom(node, slabs.near_at[axis]));
-                    far[axis] = slabs.along(fused, axis, facesFrom(node, slabs.far_at[axis]));
+                    const inverse = slabs.inverse[axis];
+                    near[axis] = along(
+                        fused,
+                        facesFrom(node, slabs.near_at[axis]),
+                        inverse,
+                        slabs.near_shift[axis],
+                    );
+                    far[axis] = along(
+                        fused,
+                        facesFrom(node, slabs.far_at[axis]),
+                        inverse,
+                        slabs.far_shift[axis],
+                    );
                 }
                 return box.between(Boxes, near, far, slabs.tnear_t, .splat(limit));
             }
 
-            inline fn along(
-                slabs: *const Slabs,
-                comptime fused: bool,
-                comptime axis: usize,
-                bound: F32,
-            ) F32 {
-                const inverse = slabs.inverse[axis];
-                const shift = slabs.shift[axis];
+            inline fn along(comptime fused: bool, bound: F32, inverse: F32, shift: F32) F32 {
                 return if (fused) bound.mulAdd(inverse, shift) else bound.sub(shift).mul(inverse);
             }
         };
@@ -121,7 +148,8 @@ pub fn TraversalRay(comptime Kernel: type) type {
             var slabs: Slabs = undefined;
             inline for (0..3) |axis| {
                 slabs.inverse[axis] = .splat(ray.inverse[axis]);
-                slabs.shift[axis] = .splat(ray.shift[axis]);
+                slabs.near_shift[axis] = .splat(ray.near_shift[axis]);
+                slabs.far_shift[axis] = .splat(ray.far_shift[axis]);
                 slabs.near_at[axis] = ray.near_at[axis];
                 slabs.far_at[axis] = ray.far_at[axis];
             }
@@ -146,7 +174,7 @@ pub fn TraversalRay(comptime Kernel: type) type {
         pub inline fn hitsOf(
             ray: *const Self,
             pack: *const Pack,
-            pad: f32,
+            padding: *const world_file.Padding,
             counts: *TestCounts,
             hits: *triangle.Intersection(Boxes),
         ) bool {
@@ -156,6 +184,7 @@ pub fn TraversalRay(comptime Kernel: type) type {
             const zero: F32 = .zero();
             const view: ray_file.ShearedRay(Boxes) = .{
                 .origin = .splat(ray.turned_origin),
+                .shift = .splat(ray.shift),
                 .direction_inv = inverse,
                 .negative = .{ inverse.x.lt(zero), inverse.y.lt(zero), inverse.z.lt(zero) },
                 .shear = .splat(ray.shear),
@@ -168,7 +197,13 @@ pub fn TraversalRay(comptime Kernel: type) type {
             if (weights.mayAgree().bitAnd(there).none()) return false;
             const agreeing = weights.agree().bitAnd(there);
             const inside = triangle.resolveTies(Boxes, seen, &weights, agreeing);
-            const hit = triangle.locate(Boxes, seen, weights, corners, &view, pad);
+            const axis: u2 = @intCast(ray.axis);
+            const center: Boxes.Vec3 = .splat(.{
+                padding.center[ray_file.turnedIndex(axis, 0)],
+                padding.center[ray_file.turnedIndex(axis, 1)],
+                padding.center[axis],
+            });
+            const hit = triangle.locate(Boxes, seen, weights, corners, &view, padding, center);
             const tnear: ray_file.Hit(Boxes) =
                 .{ .t = .splat(ray.tnear_t), .primitive = .splat(ray.tnear_primitive) };
             const closest: ray_file.Hit(Boxes) =
@@ -185,11 +220,11 @@ pub fn TraversalRay(comptime Kernel: type) type {
         pub inline fn intersect(
             ray: *Self,
             pack: *const Pack,
-            pad: f32,
+            padding: *const world_file.Padding,
             counts: *TestCounts,
         ) bool {
             var hits: triangle.Intersection(Boxes) = undefined;
-            if (!ray.hitsOf(pack, pad, counts, &hits)) return false;
+            if (!ray.hitsOf(pack, padding, counts, &hits)) return false;
             const ts = hits.t.toArray();
             var bits = hits.mask.bits();
             while (bits != 0) : (bits &= bits - 1) {

@@ -10,6 +10,7 @@
 const std = @import("std");
 const ray_file = @import("ray.zig");
 const box = @import("box.zig");
+const Padding = @import("../../world.zig").Padding;
 const vec3 = @import("../../math.zig").vec3;
 const ShearedRay = ray_file.ShearedRay;
 
@@ -113,11 +114,12 @@ pub inline fn edgeFunctionsOf(
     line: ray_file.Line(Lanes),
 ) EdgeFunctions(Lanes) {
     const axis: ray_file.LongAxis(Lanes) = .of(line.direction);
-    const view: ShearedRay(Lanes) = .init(line, axis);
-    const turned: [3]Lanes.Vec3 = .{
-        axis.turn(corners[0]), axis.turn(corners[1]), axis.turn(corners[2]),
-    };
-    return edgeFunctions(Lanes, project(Lanes, turned, &view));
+    const origin = axis.turn(line.origin);
+    return edgeFunctions(Lanes, projectOffsets(Lanes, .{
+        axis.turn(corners[0]).sub(origin),
+        axis.turn(corners[1]).sub(origin),
+        axis.turn(corners[2]).sub(origin),
+    }, ray_file.shearOf(Lanes, axis.turn(line.direction))));
 }
 
 /// Of the lanes where the rounded edge functions agree, those that the exact ones accept. Where one
@@ -230,39 +232,39 @@ pub fn WeightedIntersection(comptime Lanes: type) type {
         mask: Lanes.Mask,
         t: Lanes.F32,
         weights: EdgeFunctions(Lanes),
-
-        /// Barycentric weights of the second and the third corner.
-        pub inline fn shares(hit: @This()) [2]Lanes.F32 {
-            const share = Lanes.F32.splat(1).div(hit.weights.sum());
-            return .{ hit.weights.b.mul(share), hit.weights.c.mul(share) };
-        }
     };
 }
 
 /// Second half of the test, for lanes inside the edges: t of the plane, held within the t range of
-/// the triangle's own box grown by `pad`. A hit outside of this range comes from rounding alone
-/// (a triangle seen edge-on); holding it inside is what makes culling by boxes exact. Missing the
-/// box altogether is a miss. `corners` are turned but not sheared.
+/// the triangle's own padded box. A hit outside of this range comes from rounding alone (a triangle
+/// seen edge-on); holding it inside is what makes culling by boxes exact. Missing the box
+/// altogether is a miss. `corners` and the padding's `center` are turned but not sheared.
 pub inline fn locate(
     comptime Lanes: type,
     seen: Projection(Lanes),
     weights: EdgeFunctions(Lanes),
     corners: [3]Lanes.Vec3,
     view: *const ShearedRay(Lanes),
-    pad: f32,
+    padding: *const Padding,
+    center: Lanes.Vec3,
 ) Intersection(Lanes) {
-    // The order of comparisons is the builder's, so that both see the same box.
-    const grow: Lanes.Vec3 = .splat(@splat(pad));
-    const lower = corners[2].min(corners[1].min(corners[0])).sub(grow);
-    const upper = corners[2].max(corners[1].max(corners[0])).add(grow);
-    const near = select3(Lanes, view.negative, upper, lower);
-    const far = select3(Lanes, view.negative, lower, upper);
-    return locateWithin(Lanes, seen, weights, box.slabOffsets(
-        Lanes,
-        near.sub(view.origin),
-        far.sub(view.origin),
-        view.direction_inv,
-    ));
+    const bounds = boundsOf(Lanes, corners, padding, center);
+    return locateWithin(Lanes, seen, weights, box.padded(Lanes, bounds[0], bounds[1], view));
+}
+
+/// The lower and the upper corner of a triangle's box, grown by its pad; `center` is turned as
+/// corners are. The order of comparisons is the builder's, so that both see the same box.
+pub inline fn boundsOf(
+    comptime Lanes: type,
+    corners: [3]Lanes.Vec3,
+    padding: *const Padding,
+    center: Lanes.Vec3,
+) [2]Lanes.Vec3 {
+    const lower = corners[2].min(corners[1].min(corners[0]));
+    const upper = corners[2].max(corners[1].max(corners[0]));
+    const pad = padding.ofBoxes(Lanes, lower, upper, center);
+    const grow: Lanes.Vec3 = .{ .x = pad, .y = pad, .z = pad };
+    return .{ lower.sub(grow), upper.add(grow) };
 }
 
 /// The same with the range of the triangle's grown box given.
@@ -291,75 +293,64 @@ pub inline fn locatePlane(
     return .{ .mask = has_area, .t = depth.div(area) };
 }
 
-/// By component: `a` where the mask is set, else `b`.
-pub inline fn select3(
-    comptime Lanes: type,
-    masks: [3]Lanes.Mask,
-    a: Lanes.Vec3,
-    b: Lanes.Vec3,
-) Lanes.Vec3 {
-    return .{
-        .x = Lanes.F32.select(masks[0], a.x, b.x),
-        .y = Lanes.F32.select(masks[1], a.y, b.y),
-        .z = Lanes.F32.select(masks[2], a.z, b.z),
-    };
-}
-
 /// The whole test, for callers that have no use for its parts. `corners` as in the scene.
 pub inline fn intersect(
     comptime Lanes: type,
     corners: [3]Lanes.Vec3,
     line: ray_file.Line(Lanes),
-    pad: f32,
+    padding: *const Padding,
 ) WeightedIntersection(Lanes) {
     const axis: ray_file.LongAxis(Lanes) = .of(line.direction);
-    const view: ShearedRay(Lanes) = .init(line, axis);
+    const view: ShearedRay(Lanes) = .init(line, axis, padding);
     const turned: [3]Lanes.Vec3 = .{
         axis.turn(corners[0]), axis.turn(corners[1]), axis.turn(corners[2]),
     };
     const seen = project(Lanes, turned, &view);
     var weights = edgeFunctions(Lanes, seen);
     const inside = resolveTies(Lanes, seen, &weights, weights.agree());
-    const hit = locate(Lanes, seen, weights, turned, &view, pad);
+    const center = axis.turn(.splat(padding.center));
+    const hit = locate(Lanes, seen, weights, turned, &view, padding, center);
     return .{ .mask = inside.bitAnd(hit.mask), .t = hit.t, .weights = weights };
 }
 
 const Single = ray_file.Single;
 
-fn testHit(corners: [3][3]f32, origin: [3]f32, direction: [3]f32, pad: f32) ?f32 {
+const test_padding: Padding = .init(@splat(0), .empty);
+
+fn testHit(corners: [3][3]f32, origin: [3]f32, direction: [3]f32) ?f32 {
     const lanes: [3]Single.Vec3 = .{ .splat(corners[0]), .splat(corners[1]), .splat(corners[2]) };
-    const hit = intersect(Single, lanes, .init(.splat(origin), .splat(direction)), pad);
+    const hit = intersect(Single, lanes, .init(.splat(origin), .splat(direction)), &test_padding);
     return if (hit.mask.lane(0)) hit.t.lane(0) else null;
 }
 
 test "a triangle in the plane z = 0, from both sides and beside it" {
     const corners = [3][3]f32{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } };
-    try std.testing.expectEqual(2, testHit(corners, .{ 0.2, 0.2, 2 }, .{ 0, 0, -1 }, 1e-5));
-    try std.testing.expectEqual(1, testHit(corners, .{ 0.2, 0.2, -2 }, .{ 0, 0, 2 }, 1e-5));
-    try std.testing.expectEqual(null, testHit(corners, .{ 0.6, 0.5, 2 }, .{ 0, 0, -1 }, 1e-5));
-    try std.testing.expectEqual(null, testHit(corners, .{ 0.2, 0.2, 2 }, .{ 1, 0, 0 }, 1e-5));
+    try std.testing.expectEqual(2, testHit(corners, .{ 0.2, 0.2, 2 }, .{ 0, 0, -1 }));
+    try std.testing.expectEqual(1, testHit(corners, .{ 0.2, 0.2, -2 }, .{ 0, 0, 2 }));
+    try std.testing.expectEqual(null, testHit(corners, .{ 0.6, 0.5, 2 }, .{ 0, 0, -1 }));
+    try std.testing.expectEqual(null, testHit(corners, .{ 0.2, 0.2, 2 }, .{ 1, 0, 0 }));
 }
 
 test "no hit without an area, with NaN or with infinity" {
     const nan = std.math.nan(f32);
     const inf = std.math.inf(f32);
     const point = [3][3]f32{ .{ 0, 0, 0 }, .{ 0, 0, 0 }, .{ 0, 0, 0 } };
-    try std.testing.expectEqual(null, testHit(point, .{ 0, 0, 1 }, .{ 0, 0, -1 }, 1e-5));
+    try std.testing.expectEqual(null, testHit(point, .{ 0, 0, 1 }, .{ 0, 0, -1 }));
     const line = [3][3]f32{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 2, 0, 0 } };
-    try std.testing.expectEqual(null, testHit(line, .{ 1, 0, 1 }, .{ 0, 0, -1 }, 1e-5));
+    try std.testing.expectEqual(null, testHit(line, .{ 1, 0, 1 }, .{ 0, 0, -1 }));
     const broken = [3][3]f32{ .{ nan, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } };
-    try std.testing.expectEqual(null, testHit(broken, .{ 0.2, 0.2, 1 }, .{ 0, 0, -1 }, 1e-5));
+    try std.testing.expectEqual(null, testHit(broken, .{ 0.2, 0.2, 1 }, .{ 0, 0, -1 }));
     const endless = [3][3]f32{ .{ 0, 0, 0 }, .{ inf, 0, 0 }, .{ 0, 1, 0 } };
-    try std.testing.expectEqual(null, testHit(endless, .{ 0.2, 0.2, 1 }, .{ 0, 0, -1 }, 1e-5));
+    try std.testing.expectEqual(null, testHit(endless, .{ 0.2, 0.2, 1 }, .{ 0, 0, -1 }));
     const still = [3][3]f32{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } };
-    try std.testing.expectEqual(null, testHit(still, .{ 0.2, 0.2, 1 }, .{ 0, 0, 0 }, 1e-5));
+    try std.testing.expectEqual(null, testHit(still, .{ 0.2, 0.2, 1 }, .{ 0, 0, 0 }));
 }
 
 test "triangles so small that products of their edges vanish are hit" {
     const size = 1e-25;
     const corners = [3][3]f32{ .{ -size, -size, 0 }, .{ size, -size, 0 }, .{ 0, size, 0 } };
-    try std.testing.expectEqual(1, testHit(corners, .{ 0, 0, 1 }, .{ 0, 0, -1 }, 1e-5));
-    try std.testing.expectEqual(null, testHit(corners, .{ size, size, 1 }, .{ 0, 0, -1 }, 1e-5));
+    try std.testing.expectEqual(1, testHit(corners, .{ 0, 0, 1 }, .{ 0, 0, -1 }));
+    try std.testing.expectEqual(null, testHit(corners, .{ size, size, 1 }, .{ 0, 0, -1 }));
 }
 
 test "a ray through an edge or a corner hits exactly one of the triangles around it" {
@@ -382,7 +373,7 @@ test "a ray through an edge or a corner hits exactly one of the triangles around
             else
                 .{ middle, first, second };
             const direction = vec3.sub(target, origin);
-            hit_count += @intFromBool(testHit(corners, origin, direction, 1e-5) != null);
+            hit_count += @intFromBool(testHit(corners, origin, direction) != null);
         }
         try std.testing.expectEqual(1, hit_count);
     };
@@ -411,7 +402,7 @@ test "a ray into a cone of random triangles around a corner hits exactly one, wh
         for (rim, 0..) |first, index| {
             const corners = [3][3]f32{ apex, first, rim[(index + 1) % rim.len] };
             const direction = vec3.sub(target, origin);
-            hit_count += @intFromBool(testHit(corners, origin, direction, 1e-2) != null);
+            hit_count += @intFromBool(testHit(corners, origin, direction) != null);
         }
         try std.testing.expectEqual(1, hit_count);
     }

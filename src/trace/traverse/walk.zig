@@ -1,7 +1,8 @@
 //! Depth-first, front-to-back traversal of the wide BVH, generic over what is searched for.
 //!
 //! In: a search, which knows what it looks for (a ray: single.zig; rays in lanes: bundle.zig; a
-//! packet: interval_packet.zig). Out: whether it found anything. The hits are the search's own.
+//! packet: interval_packet.zig; a beam: beam/traverse.zig). Out: whether it found anything. The
+//! hits are the search's own.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -26,6 +27,8 @@ pub const Query = enum {
 ///     meet(node, counts)        box.Range in lanes of children, `isMet` where one may matter
 ///     intersect(pack, counts)  tests a pack of triangles, returns whether one was hit
 ///     isDone(found)             asked after every leaf
+///     allows(pack_count, stack_count)
+///                               if there is one, asked before every leaf; the end where it says no
 pub inline fn walk(
     comptime Kernel: type,
     tree: *const world_file.Tree(Kernel.width),
@@ -47,6 +50,8 @@ pub inline fn walk(
                 continue;
             }
         } else {
+            if (@hasDecl(@TypeOf(search.*), "allows") and
+                !search.allows(entry.child.pack_count, stack_count)) break;
             const first, const end = entry.child.packs();
             for (tree.packs[first..end]) |*pack| {
                 found = search.intersect(pack, counts) or found;

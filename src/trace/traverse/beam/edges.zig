@@ -1,9 +1,9 @@
-//! Triangles as a beam sees them from the point that its rays share: three edge functions and 1/t,
-//! all linear in a ray's direction, each with a bound on what rounding may have done to it.
+//! 3D rasterisation (Davidovic et al. 2012, "3D Rasterization: A Bridge between Rasterization and
+//! Ray Casting"): edge functions and 1/t of triangles as seen from the point that rays share, all
+//! linear in a ray's direction, each with a bound on what rounding may have done to it.
 //!
-//! In: a block of triangles, the rays' origin. Out: per triangle the vectors whose dot products
-//! with a direction D are the edge functions and 1/t (Davidovic et al., "3D Rasterization: A Bridge
-//! between Rasterization and Ray Casting", 2012). Edges are taken in Pluecker form,
+//! In: a pack of triangles, the rays' origin. Out: per triangle the vectors whose dot products
+//! with a direction D are the edge functions and 1/t. Edges are taken in Pluecker form,
 //! (c + b) x (c - b) = 2 b x c, with the difference of the corners as they are in the scene: then
 //! the rounding of an edge is in proportion to its length, not to its distance.
 //!
@@ -26,13 +26,8 @@
 //! 9 (1 + L^3 / |det|) u R S / |det| and 16 u; corners' depths and their sum are off by 6 sqrt(3)
 //! u R / |D|, and |D| t is at least |det| / S: 11 u R S / |det|. A quarter is added to all of it
 //! for what is of second order.
-//!
-//! Of rays that start behind the point, on lines that miss it by up to E (`Spread`): the exact test
-//! sees corners from their starts, which are up to F away, so that R is F more. An edge function is
-//! off by 2 E L |D|, det by E L^2, and 1/t, counted from the point on, by E S / |det| of it.
 
 const std = @import("std");
-const world_file = @import("../../../world.zig");
 
 /// Half a unit in the last place of 1.
 pub const unit_roundoff: f32 = 0x1p-24;
@@ -57,23 +52,9 @@ pub const turning_roundings = 64.0;
 /// Outside of this range of L^2 and R, in metres, products may leave the range of floats.
 pub const length_squared_min = 0x1p-80;
 /// See `length_squared_min`.
-pub const reach_limit = 1e11;
+pub const reach_max = 1e11;
 
-/// Of rays that do not start at the point that they are seen from.
-pub const Spread = struct {
-    /// By how much a ray's line may miss the point, and how far away its start may be, in metres.
-    apart: f32,
-    distance: f32,
-};
-
-/// The largest R for which bounds hold: boxes are grown for rays of no more than a certain length
-/// (`Geometry.pad`), so that the exact test accepts whatever is surely inside the edges.
-pub fn reachMax(pad: f32) f32 {
-    const covered = pad / world_file.pad_relative;
-    return if (covered < reach_limit) covered else reach_limit;
-}
-
-/// Triangles of a block in lanes, turned so that edge functions are positive within.
+/// Triangles of a pack in lanes, turned so that edge functions are positive within.
 pub fn Edges(comptime Lanes: type) type {
     const F32 = Lanes.F32;
     const Vec3 = Lanes.Vec3;
@@ -86,15 +67,9 @@ pub fn Edges(comptime Lanes: type) type {
 
         const Self = @This();
 
-        /// Sets up the triangles of a block. Bounds do not hold for those with a corner farther
-        /// away than `reach_max`. Rays start at the origin unless they have a spread; what lines
-        /// that miss the origin add to `slack`, 2 E L |D|, is left to the caller.
-        pub inline fn init(
-            corners: [3]Vec3,
-            origin: Vec3,
-            reach_max: f32,
-            spread: ?Spread,
-        ) Self {
+        /// Sets up the triangles of a pack. Bounds do not hold for those with a corner farther
+        /// away than `reach_max`.
+        pub inline fn init(corners: [3]Vec3, origin: Vec3) Self {
             const a = corners[0].sub(origin);
             const b = corners[1].sub(origin);
             const c = corners[2].sub(origin);
@@ -108,11 +83,7 @@ pub fn Edges(comptime Lanes: type) type {
             const flip: F32 = .select(det.lt(.zero()), .splat(-1), .splat(1));
             const length_squared = longestSquared(Lanes, edges);
             const length = length_squared.sqrt();
-            var reach = longestSquared(Lanes, .{ a, b, c }).sqrt();
-            if (spread) |s| reach = reach.add(.splat(s.distance));
-            var scale = reach.mul(reach);
-            if (spread) |s| scale = length
-                .mulAdd(.splat(s.apart / (turning_roundings * unit_roundoff)), scale);
+            const reach = longestSquared(Lanes, .{ a, b, c }).sqrt();
             const unit: F32 = .splat(unit_roundoff);
             return .{
                 .normal = .{
@@ -122,7 +93,7 @@ pub fn Edges(comptime Lanes: type) type {
                 },
                 .slack = reach.mul(reach.mulAdd(unit.add(unit), length)),
                 .facet = .{
-                    .turned = isTurned(Lanes, det, scale, length_squared, length)
+                    .turned = isTurned(Lanes, det, reach.mul(reach), length_squared, length)
                         .bitAnd(reach.lt(.splat(reach_max))),
                     .reach = reach,
                     .length = length,
@@ -165,11 +136,10 @@ pub fn Facet(comptime Lanes: type) type {
             };
         }
 
-        /// 1/t, with the spread that the edges were set up with.
-        pub inline fn inverse(facet: *const Self, spread: ?Spread) Inverse(Lanes) {
+        /// 1/t.
+        pub inline fn inverse(facet: *const Self) Inverse(Lanes) {
             const det_inv, const steepness, const thinness = facet.shape();
-            var relative = weighed(Lanes, steepness.mul(facet.reach), thinness);
-            if (spread) |s| relative = steepness.mulAdd(.splat(1.25 * s.apart), relative);
+            const relative = weighed(Lanes, steepness.mul(facet.reach), thinness);
             return .{
                 .vector = facet.plane.scale(det_inv),
                 .relative = relative,

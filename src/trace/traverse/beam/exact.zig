@@ -9,15 +9,15 @@ const ray_file = @import("../ray.zig");
 const triangle = @import("../triangle.zig");
 const assert = std.debug.assert;
 
-/// Where a triangle stands in the tree: block times width plus lane. Of a ray without a hit: -1.
+/// Where a triangle stands in the tree: pack times width plus lane. Of a ray without a hit: -1.
 pub const Slot = i32;
 /// See `Slot`.
 pub const no_slot: Slot = -1;
 
-/// The block and lane of a slot.
-pub inline fn place(comptime width: u32, slot: Slot) struct { block: u32, lane: u32 } {
+/// The pack and lane of a slot.
+inline fn place(comptime width: u32, slot: Slot) struct { pack: u32, lane: u32 } {
     const number: u32 = @intCast(slot);
-    return .{ .block = number / width, .lane = number % width };
+    return .{ .pack = number / width, .lane = number % width };
 }
 
 /// Number of the triangle in a slot.
@@ -27,43 +27,51 @@ pub inline fn primitiveAt(
     slot: Slot,
 ) i32 {
     const at = place(width, slot);
-    return @bitCast(tree.packs[at.block].primitive[at.lane]);
+    return @bitCast(tree.packs[at.pack].primitive[at.lane]);
 }
 
 /// A corner of the triangle in a slot.
-pub inline fn cornerAt(
+inline fn cornerAt(
     comptime width: u32,
     tree: *const world_file.Tree(width),
     slot: Slot,
     corner: usize,
 ) [3]f32 {
     const at = place(width, slot);
-    const components = &tree.packs[at.block].corner[corner];
+    const components = &tree.packs[at.pack].corner[corner];
     return .{ components[0][at.lane], components[1][at.lane], components[2][at.lane] };
+}
+
+/// The corners of the triangle in a slot, the same in all lanes.
+pub inline fn splat(
+    comptime Kernel: type,
+    tree: *const world_file.Tree(Kernel.width),
+    slot: Slot,
+) [3]Kernel.Rays.Vec3 {
+    var corners: [3]Kernel.Rays.Vec3 = undefined;
+    inline for (&corners, 0..) |*corner, index| {
+        corner.* = .splat(cornerAt(Kernel.width, tree, slot, index));
+    }
+    return corners;
 }
 
 /// The exact test of a group's rays with the triangle in a slot.
 pub fn meet(
     comptime Kernel: type,
-    tree: *const world_file.Tree(Kernel.width),
-    pad: f32,
+    geometry: *const world_file.Geometry,
     group: *const ray_file.Ray(Kernel.Rays),
     slot: Slot,
 ) triangle.WeightedIntersection(Kernel.Rays) {
     @branchHint(.cold);
-    var corners: [3]Kernel.Rays.Vec3 = undefined;
-    for (&corners, 0..) |*corner, index| {
-        corner.* = .splat(cornerAt(Kernel.width, tree, slot, index));
-    }
-    return triangle.intersect(Kernel.Rays, corners, group.line, pad);
+    const corners = splat(Kernel, geometry.tree.get(Kernel.width), slot);
+    return triangle.intersect(Kernel.Rays, corners, group.line, &geometry.padding);
 }
 
 /// Of rays that hit the triangle in `slot` at `t`, those whose own triangles in `others` do not
 /// come first, in the order of `ray.Hit`. Rays without one have no slot; the others do hit theirs.
 pub fn comeFirst(
     comptime Kernel: type,
-    tree: *const world_file.Tree(Kernel.width),
-    pad: f32,
+    geometry: *const world_file.Geometry,
     group: *const ray_file.Ray(Kernel.Rays),
     rays: Kernel.Rays.Mask,
     t: Kernel.Rays.F32,
@@ -74,8 +82,9 @@ pub fn comeFirst(
     const Rays = Kernel.Rays;
     const met = rays.bitAnd(Rays.I32.load(others).gt(.splat(no_slot)));
     if (met.none()) return rays;
+    const tree = geometry.tree.get(Kernel.width);
     const gathered = gather(Kernel, tree, others);
-    const other = triangle.intersect(Rays, gathered.corners, group.line, pad);
+    const other = triangle.intersect(Rays, gathered.corners, group.line, &geometry.padding);
     assert(met.andNot(other.mask).none());
     const number: Rays.I32 = .splat(primitiveAt(Kernel.width, tree, slot));
     const first = t.lt(other.t).bitOr(t.eq(other.t).bitAnd(gathered.primitive.gt(number)));

@@ -1,20 +1,36 @@
-//! What encloses a beam: four planes through the rays' origin, and how deep it has to look.
+//! View frustum culling by p-vertices (Assarsson and Moeller 2000, "Optimized View Frustum Culling
+//! Algorithms for Bounding Boxes"): four planes around a beam against all children of a node.
 //!
-//! In: normals that point inward. Out: which children of a node the beam may meet, and the least
-//! depth at which. Conservative: planes stand off by `slack_pads` times `Geometry.pad`, which
-//! covers the rounding of boxes, of ray directions and of the planes themselves. Of a box only the
-//! corner farthest along a plane's normal counts (Assarsson and Moeller 2000, "Optimized View
-//! Frustum Culling Algorithms for Bounding Boxes", the p-vertex).
+//! In: normals that point inward. Out: which children the beam may meet, and the least depth at
+//! which. Conservative: planes stand off the rays and lean away from them (`Slack`), which covers
+//! the rounding of boxes, of ray directions and of the planes themselves. Of a box only the corner
+//! farthest along a plane's normal counts.
 
 const std = @import("std");
 const world_file = @import("../../../world.zig");
-const stack = @import("../stack.zig");
+const vec3 = @import("../../../math.zig").vec3;
+const ray_file = @import("../ray.zig");
 const assert = std.debug.assert;
 
-/// `Geometry.pad` is at least 32 u R and 4 u X for distances R and coordinates X (`pad.zig`). A
-/// fused plane equation in coordinates of the scene is off by at most 6 u (2 X + R) of the length
-/// of its normal; directions that are linear in the pixel up to 24 u put a ray off by 24 u R.
-pub const slack_pads = 8.0;
+/// By how much, over the distance R from the rays' origin, what a ray meets may lie beside it: 6 u
+/// by the exact test, 6 u by the rounding of normals. A fused plane equation in coordinates of the
+/// scene is off by 3 u of those of the point and 6 u of those of the origin: 3 u R and 9 u of the
+/// latter, see `apartOf`. 64 is four times that.
+pub const by_distance = 64 * 0x1p-24;
+
+/// How far, in metres, what a ray from this origin meets may lie beside it at any distance.
+pub fn apartOf(padding: *const world_file.Padding, origin: [3]f32) f32 {
+    return 8 * padding.shiftOf(ray_file.Single, .splat(origin)).lane(0);
+}
+
+/// How far, in metres of the maximum norm, what is met may lie beside the rays.
+pub const Slack = struct {
+    apart: f32,
+    /// And so much more for each unit of depth: from the origin on,
+    by_depth: f32,
+    /// or up to this depth, where parallel rays end.
+    ends_at: ?f32 = null,
+};
 
 /// Components of a normal are at least this long, so that infinite corners of empty boxes never
 /// meet a zero.
@@ -85,14 +101,28 @@ pub fn Frustum(comptime Lanes: type) type {
 
         const Self = @This();
 
-        /// Planes that stand off `origin` by `slack` metres. Depth is counted along `depth_normal`
-        /// from there.
-        pub fn init(origin: [3]f32, normals: [4][3]f32, depth_normal: [3]f32, slack: f32) Self {
+        /// Planes through `origin`, but for the slack. Depth is counted along `depth_normal` from
+        /// there.
+        pub fn init(
+            origin: [3]f32,
+            normals: [4][3]f32,
+            depth_normal: [3]f32,
+            slack: Slack,
+        ) Self {
+            const parallel = slack.ends_at != null;
+            const shrink = if (parallel) 1 else 1 - slack.by_depth * vec3.length1(depth_normal);
+            const along = vec3.scale(depth_normal, shrink);
             var frustum: Self = .{
                 .sides = undefined,
-                .depth = .init(depth_normal, origin, -slack),
+                .depth = .init(along, origin, -slack.apart),
             };
-            for (&frustum.sides, normals) |*side, normal| side.* = .init(normal, origin, slack);
+            for (&frustum.sides, normals) |*side, normal| {
+                const lean = slack.by_depth * vec3.length1(normal);
+                const toward = if (parallel) -lean else lean;
+                const leaning = vec3.add(normal, vec3.scale(depth_normal, toward));
+                side.* = .init(leaning, origin, slack.apart);
+                if (slack.ends_at) |depth| side.offset += lean * depth;
+            }
             return frustum;
         }
 
@@ -111,24 +141,34 @@ pub fn Frustum(comptime Lanes: type) type {
             return least.isNegative().bitNot();
         }
 
-        /// Pushes the children of a node that the beam may meet before `depth_max`, and behind
-        /// `front` if there is one, the nearest on top. Returns the new count of the stack.
-        pub inline fn pushChildren(
+        /// Children of a node that the beam may meet before `depth_max`, and where.
+        pub inline fn meet(
             frustum: *const Self,
             node: *const world_file.Node(width),
-            front: ?*const Plane(width),
             depth_max: f32,
-            entries: []stack.Entry,
-            entry_count: usize,
-        ) usize {
+        ) Met(Lanes) {
             var least = frustum.sides[0].extreme(Lanes, node, 1);
             inline for (frustum.sides[1..]) |*side| {
                 least = least.minOrNegative(side.extreme(Lanes, node, 1));
             }
             const near = frustum.depth.extreme(Lanes, node, 0);
-            if (front) |plane| least = least.minOrNegative(plane.extreme(Lanes, node, 1));
-            const met = near.le(.splat(depth_max)).andNot(least.isNegative());
-            return stack.push(Lanes, node, met, near, entries, entry_count);
+            return .{
+                .near = near,
+                .mask = near.le(.splat(depth_max)).andNot(least.isNegative()),
+            };
+        }
+    };
+}
+
+/// Children of a node in lanes, as `walk.zig` wants them.
+pub fn Met(comptime Lanes: type) type {
+    return struct {
+        /// The least depth of each.
+        near: Lanes.F32,
+        mask: Lanes.Mask,
+
+        pub inline fn isMet(met: @This()) Lanes.Mask {
+            return met.mask;
         }
     };
 }

@@ -1,4 +1,4 @@
-//! What a beam of rays has found, exactly: t and barycentric weights of every hit.
+//! What a beam of rays has found, exactly: t of every hit.
 //!
 //! In: a triangle's slot for each ray. Out: hits in the bundle, by the expressions of triangle.zig,
 //! bit for bit. Rays of a beam mostly have the same longest axis and the same signs, and neighbours
@@ -14,29 +14,26 @@ const triangle = @import("../triangle.zig");
 const kernel_file = @import("../kernel.zig");
 const edges_file = @import("edges.zig");
 const exact = @import("exact.zig");
-const Found = @import("tile_depth_buffer.zig").Found;
+const TileDepthBuffer = @import("tile_depth_buffer.zig").TileDepthBuffer;
 const Grid = @import("grid.zig").Grid;
 const assert = std.debug.assert;
 
-/// Puts the hits of the triangles found into the bundle, and weights of the second and third corner
-/// into `shares`, if given. Rays start behind the grid's origin, each at its own, or at it.
+/// Puts the hits of the triangles found into the bundle.
 pub fn resolve(
     comptime Kernel: type,
-    comptime behind: bool,
     geometry: *const world_file.Geometry,
     grid: *const Grid,
-    found: *Found(Kernel),
+    buffer: *TileDepthBuffer(Kernel),
     bundle: *bundle_file.Bundle(Kernel),
-    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
 ) void {
     const course = Course.of(grid);
     switch (course.axis orelse 3) {
         inline 0...2 => |axis| {
             const tree = geometry.tree.get(Kernel.width);
-            const Octant = UniformOctant(Kernel, behind, axis);
-            Octant.run(geometry, tree, &course, grid, found, bundle, shares);
+            const Octant = UniformOctant(Kernel, axis);
+            Octant.run(geometry, tree, &course, grid, buffer, bundle);
         },
-        else => apart(Kernel, geometry, found, bundle, shares),
+        else => apart(Kernel, geometry, buffer, bundle),
     }
 }
 
@@ -80,21 +77,19 @@ const Course = struct {
 fn apart(
     comptime Kernel: type,
     geometry: *const world_file.Geometry,
-    found: *Found(Kernel),
+    buffer: *TileDepthBuffer(Kernel),
     bundle: *bundle_file.Bundle(Kernel),
-    shares: ?*[Kernel.group_count][2]Kernel.Rays.F32,
 ) void {
     const Rays = Kernel.Rays;
-    found.spreadAll();
+    buffer.spreadAll();
     for (&bundle.groups, 0..) |*group, index| {
-        const own = found.of("slot", index);
+        const own = buffer.of("slot", index);
         const there = Rays.I32.loadAligned(own).gt(.splat(exact.no_slot));
         if (there.none()) continue;
         const tree = geometry.tree.get(Kernel.width);
         const gathered = exact.gather(Kernel, tree, own);
-        const hit = triangle.intersect(Rays, gathered.corners, group.line, geometry.pad);
+        const hit = triangle.intersect(Rays, gathered.corners, group.line, &geometry.padding);
         assert(there.andNot(hit.mask).none());
-        if (shares) |all| keepShares(Rays, &all[index], there, hit.shares());
         group.closest = .{
             .t = .select(there, hit.t, group.closest.t),
             .primitive = .select(there, gathered.primitive, group.closest.primitive),
@@ -102,88 +97,80 @@ fn apart(
     }
 }
 
-/// EdgeFunctions of the rays that hit something: others may be another beam's.
-inline fn keepShares(
-    comptime Rays: type,
-    kept: *[2]Rays.F32,
-    there: Rays.Mask,
-    shares: [2]Rays.F32,
-) void {
-    for (kept, shares) |*to, share| to.* = .select(there, share, to.*);
-}
-
 /// All groups alike.
-fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2) type {
+fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
     const Rays = Kernel.Rays;
     const F32 = Rays.F32;
     const Vec3 = Rays.Vec3;
     return struct {
-        /// A triangle as it is or seen from the rays' origin, in lanes or the same in all of them.
-        fn Placed(comptime Value: type) type {
-            return struct {
-                /// Turned corners from the origin.
-                offsets: [3]Value,
-                /// Corners of its grown box from there.
-                lower: Value,
-                upper: Value,
+        /// Triangles in lanes as seen from the rays' origin.
+        const Placed = struct {
+            /// Turned corners from the origin.
+            offsets: [3]Vec3,
+            /// Corners of the grown box from there.
+            lower: Vec3,
+            upper: Vec3,
 
-                inline fn seenFrom(placed: *const @This(), origin: Vec3) @This() {
-                    var seen = placed.*;
-                    for (&seen.offsets) |*offset| offset.* = offset.sub(origin);
-                    seen.lower = seen.lower.sub(origin);
-                    seen.upper = seen.upper.sub(origin);
-                    return seen;
-                }
-            };
-        }
+            inline fn of(
+                padding: *const world_file.Padding,
+                corners: [3]Vec3,
+                origin: [3]f32,
+                shift_length: f32,
+            ) Placed {
+                const from: Vec3 = .splat(origin);
+                const shift: Vec3 = .splat(@splat(shift_length));
+                const a = turn(corners[0]);
+                const b = turn(corners[1]);
+                const c = turn(corners[2]);
+                const center: Vec3 = .splat(turned(padding.center));
+                const lower, const upper = triangle.boundsOf(Rays, .{ a, b, c }, padding, center);
+                return .{
+                    .offsets = .{ a.sub(from), b.sub(from), c.sub(from) },
+                    .lower = lower.sub(from.add(shift)),
+                    .upper = upper.sub(from.sub(shift)),
+                };
+            }
+        };
 
         fn run(
             geometry: *const world_file.Geometry,
             tree: *const world_file.Tree(Kernel.width),
             course: *const Course,
             grid: *const Grid,
-            found: *Found(Kernel),
+            buffer: *TileDepthBuffer(Kernel),
             bundle: *bundle_file.Bundle(Kernel),
-            shares: ?*[Kernel.group_count][2]F32,
         ) void {
-            // Of what starts behind it nothing is subtracted before the ray's own start is.
-            const common: ?[3]f32 = if (behind) null else turned(grid.origin);
+            const padding = &geometry.padding;
+            const origin = turned(grid.origin);
+            const shift = padding.shiftOf(ray_file.Single, .splat(grid.origin)).lane(0);
             const down = turned(course.negative);
             var last: Last = .{};
-            for (0..Kernel.subtile_count) |block| {
-                const whole = found.isWhole(block);
-                const block_slot = found.block_slot[block];
-                if (whole and block_slot == exact.no_slot) continue;
-                for (block * Kernel.subtile_groups..(block + 1) * Kernel.subtile_groups) |index| {
+            for (0..Kernel.subtile_count) |subtile| {
+                const whole = buffer.isWhole(subtile);
+                const subtile_slot = buffer.subtile_slot[subtile];
+                if (whole and subtile_slot == exact.no_slot) continue;
+                const first = subtile * Kernel.subtile_groups;
+                for (first..first + Kernel.subtile_groups) |index| {
                     const group = &bundle.groups[index];
-                    const from: Vec3 = if (behind)
-                        turn(group.line.origin)
-                    else
-                        .splat(common.?);
-                    const own = found.of("slot", index);
+                    const own = buffer.of("slot", index);
                     const lanes: Rays.I32 = .loadAligned(own);
                     if (whole or lanes.eq(.splat(own[0])).all()) {
-                        const slot = if (whole) block_slot else own[0];
+                        const slot = if (whole) subtile_slot else own[0];
                         if (slot == exact.no_slot) continue;
                         if (slot != last.slot) last = .{
                             .slot = slot,
-                            .placed = inLanes(&placeOne(tree, geometry.pad, common, slot)),
+                            .placed = .of(padding, exact.splat(Kernel, tree, slot), origin, shift),
                             .primitive = .splat(exact.primitiveAt(Kernel.width, tree, slot)),
                         };
-                        const hit = if (behind)
-                            intersect(group, &last.placed.seenFrom(from), down, .splat(true))
-                        else
-                            intersect(group, &last.placed, down, .splat(true));
-                        if (shares) |all| all[index] = hit.shares();
+                        const hit = intersect(group, &last.placed, down, .splat(true));
                         group.closest = .{ .t = hit.t, .primitive = last.primitive };
                         continue;
                     }
                     const there = lanes.gt(.splat(exact.no_slot));
                     const gathered = exact.gather(Kernel, tree, own);
-                    const each = placeEach(geometry.pad, gathered.corners).seenFrom(from);
+                    const each: Placed = .of(padding, gathered.corners, origin, shift);
                     const hit = intersect(group, &each, down, there);
                     assert(there.andNot(hit.mask).none());
-                    if (shares) |all| keepShares(Rays, &all[index], there, hit.shares());
                     group.closest = .{
                         .t = .select(there, hit.t, group.closest.t),
                         .primitive = .select(there, gathered.primitive, group.closest.primitive),
@@ -195,7 +182,7 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
         /// The triangle that was met last, in all lanes: mostly the next rays meet it, too.
         const Last = struct {
             slot: exact.Slot = exact.no_slot,
-            placed: Placed(Vec3) = undefined,
+            placed: Placed = undefined,
             primitive: Rays.I32 = undefined,
         };
 
@@ -207,63 +194,6 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
             };
         }
 
-        /// One triangle, seen from `origin` if there is one. Minima and maxima are those of
-        /// `triangle.locate`.
-        fn placeOne(
-            tree: *const world_file.Tree(Kernel.width),
-            pad: f32,
-            origin: ?[3]f32,
-            slot: exact.Slot,
-        ) Placed([3]f32) {
-            var corners: [3][3]f32 = undefined;
-            for (&corners, 0..) |*corner, index| {
-                corner.* = turned(exact.cornerAt(Kernel.width, tree, slot, index));
-            }
-            var placed: Placed([3]f32) = undefined;
-            for (0..3) |component| {
-                const a = corners[0][component];
-                const b = corners[1][component];
-                const c = corners[2][component];
-                const low = if (b < a) b else a;
-                const high = if (b > a) b else a;
-                placed.lower[component] = (if (c < low) c else low) - pad;
-                placed.upper[component] = (if (c > high) c else high) + pad;
-                for (&placed.offsets, corners) |*offset, corner| {
-                    offset[component] = corner[component];
-                }
-                const from = (origin orelse continue)[component];
-                placed.lower[component] -= from;
-                placed.upper[component] -= from;
-                for (&placed.offsets) |*offset| offset[component] -= from;
-            }
-            return placed;
-        }
-
-        inline fn inLanes(placed: *const Placed([3]f32)) Placed(Vec3) {
-            return .{
-                .offsets = .{
-                    .splat(placed.offsets[0]),
-                    .splat(placed.offsets[1]),
-                    .splat(placed.offsets[2]),
-                },
-                .lower = .splat(placed.lower),
-                .upper = .splat(placed.upper),
-            };
-        }
-
-        /// A triangle in each lane.
-        inline fn placeEach(pad: f32, corners: [3]Vec3) Placed(Vec3) {
-            const grow: Vec3 = .splat(@splat(pad));
-            const a = turn(corners[0]);
-            const b = turn(corners[1]);
-            const c = turn(corners[2]);
-            return .{
-                .offsets = .{ a, b, c },
-                .lower = c.min(b.min(a)).sub(grow),
-                .upper = c.max(b.max(a)).add(grow),
-            };
-        }
-
         inline fn turn(vector: Vec3) Vec3 {
             const components = turned([3]F32{ vector.x, vector.y, vector.z });
             return .{ .x = components[0], .y = components[1], .z = components[2] };
@@ -272,7 +202,7 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
         /// The hits of the rays in `found`.
         inline fn intersect(
             group: *const ray_file.Ray(Rays),
-            placed: *const Placed(Vec3),
+            placed: *const Placed,
             down: [3]bool,
             found: Rays.Mask,
         ) triangle.WeightedIntersection(Rays) {
@@ -294,9 +224,9 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
                 .weights = weights,
             };
             const negative = [3]Rays.Mask{ .splat(down[0]), .splat(down[1]), .splat(down[2]) };
-            const near = triangle.select3(Rays, negative, placed.upper, placed.lower);
-            const far = triangle.select3(Rays, negative, placed.lower, placed.upper);
-            const range = box.slabOffsets(Rays, near, far, .{
+            const near = box.select3(Rays, negative, placed.upper, placed.lower);
+            const far = box.select3(Rays, negative, placed.lower, placed.upper);
+            const range = box.slab(Rays, near, far, .{
                 .x = one.div(direction.x),
                 .y = one.div(direction.y),
                 .z = depth_inv,
@@ -308,7 +238,7 @@ fn UniformOctant(comptime Kernel: type, comptime behind: bool, comptime axis: u2
         /// Points so far within the box that t is surely within the range that the slab test gives:
         /// that is off by 3 u of a face's distance, the point by 1 u, and no component is longer
         /// than the last. Spares two divisions.
-        inline fn isWithin(point: Vec3, placed: *const Placed(Vec3)) Rays.Mask {
+        inline fn isWithin(point: Vec3, placed: *const Placed) Rays.Mask {
             const above = point.sub(placed.lower);
             const below = placed.upper.sub(point);
             const least = above.x.minOrNegative(above.y).minOrNegative(above.z)

@@ -1,48 +1,37 @@
-//! Where the rays of a bundle end, as their light sees it: points on a plane across its way.
+//! Shadow receivers as the light sees them: where the rays of a bundle end, on a plane across the
+//! light's way (Williams 1978, "Casting Curved Shadows on Curved Surfaces", at the rays' own places
+//! and not at texels: Aila and Laine 2004, "Alias-Free Shadow Maps").
 //!
-//! In: a light and a set of a bundle's rays. Out: by pixel the place of each on the plane and how
-//! near to the light it is; bounds of blocks of 4x4 pixels and of all, in the axes of a
-//! parallelogram, since a flat surface seen aslant is one; what encloses them; half of the set,
-//! where depth jumps and the bounds of all cover far more of the plane than the blocks do.
+//! In: what shadow_plane.zig has made of a light and some rays. Out: for `traverse.zig` the set of
+//! these rays; those that have met anything are out of it.
 
 const std = @import("std");
 const world_file = @import("../../../world.zig");
 const kernel_file = @import("../kernel.zig");
 const bundle_file = @import("../bundle.zig");
-const ray_file = @import("../ray.zig");
+const walk = @import("../walk.zig");
 const edges_file = @import("edges.zig");
-const footprint_file = @import("projected_triangle.zig");
+const exact = @import("exact.zig");
 const frustum_file = @import("frustum.zig");
-const Projection = footprint_file.Projection;
+const members_file = @import("members.zig");
+const projected = @import("projected_triangle.zig");
+const rasterise = @import("rasterise.zig");
+const Members = members_file.Members;
 
-const side = kernel_file.beam_side;
-const pack_count = kernel_file.beam_subtiles;
+const subtile_count = kernel_file.beam_subtiles;
 const subtile_pixels = kernel_file.subtile_pixels;
 const pixel_count = kernel_file.beam_pixels;
-
-/// A beam is cut where its bounds cover more than this many times what its blocks do.
-const cut_ratio = 2.0;
-/// Slopes at most; rays that go more sideways make a beam of their own.
-const slope_limit = 4.0;
-
-/// A set of rays: a bit for each pixel of each block.
-pub const Members = [pack_count]u16;
+const inf = std.math.inf(f32);
+/// With no more subtiles than this, triangles are not tested against each of them first.
+const few_subtiles = 3;
 
 /// Bounds on the light's plane, in the axes of the parallelogram.
 pub const Bounds = struct {
     u: [2]f32,
     v: [2]f32,
-    /// Of the point farthest along the light's way.
+    /// Of the point farthest along the light's way, and its nearness.
     depth: f32,
-
-    /// The longer side.
-    pub fn extent(bounds: Bounds) f32 {
-        return @max(bounds.u[1] - bounds.u[0], bounds.v[1] - bounds.v[0]);
-    }
-
-    fn area(bounds: Bounds) f32 {
-        return (bounds.u[1] - bounds.u[0]) * (bounds.v[1] - bounds.v[0]);
-    }
+    nearness: f32,
 };
 
 /// Axes of the parallelogram, and the way back: U = i00 u + i01 v, V = i10 u + i11 v.
@@ -57,7 +46,7 @@ pub const Basis = struct {
     i11: f32 = 1,
 
     /// The axes (x0, y0) and (x1, y1), unit vectors that are not parallel.
-    fn init(x0: f32, y0: f32, x1: f32, y1: f32) Basis {
+    pub fn init(x0: f32, y0: f32, x1: f32, y1: f32) Basis {
         const scale = 1 / (x0 * y1 - x1 * y0);
         return .{
             .b00 = x0,
@@ -77,448 +66,256 @@ pub const Basis = struct {
     }
 };
 
-/// The points of some rays of a bundle; undefined until `place`.
-pub fn Points(comptime Kernel: type) type {
+/// Some rays of a bundle; undefined until `shadow_plane.place`.
+pub fn ShadowReceivers(comptime Kernel: type) type {
     const Rays = Kernel.Rays;
+    const F32 = Rays.F32;
     const lanes = Kernel.ray_count;
     return struct {
-        projection: Projection,
+        geometry: *const world_file.Geometry,
+        bundle: *bundle_file.Bundle(Kernel),
+        projection: projected.LightProjection,
+        frustum: frustum_file.Frustum(Kernel.Boxes),
         basis: Basis,
-        /// Slopes of these rays, or of the light's, at most.
-        slope_max: f32,
         bounds: Bounds,
         /// Points on the light's plane by pixel, and how near to the light they are there;
         /// infinitely near if there is no ray or it has met something.
         u: [pixel_count]f32 align(64),
         v: [pixel_count]f32 align(64),
         nearness: [pixel_count]f32 align(64),
-        /// Bounds of every block; empty ones of blocks that are done.
-        block_u: [2][pack_count]f32 align(64),
-        block_v: [2][pack_count]f32 align(64),
-        /// Blocks with rays that have met nothing yet.
+        /// Bounds of every subtile; empty ones of subtiles that are done.
+        subtile_u: [2][subtile_count]f32 align(64),
+        subtile_v: [2][subtile_count]f32 align(64),
+        /// Subtiles with rays that have met nothing yet.
         live: u32,
 
+        pub const query: walk.Query = .any_hit;
         const Self = @This();
-        const Bundle = bundle_file.Bundle(Kernel);
-        const Frustum = frustum_file.Frustum(Kernel.Boxes);
-        const F32 = Rays.F32;
-        const Mask = Rays.Mask;
-        const inf = std.math.inf(f32);
+        const Coverage = rasterise.Coverage(Self, f32, i32);
 
-        /// How many rays a set has.
-        pub fn rayCount(members: *const Members) u32 {
-            return @popCount(@as(@Int(.unsigned, pixel_count), @bitCast(members.*)));
+        /// Bounds of a triangle and its edge functions, in the axes of the parallelogram.
+        pub fn Window(comptime Float: type, comptime _: type) type {
+            return struct { u: [2]Float, v: [2]Float, along: [3]projected.Linear(Float) };
         }
 
-        /// The active rays of a bundle.
-        pub fn membersOf(bundle: *const Bundle) Members {
-            var members: Members = @splat(0);
-            for (&bundle.groups, 0..) |*group, index| {
-                setGroup(&members, index, group.active.bits());
-            }
-            return members;
+        pub inline fn depthMax(set: *const Self) f32 {
+            return set.bounds.depth;
         }
 
-        inline fn setGroup(members: *Members, group: usize, bits: u32) void {
-            const shift: u4 = @intCast(group % Kernel.subtile_groups * lanes);
-            members[group / Kernel.subtile_groups] |= @as(u16, @truncate(bits)) << shift;
+        pub inline fn isDone(set: *const Self) bool {
+            return set.live == 0;
         }
 
-        /// A group's part of a set.
-        pub inline fn groupOf(members: *const Members, group: usize) Mask {
-            const shift: u4 = @intCast(group % Kernel.subtile_groups * lanes);
-            const all: u16 = @intCast((@as(u32, 1) << lanes) - 1);
-            return .fromBits(members[group / Kernel.subtile_groups] >> shift & all);
+        pub inline fn nearnessMin(set: *const Self) f32 {
+            return set.bounds.nearness;
         }
 
-        /// Puts the rays of a set on the plane of the axis that suits most of them, and takes out
-        /// those that do not fit on it, which are returned.
-        pub fn place(
-            points: *Self,
-            light: *const world_file.Light,
-            bundle: *const Bundle,
-            members: *Members,
-        ) Members {
-            points.choosePlane(light, bundle, members);
-            const all = rayCount(members) == pixel_count;
-            const unfit, const steepest = if (all)
-                points.placeEach(true, bundle, members)
-            else
-                points.placeEach(false, bundle, members);
-            var rest: Members = @splat(0);
-            if (unfit.any()) {
-                rest = members.*;
-                members.* = points.left(&rest);
-                for (&rest, members) |*one, fitting| one.* &= ~fitting;
-            }
-            points.slope_max = if (points.projection.slope) |slope|
-                @max(@abs(slope[0]), @abs(slope[1]))
-            else
-                steepest.reduceMax();
-            points.chooseBasis(members);
-            if (all and unfit.none()) points.bound(true, members) else points.bound(false, members);
-            return rest;
-        }
-
-        /// Every member's place. Returns lanes with rays that do not fit on the plane, and the
-        /// steepest slopes of those that do. `all`: every ray is a member.
-        fn placeEach(
-            points: *Self,
-            comptime all: bool,
-            bundle: *const Bundle,
-            members: *const Members,
-        ) struct { Mask, F32 } {
-            const point_light = points.projection.slope == null;
-            var unfit: Mask = .splat(false);
-            var steepest: F32 = .zero();
-            for (&bundle.groups, 0..) |*group, index| {
-                const member: Mask = if (all) .splat(true) else groupOf(members, index);
-                const first = index * lanes;
-                if (!all and member.none()) {
-                    F32.splat(inf).storeAligned(@alignCast(points.nearness[first..][0..lanes]));
-                    continue;
-                }
-                const on_plane = points.placeGroup(group);
-                const steep = on_plane.u.abs().maxFast(on_plane.v.abs());
-                var fits = member;
-                if (point_light) fits = fits.bitAnd(on_plane.depth.gt(.zero()))
-                    .bitAnd(steep.le(.splat(slope_limit)));
-                unfit = unfit.bitOr(member.andNot(fits));
-                steepest = steepest.maxFast(.select(fits, steep, .zero()));
-                const near = if (point_light)
-                    F32.splat(1).div(on_plane.depth.mul(group.closest.t))
-                else
-                    on_plane.depth.neg();
-                on_plane.u.storeAligned(@alignCast(points.u[first..][0..lanes]));
-                on_plane.v.storeAligned(@alignCast(points.v[first..][0..lanes]));
-                F32.select(fits, near, .splat(inf))
-                    .storeAligned(@alignCast(points.nearness[first..][0..lanes]));
-            }
-            return .{ unfit, steepest };
-        }
-
-        inline fn placeGroup(
-            points: *const Self,
-            group: *const ray_file.Ray(Rays),
-        ) footprint_file.Place(Rays) {
-            const projection = &points.projection;
-            // A point light's rays are given by where t is 1; a directional one's start there.
-            const point = if (projection.slope == null)
-                group.line.direction
-            else
-                group.line.origin.sub(.splat(projection.origin));
-            return footprint_file.project(Rays, projection, point);
-        }
-
-        /// The axis along which the light's way to these points is longest.
-        fn choosePlane(
-            points: *Self,
-            light: *const world_file.Light,
-            bundle: *const Bundle,
-            members: *const Members,
-        ) void {
-            const directional = light.kind == .directional;
-            var sum: Rays.Vec3 = .splat(.{ 0, 0, 0 });
-            var some: ?[3]f32 = null;
-            // One group of a block is enough to choose by.
-            for (members, 0..) |set, at| {
-                if (set == 0) continue;
-                const index = at * Kernel.subtile_groups + @ctz(set) / lanes;
-                const group = &bundle.groups[index];
-                const member = groupOf(members, index);
-                const vector = if (directional) group.line.origin else group.line.direction;
-                if (some == null) some = vector.lane(@ctz(member.bits()));
-                sum = sum.add(.select(member, vector, .splat(.{ 0, 0, 0 })));
-            }
-            const way = if (directional)
-                light.direction
-            else
-                [3]f32{ sum.x.reduceSum(), sum.y.reduceSum(), sum.z.reduceSum() };
-            var axis: u2 = 0;
-            for (1..3) |other| {
-                if (@abs(way[other]) > @abs(way[axis])) axis = @intCast(other);
-            }
-            points.projection = .{
-                .origin = if (directional) some.? else light.position,
-                .axis = axis,
-                .sign = if (way[axis] < 0) -1 else 1,
-                .slope = if (directional) .{
-                    way[ray_file.turnedIndex(axis, 0)] / way[axis],
-                    way[ray_file.turnedIndex(axis, 1)] / way[axis],
-                } else null,
-            };
-            if (directional) points.projection.reach = points.reachOf(bundle, members);
-        }
-
-        /// The largest distance of a directional light's points from the origin of the plane.
-        fn reachOf(points: *const Self, bundle: *const Bundle, members: *const Members) f32 {
-            var farthest: F32 = .zero();
-            for (&bundle.groups, 0..) |*group, index| {
-                const member = groupOf(members, index);
-                if (member.none()) continue;
-                const apart_ = group.line.origin.sub(.splat(points.projection.origin));
-                const distance = apart_.dot(apart_);
-                farthest = farthest.maxFast(.select(member, distance, .zero()));
-            }
-            return @sqrt(farthest.reduceMax());
-        }
-
-        /// Axes along the rows and columns of pixels, if the corners of the bundle are members.
-        fn chooseBasis(points: *Self, members: *const Members) void {
-            points.basis = .{};
-            const corners = comptime cornerPixels();
-            for (corners) |pixel| {
-                const block = members[pixel / subtile_pixels];
-                if (block >> @intCast(pixel % subtile_pixels) & 1 == 0) return;
-            }
-            const u = [4]f32{
-                points.u[corners[0]], points.u[corners[1]],
-                points.u[corners[2]], points.u[corners[3]],
-            };
-            const v = [4]f32{
-                points.v[corners[0]], points.v[corners[1]],
-                points.v[corners[2]], points.v[corners[3]],
-            };
-            var x0 = u[1] - u[0] + u[3] - u[2];
-            var y0 = v[1] - v[0] + v[3] - v[2];
-            var x1 = u[2] - u[0] + u[3] - u[1];
-            var y1 = v[2] - v[0] + v[3] - v[1];
-            const length0 = @sqrt(x0 * x0 + y0 * y0);
-            const length1 = @sqrt(x1 * x1 + y1 * y1);
-            if (!(length0 > 0 and length1 > 0)) return;
-            x0 /= length0;
-            y0 /= length0;
-            x1 /= length1;
-            y1 /= length1;
-            if (@abs(x0 * y1 - x1 * y0) > 0.15) {
-                points.basis = .init(x0, y0, x1, y1);
-            } else if (length0 > length1) {
-                points.basis = .init(x0, y0, -y0, x0);
-            } else {
-                points.basis = .init(x1, y1, -y1, x1);
-            }
-        }
-
-        /// Pixels of the bundle's corners: upper left, upper right, lower left, lower right.
-        fn cornerPixels() [4]usize {
-            @setEvalBranchQuota(20_000);
-            var corners: [4]usize = undefined;
-            for (0..Kernel.group_count) |group| {
-                for (0..lanes) |lane| {
-                    const x = Kernel.pixelX(group, lane);
-                    const y = Kernel.pixelY(group, lane);
-                    if (x % (side - 1) != 0 or y % (side - 1) != 0) continue;
-                    corners[x / (side - 1) + 2 * (y / (side - 1))] = group * lanes + lane;
-                }
-            }
-            return corners;
-        }
-
-        /// Bounds of blocks and of all. `all`: every ray is a member.
-        fn bound(points: *Self, comptime all_there: bool, members: *const Members) void {
-            const unit = 64 * edges_file.unit_roundoff * (1 + 2 * points.slope_max);
-            const length = if (points.projection.slope == null) 1 else points.projection.reach;
-            const margin: F32 = .splat(unit * points.basis.norm() * length);
-            const nowhere: F32 = .splat(inf);
-            const nothing = [2]F32{ nowhere, nowhere.neg() };
-            const none: Ends = .{ .u = nothing, .v = nothing, .near = nowhere };
-            var all = none;
-            points.live = 0;
-            for (0..pack_count / lanes) |part| {
-                const first = part * lanes;
-                var each: [5][lanes]F32 = undefined;
-                for (members[first..][0..lanes], first.., 0..) |set, index, at| {
-                    const gone = !all_there and set == 0;
-                    const block = if (gone) none else points.endsOf(all_there, index);
-                    each[0][at], each[1][at] = block.u;
-                    each[2][at], each[3][at] = block.v;
-                    each[4][at] = block.near;
-                }
-                var blocks: Ends = .{
-                    .u = .{ Rays.minOfEach(&each[0]), Rays.maxOfEach(&each[1]) },
-                    .v = .{ Rays.minOfEach(&each[2]), Rays.maxOfEach(&each[3]) },
-                    .near = Rays.minOfEach(&each[4]),
-                };
-                blocks.u = .{ blocks.u[0].sub(margin), blocks.u[1].add(margin) };
-                blocks.v = .{ blocks.v[0].sub(margin), blocks.v[1].add(margin) };
-                all = all.join(blocks);
-                points.live |= blocks.near.lt(nowhere).bits() << @intCast(first);
-                for (0..2) |end| {
-                    blocks.u[end].storeAligned(@alignCast(points.block_u[end][first..][0..lanes]));
-                    blocks.v[end].storeAligned(@alignCast(points.block_v[end][first..][0..lanes]));
-                }
-            }
-            const near = all.near.reduceMin();
-            points.bounds = .{
-                .u = .{ all.u[0].reduceMin(), all.u[1].reduceMax() },
-                .v = .{ all.v[0].reduceMin(), all.v[1].reduceMax() },
-                .depth = if (points.projection.slope == null) 1 / near else -near,
+        /// A form of the coordinates in the axes of the parallelogram.
+        pub inline fn inAxes(
+            set: *const Self,
+            comptime Lanes: type,
+            form: *const projected.Linear(Lanes.F32),
+        ) projected.Linear(Lanes.F32) {
+            const basis = &set.basis;
+            return .{
+                .u = form.u.mulAdd(.splat(basis.b00), form.v.mul(.splat(basis.b10))),
+                .v = form.u.mulAdd(.splat(basis.b01), form.v.mul(.splat(basis.b11))),
+                .one = form.one,
             };
         }
 
-        /// Ends of coordinates in the axes of the parallelogram, and the least nearness, in lanes
-        /// of pixels or of blocks.
-        const Ends = struct {
-            u: [2]F32,
-            v: [2]F32,
-            near: F32,
+        /// The greatest value of a form over the set.
+        pub inline fn greatest(
+            set: *const Self,
+            comptime Lanes: type,
+            form: *const projected.Linear(Lanes.F32),
+        ) Lanes.F32 {
+            const bounds = &set.bounds;
+            const u = form.u.mul(.splat(bounds.u[0])).maxFast(form.u.mul(.splat(bounds.u[1])));
+            const v = form.v.mul(.splat(bounds.v[0])).maxFast(form.v.mul(.splat(bounds.v[1])));
+            return u.add(v).add(form.one);
+        }
 
-            inline fn join(a: Ends, b: Ends) Ends {
-                return .{
-                    .u = .{ a.u[0].minFast(b.u[0]), a.u[1].maxFast(b.u[1]) },
-                    .v = .{ a.v[0].minFast(b.v[0]), a.v[1].maxFast(b.v[1]) },
-                    .near = a.near.minFast(b.near),
-                };
-            }
-        };
+        /// Windows of triangles, and lanes of those that reach into the bounds.
+        pub inline fn windowOf(
+            set: *const Self,
+            comptime Lanes: type,
+            corners: [3]Lanes.Vec3,
+            facet: *const edges_file.Facet(Lanes),
+            along: *const [3]projected.Linear(Lanes.F32),
+        ) struct { Window(Lanes.F32, Lanes.I32), Lanes.Mask } {
+            const all = [2]Lanes.F32{ .splat(-inf), .splat(inf) };
+            var window: Window(Lanes.F32, Lanes.I32) = .{ .u = all, .v = all, .along = along.* };
+            // Bounds tell more than edges of small triangles only.
+            const bounds = &set.bounds;
+            const longest = @max(bounds.u[1] - bounds.u[0], bounds.v[1] - bounds.v[0]);
+            const extent = longest * (if (set.projection.slope == null) bounds.depth else 1);
+            if (facet.length.lt(.splat(extent)).none()) return .{ window, .splat(true) };
+            window.u, window.v = set.boundsOf(Lanes, corners, facet.reach);
+            return .{
+                window,
+                window.u[1].ge(.splat(bounds.u[0]))
+                    .bitAnd(window.u[0].le(.splat(bounds.u[1])))
+                    .bitAnd(window.v[1].ge(.splat(bounds.v[0])))
+                    .bitAnd(window.v[0].le(.splat(bounds.v[1]))),
+            };
+        }
 
-        /// What the groups of a block leave, by lane.
-        inline fn endsOf(points: *const Self, comptime all_there: bool, index: usize) Ends {
-            const basis = &points.basis;
-            const nowhere: F32 = .splat(inf);
-            var ends: Ends = undefined;
-            inline for (0..Kernel.subtile_groups) |row| {
-                const first = index * subtile_pixels + row * lanes;
-                const near = lanesOf(&points.nearness, first);
-                const there: Mask = if (all_there) .splat(true) else near.lt(nowhere);
-                const x = lanesOf(&points.u, first);
-                const y = lanesOf(&points.v, first);
-                const u = x.mul(.splat(basis.i00)).add(y.mul(.splat(basis.i01)));
-                const v = x.mul(.splat(basis.i10)).add(y.mul(.splat(basis.i11)));
-                const group: Ends = .{
-                    .u = .{ .select(there, u, nowhere), .select(there, u, nowhere.neg()) },
-                    .v = .{ .select(there, v, nowhere), .select(there, v, nowhere.neg()) },
-                    .near = near,
-                };
-                ends = if (row == 0) group else ends.join(group);
+        /// Bounds of triangles by their corners; none if a corner is not in front of a point light.
+        /// A corner's u or v is off by less than 6 u |c| / depth, the exact test's displacement of
+        /// corners by as much again.
+        inline fn boundsOf(
+            set: *const Self,
+            comptime Lanes: type,
+            corners: [3]Lanes.Vec3,
+            reach: Lanes.F32,
+        ) [2][2]Lanes.F32 {
+            const projection = &set.projection;
+            const basis = &set.basis;
+            const endless: Lanes.F32 = .splat(inf);
+            var ends: [2][2]Lanes.F32 = @splat(.{ endless, endless.neg() });
+            var least_depth = endless;
+            inline for (corners) |corner| {
+                const place = projection.place(Lanes, corner.sub(.splat(projection.origin)));
+                const u = place.u.mulAdd(.splat(basis.i00), place.v.mul(.splat(basis.i01)));
+                const v = place.u.mulAdd(.splat(basis.i10), place.v.mul(.splat(basis.i11)));
+                ends[0] = .{ ends[0][0].minFast(u), ends[0][1].maxFast(u) };
+                ends[1] = .{ ends[1][0].minFast(v), ends[1][1].maxFast(v) };
+                least_depth = least_depth.minFast(place.depth);
             }
+            const unit: Lanes.F32 = .splat(16 * edges_file.unit_roundoff * basis.norm());
+            const flat = projection.slope != null;
+            const margin = if (flat) reach.mul(unit) else reach.div(least_depth).mul(unit);
+            var bounded = margin.lt(.splat(if (flat) inf else 1));
+            if (!flat) bounded = bounded.bitAnd(least_depth.gt(.zero()));
+            inline for (&ends) |*end| end.* = .{
+                .select(bounded, end[0].sub(margin), endless.neg()),
+                .select(bounded, end[1].add(margin), endless),
+            };
             return ends;
         }
 
-        /// Half of the set if it should be cut: what lies below the middle of the longer extent, in
-        /// units of the median block.
-        pub fn cut(points: *const Self, members: *const Members) ?Members {
-            const count = @popCount(points.live);
-            if (count == 0) return null;
-            const share: f32 = @floatFromInt(count);
-            // Of more than half of the blocks, and so of the median.
-            const area_max: F32 = .splat(points.bounds.area() / (cut_ratio * share));
-            var extents: [2][pack_count]f32 = undefined;
-            var small_count: u32 = 0;
-            for (0..pack_count / lanes) |part| {
+        pub inline fn subtilesOf(
+            set: *const Self,
+            comptime decisive: bool,
+            coverage: *const Coverage,
+            _: exact.Slot,
+        ) u32 {
+            if (!decisive or @popCount(set.live) <= few_subtiles) return set.live;
+            const window = &coverage.window;
+            var subtiles: u32 = 0;
+            inline for (0..subtile_count / lanes) |part| {
                 const first = part * lanes;
-                const low = lanesOf(&points.block_u[0], first);
-                const u = lanesOf(&points.block_u[1], first).sub(low);
-                const v = lanesOf(&points.block_v[1], first)
-                    .sub(lanesOf(&points.block_v[0], first));
-                const there = low.lt(.splat(inf));
-                const nowhere: F32 = .splat(inf);
-                small_count += there.bitAnd(u.mul(v).lt(area_max)).popCount();
-                F32.select(there, u, nowhere).store(extents[0][first..][0..lanes]);
-                F32.select(there, v, nowhere).store(extents[1][first..][0..lanes]);
+                var least: F32 = .splat(inf);
+                inline for (&window.along) |*edge| {
+                    const u = lanesOf(&set.subtile_u[@intFromBool(edge.u > 0)], first);
+                    const v = lanesOf(&set.subtile_v[@intFromBool(edge.v > 0)], first);
+                    least = least.minOrNegative(edge.at(F32, u, v));
+                }
+                const met = lanesOf(&set.subtile_u[0], first).le(.splat(window.u[1]))
+                    .bitAnd(lanesOf(&set.subtile_u[1], first).ge(.splat(window.u[0])))
+                    .bitAnd(lanesOf(&set.subtile_v[0], first).le(.splat(window.v[1])))
+                    .bitAnd(lanesOf(&set.subtile_v[1], first).ge(.splat(window.v[0])))
+                    .andNot(least.isNegative());
+                subtiles |= met.bits() << first;
             }
-            if (small_count <= count / 2) return null;
-            const bounds = &points.bounds;
-            const along_u = (bounds.u[1] - bounds.u[0]) * median(&extents[1], count) >
-                (bounds.v[1] - bounds.v[0]) * median(&extents[0], count);
-            const basis = &points.basis;
-            const range = if (along_u) points.bounds.u else points.bounds.v;
-            const middle: F32 = .splat(0.5 * (range[0] + range[1]));
-            const by_u: F32 = .splat(if (along_u) basis.i00 else basis.i10);
-            const by_v: F32 = .splat(if (along_u) basis.i01 else basis.i11);
-            var half: Members = @splat(0);
-            for (0..Kernel.group_count) |group| {
-                const u = lanesOf(&points.u, group * lanes);
-                const v = lanesOf(&points.v, group * lanes);
-                setGroup(&half, group, u.mul(by_u).add(v.mul(by_v)).lt(middle).bits());
-            }
-            const below = count: {
-                var both: Members = half;
-                for (&both, members) |*one, all| one.* &= all;
-                break :count rayCount(&both);
-            };
-            if (below == 0 or below == rayCount(members)) return null;
-            return half;
+            return subtiles & set.live;
         }
 
-        /// What half of the first `count` values are less than, or nearly; the rest are infinite.
-        fn median(values: *const [pack_count]f32, count: usize) f32 {
-            for (values[0..count]) |value| {
-                var less: usize = 0;
-                var not_more: usize = 0;
-                inline for (0..pack_count / lanes) |part| {
-                    const others: F32 = .load(values[part * lanes ..][0..lanes]);
-                    less += others.lt(.splat(value)).popCount();
-                    not_more += others.le(.splat(value)).popCount();
-                }
-                if (less <= count / 2 and count / 2 < not_more) return value;
+        pub inline fn rowsOf(set: *const Self, coverage: *const Coverage, subtile: u32) Rows {
+            const group = subtile * Kernel.subtile_groups;
+            return .{
+                .set = set,
+                .coverage = coverage,
+                .group = group,
+                .last = group + Kernel.subtile_groups - 1,
+            };
+        }
+
+        const Rows = struct {
+            set: *const Self,
+            coverage: *const Coverage,
+            group: u32,
+            last: u32,
+
+            pub inline fn values(rows: *const Rows) [4]F32 {
+                const u = lanesOf(&rows.set.u, rows.group * lanes);
+                const v = lanesOf(&rows.set.v, rows.group * lanes);
+                var value: [4]F32 = undefined;
+                inline for (&value, &rows.coverage.form) |*to, *form| to.* = form.at(F32, u, v);
+                return value;
             }
-            return values[0];
+
+            pub inline fn next(rows: *Rows) bool {
+                if (rows.group == rows.last) return false;
+                rows.group += 1;
+                return true;
+            }
+        };
+
+        pub inline fn lower(set: *const Self, group: usize) F32 {
+            return lanesOf(&set.nearness, group * lanes);
+        }
+
+        pub inline fn upper(set: *const Self, group: usize) F32 {
+            return set.lower(group);
+        }
+
+        pub inline fn withoutOwn(
+            set: *const Self,
+            rays: Rays.Mask,
+            group: usize,
+            coverage: *const Coverage,
+        ) Rays.Mask {
+            return rays.andNot(set.bundle.groups[group].skip.eq(.splat(coverage.primitive)));
+        }
+
+        /// Takes rays out that have met a triangle.
+        pub inline fn accept(
+            set: *Self,
+            group: usize,
+            rays: Rays.Mask,
+            slot: exact.Slot,
+            _: F32,
+            _: F32,
+        ) void {
+            F32.select(rays, .splat(inf), set.lower(group))
+                .storeAligned(@alignCast(set.nearness[group * lanes ..][0..lanes]));
+            const tree = set.geometry.tree.get(Kernel.width);
+            const primitive: Rays.I32 = .splat(exact.primitiveAt(Kernel.width, tree, slot));
+            const closest = &set.bundle.groups[group].closest.primitive;
+            closest.* = .select(rays, primitive, closest.*);
+        }
+
+        /// Marks a subtile as done when all its rays are.
+        pub inline fn boundSubtile(set: *Self, subtile: u32) void {
+            const first = subtile * Kernel.subtile_groups;
+            var least = set.lower(first);
+            inline for (1..Kernel.subtile_groups) |row|
+                least = least.minFast(set.lower(first + row));
+            if (least.lt(.splat(inf)).any()) return;
+            set.live &= ~(@as(u32, 1) << @intCast(subtile));
+            for (0..2) |end| {
+                const empty: f32 = if (end == 0) inf else -inf;
+                set.subtile_u[end][subtile] = empty;
+                set.subtile_v[end][subtile] = empty;
+            }
         }
 
         /// Members that have met nothing yet.
-        pub fn left(points: *const Self, members: *const Members) Members {
+        pub fn left(set: *const Self, members: *const Members) Members {
             var rest: Members = @splat(0);
             for (0..Kernel.group_count) |group| {
-                const near = lanesOf(&points.nearness, group * lanes);
-                setGroup(&rest, group, near.lt(.splat(inf)).bits());
+                const bits = set.lower(group).lt(.splat(inf)).bits();
+                members_file.setGroup(Kernel, &rest, group, bits);
             }
             for (&rest, members) |*one, all| one.* &= all;
             return rest;
         }
 
-        /// Four planes around the beam, and depth along the light's way.
-        pub fn frustumOf(points: *const Self, pad: f32) Frustum {
-            const projection = &points.projection;
-            const basis = &points.basis;
-            const bounds = &points.bounds;
-            const rows = [4][3]f32{
-                .{ basis.i00, basis.i01, -bounds.u[0] },
-                .{ -basis.i00, -basis.i01, bounds.u[1] },
-                .{ basis.i10, basis.i11, -bounds.v[0] },
-                .{ -basis.i10, -basis.i11, bounds.v[1] },
-            };
-            var frustum: Frustum = undefined;
-            for (&frustum.sides, rows) |*plane, row| {
-                // u - u0 >= 0 is x - u0 z >= 0 in front of a point light, and x - m z - u0 >= 0
-                // along a directional one of slope m.
-                var normal: [3]f32 = undefined;
-                const last = if (projection.slope) |slope|
-                    -(row[0] * slope[0] + row[1] * slope[1])
-                else
-                    row[2];
-                const scale = if (projection.slope == null) projection.sign else 1;
-                normal[projection.axisAt(0)] = row[0] * scale;
-                normal[projection.axisAt(1)] = row[1] * scale;
-                normal[projection.axisAt(2)] = last * scale;
-                plane.* = .init(normal, projection.origin, frustum_file.slack_pads * pad);
-                if (projection.slope != null) plane.offset += row[2];
-            }
-            var along: [3]f32 = @splat(0);
-            along[projection.axis] = projection.sign;
-            frustum.depth = .init(along, projection.origin, -frustum_file.slack_pads * pad);
-            return frustum;
-        }
-
-        /// Of an array by pixel or by block, the lanes from `first` on.
+        /// Of an array by pixel or by subtile, the lanes from `first` on.
         pub inline fn lanesOf(values: anytype, first: usize) F32 {
             return .loadAligned(@alignCast(values[first..][0..lanes]));
-        }
-
-        /// Marks a block as done when all its rays are.
-        pub inline fn checkBlock(points: *Self, index: u32) void {
-            const first = index * subtile_pixels;
-            var least = lanesOf(&points.nearness, first);
-            inline for (1..Kernel.subtile_groups) |row| {
-                least = least.minFast(lanesOf(&points.nearness, first + row * lanes));
-            }
-            if (least.lt(.splat(inf)).any()) return;
-            points.live &= ~(@as(u32, 1) << @intCast(index));
-            for (0..2) |end| {
-                const empty: f32 = if (end == 0) inf else -inf;
-                points.block_u[end][index] = empty;
-                points.block_v[end][index] = empty;
-            }
         }
     };
 }

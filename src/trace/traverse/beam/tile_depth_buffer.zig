@@ -1,7 +1,8 @@
-//! What the pixels of a beam see so far: by block one triangle all over, or one for each pixel.
+//! Hierarchical z-buffer (Greene, Kass and Miller 1993) of a tile: what its pixels see so far, by
+//! subtile one triangle all over, or one for each pixel.
 //!
 //! In: triangles that surely lie before what is known, as linear forms over the pixels. Out: the
-//! triangle of every pixel, with bounds of 1/t there, and bounds by block. A block that one
+//! triangle of every pixel, with bounds of 1/t there, and bounds by subtile. A subtile that one
 //! triangle fills, or none, is kept as that triangle's form until another touches a part of it:
 //! large triangles cost nothing by the pixel.
 
@@ -13,10 +14,10 @@ const exact = @import("exact.zig");
 
 const side = kernel_file.beam_side;
 const subtile_side = kernel_file.subtile_side;
-const pack_count = kernel_file.beam_subtiles;
+const subtile_count = kernel_file.beam_subtiles;
 const pixel_count = kernel_file.beam_pixels;
 
-/// Bounds of 1/t of a triangle, linear over the pixels; or of one in each block.
+/// Bounds of 1/t of a triangle, linear over the pixels; or of one in each subtile.
 pub fn Depth(comptime Value: type) type {
     return struct {
         /// Upper bound at the beam's first pixel, steps right and down.
@@ -32,25 +33,25 @@ pub fn Depth(comptime Value: type) type {
 const depth_names = std.meta.fieldNames(Depth(f32));
 
 /// Undefined until `clear`.
-pub fn Found(comptime Kernel: type) type {
+pub fn TileDepthBuffer(comptime Kernel: type) type {
     const Rays = Kernel.Rays;
     const lanes = Kernel.ray_count;
     const subtile_groups = Kernel.subtile_groups;
     return struct {
-        /// Blocks that one triangle fills, or none, a bit each: `block_slot` and `depth` tell of
-        /// these. Others have it by pixel.
+        /// Subtiles that one triangle fills, or none, a bit each: `subtile_slot` and `depth` tell
+        /// of these. Others have it by pixel.
         whole: u32,
-        block_slot: [pack_count]exact.Slot align(64),
-        depth: Depth([pack_count]f32) align(64),
+        subtile_slot: [subtile_count]exact.Slot align(64),
+        depth: Depth([subtile_count]f32) align(64),
         /// By pixel, in the order of groups and lanes: what is hit, and bounds of 1/t there; 0
         /// where nothing is, infinity where there is no ray.
         slot: [pixel_count]exact.Slot align(64),
         lower: [pixel_count]f32 align(64),
         upper: [pixel_count]f32 align(64),
-        /// By block, the least `lower`; of those in `whole` the greatest `upper`, else infinity.
-        block_lower: [pack_count]f32 align(64),
-        block_upper: [pack_count]f32 align(64),
-        /// The least `block_lower`, as of `depthMax`.
+        /// By subtile, the least `lower`; of those in `whole` the greatest `upper`, else infinity.
+        subtile_lower: [subtile_count]f32 align(64),
+        subtile_upper: [subtile_count]f32 align(64),
+        /// The least `subtile_lower`, as of `depthMax`.
         tile_lower: f32,
 
         const Self = @This();
@@ -58,144 +59,147 @@ pub fn Found(comptime Kernel: type) type {
         const I32 = Rays.I32;
         const Mask = Rays.Mask;
         const inf = std.math.inf(f32);
-        /// Columns and rows of the blocks' first pixels.
-        pub const block_x = blockPlaces(false);
-        pub const block_y = blockPlaces(true);
+        /// Columns and rows of the subtiles' first pixels.
+        pub const subtile_x = subtilePlaces(false);
+        pub const subtile_y = subtilePlaces(true);
 
-        fn blockPlaces(comptime rows: bool) [pack_count]f32 {
-            var places: [pack_count]f32 = undefined;
-            for (&places, 0..) |*to, block| {
+        fn subtilePlaces(comptime rows: bool) [subtile_count]f32 {
+            var places: [subtile_count]f32 = undefined;
+            for (&places, 0..) |*to, subtile| {
                 const across = side / subtile_side;
-                to.* = @floatFromInt(subtile_side * (if (rows) block / across else block % across));
+                const place = if (rows) subtile / across else subtile % across;
+                to.* = @floatFromInt(subtile_side * place);
             }
             return places;
         }
 
         /// No hit anywhere; a pixel without a ray has one at no distance.
-        pub fn clear(found: *Self, bundle: *const bundle_file.Bundle(Kernel)) void {
-            found.block_slot = @splat(exact.no_slot);
-            inline for (depth_names) |name| @field(found.depth, name) = @splat(0);
-            found.block_lower = @splat(0);
-            found.block_upper = @splat(0);
-            found.tile_lower = 0;
-            found.whole = (1 << pack_count) - 1;
-            for (0..pack_count) |block| {
-                const groups = bundle.groups[block * subtile_groups ..][0..subtile_groups];
+        pub fn clear(buffer: *Self, bundle: *const bundle_file.Bundle(Kernel)) void {
+            buffer.subtile_slot = @splat(exact.no_slot);
+            inline for (depth_names) |name| @field(buffer.depth, name) = @splat(0);
+            buffer.subtile_lower = @splat(0);
+            buffer.subtile_upper = @splat(0);
+            buffer.tile_lower = 0;
+            buffer.whole = (1 << subtile_count) - 1;
+            for (0..subtile_count) |subtile| {
+                const groups = bundle.groups[subtile * subtile_groups ..][0..subtile_groups];
                 var all = groups[0].active;
                 inline for (groups[1..]) |*group| all = all.bitAnd(group.active);
                 if (all.all()) continue;
-                found.spread(block);
-                for (groups, block * subtile_groups..) |*group, index| {
+                buffer.spread(subtile);
+                for (groups, subtile * subtile_groups..) |*group, index| {
                     const bound: F32 = .select(group.active, .zero(), .splat(inf));
-                    bound.storeAligned(found.of("lower", index));
-                    bound.storeAligned(found.of("upper", index));
+                    bound.storeAligned(buffer.of("lower", index));
+                    bound.storeAligned(buffer.of("upper", index));
                 }
-                found.boundBlock(block);
+                buffer.boundSubtile(subtile);
             }
         }
 
         /// A group's part of one of the arrays by pixel.
         pub inline fn of(
-            found: *Self,
+            buffer: *Self,
             comptime name: []const u8,
             group: usize,
         ) *align(lanes * 4) [lanes]std.meta.Elem(@FieldType(Self, name)) {
-            return @alignCast(@field(found, name)[group * lanes ..][0..lanes]);
+            return @alignCast(@field(buffer, name)[group * lanes ..][0..lanes]);
         }
 
-        /// A part of one of the arrays by block, from block `first` on.
-        pub inline fn ofBlocks(
-            found: *Self,
+        /// A part of one of the arrays by subtile, from subtile `first` on.
+        pub inline fn ofSubtiles(
+            buffer: *Self,
             comptime name: []const u8,
             first: usize,
         ) *align(lanes * 4) [lanes]std.meta.Elem(@FieldType(Self, name)) {
-            return @alignCast(@field(found, name)[first..][0..lanes]);
+            return @alignCast(@field(buffer, name)[first..][0..lanes]);
         }
 
-        /// A triangle fills some of the blocks from `first` on, before all that is known there;
+        /// A triangle fills some of the subtiles from `first` on, before all that is known there;
         /// with bounds of 1/t in each of them.
         pub inline fn fill(
-            found: *Self,
+            buffer: *Self,
             first: usize,
-            blocks: Mask,
+            subtiles: Mask,
             slot: exact.Slot,
             depth: *const Depth(f32),
             lower: F32,
             upper: F32,
         ) void {
-            const slots = found.ofBlocks("block_slot", first);
-            I32.select(blocks, .splat(slot), .loadAligned(slots)).storeAligned(slots);
-            const lowest = found.ofBlocks("block_lower", first);
-            F32.select(blocks, lower, .loadAligned(lowest)).storeAligned(lowest);
-            const highest = found.ofBlocks("block_upper", first);
-            F32.select(blocks, upper, .loadAligned(highest)).storeAligned(highest);
+            const slots = buffer.ofSubtiles("subtile_slot", first);
+            I32.select(subtiles, .splat(slot), .loadAligned(slots)).storeAligned(slots);
+            const lowest = buffer.ofSubtiles("subtile_lower", first);
+            F32.select(subtiles, lower, .loadAligned(lowest)).storeAligned(lowest);
+            const highest = buffer.ofSubtiles("subtile_upper", first);
+            F32.select(subtiles, upper, .loadAligned(highest)).storeAligned(highest);
             inline for (depth_names) |name| {
-                const all = &@field(found.depth, name);
+                const all = &@field(buffer.depth, name);
                 const known: *align(lanes * 4) [lanes]f32 = @alignCast(all[first..][0..lanes]);
-                F32.select(blocks, .splat(@field(depth, name)), .loadAligned(known))
+                F32.select(subtiles, .splat(@field(depth, name)), .loadAligned(known))
                     .storeAligned(known);
             }
-            found.whole |= blocks.bits() << @intCast(first);
+            buffer.whole |= subtiles.bits() << @intCast(first);
         }
 
-        /// Whether one triangle fills this block, or none.
-        pub inline fn isWhole(found: *const Self, block: usize) bool {
-            return found.whole >> @intCast(block) & 1 != 0;
+        /// Whether one triangle fills this subtile, or none.
+        pub inline fn isWhole(buffer: *const Self, subtile: usize) bool {
+            return buffer.whole >> @intCast(subtile) & 1 != 0;
         }
 
-        /// From one triangle for the block to one for each pixel.
-        pub fn spread(found: *Self, block: usize) void {
-            found.whole &= ~(@as(u32, 1) << @intCast(block));
-            found.block_upper[block] = inf;
+        /// From one triangle for the subtile to one for each pixel.
+        pub fn spread(buffer: *Self, subtile: usize) void {
+            buffer.whole &= ~(@as(u32, 1) << @intCast(subtile));
+            buffer.subtile_upper[subtile] = inf;
             var depth: Depth(f32) = undefined;
             inline for (depth_names) |name| {
-                @field(depth, name) = @field(found.depth, name)[block];
+                @field(depth, name) = @field(buffer.depth, name)[subtile];
             }
-            const base = depth.base + block_x[block] * depth.right + block_y[block] * depth.down;
+            const base = depth.base + subtile_x[subtile] * depth.right +
+                subtile_y[subtile] * depth.down;
             var value: F32 = .splat(base);
             if (Kernel.group_height > 1)
                 value = F32.fromArray(Kernel.lane_y).mulAdd(.splat(depth.down), value);
             value = F32.fromArray(Kernel.lane_x).mulAdd(.splat(depth.right), value);
-            const slot: I32 = .splat(found.block_slot[block]);
+            const slot: I32 = .splat(buffer.subtile_slot[subtile]);
             inline for (0..subtile_groups) |row| {
-                const group = block * subtile_groups + row;
+                const group = subtile * subtile_groups + row;
                 value.mulAdd(.splat(depth.shrink), .splat(-depth.drop))
-                    .storeAligned(found.of("lower", group));
-                value.storeAligned(found.of("upper", group));
-                slot.storeAligned(found.of("slot", group));
+                    .storeAligned(buffer.of("lower", group));
+                value.storeAligned(buffer.of("upper", group));
+                slot.storeAligned(buffer.of("slot", group));
                 value = value.add(.splat(depth.down * Kernel.group_height));
             }
         }
 
-        /// The same for all blocks.
-        pub fn spreadAll(found: *Self) void {
-            for (0..pack_count) |block| if (found.isWhole(block)) found.spread(block);
+        /// The same for all subtiles.
+        pub fn spreadAll(buffer: *Self) void {
+            for (0..subtile_count) |subtile| if (buffer.isWhole(subtile)) buffer.spread(subtile);
         }
 
-        /// Bounds of a block that has its triangles by pixel.
-        pub inline fn boundBlock(found: *Self, block: usize) void {
-            const first = block * subtile_groups;
-            var least: F32 = .loadAligned(found.of("lower", first));
+        /// Bounds of a subtile that has its triangles by pixel.
+        pub inline fn boundSubtile(buffer: *Self, subtile: usize) void {
+            const first = subtile * subtile_groups;
+            var least: F32 = .loadAligned(buffer.of("lower", first));
             inline for (1..subtile_groups) |row| {
-                least = least.minFast(.loadAligned(found.of("lower", first + row)));
+                least = least.minFast(.loadAligned(buffer.of("lower", first + row)));
             }
-            found.block_lower[block] = least.reduceMin();
+            buffer.subtile_lower[subtile] = least.reduceMin();
         }
 
         /// t beyond which nothing can be seen any more.
-        pub inline fn depthMax(found: *Self) f32 {
-            var least: F32 = .loadAligned(found.ofBlocks("block_lower", 0));
-            inline for (1..pack_count / lanes) |part| {
-                least = least.minFast(.loadAligned(found.ofBlocks("block_lower", part * lanes)));
+        pub inline fn depthMax(buffer: *Self) f32 {
+            var least: F32 = .loadAligned(buffer.ofSubtiles("subtile_lower", 0));
+            inline for (1..subtile_count / lanes) |part| {
+                const lowest = buffer.ofSubtiles("subtile_lower", part * lanes);
+                least = least.minFast(.loadAligned(lowest));
             }
-            found.tile_lower = least.reduceMin();
-            if (found.tile_lower == 0) return inf;
-            return 1 / found.tile_lower * (1 + 4 * edges_file.unit_roundoff);
+            buffer.tile_lower = least.reduceMin();
+            if (buffer.tile_lower == 0) return inf;
+            return 1 / buffer.tile_lower * (1 + 4 * edges_file.unit_roundoff);
         }
     };
 }
 
-test "a block that a triangle fills says the same by pixel; a pixel without a ray stays out" {
+test "a subtile that a triangle fills says the same by pixel; a pixel without a ray stays out" {
     inline for (.{ 4, 8, 16 }) |lane_count| {
         const Kernel = kernel_file.Kernel(.{
             .backend = .vector,
@@ -206,45 +210,45 @@ test "a block that a triangle fills says the same by pixel; a pixel without a ra
         var bundle: bundle_file.Bundle(Kernel) = undefined;
         for (&bundle.groups) |*group| group.active = .splat(true);
         bundle.groups[0].active = Mask.splat(true).andNot(.fromBits(2));
-        var found: Found(Kernel) = undefined;
-        found.clear(&bundle);
-        try std.testing.expect(!found.isWhole(0));
-        try std.testing.expectEqual(std.math.inf(f32), found.lower[1]);
-        try std.testing.expectEqual(0, found.lower[0]);
-        try std.testing.expectEqual(std.math.inf(f32), found.depthMax());
+        var buffer: TileDepthBuffer(Kernel) = undefined;
+        buffer.clear(&bundle);
+        try std.testing.expect(!buffer.isWhole(0));
+        try std.testing.expectEqual(std.math.inf(f32), buffer.lower[1]);
+        try std.testing.expectEqual(0, buffer.lower[0]);
+        try std.testing.expectEqual(std.math.inf(f32), buffer.depthMax());
 
-        const block = pack_count - 2;
-        const first = block / Kernel.ray_count * Kernel.ray_count;
+        const subtile = subtile_count - 2;
+        const first = subtile / Kernel.ray_count * Kernel.ray_count;
         const depth: Depth(f32) =
             .{ .base = 1.25, .right = 0.015625, .down = 0.03125, .shrink = 0.875, .drop = 0.125 };
-        found.fill(
+        buffer.fill(
             first,
-            .fromBits(@as(u32, 1) << @intCast(block - first)),
+            .fromBits(@as(u32, 1) << @intCast(subtile - first)),
             7,
             &depth,
             .splat(1),
             .splat(2),
         );
-        try std.testing.expect(found.isWhole(block) and found.block_slot[block] == 7);
-        try std.testing.expectEqual(exact.no_slot, found.block_slot[block - 1]);
+        try std.testing.expect(buffer.isWhole(subtile) and buffer.subtile_slot[subtile] == 7);
+        try std.testing.expectEqual(exact.no_slot, buffer.subtile_slot[subtile - 1]);
         try std.testing.expectEqual([2]f32{ 1, 2 }, .{
-            found.block_lower[block], found.block_upper[block],
+            buffer.subtile_lower[subtile], buffer.subtile_upper[subtile],
         });
-        found.spread(block);
-        try std.testing.expect(!found.isWhole(block));
+        buffer.spread(subtile);
+        try std.testing.expect(!buffer.isWhole(subtile));
         for (0..kernel_file.subtile_pixels) |pixel| {
-            const at = block * kernel_file.subtile_pixels + pixel;
+            const at = subtile * kernel_file.subtile_pixels + pixel;
             const group = at / Kernel.ray_count;
             const x: f32 = @floatFromInt(Kernel.pixelX(group, at % Kernel.ray_count));
             const y: f32 = @floatFromInt(Kernel.pixelY(group, at % Kernel.ray_count));
             const value = 1.25 + 0.015625 * x + 0.03125 * y;
-            try std.testing.expectEqual(7, found.slot[at]);
-            try std.testing.expectEqual(value, found.upper[at]);
-            try std.testing.expectEqual(value * 0.875 - 0.125, found.lower[at]);
+            try std.testing.expectEqual(7, buffer.slot[at]);
+            try std.testing.expectEqual(value, buffer.upper[at]);
+            try std.testing.expectEqual(value * 0.875 - 0.125, buffer.lower[at]);
         }
-        found.boundBlock(block);
-        const corner = 1.25 + 0.015625 * Found(Kernel).block_x[block] +
-            0.03125 * Found(Kernel).block_y[block];
-        try std.testing.expectEqual(corner * 0.875 - 0.125, found.block_lower[block]);
+        buffer.boundSubtile(subtile);
+        const corner = 1.25 + 0.015625 * TileDepthBuffer(Kernel).subtile_x[subtile] +
+            0.03125 * TileDepthBuffer(Kernel).subtile_y[subtile];
+        try std.testing.expectEqual(corner * 0.875 - 0.125, buffer.subtile_lower[subtile]);
     }
 }
