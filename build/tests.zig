@@ -150,6 +150,7 @@ fn commandLine(tests: Tests, target: Target) LazyPath {
         const command = std.mem.join(b.allocator, " ", target.emulator) catch @panic("OOM");
         run.addArg(b.fmt("--env=RAYLANE_EMULATOR={s}", .{command}));
     }
+    run.addArg(b.fmt("--env=RAYLANE_OPTIMIZE={t}", .{target.package.optimize}));
     run.addArtifactArg2(target.package.program(), .{
         .prefix = "--env=RAYLANE_PROGRAM=",
         .make_absolute = true,

@@ -4,6 +4,7 @@
 //! all. Colours are made by all threads; the bytes depend on the frame and the settings alone.
 
 const std = @import("std");
+const choices = @import("settings.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Image = @import("image.zig").Image;
@@ -20,74 +21,51 @@ pub const TargetError = target_file.Error;
 /// What targets create until they are in place.
 pub const TemporaryFiles = @import("output/temporary.zig").TemporaryFiles;
 
-/// File formats, by their extensions.
-pub const Format = enum {
-    png,
-    jpg,
-    tga,
-    bmp,
-    /// Radiance RGBE: linear, 8 bits and a common exponent.
-    hdr,
-    /// Netpbm's binary format: RGB of 8 bits.
-    ppm,
-    /// Its relative for floats, linear: the picture itself, bit for bit, without alpha.
-    pfm,
+/// Pixels on a side at most, where the format counts them in two bytes.
+fn sideMax(format: choices.Format) u32 {
+    return switch (format) {
+        .jpg, .tga => 65_535,
+        else => std.math.maxInt(u31),
+    };
+}
 
-    /// Pixels on a side at most: two bytes in the file.
-    fn sideMax(format: Format) u32 {
-        return switch (format) {
-            .jpg, .tga => 65_535,
-            else => std.math.maxInt(u31),
-        };
-    }
-
-    fn form(format: Format, transparent: bool) tonemap.Form {
-        return switch (format) {
-            .png, .tga => if (transparent) .rgba else .rgb,
-            .jpg, .bmp, .ppm => .rgb,
-            .hdr => .radiance,
-            .pfm => .linear,
-        };
-    }
-};
-
-/// How radiance becomes brightness.
-pub const Exposure = union(enum) {
-    /// Stops: radiance 2^-ev is white.
-    ev: f32,
-    /// 95 % of the pixels are no brighter than 0.8.
-    auto,
-};
+fn formOf(format: choices.Format, transparent: bool) tonemap.Form {
+    return switch (format) {
+        .png, .tga => if (transparent) .rgba else .rgb,
+        .jpg, .bmp, .ppm => .rgb,
+        .hdr => .radiance,
+        .pfm => .linear,
+    };
+}
 
 pub const Settings = struct {
-    format: Format = .png,
+    format: choices.Format = .png,
     /// Of the formats that are not linear.
-    exposure: Exposure = .{ .ev = 0 },
+    exposure: choices.Exposure = .{ .ev = 0 },
     /// Keep alpha, where the format has it; otherwise the picture is over black.
     transparent: bool = false,
-    /// Of JPEG, 1 to 100.
-    jpeg_quality: u8 = 90,
-    /// 1..`parallel.thread_count_max`. The bytes do not depend on it.
-    thread_count: usize = 1,
+    /// Within `settings.jpeg_quality`.
+    jpeg_quality: u8 = choices.jpeg_quality.default,
+    pool: *parallel.Pool,
 };
 
-/// The diagnostic says why.
-pub const Error = error{ OutOfMemory, InputOutput };
+/// The diagnostic says why, unless the pool's work was cancelled.
+pub const Error = error{ OutOfMemory, InputOutput } || parallel.Error;
 
 /// Refuses a picture that the format cannot hold; best asked before it is rendered.
 pub fn check(
-    settings: Settings,
+    format: choices.Format,
+    transparent: bool,
     width: u32,
     height: u32,
     diagnostic: *Diagnostic,
 ) error{InputOutput}!void {
-    const format = settings.format;
-    if (@max(width, height) > format.sideMax()) return diagnostic.fail(
+    if (@max(width, height) > sideMax(format)) return diagnostic.fail(
         error.InputOutput,
         "a {t} file has {d} pixels on a side at most",
-        .{ format, format.sideMax() },
+        .{ format, sideMax(format) },
     );
-    const channel_count: u64 = if (format.form(settings.transparent) == .rgba) 4 else 3;
+    const channel_count: u64 = if (formOf(format, transparent) == .rgba) 4 else 3;
     const by_library = format != .ppm and format != .pfm;
     const value_count = (width * channel_count + 1) * height;
     if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
@@ -106,9 +84,9 @@ pub fn write(
     diagnostic: *Diagnostic,
 ) Error!void {
     defer target.abandon();
-    try check(settings, image.width, image.height, diagnostic);
     const format = settings.format;
-    const form = format.form(settings.transparent);
+    try check(format, settings.transparent, image.width, image.height, diagnostic);
+    const form = formOf(format, settings.transparent);
     const rows: tonemap.Rows = .{
         .image = image,
         .form = form,
@@ -120,7 +98,7 @@ pub fn write(
             },
         },
     };
-    const pixels = try encodeRows(gpa, rows, format == .pfm, settings.thread_count);
+    const pixels = try encodeRows(gpa, rows, settings.pool, format == .pfm);
     defer huge_pages.free(gpa, pixels);
 
     var buffer: [48]u8 = undefined;
@@ -155,37 +133,32 @@ pub fn write(
 fn encodeRows(
     gpa: Allocator,
     rows: tonemap.Rows,
+    pool: *parallel.Pool,
     from_bottom: bool,
-    thread_count: usize,
-) error{OutOfMemory}![]align(64) u8 {
+) Error![]align(64) u8 {
     comptime assert(@import("builtin").cpu.arch.endian() == .little);
-    const byte_count = std.math.mul(usize, rows.byteCount(), rows.image.height) catch
+    const height = rows.image.height;
+    const byte_count = std.math.mul(usize, rows.byteCount(), height) catch
         return error.OutOfMemory;
-    var work: Work = .{
+    const work: Work = .{
         .rows = rows,
         .from_bottom = from_bottom,
         .bytes = try huge_pages.alloc(gpa, u8, byte_count),
     };
-    parallel.share(@min(thread_count, rows.image.height), &work, Work.run);
+    errdefer huge_pages.free(gpa, work.bytes);
+    try pool.forEach(height, &work, Work.encodeRow);
     return work.bytes;
 }
 
-/// Rows, each to one thread.
 const Work = struct {
     rows: tonemap.Rows,
     from_bottom: bool,
     bytes: []align(64) u8,
-    next: std.atomic.Value(u32) = .init(0),
 
-    fn run(work: *Work, _: usize) void {
+    fn encodeRow(work: *const Work, y: usize, _: usize) void {
         const row_bytes = work.rows.byteCount();
-        const height = work.rows.image.height;
-        while (true) {
-            const y = work.next.fetchAdd(1, .monotonic);
-            if (y >= height) return;
-            const place: usize = if (work.from_bottom) height - 1 - y else y;
-            work.rows.encode(y, work.bytes[place * row_bytes ..][0..row_bytes]);
-        }
+        const place = if (work.from_bottom) work.rows.image.height - 1 - y else y;
+        work.rows.encode(@intCast(y), work.bytes[place * row_bytes ..][0..row_bytes]);
     }
 };
 
@@ -196,13 +169,21 @@ test {
     _ = tonemap;
 }
 
+const TestSettings = struct {
+    format: choices.Format = .png,
+    exposure: choices.Exposure = .{ .ev = 0 },
+    transparent: bool = false,
+};
+
 /// What `write` leaves in a file called `name`; the caller frees it.
 fn writeForTest(
     folder: std.Io.Dir,
     name: []const u8,
     image: *const Image,
-    settings: Settings,
+    settings: TestSettings,
 ) ![]u8 {
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
     const gpa = std.testing.allocator;
     const io = std.testing.io;
     var path_buffer: [std.fs.max_path_bytes]u8 = undefined;
@@ -212,7 +193,12 @@ fn writeForTest(
     var diagnostic: Diagnostic = .{};
     var temporaries: TemporaryFiles = .{};
     var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
-    try write(gpa, image, settings, &target, &diagnostic);
+    try write(gpa, image, .{
+        .format = settings.format,
+        .exposure = settings.exposure,
+        .transparent = settings.transparent,
+        .pool = &pool,
+    }, &target, &diagnostic);
     return folder.readFileAlloc(io, name, gpa, .unlimited);
 }
 
@@ -262,14 +248,16 @@ test "memory that runs out leaves no file, whenever it does" {
     const folder_path = path_buffer[0..try folder.dir.realPath(io, &path_buffer)];
     const path = try std.fs.path.join(std.testing.allocator, &.{ folder_path, "a" });
     defer std.testing.allocator.free(path);
-    for (std.enums.values(Format)) |format| {
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    for (std.enums.values(choices.Format)) |format| {
         var failing: std.testing.FailingAllocator = .init(std.testing.allocator, .{
             .fail_index = 0,
         });
         var diagnostic: Diagnostic = .{};
         var temporaries: TemporaryFiles = .{};
         var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
-        const settings: Settings = .{ .format = format, .exposure = .auto };
+        const settings: Settings = .{ .format = format, .exposure = .auto, .pool = &pool };
         const result = write(failing.allocator(), &image, settings, &target, &diagnostic);
         try std.testing.expectError(error.OutOfMemory, result);
         var entries = folder.dir.iterate();

@@ -1,7 +1,7 @@
 //! What a frame cost, as text for people and as JSON for programs.
 //!
-//! In: plain values that `main` collects from the stages. Out: a few aligned lines, or one JSON
-//! object in one line. Keys of the JSON grow in number but never change their meaning.
+//! In: plain values that the session collects. Out: a few aligned lines, or one JSON object in one
+//! line. Keys of the JSON grow in number but never change their meaning.
 
 const std = @import("std");
 const Stringify = std.json.Stringify;
@@ -12,11 +12,11 @@ const statistics = @import("statistics.zig");
 /// One frame.
 pub const Report = struct {
     /// Of the program.
-    version: []const u8,
+    version: []const u8 = "",
     /// As on the command line.
-    scene: []const u8,
+    scene: []const u8 = "",
     /// Where the image went, as on the command line.
-    output: []const u8,
+    output: []const u8 = "",
     triangle_count: u64,
     width: u32,
     height: u32,
@@ -33,7 +33,7 @@ pub const Report = struct {
     bvh: Bvh,
     memory_peak_bytes: u64,
     image_hash: u64,
-    warnings: []const []const u8,
+    warnings: []const []const u8 = &.{},
 
     /// Facts about the tree.
     pub const Bvh = struct {

@@ -5,9 +5,9 @@
 //! picture is the same bits for every variant, thread count and tile size.
 
 const std = @import("std");
+const choices = @import("settings.zig");
 const world_file = @import("world.zig");
 const variant_file = @import("variant.zig");
-const path = @import("trace/integrate/path.zig");
 const tiles = @import("trace/integrate/tiles.zig");
 const Film = @import("film.zig").Film;
 const assert = std.debug.assert;
@@ -55,9 +55,6 @@ pub const searches = @import("trace/traverse/searches.zig");
 /// A bundle in the variant's own way.
 pub const dispatch = @import("trace/traverse/dispatch.zig");
 
-/// Bounces at most.
-pub const depth_limit = path.depth_limit;
-
 /// The searches of a kernel, where the build has kernels show them.
 pub fn searchesOf(comptime Kernel: type) *const searches.Searches(Kernel) {
     const Face = searches.Searches(Kernel);
@@ -102,7 +99,7 @@ fn run(
     settings: *const Settings,
 ) Error!Statistics {
     assert(film.image.width == frame.view.width and film.image.height == frame.view.height);
-    assert(settings.sample_count >= 1 and settings.depth_max <= depth_limit);
+    assert(settings.sample_count >= 1 and choices.depth.holds(settings.depth_max));
     const integrators = comptime integrators: {
         var list: [variant_file.compiled.len]*const Integrator = undefined;
         for (&list, variant_file.compiled) |*to, held| {
@@ -126,7 +123,7 @@ test {
     _ = @import("trace/traverse/stack.zig");
     _ = bundle;
     _ = dispatch;
-    _ = path;
+    _ = @import("trace/integrate/path.zig");
     _ = tiles;
     _ = @import("trace/traverse/beam/budget.zig");
     _ = @import("trace/traverse/beam/tile_depth_buffer.zig");

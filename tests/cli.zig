@@ -1,8 +1,9 @@
 //! Tests of the command line: the real program, in a fresh folder, under qemu where it is foreign.
 //!
-//! In: the environment, RAYLANE_PROGRAM (the program's path) and RAYLANE_EMULATOR (what runs it,
-//! with its arguments, if anything does), as build/tests.zig sets them. Each test opens a `Sandbox`
-//! and looks at exit codes, at both output streams and at the files left behind.
+//! In: the environment, RAYLANE_PROGRAM (the program's path), RAYLANE_OPTIMIZE (its mode) and
+//! RAYLANE_EMULATOR (what runs it, with its arguments, if anything does), as build/tests.zig sets
+//! them. Each test opens a `Sandbox` and looks at exit codes, at both output streams and at the
+//! files left behind.
 
 const std = @import("std");
 const Io = std.Io;
@@ -680,6 +681,35 @@ test "exhausted memory is an error in one line" {
     try expectOneErrorLine(ending);
     try testing.expect(std.mem.find(u8, ending.stderr, "out of memory") != null);
     try sandbox.expectEmpty();
+}
+
+test "a small stack is enough for every command" {
+    // Unoptimised code gives each value a place of its own.
+    const mode = testing.environ.getPosix("RAYLANE_OPTIMIZE") orelse return error.ModeNotNamed;
+    const limit_kib: u32 = if (std.mem.eql(u8, mode, "debug")) 2048 else 256;
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const arena = sandbox.arena_state.allocator();
+    // An emulator needs the limit for itself, and has another for the program.
+    const script = if (testing.environ.getPosix("RAYLANE_EMULATOR") != null)
+        try arena.print("QEMU_STACK_SIZE={d} exec \"$@\"", .{limit_kib << 10})
+    else
+        try arena.print("ulimit -s {d}; exec \"$@\"", .{limit_kib});
+    try sandbox.write("empty.gltf", empty_scene);
+    const variant = try firstVariant(&sandbox);
+    for ([_][]const []const u8{
+        &.{"--help"},
+        &.{"--list-variants"},
+        &.{ "empty.gltf", "-r1x1" },
+        // Mirrors, glass and shadows through it, by the caller's thread and by another.
+        &.{ "builtin:cornell", "-r64x64", "-t1", "--bvh=high", "--count-tests" },
+        &.{ "builtin:cornell", "-r64x64", "-t2" },
+        &.{ "bench", "builtin:cornell", "-r16x16", "-q", "--no-energy", "--rounds=2", variant },
+    }) |arguments| {
+        const ending = try sandbox.runShell(script, arguments);
+        errdefer std.debug.print("{s}: {s}\n", .{ arguments[0], ending.stderr });
+        try testing.expectEqual(0, ending.exit_code);
+    }
 }
 
 /// Starts a render that does not end by itself, by a script as `runShell` takes it, and waits until

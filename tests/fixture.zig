@@ -8,6 +8,7 @@ const raylane = @import("raylane");
 const Affine = raylane.math.Affine;
 const Scene = raylane.scene.Scene;
 const Image = raylane.image.Image;
+const Session = raylane.session.Session;
 const World = raylane.world.World;
 const vec3 = raylane.math.vec3;
 const gpa = std.testing.allocator;
@@ -142,7 +143,7 @@ pub const Options = struct {
     sample_count: u32 = 1,
     tile_size: u32 = 16,
     thread_count: usize = 1,
-    tree_quality: raylane.prepare.TreeQuality = .default,
+    tree_quality: raylane.settings.TreeQuality = .default,
     ambient: ?f32 = null,
     background: ?[3]f32 = null,
     transparent: bool = false,
@@ -153,42 +154,53 @@ pub const Options = struct {
 /// The world of a scene in the given width of tree.
 pub fn prepare(scene: *const Scene, lanes: u8, options: Options) !World {
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
-    var times: raylane.statistics.StageTimes = .{};
+    var session: Session = .init(gpa, std.testing.io, options.thread_count, &diagnostic);
+    defer session.deinit();
+    try view(&session, scene, lanes, options);
+    defer session.world = null; // The caller's now.
+    return session.world.?;
+}
+
+/// Makes a session ready to trace a scene by variants of the given width of tree.
+pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options) !void {
     const mode = raylane.simd.setFlushToZero();
     defer raylane.simd.setFloatControl(mode);
-    return raylane.prepare.prepare(gpa, std.testing.io, scene, .{
-        .lanes = lanes,
-        .thread_count = options.thread_count,
-        .tree_quality = options.tree_quality,
+    session.adopt(scene.*, .borrowed);
+    try session.pose(.{ .lanes = lanes, .tree_quality = options.tree_quality });
+    try session.view(.{
         .resolution = .{ options.width, options.height },
         .ambient = options.ambient,
-        .background = options.background,
-    }, &diagnostic, &times);
+        .background = if (options.transparent)
+            .transparent
+        else if (options.background) |color| .{ .linear = color } else .default,
+    });
+}
+
+/// Traces what a session sees. The image is the session's.
+pub fn trace(session: *Session, options: Options) !*Image {
+    const layers: raylane.film.Layers = .init(.{ .color = true });
+    if (session.film == null)
+        session.film = try .init(gpa, options.width, options.height, layers);
+    // Every pixel must be written.
+    @memset(session.film.?.image.pixels, @splat(std.math.nan(f32)));
+    try session.render(.{
+        .variant = options.variant,
+        .sample_count = options.sample_count,
+        .depth = options.depth_max,
+        .tile_size = options.tile_size,
+    });
+    try std.testing.expectEqual(0, session.traced.non_finite_count);
+    return &session.film.?.image;
 }
 
 /// The picture of a scene.
 pub fn render(scene: *const Scene, options: Options) !Image {
-    const lanes = raylane.variant.compiled[options.variant].lanes;
-    var world = try prepare(scene, lanes, options);
-    defer world.deinit();
-    return renderWorld(&world, options);
-}
-
-/// The picture of a world that has the variant's width of tree.
-pub fn renderWorld(world: *const World, options: Options) !Image {
-    const layers: raylane.film.Layers = .init(.{ .color = true, .alpha = options.transparent });
-    var film: raylane.film.Film = try .init(gpa, world.view.width, world.view.height, layers);
-    errdefer film.deinit(gpa);
-    // Every pixel must be written.
-    @memset(film.image.pixels, @splat(std.math.nan(f32)));
-    const traced = try raylane.trace.trace(gpa, options.variant, &world.frame(), &film, .{
-        .thread_count = options.thread_count,
-        .sample_count = options.sample_count,
-        .depth_max = options.depth_max,
-        .tile_size = options.tile_size,
-    });
-    try std.testing.expectEqual(0, traced.non_finite_count);
-    return film.image;
+    var diagnostic: raylane.diagnostic.Diagnostic = .{};
+    var session: Session = .init(gpa, std.testing.io, options.thread_count, &diagnostic);
+    defer session.deinit();
+    try view(&session, scene, raylane.variant.compiled[options.variant].lanes, options);
+    defer session.film = null; // The caller's now.
+    return (try trace(&session, options)).*;
 }
 
 /// A material without reflection, lit or shining by itself only.

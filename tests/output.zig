@@ -44,15 +44,23 @@ fn Decoded(comptime Channel: type) type {
     };
 }
 
+const Settings = struct {
+    format: raylane.settings.Format = .png,
+    exposure: raylane.settings.Exposure = .{ .ev = 0 },
+    transparent: bool = false,
+    jpeg_quality: u8 = raylane.settings.jpeg_quality.default,
+    thread_count: usize = 1,
+};
+
 /// Writes the image and decodes it.
-fn roundTrip(image: *const Image, settings: raylane.output.Settings) !Decoded(u8) {
+fn roundTrip(image: *const Image, settings: Settings) !Decoded(u8) {
     const file = try written(image, settings);
     defer testing.allocator.free(file);
     return .init(file);
 }
 
 /// The file that the image becomes; the caller frees it.
-fn written(image: *const Image, settings: raylane.output.Settings) ![]u8 {
+fn written(image: *const Image, settings: Settings) ![]u8 {
     const gpa = testing.allocator;
     const io = testing.io;
     var folder = testing.tmpDir(.{});
@@ -65,7 +73,15 @@ fn written(image: *const Image, settings: raylane.output.Settings) ![]u8 {
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
     var temporaries: raylane.output.TemporaryFiles = .{};
     var target: raylane.output.Target = try .openFile(io, &temporaries, path, &diagnostic);
-    try raylane.output.write(gpa, image, settings, &target, &diagnostic);
+    var pool: raylane.parallel.Pool = .init(settings.thread_count);
+    defer pool.deinit();
+    try raylane.output.write(gpa, image, .{
+        .format = settings.format,
+        .exposure = settings.exposure,
+        .transparent = settings.transparent,
+        .jpeg_quality = settings.jpeg_quality,
+        .pool = &pool,
+    }, &target, &diagnostic);
     return folder.dir.readFileAlloc(io, "a.png", gpa, .unlimited);
 }
 
@@ -90,7 +106,7 @@ const odd_sizes = [_][2]u32{
 };
 
 test "PNG, TGA and BMP hold the encoded colours" {
-    for (odd_sizes) |size| for ([_]raylane.output.Format{ .png, .tga, .bmp }) |format| {
+    for (odd_sizes) |size| for ([_]raylane.settings.Format{ .png, .tga, .bmp }) |format| {
         errdefer std.debug.print("{t} {d}x{d}\n", .{ format, size[0], size[1] });
         var image = try testImage(testing.allocator, size[0], size[1]);
         defer image.deinit(testing.allocator);
@@ -213,7 +229,7 @@ fn checkers(gpa: std.mem.Allocator) !Image {
 test "every format has the same bytes on every machine" {
     var image = try checkers(testing.allocator);
     defer image.deinit(testing.allocator);
-    const expected = [_]struct { raylane.output.Format, u64 }{
+    const expected = [_]struct { raylane.settings.Format, u64 }{
         .{ .png, 0xd9aa232445eb57fd }, .{ .jpg, 0xf6f4e06efab8dc20 },
         .{ .tga, 0x27a4b70272305b9a }, .{ .bmp, 0xc0a9f1c2ed9ec202 },
         .{ .hdr, 0x7e1e5a338bf0dcc9 }, .{ .ppm, 0x90c7a2393d5f932d },
@@ -233,7 +249,7 @@ test "every format has the same bytes on every machine" {
 }
 
 test "what a format cannot hold is refused" {
-    const Case = struct { raylane.output.Format, u32, u32, ?[]const u8 };
+    const Case = struct { raylane.settings.Format, u32, u32, ?[]const u8 };
     for ([_]Case{
         .{ .png, 65_536, 4096, null },
         .{ .png, 16_384, 16_384, null },
@@ -248,8 +264,7 @@ test "what a format cannot hold is refused" {
         .{ .pfm, 65_536, 65_536, null },
     }) |case| {
         var diagnostic: raylane.diagnostic.Diagnostic = .{};
-        const settings: raylane.output.Settings = .{ .format = case[0] };
-        const result = raylane.output.check(settings, case[1], case[2], &diagnostic);
+        const result = raylane.output.check(case[0], false, case[1], case[2], &diagnostic);
         const needle = case[3] orelse {
             try result;
             continue;
@@ -264,7 +279,7 @@ test "what a format cannot hold is refused" {
 test "the bytes do not depend on the number of threads" {
     var image = try testImage(testing.allocator, 500, 400);
     defer image.deinit(testing.allocator);
-    for (std.enums.values(raylane.output.Format)) |format| {
+    for (std.enums.values(raylane.settings.Format)) |format| {
         const alone = try written(&image, .{ .format = format });
         defer testing.allocator.free(alone);
         for ([_]usize{ 2, 7, 256 }) |thread_count| {
@@ -279,7 +294,7 @@ test "a transparent PNG or TGA holds alpha and colours that are not premultiplie
     var image = try testImage(testing.allocator, 70, 40);
     defer image.deinit(testing.allocator);
     image.pixels[0] = .{ 0, 0, 0, 0 };
-    for ([_]raylane.output.Format{ .png, .tga }) |format| {
+    for ([_]raylane.settings.Format{ .png, .tga }) |format| {
         var decoded = try roundTrip(&image, .{ .format = format, .transparent = true });
         defer decoded.deinit();
         try testing.expectEqual(4, decoded.channel_count);

@@ -24,7 +24,7 @@ const goldens = [_]Golden{
 
 fn parse(name: []const u8) !raylane.scene.Scene {
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
-    return raylane.parse.parse(gpa, std.testing.io, name, .{}, &diagnostic);
+    return raylane.session.loadScene(gpa, std.testing.io, name, .{}, &diagnostic);
 }
 
 fn expectHash(expected: u64, image: *const raylane.image.Image, what: []const u8) !void {
@@ -35,16 +35,16 @@ fn expectHash(expected: u64, image: *const raylane.image.Image, what: []const u8
 
 fn expectAllVariants(scene: *const raylane.scene.Scene, base: fixture.Options, hash: u64) !void {
     inline for (.{ 4, 8, 16 }) |lanes| {
-        var world: ?raylane.world.World = null;
-        defer if (world) |*prepared| prepared.deinit();
+        var diagnostic: raylane.diagnostic.Diagnostic = .{};
+        var session: raylane.session.Session =
+            .init(gpa, std.testing.io, base.thread_count, &diagnostic);
+        defer session.deinit();
         for (raylane.variant.compiled, raylane.variant.names, 0..) |variant, name, index| {
             if (variant.lanes != lanes) continue;
-            if (world == null) world = try fixture.prepare(scene, lanes, base);
+            if (session.world == null) try fixture.view(&session, scene, lanes, base);
             var options = base;
             options.variant = index;
-            var image = try fixture.renderWorld(&world.?, options);
-            defer image.deinit(gpa);
-            try expectHash(hash, &image, name);
+            try expectHash(hash, try fixture.trace(&session, options), name);
         }
     }
 }
@@ -101,7 +101,7 @@ test "the quality of the tree changes nothing in the picture, by any variant" {
         var options: fixture.Options = .{ .width = 32, .height = 32, .thread_count = 2 };
         var first = try fixture.render(&scene, options);
         defer first.deinit(gpa);
-        for (std.enums.values(raylane.prepare.TreeQuality)) |quality| {
+        for (std.enums.values(raylane.settings.TreeQuality)) |quality| {
             options.tree_quality = quality;
             try expectAllVariants(&scene, options, first.hash());
         }

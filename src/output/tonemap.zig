@@ -8,12 +8,10 @@ const std = @import("std");
 const Allocator = std.mem.Allocator;
 const Image = @import("../image.zig").Image;
 const math = @import("../math.zig");
+const settings = @import("../settings.zig");
 const assert = std.debug.assert;
 
-/// Brightness that `autoScale` gives to its percentile.
-const auto_brightness: f32 = 0.8;
-/// Share of the pixels, in percent, that are to be no brighter.
-const auto_percentile = 95;
+const auto = settings.auto_exposure;
 
 /// The factor of an exposure in stops, 2^ev. Asserts that it is within f32's normal range.
 pub fn scaleOf(ev: f32) f32 {
@@ -36,7 +34,7 @@ pub fn autoScale(gpa: Allocator, image: *const Image) error{OutOfMemory}!f32 {
         pixel_count += 1;
     }
     if (pixel_count == 0) return 1;
-    const rank = (pixel_count * auto_percentile + 99) / 100 - 1;
+    const rank = (pixel_count * auto.percentile + 99) / 100 - 1;
     const upper = select(counts, rank);
     @memset(counts, 0);
     for (image.pixels) |pixel| {
@@ -46,7 +44,7 @@ pub fn autoScale(gpa: Allocator, image: *const Image) error{OutOfMemory}!f32 {
     const lower = select(counts, upper.rank);
     const luminance: f32 = @bitCast(upper.index << 16 | lower.index);
     if (luminance < std.math.floatMin(f32)) return 1;
-    const scale = auto_brightness / luminance;
+    const scale = auto.brightness / luminance;
     return if (scale < std.math.floatMin(f32)) std.math.floatMin(f32) else scale;
 }
 

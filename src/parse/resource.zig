@@ -20,7 +20,7 @@ const Diagnostic = diagnostic_data.Diagnostic;
 const Identity = @import("../identity.zig").Identity;
 const Io = std.Io;
 const Reason = diagnostic_data.Message;
-const Settings = @import("settings.zig").Settings;
+const Settings = @import("../settings.zig").Load;
 const assert = std.debug.assert;
 
 const Resources = @This();

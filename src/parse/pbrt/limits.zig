@@ -16,12 +16,6 @@ pub const parameter_count_max = 256;
 pub const instance_count_max: u64 = 1 << 24;
 /// Shapes that emit light.
 pub const emitter_count_max = 4096;
-/// Sides and pixels of a film: those of a picture on the command line.
-pub const film_side_max = 65_536;
-pub const film_pixel_count_max = 1 << 28;
-/// Samples a pixel and bounces that a scene may ask for; more is taken as this.
-pub const sample_count_max = 4096;
-pub const depth_max = 32;
 /// Times that a control mesh is subdivided; more is taken as this.
 pub const subdivision_count_max = 8;
 /// Largest order of a NURBS.

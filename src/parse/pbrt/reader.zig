@@ -6,6 +6,7 @@
 const std = @import("std");
 const diagnostic_file = @import("../../diagnostic.zig");
 const lights = @import("lights.zig");
+const choices = @import("../../settings.zig");
 const limits = @import("limits.zig");
 const materials = @import("materials.zig");
 const number = @import("number.zig");
@@ -514,7 +515,8 @@ fn sampler(reader: *Reader) Error!void {
         @as(i64, across.?) * down.?
     else
         parameters.integer("pixelsamples") orelse return;
-    reader.sample_count = @intCast(std.math.clamp(asked, 1, limits.sample_count_max));
+    const range = choices.sample_count;
+    reader.sample_count = @intCast(std.math.clamp(asked, range.min, range.max));
 }
 
 /// All integrators are Whitted's here; "maxdepth" counts rays in his and in direct lighting,
@@ -531,7 +533,7 @@ fn integrator(reader: *Reader, name: []const u8, position: usize) Error!void {
     const asked = reader.parameters.integer("maxdepth") orelse return;
     const counts_rays = std.mem.eql(u8, name, "whitted") or std.mem.eql(u8, name, "directlighting");
     const bounces = @as(i64, asked) - @intFromBool(counts_rays);
-    reader.depth = @intCast(std.math.clamp(bounces, 0, limits.depth_max));
+    reader.depth = @intCast(std.math.clamp(bounces, choices.depth.min, choices.depth.max));
 }
 
 fn makeMaterial(reader: *Reader, name: []const u8, position: usize) Error!NamedMaterial {

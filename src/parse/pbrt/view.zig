@@ -5,9 +5,9 @@
 
 const std = @import("std");
 const elementary = @import("../../math.zig").elementary;
-const limits = @import("limits.zig");
 const quote = @import("../../diagnostic.zig").quote;
 const scene = @import("../../scene.zig");
+const settings = @import("../../settings.zig");
 const Input = @import("input.zig");
 const Parameters = @import("parameters.zig");
 const math = @import("../../math.zig");
@@ -39,17 +39,17 @@ pub fn setFilm(
     var size: [2]u32 = .{ 640, 480 };
     for (&size, [_][]const u8{ "xresolution", "yresolution" }) |*side, name| {
         const value = parameters.integer(name) orelse continue;
-        if (value < 1 or value > limits.film_side_max) return input.fail(
+        if (!settings.side.holds(value)) return input.fail(
             position,
-            "{s} is {d}, not 1 to {d}",
-            .{ name, value, limits.film_side_max },
+            "{s} is {d}, not " ++ settings.side.text(),
+            .{ name, value },
         );
         side.* = @intCast(value);
     }
-    if (@as(u64, size[0]) * size[1] > limits.film_pixel_count_max) return input.fail(
+    if (@as(u64, size[0]) * size[1] > settings.pixel_count_max) return input.fail(
         position,
         "the film has over {d} pixels",
-        .{limits.film_pixel_count_max},
+        .{settings.pixel_count_max},
     );
     if (parameters.find("cropwindow") != null or parameters.find("pixelbounds") != null)
         try input.warn(position, "cropwindow", "Film: crop windows are not supported", .{});

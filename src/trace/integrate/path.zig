@@ -13,8 +13,8 @@ const visibility = @import("visibility.zig");
 const assert = std.debug.assert;
 const Frame = @import("../../world.zig").Frame;
 
-/// Bounces at most, whatever the options say.
-pub const depth_limit = 32;
+/// Bounces at most.
+pub const depth_limit = @import("../../settings.zig").depth.max;
 
 /// Rays to be traced, and what they are worth.
 pub fn PathState(comptime Kernel: type) type {

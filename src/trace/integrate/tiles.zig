@@ -15,6 +15,7 @@
 //! which is compiled in an object of its own: `Integrator` is what its kernel shows of it.
 
 const std = @import("std");
+const choices = @import("../../settings.zig");
 const world_file = @import("../../world.zig");
 const statistics = @import("../../statistics.zig");
 const parallel = @import("../../parallel.zig");
@@ -25,15 +26,15 @@ const Film = film_file.Film;
 const Frame = world_file.Frame;
 const Rectangle = film_file.Rectangle;
 
-/// What the options say about tracing.
+/// How a frame is traced, and who does the work.
 pub const Settings = struct {
-    thread_count: usize,
+    pool: *parallel.Pool,
     /// Samples a pixel, at least 1.
-    sample_count: u32 = 1,
-    /// Bounces after the primary ray, at most `depth_limit`.
-    depth_max: u32 = 6,
+    sample_count: u32 = choices.sample_count.default,
+    /// Bounces after the primary ray, at most `settings.depth.max`.
+    depth_max: u32 = choices.depth.default,
     /// Side of a tile in pixels, at least 1.
-    tile_size: u32 = 32,
+    tile_size: u32 = choices.tile_size.default,
     /// Told of every finished tile of a pass.
     progress: std.Progress.Node = .none,
     /// Looked at between tiles: set, it ends the work.
@@ -60,7 +61,7 @@ pub const Statistics = struct {
 };
 
 /// `Canceled`: the film is not finished.
-pub const Error = error{ OutOfMemory, Canceled };
+pub const Error = error{OutOfMemory} || parallel.Error;
 
 /// An integrator behind pointers: only data that the program and the kernel agree on passes here,
 /// and no state but what `init` gives.
@@ -146,14 +147,14 @@ pub fn render(
         .by_thread = by_thread[0..0],
     };
     defer for (job.by_thread) |one| integrator.deinit(one, &gpa);
-    while (job.by_thread.len < @min(settings.thread_count, tiles.count)) {
+    while (job.by_thread.len < settings.pool.threadsFor(tiles.count)) {
         by_thread[job.by_thread.len] = integrator.init(&gpa, frame, settings) orelse {
             if (job.by_thread.len == 0) return error.OutOfMemory;
             break;
         };
         job.by_thread = by_thread[0 .. job.by_thread.len + 1];
     }
-    parallel.share(job.by_thread.len, &job, Job.work);
+    settings.pool.share(job.by_thread.len, &job, Job.work);
     if (settings.isCancelled()) return error.Canceled;
     var total: Statistics = .{ .non_finite_count = tiles.non_finite_count.load(.monotonic) };
     var tests: statistics.TestCounts = .{};
@@ -267,10 +268,12 @@ const Tiles = struct {
 };
 
 test "every pixel is in exactly one tile, and every tile is due once a pass" {
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
     for ([_][3]u32{ .{ 1, 1, 1 }, .{ 7, 5, 3 }, .{ 64, 64, 16 }, .{ 3, 100, 256 } }) |case| {
         var covered: [100 * 100]u8 = @splat(0);
         var tiles: Tiles = .init(case[0], case[1], &.{
-            .thread_count = 1,
+            .pool = &pool,
             .tile_size = case[2],
             .sample_count = 3,
         });
@@ -287,8 +290,10 @@ test "every pixel is in exactly one tile, and every tile is due once a pass" {
 }
 
 test "huge pictures have a countable number of tiles" {
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
     const tiles: Tiles = .init(65536, 65536, &.{
-        .thread_count = 1,
+        .pool = &pool,
         .tile_size = 1,
         .sample_count = 4096,
     });
@@ -339,12 +344,14 @@ test "the samples of each pixel come in order, by however many threads; a flag e
     const frame: Frame = undefined;
     for ([_]usize{ 1, 2, 5 }) |thread_count| for ([_]u32{ 1, 3, 40 }) |tile_size| {
         for ([_]bool{ false, true }) |is_cancelled| {
+            var pool: parallel.Pool = .init(thread_count);
+            defer pool.deinit();
             var film: Film = try .init(gpa, 21, 17, .init(.{ .color = true }));
             defer film.deinit(gpa);
             TestIntegrator.bundles_left.store(if (is_cancelled) 3 else -1, .monotonic);
             TestIntegrator.cancel.store(false, .monotonic);
             const result = render(&.of(TestIntegrator), gpa, &frame, &film, &.{
-                .thread_count = thread_count,
+                .pool = &pool,
                 .sample_count = sample_count,
                 .tile_size = tile_size,
                 .cancel = &TestIntegrator.cancel,
