@@ -90,7 +90,7 @@ pub fn pose(
         .padding = .init(place_file.round(place.center), soup.bounds),
         .size = @floatCast(place.size),
     };
-    const materials = try material.convertAll(arena.allocator(), from);
+    const materials = try material.place(arena.allocator(), from, soup.triangles);
     const tree_start = Clock.awake.now(io);
     const tree_facts = try buildTree(gpa, arena.allocator(), &geometry, settings);
     const end = Clock.awake.now(io);

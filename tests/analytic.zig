@@ -195,6 +195,62 @@ test "a shadow falls where the light is hidden, and colours behind glass" {
     try expectClose(0.25, dimmed[0] / same_distance[0], 1e-3);
 }
 
+test "sixteen surfaces weaken a shadow ray, holes do not count, vertices colour" {
+    var builder: Builder = try .init();
+    try builder.addQuad(fixture.matte(.{ 1, 1, 1 }), .{ 0, 0, -10 }, .{ 20, 0, 0 }, .{ 0, 20, 0 });
+    var veil = fixture.matte(.{ 0, 0, 0 });
+    veil.alpha_mode = .blend;
+    veil.base_color[3] = 0.125;
+    var hole = veil;
+    hole.alpha_mode = .mask;
+    for (0..17) |index| {
+        const z = -5 - 0.01 * @as(f32, @floatFromInt(index));
+        if (index < 16) {
+            try builder.addQuad(veil, .{ -3, 0, z }, .{ 1, 0, 0 }, .{ 0, 1, 0 });
+            try builder.addQuad(veil, .{ 0, 3, z }, .{ 1, 0, 0 }, .{ 0, 1, 0 });
+        }
+        try builder.addQuad(veil, .{ 3, 0, z }, .{ 1, 0, 0 }, .{ 0, 1, 0 });
+        // More than are kept at once, before and between the veils.
+        for ([_]f32{ -4, -5.001, -5.003 }) |first| {
+            const place = [3]f32{ 0, 3, first - 0.01 * @as(f32, @floatFromInt(index)) };
+            try builder.addQuad(hole, place, .{ 1, 0, 0 }, .{ 0, 1, 0 });
+        }
+    }
+    var pane = fixture.matte(.{ 1, 1, 1 });
+    pane.transmission = 1;
+    try builder.addQuad(pane, .{ 0, -3, -5 }, .{ 1, 0, 0 }, .{ 0, 1, 0 });
+    try builder.addPointLight(.{ 0, 0, 0 }, 1000);
+    try builder.addCamera(.{ 0, 0, -6 }, 2);
+    var scene = try builder.finish();
+    defer scene.deinit();
+    const meshes = try gpa.dupe(raylane.scene.Mesh, scene.meshes);
+    defer gpa.free(meshes);
+    const colors: [4][4]f32 = @splat(.{ 0.5, 0.25, 1, 1 });
+    meshes[meshes.len - 1].colors = &colors;
+    scene.meshes = meshes;
+    const size = 80;
+    const last = raylane.variant.compiled.len - 1;
+    var expected: ?u64 = null;
+    for (0..last + 1) |variant| {
+        const options: fixture.Options = .{ .width = size, .height = size, .variant = variant };
+        var image = try fixture.render(&scene, options);
+        defer image.deinit(gpa);
+        try std.testing.expectEqual(expected orelse image.hash(), image.hash());
+        expected = image.hash();
+        if (variant < last) continue;
+        // Pixels at the same distance from the axis: one in the light, one in each shadow.
+        const free = image.at(size / 2 + 21, size / 2 + 21).*;
+        const weakened = std.math.pow(f32, 0.875, 16);
+        try expectClose(weakened, image.at(size / 2 - 31, size / 2).*[0] / free[0], 0.005);
+        try std.testing.expectEqual(0, image.at(size / 2 + 30, size / 2).*[0]);
+        try expectClose(weakened, image.at(size / 2, size / 2 - 31).*[0] / free[0], 0.005);
+        const colored = image.at(size / 2, size / 2 + 30).*;
+        for (colored[0..3], free[0..3], [3]f32{ 0.5, 0.25, 1 }) |seen, whole, share| {
+            try expectClose(share, seen / whole, 0.005);
+        }
+    }
+}
+
 test "closed furnace: walls of radiance 1 around black things look the same everywhere" {
     var wall = fixture.matte(.{ 0, 0, 0 });
     wall.emissive = .{ 1, 1, 1 };

@@ -107,12 +107,14 @@ fn expectMultiHit(
 ) !void {
     const lists = try gpa.create(raylane.trace.multi_hit.HitLists(Kernel));
     defer gpa.destroy(lists);
-    var material = std.mem.zeroes(raylane.world.Material);
-    material.alpha_cutoff = -1;
+    const occluders = try gpa.alloc(u32, world.geometry.triangles.len / 32 + 1);
+    defer gpa.free(occluders);
+    var materials = world.materials;
+    materials.occluders = occluders;
     lists.geometry = &world.geometry;
-    lists.materials = (&material)[0..1];
-    for ([_]f32{ 0, 1 }) |transmission| {
-        material.transmission = transmission;
+    lists.materials = &materials;
+    for ([_]bool{ true, false }) |is_opaque| {
+        @memset(occluders, if (is_opaque) std.math.maxInt(u32) else 0);
         var counts: raylane.statistics.TestCounts = .{};
         var bundle = makeBundle(Kernel, queries);
         raylane.trace.searchesOf(Kernel).hit_lists(lists, &bundle, &counts);
@@ -122,9 +124,9 @@ fn expectMultiHit(
             const lane = index % Kernel.ray_count;
             const stopped = lists.stopped[group] >> @intCast(lane) & 1 == 1;
             const met = hit.primitive != ray_file.no_primitive;
-            try std.testing.expectEqual(transmission == 0 and met, stopped);
+            try std.testing.expectEqual(is_opaque and met, stopped);
             // Brute force takes its time.
-            if (transmission == 0 or index % 8 != 0) continue;
+            if (is_opaque or index % 8 != 0) continue;
             const list = lists.hits[group][lane][0..lists.counts[group][lane]];
             try expectList(world, query, list);
         }

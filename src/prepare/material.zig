@@ -9,28 +9,33 @@ const math = @import("../math.zig");
 const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const assert = std.debug.assert;
+const Allocator = std.mem.Allocator;
 
 /// Darkest attenuation colour: a channel at 0 would absorb without bound.
 const attenuation_color_min = 1e-4;
 
-/// The world's materials in the order of the scene's, from `arena`.
-pub fn convertAll(
-    arena: std.mem.Allocator,
+/// The world's materials in the order of the scene's; `triangles` are the world's.
+pub fn place(
+    arena: Allocator,
     from: *const scene.Scene,
+    triangles: []const world.Triangle,
 ) error{OutOfMemory}!world.Materials {
     const converted = try arena.alloc(world.Material, from.materials.len);
-    for (from.materials, converted) |*original, *to| to.* = convert(original);
-    var materials: world.Materials = .{
-        .all = converted,
-        .has_transparency = false,
-        .has_holes = false,
-    };
+    for (from.materials, converted) |*material, *to| to.* = convert(material);
+    var has_transparency = false;
+    var has_holes = false;
     for (from.instances) |instance| {
         const used = &converted[from.meshes[instance.mesh].material];
-        materials.has_transparency = materials.has_transparency or isTransparent(used);
-        materials.has_holes = materials.has_holes or used.alpha_cutoff >= 0;
+        has_transparency = has_transparency or isTransparent(used);
+        has_holes = has_holes or used.alpha_cutoff >= 0;
     }
-    return materials;
+    const stops_all = !has_transparency and !has_holes;
+    return .{
+        .all = converted,
+        .has_transparency = has_transparency,
+        .has_holes = has_holes,
+        .occluders = if (stops_all) &.{} else try occluders(arena, converted, triangles),
+    };
 }
 
 /// Whether light passes surfaces of this material in part.
@@ -73,6 +78,24 @@ fn absorption(from: *const scene.Material) math.Vec3 {
         channel.* = @floatCast(if (exact < largest) exact else largest);
     }
     return result;
+}
+
+/// See `world.Materials.occluders`.
+fn occluders(
+    arena: Allocator,
+    materials: []const world.Material,
+    triangles: []const world.Triangle,
+) error{OutOfMemory}![]const u32 {
+    const words = try arena.alloc(u32, @divCeil(triangles.len, 32));
+    for (words, 0..) |*word, index| {
+        word.* = 0;
+        const first = 32 * index;
+        for (triangles[first..@min(first + 32, triangles.len)], 0..) |*triangle, bit| {
+            const stops = materials[triangle.material].stopsLight();
+            word.* |= @as(u32, @intFromBool(stops)) << @intCast(bit);
+        }
+    }
+    return words;
 }
 
 fn flag(condition: bool) f32 {

@@ -42,4 +42,13 @@ pub const Materials = struct {
     has_transparency: bool,
     /// Some drawn material has holes (mask).
     has_holes: bool,
+    /// By triangle, a bit each: whether no light passes it. Small enough to be at hand when a
+    /// triangle is hit, which neither that nor its material is. Empty where both of the above are
+    /// false.
+    occluders: []const u32,
+
+    /// Whether a triangle lets no light pass.
+    pub inline fn isOccluder(materials: *const Materials, primitive: u32) bool {
+        return materials.occluders[primitive / 32] >> @truncate(primitive % 32) & 1 != 0;
+    }
 };

@@ -5,10 +5,13 @@
 
 const std = @import("std");
 const bundle_file = @import("../traverse/bundle.zig");
+const ray_file = @import("../traverse/ray.zig");
 const bsdf_file = @import("../shade/bsdf.zig");
 const interaction_file = @import("../shade/interaction.zig");
 const exponential = @import("../shade/exponential.zig");
+const visibility = @import("visibility.zig");
 const assert = std.debug.assert;
+const Frame = @import("../../world.zig").Frame;
 
 /// Bounces at most.
 pub const depth_limit = @import("../../settings.zig").depth.max;
@@ -90,5 +93,20 @@ pub fn Vertex(comptime Lanes: type) type {
         seen: Lanes.Mask,
         /// Throughput of the path up to here, opacity included.
         throughput: Lanes.Vec3,
+
+        /// Where the rays of a group end. Where none hit anything, all but `seen` is undefined.
+        pub fn find(vertex: *@This(), frame: *const Frame, path: anytype, group: usize) void {
+            const ray = &path.bundle.groups[group];
+            vertex.seen = .splat(false);
+            const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
+            if (ray.active.andNot(missed).none()) return;
+            vertex.point = visibility.interactionOf(Lanes, frame, ray);
+            const point = &vertex.point;
+            point.opacity = Lanes.F32.select(point.culled, .zero(), point.opacity);
+            vertex.bsdf = .of(point);
+            vertex.seen = point.hit.bitAnd(point.opacity.gt(.zero()));
+            const throughput = path.throughputAt(group, point.distance).scale(point.opacity);
+            vertex.throughput = .select(vertex.seen, throughput, .splat(.{ 0, 0, 0 }));
+        }
     };
 }

@@ -53,7 +53,7 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility.frame = frame;
             visibility.tests = .{};
             visibility.hits.geometry = frame.geometry;
-            visibility.hits.materials = frame.materials.all;
+            visibility.hits.materials = frame.materials;
         }
 
         /// Finds what the rays of a bundle see first. A grid says that they are primary ones.
@@ -63,21 +63,20 @@ pub fn Visibility(comptime Kernel: type) type {
             return dispatch.closestHit(Kernel, geometry, bundle, grid, &visibility.tests);
         }
 
-        /// How much of a light comes through along shadow rays (`shadowRay`) of this light, in the
-        /// lanes of active rays; which rays are active is undefined afterwards. Those of the
-        /// coherent ones end near to each other.
+        /// Transmittance of shadow rays (`shadowRay`) of this light, in the lanes of active rays;
+        /// which rays are active is undefined afterwards. Coherent ones end near to each other.
         pub fn transmittance(
             visibility: *Self,
             bundle: *Bundle,
             light: *const Light,
             coherence: Coherence,
-            passing: *[group_count]Vec3,
+            transmittances: *[group_count]Vec3,
         ) void {
             const materials = visibility.frame.materials;
             if (materials.has_transparency or materials.has_holes)
-                visibility.attenuated(bundle, light, coherence, passing)
+                visibility.attenuated(bundle, light, coherence, transmittances)
             else
-                visibility.occluded(bundle, light, coherence, passing);
+                visibility.occluded(bundle, light, coherence, transmittances);
         }
 
         /// Light is stopped by anything: the quick path of scenes where all is opaque.
@@ -86,14 +85,14 @@ pub fn Visibility(comptime Kernel: type) type {
             bundle: *Bundle,
             light: *const Light,
             coherence: Coherence,
-            passing: *[group_count]Vec3,
+            transmittances: *[group_count]Vec3,
         ) void {
             const geometry = visibility.frame.geometry;
             dispatch.anyHit(Kernel, geometry, bundle, light, coherence, &visibility.tests);
-            for (&bundle.groups, passing) |*ray, *share| {
+            for (&bundle.groups, transmittances) |*ray, *value| {
                 if (ray.active.none()) continue;
                 const free = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
-                share.* = .select(free, .splat(.{ 1, 1, 1 }), .splat(.{ 0, 0, 0 }));
+                value.* = .select(free, .splat(.{ 1, 1, 1 }), .splat(.{ 0, 0, 0 }));
             }
         }
 
@@ -103,26 +102,26 @@ pub fn Visibility(comptime Kernel: type) type {
             bundle: *Bundle,
             light: *const Light,
             coherence: Coherence,
-            passing: *[group_count]Vec3,
+            transmittances: *[group_count]Vec3,
         ) void {
             const none: Vec3 = .splat(.{ 0, 0, 0 });
-            passing.* = @splat(.splat(.{ 1, 1, 1 }));
+            transmittances.* = @splat(.splat(.{ 1, 1, 1 }));
             const limit = shadowLimit(Rays, light);
-            visibility.occlusionPrepass(bundle, light, coherence, passing);
+            visibility.occlusionPrepass(bundle, light, coherence, transmittances);
             var weakened_counts: [group_count]F32 = @splat(.zero());
             for (0..transparency_depth_max / multi_hit.hits_max) |_| {
                 for (&bundle.groups) |*ray| ray.closest = limit;
                 visibility.hits.trace(bundle, &visibility.tests);
                 var any_left = false;
-                for (&bundle.groups, passing, &weakened_counts, 0..) |*ray, *share, *count, group| {
+                for (&bundle.groups, transmittances, 0..) |*ray, *value, group| {
                     if (ray.active.none()) continue;
-                    visibility.attenuate(ray, group, share, count);
+                    visibility.attenuate(ray, group, value, &weakened_counts[group]);
                     any_left = any_left or ray.active.any();
                 }
                 if (!any_left) return;
             }
-            for (&bundle.groups, passing) |*ray, *share| {
-                share.* = .select(ray.active, none, share.*);
+            for (&bundle.groups, transmittances) |*ray, *value| {
+                value.* = .select(ray.active, none, value.*);
             }
         }
 
@@ -134,18 +133,18 @@ pub fn Visibility(comptime Kernel: type) type {
             bundle: *Bundle,
             light: *const Light,
             coherence: Coherence,
-            passing: *[group_count]Vec3,
+            transmittances: *[group_count]Vec3,
         ) void {
             if (Kernel.variant.traversal != .beam or coherence == .none) return;
             const geometry = visibility.frame.geometry;
             dispatch.anyHit(Kernel, geometry, bundle, light, .all, &visibility.tests);
-            for (&bundle.groups, passing) |*ray, *share| {
+            for (&bundle.groups, transmittances) |*ray, *value| {
                 if (ray.active.none()) continue;
                 const primitive = ray.closest.primitive;
                 const free = ray.active.bitAnd(primitive.eq(.splat(ray_file.no_primitive)));
                 const met = ray.active.andNot(free);
                 const stopped: Mask = .fromBits(visibility.hits.stopping(primitive, met));
-                share.* = .select(stopped, .splat(.{ 0, 0, 0 }), share.*);
+                value.* = .select(stopped, .splat(.{ 0, 0, 0 }), value.*);
                 ray.active = met.andNot(stopped);
             }
         }
@@ -156,13 +155,13 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *const Self,
             ray: *ray_file.Ray(Rays),
             group: usize,
-            share: *Vec3,
+            value: *Vec3,
             weakened_count: *F32,
         ) void {
             const one: F32 = .splat(1);
             const none: Vec3 = .splat(.{ 0, 0, 0 });
             const stopped: Mask = .fromBits(visibility.hits.stopped[group]);
-            share.* = .select(stopped.bitAnd(ray.active), none, share.*);
+            value.* = .select(stopped.bitAnd(ray.active), none, value.*);
             ray.active = ray.active.andNot(stopped);
             for (0..multi_hit.hits_max) |index| {
                 const next = visibility.hits.at(group, index, ray.active);
@@ -170,13 +169,13 @@ pub fn Visibility(comptime Kernel: type) type {
                 if (ray.active.none()) return;
                 ray.tnear = next;
                 const through = visibility.attenuationAt(ray, next.primitive);
-                share.* = .select(ray.active, share.mul(through.share), share.*);
+                value.* = .select(ray.active, value.mul(through.share), value.*);
                 weakened_count.* =
                     weakened_count.add(F32.select(through.weakens, one, .zero()));
                 const limit: F32 = .splat(attenuation_count_max);
                 const ended = weakened_count.gt(limit).bitAnd(ray.active);
-                share.* = .select(ended, none, share.*);
-                const dark = share.x.max(share.y).max(share.z).le(.zero());
+                value.* = .select(ended, none, value.*);
+                const dark = value.x.max(value.y).max(value.z).le(.zero());
                 ray.active = ray.active.andNot(ended).andNot(dark);
             }
         }

@@ -9,11 +9,10 @@ const std = @import("std");
 const world_file = @import("../../world.zig");
 const statistics = @import("../../statistics.zig");
 const ray_file = @import("../traverse/ray.zig");
-const bundle_file = @import("../traverse/bundle.zig");
 const dispatch = @import("../traverse/dispatch.zig");
 const bsdf_file = @import("../shade/bsdf.zig");
-const light_file = @import("../shade/light.zig");
 const camera = @import("camera.zig");
+const direct = @import("direct.zig");
 const path_file = @import("path.zig");
 const sampler = @import("sampler.zig");
 const tiles = @import("tiles.zig");
@@ -139,7 +138,17 @@ pub fn Whitted(comptime Kernel: type) type {
                 whitted.find(group, vertex);
                 any_seen = any_seen or vertex.seen.any();
             }
-            if (any_seen) for (whitted.frame.lights) |*light| whitted.addLight(light, coherence);
+            if (any_seen) for (whitted.frame.lights) |*light| {
+                whitted.rays.shadow += direct.addLight(
+                    Kernel,
+                    &whitted.visibility,
+                    light,
+                    path,
+                    &whitted.vertices,
+                    coherence,
+                    &whitted.radiance,
+                );
+            };
             // The last pushed is traced first: reflection, refraction, the ray's own rest.
             whitted.pushRest();
             if (path.depth == whitted.settings.depth_max or !any_seen) return;
@@ -171,22 +180,9 @@ pub fn Whitted(comptime Kernel: type) type {
         /// Finds the points that rays of a group see, and adds what these emit and the ambient
         /// light that they scatter.
         fn find(whitted: *Self, group: usize, vertex: *Vertex) void {
-            const path = &whitted.path;
-            const ray = &path.bundle.groups[group];
-            const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
-            if (ray.active.andNot(missed).none()) {
-                vertex.seen = .splat(false);
-                return;
-            }
-            vertex.point = visibility_file.interactionOf(Rays, whitted.frame, ray);
-            const point = &vertex.point;
-            point.opacity = F32.select(point.culled, .zero(), point.opacity);
-            vertex.bsdf = .of(point);
-            vertex.seen = point.hit.bitAnd(point.opacity.gt(.zero()));
-            const throughput = path.throughputAt(group, point.distance).scale(point.opacity);
-            vertex.throughput = .select(vertex.seen, throughput, .splat(.{ 0, 0, 0 }));
+            vertex.find(whitted.frame, &whitted.path, group);
             if (vertex.seen.none()) return;
-            const material = &point.material;
+            const material = &vertex.point.material;
             const glow = material.emissive.add(whitted.scatterAmbient(vertex));
             const shown: Vec3 = .select(material.unlit, material.base_color, glow);
             whitted.add(group, vertex.throughput.mul(shown));
@@ -218,49 +214,6 @@ pub fn Whitted(comptime Kernel: type) type {
                 .andNot(material.unlit);
         }
 
-        /// Adds the light of one source, as far as it arrives. Points of coherent rays are near to
-        /// each other.
-        fn addLight(
-            whitted: *Self,
-            light: *const world_file.Light,
-            coherence: dispatch.Coherence,
-        ) void {
-            var bundle: bundle_file.Bundle(Kernel) = undefined;
-            var unshadowed: [group_count]Vec3 = undefined;
-            var active: [group_count]Mask = undefined;
-            var any_lit = false;
-            for (&whitted.vertices, &bundle.groups, &active, 0..) |*vertex, *ray, *arrives, group| {
-                arrives.* = .splat(false);
-                ray.active = arrives.*;
-                if (vertex.seen.none()) continue;
-                const point = &vertex.point;
-                const arrival = light_file.arrive(Rays, light, point);
-                const zero: F32 = .zero();
-                const lit = vertex.seen.andNot(point.material.unlit)
-                    .bitAnd(point.normal.dot(arrival.to_light).gt(zero))
-                    .bitAnd(point.normal_geometric.dot(arrival.to_light).gt(zero));
-                if (lit.none()) continue;
-                const response = vertex.bsdf.eval(point, arrival.to_light);
-                const worth = vertex.throughput.mul(response).mul(arrival.irradiance);
-                unshadowed[group] = worth;
-                arrives.* = lit.bitAnd(worth.x.gt(zero).bitOr(worth.y.gt(zero))
-                    .bitOr(worth.z.gt(zero)));
-                const primitive = whitted.path.bundle.groups[group].closest.primitive;
-                const away = point.normal_geometric;
-                const end = point.offsetOrigin(away, arrival.distance);
-                ray.* = visibility_file.shadowRay(Rays, light, end, primitive, arrives.*);
-                whitted.rays.shadow += arrives.popCount();
-                any_lit = any_lit or arrives.any();
-            }
-            if (!any_lit) return;
-            var passing: [group_count]Vec3 = undefined;
-            whitted.visibility.transmittance(&bundle, light, coherence, &passing);
-            for (active, passing, unshadowed, 0..) |arrives, share, worth, group| {
-                if (arrives.none()) continue;
-                whitted.add(group, .select(arrives, worth.mul(share), .splat(.{ 0, 0, 0 })));
-            }
-        }
-
         /// Pushes what goes straight on behind holes, culled backs and blended surfaces.
         fn pushRest(whitted: *Self) void {
             const path = &whitted.path;
@@ -283,8 +236,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 if (mask.none()) continue;
                 ray.tnear = ray.closest;
                 ray.closest = .before(.splat(std.math.inf(f32)));
-                const share = F32.splat(1).sub(vertex.point.opacity);
-                rest.throughput[group] = path.throughput[group].scale(share);
+                const clear = F32.splat(1).sub(vertex.point.opacity);
+                rest.throughput[group] = path.throughput[group].scale(clear);
             }
         }
 

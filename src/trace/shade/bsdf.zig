@@ -1,6 +1,6 @@
-//! How a surface scatters light: glTF's metallic-roughness model in lanes.
+//! The BSDF of glTF's metallic-roughness model in lanes: Lambert, GGX, Schlick's Fresnel, Snell.
 //!
-//! In: a point. Out: its lobes, what they make of light from a direction, and what goes on by
+//! In: points on surfaces. Out: what they make of light from a direction, and what goes on by
 //! reflection and refraction. Formulas: glTF 2.0, appendix B (Burley 2012 for roughness squared,
 //! Schlick 1994 for Fresnel, Walter et al. 2007 and Heitz 2014 for GGX with its correlated
 //! shadowing). Everything is + - * / sqrt in a fixed order.

@@ -188,16 +188,18 @@ pub inline fn intersectLane(
     counts: *TestCounts,
 ) bool {
     const Rays = Kernel.Rays;
-    const hit = hitsOfLane(Kernel, group, view, pack, at, counts) orelse return false;
+    var hit: triangle.Intersection(Rays) = undefined;
+    if (!hitsOfLane(Kernel, group, view, pack, at, counts, &hit)) return false;
     // A ray that found any hit accepts no other: nothing comes before t = -inf.
     const t: Rays.F32 = if (query == .any_hit) .splat(-std.math.inf(f32)) else hit.t;
     const primitive: Rays.I32 = .splat(@bitCast(pack.primitive[at.lane]));
     group.closest.t = Rays.F32.select(hit.mask, t, group.closest.t);
     group.closest.primitive = Rays.I32.select(hit.mask, primitive, group.closest.primitive);
-    return hit.mask.any();
+    return true;
 }
 
-/// The active rays of one group that hit one triangle of a pack within their limits; null: none.
+/// Tests one triangle of a pack: which active rays of a group hit it within their limits, and
+/// where. Returns whether any does.
 pub inline fn hitsOfLane(
     comptime Kernel: type,
     group: *const ray_file.Ray(Kernel.Rays),
@@ -205,7 +207,8 @@ pub inline fn hitsOfLane(
     pack: *const world_file.TrianglePack(Kernel.width),
     at: At,
     counts: *TestCounts,
-) ?triangle.Intersection(Kernel.Rays) {
+    hits: *triangle.Intersection(Kernel.Rays),
+) bool {
     if (Kernel.counts_tests) {
         counts.triangle_issued += Kernel.ray_count;
         counts.triangle_useful += group.active.popCount();
@@ -214,18 +217,19 @@ pub inline fn hitsOfLane(
     const corners = turnedCorners(Rays, pack, at.lane, view);
     const seen = triangle.project(Rays, corners, &view.view);
     var weights = triangle.edgeFunctions(Rays, seen);
-    if (weights.mayAgree().bitAnd(group.active).none()) return null;
+    if (weights.mayAgree().bitAnd(group.active).none()) return false;
     const agreeing = weights.agree().bitAnd(group.active);
     const inside = triangle.resolveTies(Rays, seen, &weights, agreeing);
     const center = turnedPoint(Rays, at.padding.center, view);
     const hit = triangle
         .locate(Rays, seen, weights, corners, &view.view, at.padding, center);
     const primitive: Rays.I32 = .splat(@bitCast(pack.primitive[at.lane]));
-    const accepted = inside.bitAnd(hit.mask)
+    hits.t = hit.t;
+    hits.mask = inside.bitAnd(hit.mask)
         .bitAnd(group.tnear.isBefore(hit.t, primitive))
         .bitAnd(group.closest.isAfter(hit.t, primitive))
         .andNot(primitive.eq(group.skip));
-    return .{ .mask = accepted, .t = hit.t };
+    return hits.mask.any();
 }
 
 /// One triangle for all rays of a group, turned as each ray wants it.

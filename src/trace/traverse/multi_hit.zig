@@ -12,6 +12,7 @@ const ray_file = @import("ray.zig");
 const box = @import("box.zig");
 const bundle_file = @import("bundle.zig");
 const traversal_ray = @import("traversal_ray.zig");
+const triangle = @import("triangle.zig");
 const walk = @import("walk.zig");
 const interval_packet = @import("interval_packet.zig");
 const Geometry = world_file.Geometry;
@@ -51,7 +52,7 @@ pub fn HitLists(comptime Kernel: type) type {
     const TraversalRay = traversal_ray.TraversalRay(Kernel);
     return struct {
         geometry: *const Geometry,
-        materials: []const world_file.Material,
+        materials: *const world_file.Materials,
         /// By group and lane; undefined where there was no active ray.
         counts: [Kernel.group_count][Kernel.ray_count]u32,
         /// The hits of each in order.
@@ -67,11 +68,10 @@ pub fn HitLists(comptime Kernel: type) type {
             bundle: *bundle_file.Bundle(Kernel),
             tests: *TestCounts,
         ) void {
-            const all = .{ &bundle.groups, &lists.counts, &lists.stopped };
-            for (all[0], all[1], all[2], 0..) |*group, *each, *stop, number| {
+            for (&bundle.groups, 0..) |*group, number| {
                 if (group.active.none()) continue;
-                stop.* = 0;
-                each.* = @splat(0);
+                lists.stopped[number] = 0;
+                lists.counts[number] = @splat(0);
                 if (Kernel.variant.traversal == .beam) continue;
                 const view = bundle_file.viewOf(Rays, &lists.geometry.padding, group);
                 lists.traceEach(bundle, number, &view, tests);
@@ -108,14 +108,10 @@ pub fn HitLists(comptime Kernel: type) type {
             var bits = asked.bits();
             while (bits != 0) : (bits &= bits - 1) {
                 const lane = @ctz(bits);
-                if (lists.isStopping(numbers[lane])) stops |= bits & (~bits + 1);
+                const is_stopping = lists.materials.isOccluder(@intCast(numbers[lane]));
+                stops |= @as(u32, @intFromBool(is_stopping)) << @intCast(lane);
             }
             return stops;
-        }
-
-        inline fn isStopping(lists: *const Self, primitive: i32) bool {
-            const triangle = &lists.geometry.triangles[@intCast(primitive)];
-            return lists.materials[triangle.material].stopsLight();
         }
 
         /// Every active ray of a group by itself.
@@ -151,12 +147,14 @@ pub fn HitLists(comptime Kernel: type) type {
             pack: *const world_file.TrianglePack(Kernel.width),
             tests: *TestCounts,
         ) bool {
-            const hits = ray.hitsOf(pack, &lists.geometry.padding, tests);
-            var rest = hits.lanes;
+            var hits: triangle.Intersection(Kernel.Boxes) = undefined;
+            if (!ray.hitsOf(pack, &lists.geometry.padding, tests, &hits)) return false;
+            const ts = hits.t.toArray();
+            var rest = hits.mask.bits();
             while (rest != 0) : (rest &= rest - 1) {
                 const lane = @ctz(rest);
                 const number: i32 = @bitCast(pack.primitive[lane]);
-                const limit = lists.keep(place, .{ .t = hits.t[lane], .primitive = number }) orelse
+                const limit = lists.keep(place, .{ .t = ts[lane], .primitive = number }) orelse
                     continue;
                 ray.limit = limit.t;
                 ray.closest_primitive = limit.primitive;
@@ -175,10 +173,10 @@ pub fn HitLists(comptime Kernel: type) type {
             which: bundle_file.At,
             tests: *TestCounts,
         ) bool {
-            const hit = bundle_file.hitsOfLane(Kernel, group, view, pack, which, tests) orelse
+            var hit: triangle.Intersection(Rays) = undefined;
+            if (!bundle_file.hitsOfLane(Kernel, group, view, pack, which, tests, &hit))
                 return false;
             var rest = hit.mask.bits();
-            if (rest == 0) return false;
             const found = hit.t.toArray();
             var ts = group.closest.t.toArray();
             var primitives = group.closest.primitive.toArray();
@@ -200,10 +198,13 @@ pub fn HitLists(comptime Kernel: type) type {
         /// Keeps a hit. Returns the ray's new limit where that changes; nothing is before that of a
         /// ray that is stopped.
         pub fn keep(lists: *Self, place: Place, hit: Hit) ?Hit {
-            if (lists.isStopping(hit.primitive)) {
+            const number: u32 = @intCast(hit.primitive);
+            if (lists.materials.isOccluder(number)) {
                 lists.stopped[place.group] |= @as(u32, 1) << @intCast(place.lane);
                 return .{ .t = -std.math.inf(f32), .primitive = hit.primitive };
             }
+            // Its material is asked for next.
+            @prefetch(&lists.geometry.triangles[number], .{});
             const list = &lists.hits[place.group][place.lane];
             const count = &lists.counts[place.group][place.lane];
             count.* = insert(list, count.*, hit);

@@ -168,16 +168,16 @@ pub fn TraversalRay(comptime Kernel: type) type {
             return @ptrCast(@alignCast(bounds + at));
         }
 
-        /// Triangles of a pack that are hit within the limits, a bit each, and where.
-        pub const Hits = struct { lanes: u32, t: [width]f32 };
-
-        /// Tests the triangles of a pack.
+        /// Tests the triangles of a pack: which are hit within the limits, and where. Returns
+        /// whether any is. (Not the hits: a structure that comes back from two places goes through
+        /// memory, in pieces of another size than it is read in.)
         pub inline fn hitsOf(
             ray: *const Self,
             pack: *const Pack,
             padding: *const world_file.Padding,
             counts: *TestCounts,
-        ) Hits {
+            hits: *triangle.Intersection(Boxes),
+        ) bool {
             @setEvalBranchQuota(4000); // For what is inlined here.
             walk.countPack(Kernel, pack, counts);
             const inverse: Boxes.Vec3 = .splat(ray.turned_inverse);
@@ -194,7 +194,7 @@ pub fn TraversalRay(comptime Kernel: type) type {
             var weights = triangle.edgeFunctions(Boxes, seen);
             const primitive: Boxes.I32 = .load(@ptrCast(&pack.primitive));
             const there = primitive.gt(.splat(ray_file.no_primitive));
-            if (weights.mayAgree().bitAnd(there).none()) return .{ .lanes = 0, .t = undefined };
+            if (weights.mayAgree().bitAnd(there).none()) return false;
             const agreeing = weights.agree().bitAnd(there);
             const inside = triangle.resolveTies(Boxes, seen, &weights, agreeing);
             const axis: u2 = @intCast(ray.axis);
@@ -208,11 +208,12 @@ pub fn TraversalRay(comptime Kernel: type) type {
                 .{ .t = .splat(ray.tnear_t), .primitive = .splat(ray.tnear_primitive) };
             const closest: ray_file.Hit(Boxes) =
                 .{ .t = .splat(ray.limit), .primitive = .splat(ray.closest_primitive) };
-            const accepted = inside.bitAnd(hit.mask)
+            hits.t = hit.t;
+            hits.mask = inside.bitAnd(hit.mask)
                 .bitAnd(tnear.isBefore(hit.t, primitive))
                 .bitAnd(closest.isAfter(hit.t, primitive))
                 .andNot(primitive.eq(.splat(ray.skip)));
-            return .{ .lanes = accepted.bits(), .t = hit.t.toArray() };
+            return hits.mask.any();
         }
 
         /// Tests the triangles of a pack and keeps the nearest hit. Returns whether there was one.
@@ -222,19 +223,21 @@ pub fn TraversalRay(comptime Kernel: type) type {
             padding: *const world_file.Padding,
             counts: *TestCounts,
         ) bool {
-            const hits = ray.hitsOf(pack, padding, counts);
-            var rest = hits.lanes;
-            while (rest != 0) : (rest &= rest - 1) {
-                const lane = @ctz(rest);
+            var hits: triangle.Intersection(Boxes) = undefined;
+            if (!ray.hitsOf(pack, padding, counts, &hits)) return false;
+            const ts = hits.t.toArray();
+            var bits = hits.mask.bits();
+            while (bits != 0) : (bits &= bits - 1) {
+                const lane = @ctz(bits);
                 const number: i32 = @bitCast(pack.primitive[lane]);
-                const closer = hits.t[lane] < ray.limit or
-                    (hits.t[lane] == ray.limit and number < ray.closest_primitive);
+                const closer = ts[lane] < ray.limit or
+                    (ts[lane] == ray.limit and number < ray.closest_primitive);
                 if (closer) {
-                    ray.limit = hits.t[lane];
+                    ray.limit = ts[lane];
                     ray.closest_primitive = number;
                 }
             }
-            return hits.lanes != 0;
+            return true;
         }
     };
 }

@@ -1,0 +1,60 @@
+//! Direct lighting (next event estimation) by punctual lights: one shadow ray a vertex and light.
+//!
+//! In: a light, the vertices of a bundle's paths. Out: the light that they scatter towards the eye,
+//! added to the radiance of their samples. The same for any integrator.
+
+const world_file = @import("../../world.zig");
+const bundle_file = @import("../traverse/bundle.zig");
+const dispatch = @import("../traverse/dispatch.zig");
+const light_file = @import("../shade/light.zig");
+const path_file = @import("path.zig");
+const visibility_file = @import("visibility.zig");
+
+/// Adds the light of one source, as far as it arrives. Vertices of coherent rays are near to each
+/// other. Returns how many shadow rays it took.
+pub fn addLight(
+    comptime Kernel: type,
+    visibility: *visibility_file.Visibility(Kernel),
+    light: *const world_file.Light,
+    path: *const path_file.PathState(Kernel),
+    vertices: *const [Kernel.group_count]path_file.Vertex(Kernel.Rays),
+    coherence: dispatch.Coherence,
+    radiance: *[Kernel.group_count]Kernel.Rays.Vec3,
+) u64 {
+    const Rays = Kernel.Rays;
+    const Vec3 = Rays.Vec3;
+    const zero: Rays.F32 = .zero();
+    var bundle: bundle_file.Bundle(Kernel) = undefined;
+    var unshadowed: [Kernel.group_count]Vec3 = undefined;
+    var active: [Kernel.group_count]Rays.Mask = undefined;
+    var ray_count: u64 = 0;
+    for (vertices, &bundle.groups, &active, 0..) |*vertex, *ray, *arrives, group| {
+        arrives.* = .splat(false);
+        ray.active = arrives.*;
+        if (vertex.seen.none()) continue;
+        const point = &vertex.point;
+        const arrival = light_file.arrive(Rays, light, point);
+        const lit = vertex.seen.andNot(point.material.unlit)
+            .bitAnd(point.normal.dot(arrival.to_light).gt(zero))
+            .bitAnd(point.normal_geometric.dot(arrival.to_light).gt(zero));
+        if (lit.none()) continue;
+        const response = vertex.bsdf.eval(point, arrival.to_light);
+        const worth = vertex.throughput.mul(response).mul(arrival.irradiance);
+        unshadowed[group] = worth;
+        const shines = worth.x.gt(zero).bitOr(worth.y.gt(zero)).bitOr(worth.z.gt(zero));
+        arrives.* = lit.bitAnd(shines);
+        const primitive = path.bundle.groups[group].closest.primitive;
+        const end = point.offsetOrigin(point.normal_geometric, arrival.distance);
+        ray.* = visibility_file.shadowRay(Rays, light, end, primitive, arrives.*);
+        ray_count += arrives.popCount();
+    }
+    if (ray_count == 0) return 0;
+    var transmittances: [Kernel.group_count]Vec3 = undefined;
+    visibility.transmittance(&bundle, light, coherence, &transmittances);
+    for (active, transmittances, unshadowed, radiance) |arrives, transmittance, worth, *sum| {
+        if (arrives.none()) continue;
+        const light_seen = worth.mul(transmittance);
+        sum.* = sum.add(.select(arrives, light_seen, .splat(.{ 0, 0, 0 })));
+    }
+    return ray_count;
+}
