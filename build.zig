@@ -1,6 +1,6 @@
 //! Builds Raylane: one static `raylane`, its tests on every target, and its tools.
 //!
-//! In: the command line's options, the sources, the headers that `vendor/fetch` checks. Out: the
+//! In: the command line's options, the sources, the files that `vendor/fetch` checks. Out: the
 //! steps at the top of `build`; `zig build` alone installs a fast, native, static program. What is
 //! wired once a target stands in build/package.zig, what only tests need in build/tests.zig.
 
@@ -9,6 +9,7 @@ const builtin = @import("builtin");
 const manifest = @import("build.zig.zon");
 const Package = @import("build/package.zig");
 const Tests = @import("build/tests.zig");
+const variants = @import("build/variants.zig");
 const Compile = std.Build.Step.Compile;
 const Run = std.Build.Step.Run;
 
@@ -30,7 +31,7 @@ pub fn build(b: *std.Build) void {
         .test_integration = b.step("test:integration", "Run its tests of rays and pictures"),
         .test_fmt = b.step("test:fmt", "Check the formatting"),
         .test_tidy = b.step("test:tidy", "Check the style of the source tree"),
-        .test_report = b.step("test:report", "Test the report of the benchmark"),
+        .test_report = b.step("test:report", "Test the tools in Python"),
         .check = b.step("check", "Compile the program, its benchmarks and tests, write nothing"),
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
@@ -39,18 +40,11 @@ pub fn build(b: *std.Build) void {
         .bench_structures = b.step("bench:structures", "Trees beside each other: -- SCENE"),
         .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
-        .vendor = b.step("vendor", "Fetch and check the third-party headers"),
+        .vendor = b.step("vendor", "Fetch and check the third-party files"),
     };
     const query = b.standardTargetOptionsQueryOnly(.{});
     const optimize = b.option(std.lang.Optimize, "optimize", "debug, safe, fast (default), small");
-    const options: Package.Options = .{
-        .backend = b.option(Package.Backend, "backend", "Arithmetic of the default variant") orelse
-            .vector,
-        .traversal = b.option(Package.Traversal, "traversal", "Its bundles of rays") orelse .beam,
-        .lanes = b.option(u8, "lanes", "Its SIMD width: 4, 8 or 16 (default: the target's)"),
-        .variants = b.option(Package.Variants, "variants", "Hold that variant only, or all") orelse
-            .all,
-    };
+    const options, const all = variantOptions(b);
     const filters = b.option([]const []const u8, "test-filter", "Only tests with this in the name");
     const vendor = addVendor(b);
     steps.vendor.dependOn(vendor.step);
@@ -62,20 +56,21 @@ pub fn build(b: *std.Build) void {
     const run = runOn(b, program);
     run.addPassthruArgs();
     steps.run.dependOn(&run.step);
-    steps.@"asm".dependOn(&b.addInstallFile(program.getEmittedAsm(), "raylane.s").step);
+    steps.@"asm".dependOn(&b.addInstallFile(package.assembly(), "raylane.s").step);
 
     addBenchmark(steps.check, steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
     addBenchmark(steps.check, steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
     const structures = package.benchmark("structures", "bench/structures.zig");
     addBenchmark(steps.check, steps.bench_structures, structures);
-    addCompare(steps.compare, package, vendor.headers);
+    const full: Package = .init(b, target, optimize orelse .fast, vendor.headers, all);
+    addCompare(steps.compare, full, vendor.headers);
 
     const tests: Tests = .init(b, resolve(b, .{}), filters orelse &.{});
     const test_packages: TestPackages = .{
         .owner = b,
         .optimize = optimize orelse .safe,
         .headers = vendor.headers,
-        .options = options,
+        .options = all,
     };
     const targets = test_packages.targets(query);
     tests.addAll(steps.@"test", targets);
@@ -89,6 +84,24 @@ pub fn build(b: *std.Build) void {
     const here: Package = .init(b, resolve(b, .{}), .safe, vendor.headers, options);
     addScenes(steps.scenes, here);
     addLowering(steps.lowering);
+}
+
+/// The choice of variants, for programs that are used and for those that compare variants.
+fn variantOptions(b: *std.Build) [2]Package.Options {
+    var options: Package.Options = .{
+        .backend = b.option(variants.Backend, "backend", "Arithmetic of the default variant") orelse
+            .vector,
+        .traversal = b.option(variants.Traversal, "traversal", "Its bundles of rays") orelse .beam,
+        .lanes = b.option(u8, "lanes", "Its SIMD width: 4, 8 or 16 (default: the target's)"),
+        .extent = undefined,
+    };
+    const description = "Hold that variant (one), the scalar reference beside it (few), or all";
+    const extent = b.option(variants.Extent, "variants", description);
+    options.extent = extent orelse .few;
+    var all = options;
+    all.extent = extent orelse .all;
+    all.shows_searches = true;
+    return .{ options, all };
 }
 
 /// Makes `step` write the scenes that come with Raylane.
@@ -111,27 +124,20 @@ fn addCompare(step: *std.Build.Step, package: Package, headers: std.Build.LazyPa
     run.addArtifactArg2(package.program(), .{ .prefix = "", .make_absolute = true });
     const description = "Only variants with this in their names";
     const wanted = b.option([]const u8, "compare", description) orelse "";
-    const is_x86 = package.target.result.cpu.arch.isX86();
-    const widths: []const u8 = if (is_x86) &.{ 4, 8, 16 } else &.{4};
-    for (widths) |lanes| for (std.enums.values(Package.Backend)) |backend| {
-        // As in src/variant.zig: what is wide there is `vector` alone.
-        if (lanes > 4 and backend != .vector) continue;
-        for (std.enums.values(Package.Traversal)) |traversal| {
-            if (lanes > 4 and traversal == .packet2x2) continue;
-            const name = b.fmt("{t}-{t}-{d}", .{ backend, traversal, lanes });
-            if (std.mem.find(u8, name, wanted) == null) continue;
-            const single: Package = .init(b, package.target, package.optimize, headers, .{
-                .backend = backend,
-                .traversal = traversal,
-                .lanes = lanes,
-                .variants = .one,
-            });
-            run.addArtifactArg2(single.program(), .{
-                .prefix = b.fmt("{s}=", .{name}),
-                .make_absolute = true,
-            });
-        }
-    };
+    for (package.held) |variant| {
+        const name = variant.name(b.allocator);
+        if (std.mem.find(u8, name, wanted) == null) continue;
+        const single: Package = .init(b, package.target, package.optimize, headers, .{
+            .backend = variant.backend,
+            .traversal = variant.traversal,
+            .lanes = variant.lanes,
+            .extent = .one,
+        });
+        run.addArtifactArg2(single.program(), .{
+            .prefix = b.fmt("{s}=", .{name}),
+            .make_absolute = true,
+        });
+    }
     run.addArg("--");
     run.addPassthruArgs();
     step.dependOn(&run.step);
@@ -148,19 +154,17 @@ fn addLowering(step: *std.Build.Step) void {
     step.dependOn(&lowering.step);
 }
 
-/// The step that puts the headers in place, and the folder of copies that depends on it.
+/// The step that puts the third-party files in place, and the folder of copies that depends on it.
 fn addVendor(b: *std.Build) struct { step: *std.Build.Step, headers: std.Build.LazyPath } {
-    const fetch = b.addSystemCommand(&.{"sh"});
+    const fetch = b.addSystemCommand(&.{"python3"});
     fetch.setName("vendor/fetch");
     fetch.addFileArg(b.path("vendor/fetch"));
-    // It looks at files that a user may have put there, so it runs each time (10 ms).
+    // It looks at files that a user may have put there, so it runs each time (0.1 s).
     fetch.has_side_effects = true;
     const copies = b.addWriteFiles();
     copies.step.dependOn(&fetch.step);
-    for ([_][]const u8{ "cgltf.h", "stb_image.h" }) |name| {
-        _ = copies.addCopyFile(b.path(b.pathJoin(&.{ "vendor/include", name })), name);
-    }
-    return .{ .step = &fetch.step, .headers = copies.getDirectory() };
+    const headers = copies.addCopyDirectory(b.path("vendor/include"), "include", .{});
+    return .{ .step = &fetch.step, .headers = headers };
 }
 
 /// Fills in what a bare `-Dtarget=` leaves open: a static libc, and a NEON CPU for ARMv7.
@@ -221,17 +225,9 @@ const TestPackages = struct {
         const is_here = target.result.cpu.arch == b.graph.host.result.cpu.arch;
         const package: Package =
             .init(b, target, packages.optimize, packages.headers, packages.options);
-        // The integration tests compare all variants everywhere; a second program that holds them
-        // all takes minutes to compile, so elsewhere the command line makes do with one.
-        var fewer = packages.options;
-        if (!is_here) fewer.variants = .one;
         list.append(b.allocator, .{
             .name = name,
             .package = package,
-            .command = if (is_here)
-                package
-            else
-                .init(b, target, packages.optimize, packages.headers, fewer),
             .emulator = if (is_here) &.{} else b.graph.dupeStrings(emulator),
         }) catch @panic("OOM");
     }

@@ -19,7 +19,7 @@ const Boxes = Kernel.Boxes;
 const Node = world.Node(Kernel.width);
 const Block = world.TrianglePack(Kernel.width);
 const Search = raylane.trace.single.Search(Kernel, .closest_hit, true);
-const View = raylane.trace.ray.View(Boxes);
+const View = raylane.trace.ray.ShearedRay(Boxes);
 
 const Ranges = extern struct { near: [Kernel.width]f32, far: [Kernel.width]f32 };
 

@@ -50,8 +50,8 @@ one plane to the next. Their loops are counted as the compiler unrolled them, on
 What to read from it:
 
 - The vector backend is as short as the intrinsics, give or take an instruction a kernel, but for
-  ARMv7, where NEON's `vmin`, `vmax` and its reciprocal estimates have no Zig builtin. `@min` of
-  floats is a library call a lane there, and the library does not use it.
+  ARMv7, where NEON's `vmin` and `vmax` have no Zig builtin. `@min` of floats is a library call a
+  lane there, and the library does not use it.
 - The exact minimum (`a < b ? a : b`) is x86's `minps` to the letter. ARM needs a comparison and a
   bitwise select, so that box tests, which only cull, use `minFast`.
 - `minOrNegative` and its kin are one instruction as well, of integers: a cycle on x86-64, where
@@ -66,13 +66,10 @@ What to read from it:
 """
 
 CONFIG = """
-pub const Backend = enum { scalar, vector, intrinsics };
-pub const Traversal = enum { single, packet2x2, packet };
-pub const Variants = enum { one, all };
-pub const backend: Backend = .vector;
-pub const traversal: Traversal = .single;
-pub const lanes: u8 = 4;
-pub const variants: Variants = .one;
+pub const variants: []const []const u8 = &.{"vector-single-4"};
+pub const counting: []const []const u8 = &.{"vector-single-4"};
+pub const are_all = false;
+pub const shows_searches = false;
 """
 
 # What a call costs and inlined code does not: returns, frames, and moves between two registers.

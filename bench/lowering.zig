@@ -14,12 +14,6 @@ const shifts = struct {
     pub inline fn shiftLeft(a: L.I32) L.I32 {
         return a.shiftLeft(7);
     }
-    pub inline fn shiftRightArithmetic(a: L.I32) L.I32 {
-        return a.shiftRightArithmetic(7);
-    }
-    pub inline fn shiftRightLogical(a: L.I32) L.I32 {
-        return a.shiftRightLogical(7);
-    }
 };
 
 /// How a value of the library's type passes in registers.
@@ -144,26 +138,25 @@ comptime {
         @export(&@field(kernels, name), .{ .name = "Kernel." ++ name });
     }
     exportAll("F32", L.F32, &.{
-        "load",    "store",     "splat",  "gather",    "add",
-        "sub",     "mul",       "div",    "sqrt",      "neg",
-        "abs",     "copySign",  "mulAdd", "min",       "max",
-        "minFast", "maxFast",   "eq",     "lt",        "le",
-        "gt",      "ge",        "select", "reduceMin", "reduceMax",
-        "toI32",   "reduceSum",
+        "load",  "store",     "splat",     "add",
+        "sub",   "mul",       "div",       "sqrt",
+        "neg",   "abs",       "copySign",  "mulAdd",
+        "min",   "max",       "minFast",   "maxFast",
+        "eq",    "lt",        "le",        "gt",
+        "ge",    "select",    "reduceMin", "reduceMax",
+        "toI32", "reduceSum",
     });
     exportAll("F32", L.F32, &.{
         "minOrNegative", "maxOrNegative", "isNegative", "leOrNegative",
     });
-    exportAll("F32", L.F32, &.{ "reciprocalEstimate", "reciprocalSqrtEstimate" });
     if (L.count > 1) exportAll("F32", L.F32, &.{ "interleaveLow", "interleaveHigh" });
     exportAll("I32", L.I32, &.{
-        "add",   "sub",    "mul",    "min", "max", "bitAnd",
-        "bitOr", "bitXor", "bitNot", "eq",  "lt",  "le",
-        "gt",    "select", "toF32",
+        "add", "sub", "min", "max", "bitAnd", "bitOr",
+        "eq",  "lt",  "le",  "gt",  "select", "toF32",
     });
-    exportAll("I32", shifts, &.{ "shiftLeft", "shiftRightArithmetic", "shiftRightLogical" });
+    exportAll("I32", shifts, &.{"shiftLeft"});
     exportAll("Mask", L.Mask, &.{
-        "fromBits", "firstN", "bitAnd", "bitOr", "bitXor", "bitNot",
-        "andNot",   "any",    "all",    "none",  "bits",   "popCount",
+        "fromBits", "bitAnd", "bitOr", "bitNot", "andNot",
+        "any",      "all",    "none",  "bits",   "popCount",
     });
 }

@@ -59,7 +59,7 @@ pub fn main(init: std.process.Init) !u8 {
 fn timeParse(gpa: Allocator, io: Io, path: []const u8, triangle_count: *u64) !u64 {
     const begin = Clock.awake.now(io);
     var diagnostic: Diagnostic = .{};
-    var scene = raylane.parse.parse(gpa, io, path, .{}, &diagnostic) catch |err| {
+    var scene = raylane.session.loadScene(gpa, io, path, .{}, &diagnostic) catch |err| {
         std.debug.print("{s}: {s}\n", .{ diagnostic.place.text(), diagnostic.message.text() });
         return err;
     };

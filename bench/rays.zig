@@ -20,6 +20,7 @@ const Marks = phases.Marks;
 const Observer = observer_file.Observer;
 const Options = options_file.Options;
 const Phase = phases.Phase;
+const Session = raylane.session.Session;
 const Spread = report_file.Spread;
 const World = raylane.world.World;
 const compiled = raylane.variant.compiled;
@@ -27,7 +28,7 @@ const assert = std.debug.assert;
 
 /// Widths of trees.
 const widths = [_]u8{ 4, 8, 16 };
-const quality_count = std.enums.values(raylane.prepare.TreeQuality).len;
+const quality_count = std.enums.values(raylane.settings.TreeQuality).len;
 
 pub fn main(init: std.process.Init) u8 {
     _ = raylane.simd.setFlushToZero();
@@ -47,7 +48,9 @@ pub fn main(init: std.process.Init) u8 {
         .io = init.io,
         .options = &options,
         .diagnostic = &diagnostic,
+        .session = .init(init.gpa, init.io, options.build_thread_count, &diagnostic),
     };
+    defer bench.session.deinit();
     const agreed = bench.run() catch |err| {
         const text = diagnostic.message.text();
         return say(init.io, if (text.len > 0) text else @errorName(err), 1);
@@ -97,6 +100,7 @@ const Bench = struct {
     io: Io,
     options: *const Options,
     diagnostic: *Diagnostic,
+    session: Session,
     /// The scene with a tree of each quality and width that is needed.
     worlds: [quality_count][widths.len]?World = @splat(@splat(null)),
     setup: workload.Setup = undefined,
@@ -110,13 +114,13 @@ const Bench = struct {
         if (!options.count) bench.processor_list = processors.allowed(&bench.processor_buffer);
         // Threads that build start where the one that starts them may run: anywhere, then.
         if (options.build_thread_count == 1) processors.pin(bench.processor_list, 0);
-        var base = try bench.prepare();
-        defer base.deinit();
+        try bench.prepare();
+        const base = &bench.session.world.?;
         var tree_arena: std.heap.ArenaAllocator = .init(bench.gpa);
         defer tree_arena.deinit();
-        const builds = try bench.buildAll(tree_arena.allocator(), &base);
-        bench.setup = try input.setUp(bench.arena, &base, bench.diagnostic);
-        if (options.dump) |path| try dump.write(bench.gpa, bench.io, path, &base, &bench.setup);
+        const builds = try bench.buildAll(tree_arena.allocator(), base);
+        bench.setup = try input.setUp(bench.arena, base, bench.diagnostic);
+        if (options.dump) |path| try dump.write(bench.gpa, bench.io, path, base, &bench.setup);
 
         processors.pin(bench.processor_list, 0);
         const runs = if (options.build_only) &.{} else try bench.runAll();
@@ -137,23 +141,20 @@ const Bench = struct {
     }
 
     /// The world without a tree that counts: each width gets its own below.
-    fn prepare(bench: *Bench) !World {
+    fn prepare(bench: *Bench) !void {
         const options = bench.options;
-        const diagnostic = bench.diagnostic;
-        const parsed = raylane.parse.parse(bench.gpa, bench.io, options.scene, .{}, diagnostic);
-        var scene = parsed catch |err| return bench.named(options.scene, err);
-        defer scene.deinit();
+        const session = &bench.session;
+        session.load(options.scene, .{}) catch |err| return bench.named(options.scene, err);
+        const scene = &session.scene.?;
         if (options.camera) |path| {
-            input.placeCamera(bench.io, &scene, path, diagnostic) catch |err|
+            input.placeCamera(bench.io, scene, path, bench.diagnostic) catch |err|
                 return bench.named(path, err);
         }
-        for (0..options.subdivide) |_| try input.subdivide(&scene);
-        var times: raylane.statistics.StageTimes = .{};
-        return raylane.prepare.prepare(bench.gpa, bench.io, &scene, .{
-            .lanes = compiled[options.chosen()[0]].lanes,
-            .thread_count = options.build_thread_count,
-            .resolution = .{ options.size, options.size },
-        }, diagnostic, &times) catch |err| bench.named(options.scene, err);
+        for (0..options.subdivide) |_| try input.subdivide(scene);
+        try session.pose(.{ .lanes = compiled[options.chosen()[0]].lanes });
+        session.view(.{ .resolution = .{ options.size, options.size } }) catch |err|
+            return bench.named(options.scene, err);
+        session.dropScene();
     }
 
     /// Puts the file's name before the message.
@@ -193,7 +194,7 @@ const Bench = struct {
     /// A tree that is built over and over.
     const TimedTree = struct {
         world: *World,
-        quality: raylane.prepare.TreeQuality,
+        quality: raylane.settings.TreeQuality,
         lanes: u8,
         first_tag: u32,
         /// By repetition.
@@ -205,7 +206,7 @@ const Bench = struct {
         const options = bench.options;
         const settings: raylane.prepare.Settings = .{
             .lanes = tree.lanes,
-            .thread_count = options.build_thread_count,
+            .pool = &bench.session.pool,
             .tree_quality = tree.quality,
         };
         var own_arena: std.heap.ArenaAllocator = .init(bench.gpa);
@@ -242,7 +243,7 @@ const Bench = struct {
     }
 
     /// What makes a picture.
-    const Candidate = struct { variant: usize, quality: raylane.prepare.TreeQuality };
+    const Candidate = struct { variant: usize, quality: raylane.settings.TreeQuality };
 
     fn worldOf(bench: *const Bench, candidate: Candidate) *const World {
         const index = std.mem.findScalar(u8, &widths, compiled[candidate.variant].lanes).?;
@@ -293,9 +294,10 @@ const Bench = struct {
     ) workload.Times {
         const options = bench.options;
         const tag = firstTag(position);
+        bench.session.pool.thread_count = if (observer == null) options.thread_count else 1;
         const settings: workload.Settings = .{
             .depth_max = options.depth,
-            .thread_count = if (observer == null) options.thread_count else 1,
+            .pool = &bench.session.pool,
             .mode = if (options.count and observer == null) .{ .tags = tag } else .clock,
             .processors = bench.processor_list,
         };
@@ -373,7 +375,7 @@ const Bench = struct {
         try raylane.output.write(bench.gpa, &image, .{
             .format = .pfm,
             .exposure = .{ .ev = 0 },
-            .transparent = false,
+            .pool = &bench.session.pool,
         }, &target, bench.diagnostic);
     }
 

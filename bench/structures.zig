@@ -156,9 +156,14 @@ fn measure(
     diagnostic: *Diagnostic,
 ) !bool {
     var worlds: Worlds = undefined;
-    worlds.wide = try prepare(gpa, io, options, diagnostic);
-    defer worlds.wide.deinit();
-    const builds = try buildAll(gpa, arena, options, &worlds);
+    var session: raylane.session.Session = .init(gpa, io, 1, diagnostic);
+    defer session.deinit();
+    try session.load(options.scene, .{});
+    try session.pose(.{ .lanes = cost.width });
+    try session.view(.{ .resolution = .{ options.size, options.size } });
+    session.dropScene();
+    worlds.wide = session.world.?;
+    const builds = try buildAll(gpa, arena, options, &session.pool, &worlds);
     const setup = try input.setUp(arena, &worlds.wide, diagnostic);
 
     var runs: std.ArrayList(Run) = .empty;
@@ -189,19 +194,14 @@ fn keepLeast(kept: *Run, run: *const Run) void {
     }
 }
 
-fn prepare(gpa: Allocator, io: Io, options: Options, diagnostic: *Diagnostic) !World {
-    var scene = try raylane.parse.parse(gpa, io, options.scene, .{}, diagnostic);
-    defer scene.deinit();
-    var times: raylane.statistics.StageTimes = .{};
-    return raylane.prepare.prepare(gpa, io, &scene, .{
-        .lanes = cost.width,
-        .thread_count = 1,
-        .resolution = .{ options.size, options.size },
-    }, diagnostic, &times);
-}
-
 /// Builds all three, marked by themselves.
-fn buildAll(gpa: Allocator, arena: Allocator, options: Options, worlds: *Worlds) ![]const Build {
+fn buildAll(
+    gpa: Allocator,
+    arena: Allocator,
+    options: Options,
+    pool: *raylane.parallel.Pool,
+    worlds: *Worlds,
+) ![]const Build {
     const tags = [_]u32{ 0, phases.tags_per_run, 2 * phases.tags_per_run };
     const list = try cost.references(arena, &worlds.wide);
 
@@ -212,7 +212,7 @@ fn buildAll(gpa: Allocator, arena: Allocator, options: Options, worlds: *Worlds)
     markBuild(options, tags[1]);
     try raylane.prepare.buildTree(gpa, arena, &worlds.wide, .{
         .lanes = cost.width,
-        .thread_count = 1,
+        .pool = pool,
     });
     markBuild(options, tags[2]);
     worlds.kd = try kd.build(arena, gpa, &worlds.wide, list);

@@ -1,14 +1,18 @@
 //! One build of Raylane for one target: the library module with all it imports, and the program.
 //!
 //! In: the target, the optimisation mode, the variant options, the checked third-party headers.
-//! Out: modules and programs that share nothing with those of another target. Third-party C is
-//! compiled without the undefined-behaviour sanitizer, ours with it outside fast mode; floating
-//! point is never contracted, so that every target computes the same bits.
+//! Out: modules and programs that share nothing with those of another target. Our C is compiled
+//! with the undefined-behaviour sanitizer outside fast mode; floating point is never contracted,
+//! so that every target computes the same bits. Third-party C is in libraries.zig.
 
 const std = @import("std");
+const libraries = @import("libraries.zig");
 const manifest = @import("../build.zig.zon");
 const Module = std.Build.Module;
 const LazyPath = std.Build.LazyPath;
+const Compile = std.Build.Step.Compile;
+const variants = @import("variants.zig");
+const Variant = variants.Variant;
 const Package = @This();
 
 owner: *std.Build,
@@ -17,28 +21,28 @@ optimize: std.lang.Optimize,
 headers: LazyPath,
 /// The library, `@import("raylane")`.
 raylane: *Module,
-
-/// How four floats are added; `src/variant.zig` says what each means.
-pub const Backend = enum { scalar, vector, intrinsics };
-/// How rays are bundled; `src/variant.zig` says what each means.
-pub const Traversal = enum { single, packet2x2, beam };
-/// Whether the program holds the default variant only.
-pub const Variants = enum { one, all };
+shows_searches: bool,
+/// The variants of its programs, the default one first, and those of them that count.
+held: []const Variant,
+counting: []const Variant,
+/// A kernel of each: see `addKernels`.
+kernels: []const *Compile,
+intrinsics: *Compile,
+config: *Module,
 
 /// The choice of variants, from the command line.
 pub const Options = struct {
-    backend: Backend,
-    traversal: Traversal,
+    backend: variants.Backend,
+    traversal: variants.Traversal,
     /// Null: what the target's registers hold.
     lanes: ?u8,
-    variants: Variants,
+    extent: variants.Extent,
+    /// Whether kernels show their searches, for tests of traversal.
+    shows_searches: bool = false,
 };
 
 const own_c_flags: []const []const u8 = &.{
     "-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-Wall", "-Wextra", "-Werror",
-};
-const third_party_c_flags: []const []const u8 = &.{
-    "-std=c11", "-ffp-contract=off", "-fno-sanitize=undefined",
 };
 
 /// Declares the modules for `target`; `headers` is the folder of the third-party headers.
@@ -49,57 +53,160 @@ pub fn init(
     headers: LazyPath,
     options: Options,
 ) Package {
-    const config = b.addOptions();
-    config.addOption([]const u8, "version", manifest.version);
-    config.addOption(Backend, "backend", options.backend);
-    config.addOption(Traversal, "traversal", options.traversal);
-    config.addOption(u8, "lanes", options.lanes orelse defaultLanes(target.result.cpu, options));
-    config.addOption(Variants, "variants", options.variants);
-
+    const default: Variant = .{
+        .backend = options.backend,
+        .traversal = options.traversal,
+        .lanes = options.lanes orelse defaultLanes(target.result.cpu, options),
+    };
+    const held = variants.held(b.allocator, target.result.cpu, default, options.extent);
+    const counting = variants.counting(b.allocator, held);
     var package: Package = .{
         .owner = b,
         .target = target,
         .optimize = optimize,
         .headers = headers,
+        .shows_searches = options.shows_searches,
+        .held = held,
+        .counting = counting,
         .raylane = undefined,
+        .config = undefined,
+        .intrinsics = undefined,
+        .kernels = undefined,
     };
-    package.raylane = b.createModule(.{
-        .root_source_file = b.path("src/raylane.zig"),
-        .target = target,
-        .optimize = optimize,
-        .link_libc = true,
-        // A failed test tells where its error came from, in safe mode too.
-        .error_tracing = if (optimize == .safe) true else null,
-        .omit_frame_pointer = if (optimize == .fast) true else null,
-        .imports = &.{
-            .{ .name = "config", .module = config.createModule() },
-            .{ .name = "cgltf", .module = package.cgltf() },
-        },
-    });
-    package.raylane.addCSourceFile(.{
-        .file = b.path("src/simd/intrinsics.c"),
-        .flags = own_c_flags,
-    });
+    package.config = package.configOf(held, counting, options.extent == .all);
+    package.raylane = package.library();
+    package.intrinsics = package.intrinsicsObject();
+    package.kernels = package.kernelObjects();
     return package;
 }
 
-/// The program, linked in one piece with the C intrinsics inlined in fast mode.
-pub fn program(package: Package) *std.Build.Step.Compile {
+/// The library as a module of its own, for a program that has it as its root.
+pub fn library(package: Package) *Module {
+    const root = package.moduleOf("src/raylane.zig");
+    const is_musl = package.target.result.isMuslLibC();
+    root.addImport("config", package.config);
+    root.addImport("licenses", libraries.licenses(package.owner, package.headers, is_musl));
+    for (libraries.program) |each| each.addTo(root, package.headers);
+    return root;
+}
+
+/// What our Zig code has in common wherever it is compiled.
+fn moduleOf(package: Package, root: []const u8) *Module {
+    return package.owner.createModule(.{
+        .root_source_file = package.owner.path(root),
+        .target = package.target,
+        .optimize = package.optimize,
+        .link_libc = true,
+        // A failed test tells where its error came from, in safe mode too.
+        .error_tracing = if (package.optimize == .safe) true else null,
+        .omit_frame_pointer = if (package.optimize == .fast) true else null,
+    });
+}
+
+fn configOf(
+    package: Package,
+    held: []const Variant,
+    counting: []const Variant,
+    are_all: bool,
+) *Module {
+    const b = package.owner;
+    const options = b.addOptions();
+    options.addOption([]const u8, "version", manifest.version);
+    options.addOption([]const []const u8, "variants", package.names(held));
+    options.addOption([]const []const u8, "counting", package.names(counting));
+    options.addOption(bool, "are_all", are_all);
+    options.addOption(bool, "shows_searches", package.shows_searches);
+    return options.createModule();
+}
+
+fn names(package: Package, list: []const Variant) []const []const u8 {
+    const arena = package.owner.allocator;
+    const result = arena.alloc([]const u8, list.len) catch @panic("OOM");
+    for (result, list) |*name, variant| name.* = variant.name(arena);
+    return result;
+}
+
+/// The C intrinsics. In fast mode what is linked is LLVM's code, as it is of the kernels that call
+/// them, and the linker inlines one into the other.
+fn intrinsicsObject(package: Package) *Compile {
+    const b = package.owner;
+    const object = package.archive("intrinsics", b.createModule(.{
+        .target = package.target,
+        .optimize = package.optimize,
+        .link_libc = true,
+        .omit_frame_pointer = if (package.optimize == .fast) true else null,
+    }));
+    object.root_module.addCSourceFile(.{
+        .file = b.path("src/simd/intrinsics.c"),
+        .flags = own_c_flags,
+    });
+    if (package.optimize == .fast) object.lto = .full;
+    return object;
+}
+
+/// One object for each variant, and one more for each that counts: they are compiled side by side,
+/// and shared by all programs of the package.
+fn kernelObjects(package: Package) []*Compile {
+    const arena = package.owner.allocator;
+    var list: std.ArrayList(*Compile) = .empty;
+    for ([_][]const Variant{ package.held, package.counting }, 0..) |part, is_counting| {
+        for (part) |variant| {
+            const object = package.kernel(variant, is_counting == 1);
+            list.append(arena, object) catch @panic("OOM");
+        }
+    }
+    return list.items;
+}
+
+/// Assembly of the default variant's kernel, by a compile step of its own: whoever is asked for
+/// assembly generates code twice.
+pub fn assembly(package: Package) LazyPath {
+    return package.kernel(package.held[0], false).getEmittedAsm();
+}
+
+fn kernel(package: Package, variant: Variant, is_counting: bool) *Compile {
+    const b = package.owner;
+    const root = package.moduleOf("src/kernel.zig");
+    const own: []const Variant = &.{variant};
+    root.addImport("config", package.configOf(own, if (is_counting) own else &.{}, false));
+    root.strip = package.optimize == .fast;
+    const suffix = if (is_counting) "-counting" else "";
+    const name = b.fmt("kernel-{s}{s}", .{ variant.name(b.allocator), suffix });
+    const object = package.archive(name, root);
+    if (package.optimize == .fast and variant.backend == .intrinsics) object.lto = .full;
+    return object;
+}
+
+/// An object in an archive, so that programs that do not refer to it do without.
+fn archive(package: Package, name: []const u8, root: *Module) *Compile {
+    return package.owner.addLibrary(.{ .linkage = .static, .name = name, .root_module = root });
+}
+
+/// Links a program with its kernels, and with the intrinsics for them and for itself.
+pub fn addKernels(package: Package, root: *Module) void {
+    for (package.kernels) |object| root.addObjectFile(object.getEmittedBin());
+    root.addObjectFile(package.intrinsics.getEmittedBin());
+}
+
+/// The program.
+pub fn program(package: Package) *Compile {
     const exe = package.addProgram("raylane", "src/main.zig");
-    if (package.optimize == .fast) exe.lto = .full;
+    package.addKernels(exe.root_module);
     return exe;
 }
 
-/// A benchmark: compiled and linked like the program, but with its symbols, for profilers.
-pub fn benchmark(package: Package, name: []const u8, root: []const u8) *std.Build.Step.Compile {
+/// A benchmark: the traversal that it times is compiled with it, in one piece with the C intrinsics
+/// inlined in fast mode, and it has its symbols, for profilers.
+pub fn benchmark(package: Package, name: []const u8, root: []const u8) *Compile {
     const exe = package.addProgram(name, root);
     exe.root_module.strip = false;
+    exe.root_module.addObjectFile(package.intrinsics.getEmittedBin());
     if (package.optimize == .fast) exe.lto = .full;
     return exe;
 }
 
 /// A program of its own that imports `raylane`: the renderer, or a tool beside it.
-pub fn addProgram(package: Package, name: []const u8, root: []const u8) *std.Build.Step.Compile {
+pub fn addProgram(package: Package, name: []const u8, root: []const u8) *Compile {
     const b = package.owner;
     return b.addExecutable(.{ .name = name, .root_module = b.createModule(.{
         .root_source_file = b.path(root),
@@ -109,50 +216,6 @@ pub fn addProgram(package: Package, name: []const u8, root: []const u8) *std.Bui
         .omit_frame_pointer = if (package.optimize == .fast) true else null,
         .imports = &.{.{ .name = "raylane", .module = package.raylane }},
     }) });
-}
-
-/// stb_image as a module, for tests that decode pictures.
-pub fn stbImage(package: Package) *Module {
-    const b = package.owner;
-    const defines: []const []const u8 = &.{
-        "-DSTBI_ONLY_PNG", "-DSTBI_ONLY_JPEG", "-DSTBI_NO_STDIO", "-DSTBI_MAX_DIMENSIONS=32768",
-    };
-    const header = package.headers.path(b, "stb_image.h");
-    const translation = package.translate(header);
-    translation.addCFlags(defines);
-    const module = translation.createModule();
-    module.addCSourceFile(.{
-        .file = header,
-        .language = .c,
-        .flags = b.graph.dupeStrings(defines ++ third_party_c_flags ++
-            .{"-DSTB_IMAGE_IMPLEMENTATION"}),
-    });
-    return module;
-}
-
-fn cgltf(package: Package) *Module {
-    const b = package.owner;
-    const module = package.translate(b.path("src/parse/cgltf_shim.h")).createModule();
-    package.addThirdParty(module, "src/parse/cgltf.c");
-    return module;
-}
-
-fn translate(package: Package, header: LazyPath) *std.Build.Step.TranslateC {
-    const translation = package.owner.addTranslateC(.{
-        .root_source_file = header,
-        .target = package.target,
-        .optimize = package.optimize,
-    });
-    translation.addIncludePath(package.headers);
-    return translation;
-}
-
-fn addThirdParty(package: Package, module: *Module, implementation: []const u8) void {
-    module.addIncludePath(package.headers);
-    module.addCSourceFile(.{
-        .file = package.owner.path(implementation),
-        .flags = third_party_c_flags,
-    });
 }
 
 /// As many lanes as the registers hold; the C intrinsics and 2x2 packets have 4 only.

@@ -6,6 +6,7 @@
 //! every time: what they read (scenes, pictures, the source tree) is more than the build knows of.
 
 const std = @import("std");
+const libraries = @import("libraries.zig");
 const Package = @import("package.zig");
 const Compile = std.Build.Step.Compile;
 const LazyPath = std.Build.LazyPath;
@@ -23,8 +24,6 @@ filters: []const []const u8,
 pub const Target = struct {
     name: []const u8,
     package: Package,
-    /// Of the program whose command line is tested.
-    command: Package,
     /// The program, with its arguments, that runs foreign executables here; empty for this machine.
     emulator: []const []const u8,
 };
@@ -54,7 +53,7 @@ pub fn addAll(tests: Tests, step: *std.Build.Step, targets: []const Target) void
     var logs: std.ArrayList(LazyPath) = .empty;
     const arena = tests.owner.allocator;
     logs.appendSlice(arena, &.{
-        tests.format(), tests.tidy(), tests.machinery(), tests.report(),
+        tests.format(), tests.tidy(), tests.machinery(), tests.report(), tests.fetcher(),
     }) catch @panic("OOM");
     for (targets) |target| {
         logs.appendSlice(arena, &.{
@@ -86,9 +85,9 @@ pub fn addTidy(tests: Tests, step: *std.Build.Step) void {
     tests.close(step, &.{tests.tidy()}, .logs_only);
 }
 
-/// Makes `step` test the report of the benchmark.
+/// Makes `step` test the tools in Python: the report of the benchmark, and vendor/fetch.
 pub fn addReport(tests: Tests, step: *std.Build.Step) void {
-    tests.close(step, &.{tests.report()}, .logs_only);
+    tests.close(step, &.{ tests.report(), tests.fetcher() }, .logs_only);
 }
 
 /// Makes `step` compile the test programs of `target` without a file as the result.
@@ -119,6 +118,14 @@ fn report(tests: Tests) LazyPath {
     return log;
 }
 
+/// What fetches the third-party files; each kind of package is tested where its tool is installed.
+fn fetcher(tests: Tests) LazyPath {
+    const run, const log = tests.start("fetch", "sources");
+    run.addArgs(&.{ "--one", "--needs=python3", "--", "python3", "-m", "unittest", "discover" });
+    run.addArgs(&.{ "-s", "vendor" });
+    return log;
+}
+
 fn machinery(tests: Tests) LazyPath {
     const run, const log = tests.start("summary", "host");
     run.addArg("--");
@@ -143,7 +150,8 @@ fn commandLine(tests: Tests, target: Target) LazyPath {
         const command = std.mem.join(b.allocator, " ", target.emulator) catch @panic("OOM");
         run.addArg(b.fmt("--env=RAYLANE_EMULATOR={s}", .{command}));
     }
-    run.addArtifactArg2(target.command.program(), .{
+    run.addArg(b.fmt("--env=RAYLANE_OPTIMIZE={t}", .{target.package.optimize}));
+    run.addArtifactArg2(target.package.program(), .{
         .prefix = "--env=RAYLANE_PROGRAM=",
         .make_absolute = true,
     });
@@ -153,21 +161,23 @@ fn commandLine(tests: Tests, target: Target) LazyPath {
 }
 
 fn unitProgram(tests: Tests, target: Target) *Compile {
-    return tests.program("unit", target.package.raylane);
+    const root = target.package.library();
+    target.package.addKernels(root);
+    return tests.program("unit", root);
 }
 
 fn integrationProgram(tests: Tests, target: Target) *Compile {
     const b = tests.owner;
-    return tests.program("integration", b.createModule(.{
+    const root = b.createModule(.{
         .root_source_file = b.path("tests/integration.zig"),
         .target = target.package.target,
         .optimize = target.package.optimize,
         .error_tracing = target.package.raylane.error_tracing,
-        .imports = &.{
-            .{ .name = "raylane", .module = target.package.raylane },
-            .{ .name = "stb_image", .module = target.package.stbImage() },
-        },
-    }));
+        .imports = &.{.{ .name = "raylane", .module = target.package.raylane }},
+    });
+    libraries.stb_image.addTo(root, target.package.headers);
+    target.package.addKernels(root);
+    return tests.program("integration", root);
 }
 
 /// A test program of this machine whose root is `tests/NAME.zig`.

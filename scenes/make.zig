@@ -34,7 +34,7 @@ pub fn main(init: std.process.Init) !u8 {
         return 2;
     }
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
-    var scene = try raylane.parse.builtin.build(init.gpa, "cornell", &diagnostic);
+    var scene = try raylane.builtin.build(init.gpa, "cornell", &diagnostic);
     defer scene.deinit();
 
     var text: Writer.Allocating = .init(arena);

@@ -9,7 +9,7 @@
 const std = @import("std");
 const energy = @import("energy.zig");
 const machine = @import("bench/machine.zig");
-const prepare = @import("prepare.zig");
+const TreeQuality = @import("settings.zig").TreeQuality;
 const results_file = @import("bench/results.zig");
 const rounds_file = @import("bench/rounds.zig");
 const stages_file = @import("bench/stages.zig");
@@ -42,14 +42,14 @@ pub const Settings = struct {
     /// At least one.
     scenes: []const []const u8,
     allow_outside: bool = false,
-    /// See parse/settings.zig.
+    /// See `settings.Load`.
     output: ?Identity = null,
     width: u32,
     height: u32,
     thread_count: usize,
     sample_count: u32,
     depth: u32,
-    tree_quality: prepare.TreeQuality,
+    tree_quality: TreeQuality,
     /// By variant of `variant.compiled`: whether it is measured. At least one is.
     wanted: [variant_file.compiled.len]bool,
     /// Null: until intervals are narrow.
@@ -238,17 +238,14 @@ pub const Bench = struct {
         const title = try bench.arena.print("{f}", .{printable(name)});
         const progress = bench.progress.start(title, 0);
         defer progress.end();
-        var stages: Stages = try .init(bench.gpa, bench.io, .{
+        var stages: Stages = .init(bench.gpa, bench.io, .{
             .scene = name,
-            .allow_outside = settings.allow_outside,
-            .output = settings.output,
-            .width = settings.width,
-            .height = settings.height,
-            .thread_count = settings.thread_count,
+            .load = .{ .allow_outside = settings.allow_outside, .output = settings.output },
+            .tree_quality = settings.tree_quality,
+            .view = .{ .resolution = .{ settings.width, settings.height } },
             .sample_count = settings.sample_count,
             .depth = settings.depth,
-            .tree_quality = settings.tree_quality,
-        }, bench.diagnostic, bench.meter, progress);
+        }, settings.thread_count, bench.diagnostic, bench.meter, progress);
         defer stages.deinit();
         var rounds = try Rounds.measure(bench.arena, &stages, .{
             .variants = bench.order,
@@ -263,7 +260,7 @@ pub const Bench = struct {
         };
         return .{
             .scene = title,
-            .triangles = stages.triangle_count,
+            .triangles = stages.session.facts.triangle_count,
             .image_hash = try bench.arena.print("{x:0>16}", .{rounds.hash.?}),
             .rays = rounds.rays,
             .rounds = rounds.round_count,

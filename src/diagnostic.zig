@@ -77,6 +77,36 @@ pub const Diagnostic = struct {
     }
 };
 
+const system_reasons: std.StaticStringMap([]const u8) = .initComptime(.{
+    .{ "AccessDenied", "permission denied" },
+    .{ "BadPathName", "not a file name" },
+    .{ "BrokenPipe", "nobody reads it" },
+    .{ "Canceled", "the program is ending" },
+    .{ "DeviceBusy", "device busy" },
+    .{ "DiskQuota", "disk quota exceeded" },
+    .{ "FileBusy", "it is in use" },
+    .{ "FileNotFound", "no such file or directory" },
+    .{ "FileTooBig", "file too large" },
+    .{ "InputOutput", "input/output error" },
+    .{ "IsDir", "it is a directory" },
+    .{ "NameTooLong", "name too long" },
+    .{ "NoDevice", "no such device" },
+    .{ "NoSpaceLeft", "no space left on the device" },
+    .{ "NotDir", "not a directory" },
+    .{ "NotOpenForWriting", "it is closed" },
+    .{ "PermissionDenied", "permission denied" },
+    .{ "ProcessFdQuotaExceeded", "too many open files" },
+    .{ "ReadOnlyFileSystem", "read-only file system" },
+    .{ "SymLinkLoop", "too many symbolic links" },
+    .{ "SystemFdQuotaExceeded", "too many open files" },
+    .{ "SystemResources", "the system is out of resources" },
+});
+
+/// An error of the file system in words.
+pub fn systemReason(err: anyerror) []const u8 {
+    return system_reasons.get(@errorName(err)) orelse @errorName(err);
+}
+
 /// Prints a text of outside origin whole, bad UTF-8 and controls as `?`.
 pub const Printable = struct {
     text: []const u8,

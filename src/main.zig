@@ -1,28 +1,23 @@
-//! The program: the command line, the four stages in order, the report.
+//! The program: the command line, a session led through its stages, the report.
 //!
 //! In: arguments. Out: an image, a report, and an exit code that says how it went. Whatever a stage
 //! has to say reaches the user here, in one line; nothing else prints or exits.
 
 const std = @import("std");
 const raylane = @import("raylane");
+const cli = raylane.cli;
 const signals = @import("signals.zig");
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
+const Account = raylane.memory_account.Account;
 const assert = std.debug.assert;
 const Diagnostic = raylane.diagnostic.Diagnostic;
-const Film = raylane.film.Film;
-const Image = raylane.image.Image;
-const Options = raylane.options.Options;
+const Options = raylane.cli.Options;
 const Report = raylane.report.Report;
+const Session = raylane.session.Session;
 const Target = raylane.output.Target;
 const World = raylane.world.World;
 const printable = raylane.diagnostic.printable;
-
-comptime {
-    // What the options promise the stages keep.
-    assert(raylane.options.depth_max <= raylane.trace.depth_limit);
-    assert(raylane.options.thread_count_max <= raylane.parallel.thread_count_max);
-}
 
 const ExitCode = enum(u8) {
     ok = 0,
@@ -49,35 +44,32 @@ fn run(init: std.process.Init) ExitCode {
         return outOfMemory(io);
     const own_arguments = arguments[@min(1, arguments.len)..];
     const names = raylane.variant.names;
-    const command = raylane.options.parse(own_arguments, names, &diagnostic) catch {
+    const command = cli.parse(own_arguments, names, &diagnostic) catch {
         say(io, "raylane: {s}\n", .{diagnostic.message.text()});
         return .usage;
     };
     switch (command) {
-        .help => return print(io, raylane.options.help),
-        .bench_help => return print(io, raylane.options.bench_help),
-        .version => return print(io, "raylane " ++ raylane.options.version ++ "\n"),
+        .help => return print(io, cli.help),
+        .bench_help => return print(io, cli.bench_help),
+        .version => return print(io, "raylane " ++ cli.version ++ "\n"),
+        .licenses => return print(io, raylane.licenses),
         .list_variants => return print(io, comptime list: {
             var list: []const u8 = "";
             for (names) |name| list = list ++ name ++ "\n";
             break :list list;
         }),
-        .render => |*options| return renderAndReport(init.gpa, io, options, &diagnostic),
+        .render => |*options| {
+            var account: Account = .init(init.gpa, options.memory_max);
+            return renderAndReport(&account, io, options, &diagnostic);
+        },
         .bench => |*options| return bench(init, options, &diagnostic),
     }
-}
-
-comptime {
-    // What the options accept is what the reader of scenes expects.
-    assert(raylane.options.tessellation_min == raylane.parse.tessellation_min);
-    assert(raylane.options.tessellation_max == raylane.parse.tessellation_max);
-    assert(raylane.options.tessellation_default == raylane.parse.tessellation_default);
 }
 
 /// Measures all variants on some scenes, then prints the tables, or why there are none.
 fn bench(
     init: std.process.Init,
-    options: *const raylane.options.Bench,
+    options: *const cli.Bench,
     diagnostic: *Diagnostic,
 ) ExitCode {
     const io = init.io;
@@ -88,6 +80,11 @@ fn bench(
         });
         return .usage;
     }
+    if (!raylane.variant.are_all and !options.quiet) say(
+        io,
+        "raylane: this program holds {d} of the variants; zig build -Dvariants=all builds all\n",
+        .{raylane.variant.names.len},
+    );
     // Before the work, so that a place that cannot be written is an error in the first second.
     var target = openJson(io, options.json, diagnostic) catch {
         const text = diagnostic.message.text();
@@ -126,17 +123,17 @@ fn bench(
     return printBench(init.gpa, io, options, &results, &target, diagnostic);
 }
 
-fn benchSettings(options: *const raylane.options.Bench) raylane.bench.Settings {
+fn benchSettings(options: *const cli.Bench) raylane.bench.Settings {
     var settings: raylane.bench.Settings = .{
-        .version = raylane.options.version,
+        .version = cli.version,
         .scenes = options.scenes[0..options.scene_count],
         .allow_outside = options.allow_outside,
         .width = options.resolution[0],
         .height = options.resolution[1],
-        .thread_count = options.thread_count orelse processorCount(),
+        .thread_count = options.thread_count orelse raylane.session.processorCount(),
         .sample_count = options.sample_count,
         .depth = options.depth,
-        .tree_quality = treeQuality(options.bvh),
+        .tree_quality = options.tree_quality,
         .wanted = undefined,
         .round_count = if (options.round_count) |count| count else null,
         .time_s = options.time_s,
@@ -156,7 +153,7 @@ fn benchSettings(options: *const raylane.options.Bench) raylane.bench.Settings {
 fn printBench(
     gpa: Allocator,
     io: Io,
-    options: *const raylane.options.Bench,
+    options: *const cli.Bench,
     results: *const raylane.bench.Results,
     target: *Target,
     diagnostic: *Diagnostic,
@@ -168,7 +165,7 @@ fn printBench(
     raylane.bench.writeTables(results, &text.writer) catch return outOfMemory(io);
     if (options.json) |path| {
         raylane.bench.writeJson(results, &json.writer) catch return outOfMemory(io);
-        if (raylane.options.isStdout(path)) return print(io, json.written());
+        if (cli.isStdout(path)) return print(io, json.written());
         target.finish(&.{json.written()}, diagnostic) catch {
             _ = print(io, text.written()); // Minutes of work: show what was found.
             say(io, "raylane: {f}: {s}\n", .{ printable(path), diagnostic.message.text() });
@@ -185,7 +182,7 @@ fn openJson(
     diagnostic: *Diagnostic,
 ) raylane.output.TargetError!Target {
     const name = path orelse return .openStdout(io);
-    if (raylane.options.isStdout(name)) return .openStdout(io);
+    if (cli.isStdout(name)) return .openStdout(io);
     return .openFile(io, &signals.temporary_files, name, diagnostic);
 }
 
@@ -200,33 +197,33 @@ fn outOfMemory(io: Io) ExitCode {
     return .failed;
 }
 
-fn processorCount() usize {
-    const cpu_count = std.Thread.getCpuCount() catch 1;
-    return @min(cpu_count, raylane.options.thread_count_max);
-}
-
-fn treeQuality(bvh: raylane.options.Bvh) raylane.prepare.TreeQuality {
-    return switch (bvh) {
-        inline else => |quality| @field(raylane.prepare.TreeQuality, @tagName(quality)),
-    };
-}
-
 /// Renders one scene, then says what it cost or why it failed.
 fn renderAndReport(
-    gpa: Allocator,
+    account: *Account,
     io: Io,
     options: *const Options,
     diagnostic: *Diagnostic,
 ) ExitCode {
-    const output_name = raylane.options.outputName(gpa, options) catch return outOfMemory(io);
+    const gpa = account.allocator();
+    const output_name = cli.outputName(gpa, options) catch {
+        account.explain(&diagnostic.message);
+        say(io, "raylane: {s}\n", .{diagnostic.message.text()});
+        return .failed;
+    };
     defer gpa.free(output_name);
     var job: Job = .{
-        .gpa = gpa,
         .io = io,
         .options = options,
         .output_name = output_name,
         .diagnostic = diagnostic,
+        .session = .init(
+            gpa,
+            io,
+            if (options.thread_count) |count| count else null,
+            diagnostic,
+        ),
     };
+    defer job.session.deinit();
     const outcome = job.run();
     job.sayWarnings();
     if (diagnostic.warning_dropped_count > 0 and !options.quiet) {
@@ -237,138 +234,65 @@ fn renderAndReport(
             job.outputTitle()
         else
             placeOf(diagnostic, options.scene);
-        const text = if (err == error.OutOfMemory) "out of memory" else diagnostic.message.text();
+        if (err == error.OutOfMemory) account.explain(&diagnostic.message);
+        const text = diagnostic.message.text();
         assert(text.len > 0);
         say(io, "raylane: {f}: {s}\n", .{ printable(file), text });
         return switch (err) {
             error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
             error.CameraUnknown => .usage,
             error.InvalidInput, error.SceneTooLarge => .invalid,
-            error.Canceled => unreachable, // Nobody does.
+            error.Canceled => unreachable, // Nobody asks for it here.
         };
     };
     return job.printReport(&report);
 }
 
-/// The way of one scene through the stages.
+/// The way of one scene through the session.
 const Job = struct {
-    gpa: Allocator,
     io: Io,
     options: *const Options,
     output_name: []const u8,
     diagnostic: *Diagnostic,
-    progress: std.Progress.Node = .none,
-    /// Samples a pixel and bounces: what the user says, or the scene.
-    sample_count: u32 = raylane.options.sample_count_default,
-    depth: u32 = raylane.options.depth_default,
+    session: Session,
     /// Warnings that the user has seen.
     warning_count: usize = 0,
 
-    const Error = raylane.parse.Error || raylane.prepare.Error || raylane.trace.Error ||
-        error{OutputFailed};
+    const Error = Session.Error || error{OutputFailed};
 
     fn run(job: *Job) Error!Report {
+        const session = &job.session;
         if (!job.options.quiet) {
-            job.progress = std.Progress.start(job.io, .{ .root_name = "raylane" });
+            session.progress = std.Progress.start(job.io, .{ .root_name = "raylane" });
         }
-        defer job.progress.end();
-        return job.render();
-    }
-
-    /// parse -> Scene -> prepare -> World -> trace -> Film -> output.
-    fn render(job: *Job) Error!Report {
-        const gpa = job.gpa;
-        const io = job.io;
-        const variant_index = job.options.variant_index;
-        var times: raylane.statistics.StageTimes = .{};
+        defer session.progress.end();
+        const options = job.options;
+        // Before the work, so that a place that cannot be written is an error in the first second.
         var target = try job.openTarget();
         defer target.abandon();
-
-        const start = Io.Clock.awake.now(io);
-        var scene = try raylane.parse.parse(gpa, io, job.options.scene, .{
-            .allow_outside = job.options.allow_outside,
-            .tessellation = job.options.tessellation,
-            .output = target.replaces,
-        }, job.diagnostic);
-        const triangle_count = scene.triangleCount();
-        job.sample_count = job.options.sample_count orelse scene.sample_count orelse
-            raylane.options.sample_count_default;
-        job.depth = job.options.depth orelse scene.depth orelse raylane.options.depth_default;
-        times.parse_ns = since(io, start);
-
-        var world = prepared: {
-            defer scene.deinit();
-            break :prepared try raylane.prepare.prepare(
-                gpa,
-                io,
-                &scene,
-                job.prepareSettings(),
-                job.diagnostic,
-                &times,
-            );
-        };
-        defer world.deinit();
+        var load = options.load;
+        load.output = target.replaces;
+        try session.load(options.scene, load);
+        try session.pose(.{
+            .lanes = raylane.variant.compiled[options.render.variant].lanes,
+            .tree_quality = options.tree_quality,
+        });
+        try session.view(options.view);
+        session.dropScene();
         job.sayWarnings();
-        job.sayFacts(&world);
-
-        const view = &world.view;
-        const has_alpha = job.options.background == .transparent;
-        const layers: raylane.film.Layers = .init(.{ .color = true, .alpha = has_alpha });
-        var film: Film = try .init(gpa, view.width, view.height, layers);
-        defer film.deinit(gpa);
-        const trace_start = Io.Clock.awake.now(io);
-        const frame = world.frame();
-        const settings = job.traceSettings();
-        const traced = try raylane.trace.trace(gpa, variant_index, &frame, &film, settings);
-        times.trace_ns = since(io, trace_start);
-        if (traced.non_finite_count > 0) job.diagnostic.warn(
-            "{d} pixels came out as not a number and were made black",
-            .{traced.non_finite_count},
-        );
-
-        const output_start = Io.Clock.awake.now(io);
-        try job.write(&film.image, &target);
-        times.output_ns = since(io, output_start);
-        times.total_ns = since(io, start);
-
-        var report = job.reportOf(&world, &film.image);
-        report.triangle_count = triangle_count;
-        report.times = times;
-        report.rays = traced.rays;
-        if (job.options.count_tests) {
-            const counted = try raylane.trace
-                .traceCounting(gpa, variant_index, &frame, &film, settings);
-            report.tests = counted.tests;
-        }
-        return report;
-    }
-
-    /// What the options and the results say; the measurements are the caller's.
-    fn reportOf(job: *const Job, world: *const World, image: *const Image) Report {
-        return .{
-            .version = raylane.options.version,
-            .scene = job.options.scene,
-            .output = job.outputTitle(),
-            .triangle_count = 0,
-            .width = image.width,
-            .height = image.height,
-            .sample_count = job.sample_count,
-            .depth = job.depth,
-            .thread_count = job.threadCount(),
-            .variant = raylane.variant.names[job.options.variant_index],
-            .times = .{},
-            .rays = .{},
-            .tests = null,
-            .bvh = .{
-                .node_count = world.facts.tree.node_count,
-                .depth = world.facts.tree.depth,
-                .sah_cost = world.facts.tree.sah_cost,
-                .bytes = world.facts.tree.bytes,
-            },
-            .memory_peak_bytes = raylane.report.memoryPeakBytes(),
-            .image_hash = image.hash(),
-            .warnings = &.{},
+        job.sayFacts(&session.world.?);
+        session.checkWrite(options.write) catch return error.OutputFailed;
+        try session.render(options.render);
+        session.write(&target, options.write) catch |err| return switch (err) {
+            error.OutOfMemory, error.Canceled => |other| other,
+            error.InputOutput => error.OutputFailed,
         };
+        var report = session.report(options.render);
+        report.version = cli.version;
+        report.scene = options.scene;
+        report.output = job.outputTitle();
+        if (options.count_tests) report.tests = try session.countTests(options.render);
+        return report;
     }
 
     /// What messages call the image's place.
@@ -381,64 +305,6 @@ const Job = struct {
         const temporaries = &signals.temporary_files;
         return Target.openFile(job.io, temporaries, job.output_name, job.diagnostic) catch
             error.OutputFailed;
-    }
-
-    fn prepareSettings(job: *const Job) raylane.prepare.Settings {
-        const options = job.options;
-        return .{
-            .lanes = raylane.variant.compiled[options.variant_index].lanes,
-            .thread_count = job.threadCount(),
-            .tree_quality = treeQuality(options.bvh),
-            .camera = switch (options.camera) {
-                .default => .default,
-                .auto => .auto,
-                .index => |index| .{ .index = index },
-                .name => |name| .{ .name = name },
-            },
-            .resolution = options.resolution,
-            .ambient = options.ambient,
-            .background = switch (options.background) {
-                .default => null,
-                .transparent => .{ 0, 0, 0 },
-                .linear => |color| color,
-                .srgb => |codes| color: {
-                    var color: raylane.math.Vec3 = undefined;
-                    for (&color, codes) |*light, code| light.* = raylane.math.srgb.decoded[code];
-                    break :color color;
-                },
-            },
-        };
-    }
-
-    fn traceSettings(job: *const Job) raylane.trace.Settings {
-        return .{
-            .thread_count = job.threadCount(),
-            .sample_count = job.sample_count,
-            .depth_max = job.depth,
-            .tile_size = job.options.tile_size,
-            .progress = job.progress,
-        };
-    }
-
-    fn threadCount(job: *const Job) usize {
-        return job.options.thread_count orelse processorCount();
-    }
-
-    fn write(job: *Job, image: *const Image, target: *Target) Error!void {
-        raylane.output.write(job.gpa, image, .{
-            .format = switch (job.options.format) {
-                inline else => |format| @field(raylane.output.Format, @tagName(format)),
-            },
-            .exposure = switch (job.options.exposure) {
-                .ev => |ev| .{ .ev = ev },
-                .auto => .auto,
-            },
-            .transparent = job.options.background == .transparent,
-            .thread_count = job.threadCount(),
-        }, target, job.diagnostic) catch |err| return switch (err) {
-            error.OutOfMemory => error.OutOfMemory,
-            error.InputOutput => error.OutputFailed,
-        };
     }
 
     /// Says the warnings that have not been said yet.
@@ -462,7 +328,7 @@ const Job = struct {
         }
         job.sayOfScene("ambient radiance: {d}", .{world.environment.ambient});
         job.sayOfScene("tracer: {s}, {d} threads", .{
-            raylane.variant.names[job.options.variant_index], job.threadCount(),
+            raylane.variant.names[job.options.render.variant], job.session.pool.thread_count,
         });
         if (world.facts.degenerate_count > 0) {
             job.sayOfScene("{d} triangles without area left out", .{world.facts.degenerate_count});
@@ -478,7 +344,7 @@ const Job = struct {
     fn printReport(job: *Job, measured: *const Report) ExitCode {
         const options = job.options;
         const to_stdout = !options.toStdout();
-        const default: raylane.options.Stats = if (options.quiet or !to_stdout) .none else .text;
+        const default: cli.Stats = if (options.quiet or !to_stdout) .none else .text;
         var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
         const diagnostic = job.diagnostic;
         for (diagnostic.warnings[0..diagnostic.warning_count], 0..) |*warning, index| {
@@ -487,7 +353,7 @@ const Job = struct {
         var report = measured.*;
         report.warnings = warnings[0..diagnostic.warning_count];
 
-        var text: Io.Writer.Allocating = .init(job.gpa);
+        var text: Io.Writer.Allocating = .init(job.session.gpa);
         defer text.deinit();
         const written = switch (options.stats orelse default) {
             .none => return .ok,
@@ -508,10 +374,6 @@ const Job = struct {
         return .ok;
     }
 };
-
-fn since(io: Io, start: Io.Timestamp) u64 {
-    return @intCast(start.untilNow(io, .awake).toNanoseconds());
-}
 
 /// Prints what was asked for to standard output.
 fn print(io: Io, text: []const u8) ExitCode {

@@ -1,16 +1,16 @@
 //! Stage 4: `Image` -> file.
 //!
-//! In: a finished frame. Out: a PNG, PPM or PFM, either the whole file in its place or nothing at
-//! all. Encoded by all threads; the bytes depend on the frame and the settings alone.
+//! In: a finished frame. Out: a file in one of seven formats, whole and in its place, or nothing at
+//! all. Colours are made by all threads; the bytes depend on the frame and the settings alone.
 
 const std = @import("std");
+const choices = @import("settings.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Image = @import("image.zig").Image;
+const huge_pages = @import("huge_pages.zig");
 const parallel = @import("parallel.zig");
-const pfm = @import("output/pfm.zig");
-const png = @import("output/png.zig");
-const ppm = @import("output/ppm.zig");
+const stb_image_write = @import("output/stb_image_write.zig");
 const target_file = @import("output/target.zig");
 const tonemap = @import("output/tonemap.zig");
 const assert = std.debug.assert;
@@ -21,28 +21,59 @@ pub const TargetError = target_file.Error;
 /// What targets create until they are in place.
 pub const TemporaryFiles = @import("output/temporary.zig").TemporaryFiles;
 
-/// File formats.
-pub const Format = enum { png, ppm, pfm };
+/// Pixels on a side at most, where the format counts them in two bytes.
+fn sideMax(format: choices.Format) u32 {
+    return switch (format) {
+        .jpg, .tga => 65_535,
+        else => std.math.maxInt(u31),
+    };
+}
 
-/// How radiance becomes brightness.
-pub const Exposure = union(enum) {
-    /// Stops: radiance 2^-ev is white.
-    ev: f32,
-    /// 95 % of the pixels are no brighter than 0.8.
-    auto,
-};
+fn formOf(format: choices.Format, transparent: bool) tonemap.Form {
+    return switch (format) {
+        .png, .tga => if (transparent) .rgba else .rgb,
+        .jpg, .bmp, .ppm => .rgb,
+        .hdr => .radiance,
+        .pfm => .linear,
+    };
+}
 
 pub const Settings = struct {
-    format: Format = .png,
-    exposure: Exposure = .{ .ev = 0 },
+    format: choices.Format = .png,
+    /// Of the formats that are not linear.
+    exposure: choices.Exposure = .{ .ev = 0 },
     /// Keep alpha, where the format has it; otherwise the picture is over black.
     transparent: bool = false,
-    /// 1..`parallel.thread_count_max`. The bytes do not depend on it.
-    thread_count: usize = 1,
+    /// Within `settings.jpeg_quality`.
+    jpeg_quality: u8 = choices.jpeg_quality.default,
+    pool: *parallel.Pool,
 };
 
-/// The diagnostic says why.
-pub const Error = error{ OutOfMemory, InputOutput };
+/// The diagnostic says why, unless the pool's work was cancelled.
+pub const Error = error{ OutOfMemory, InputOutput } || parallel.Error;
+
+/// Refuses a picture that the format cannot hold; best asked before it is rendered.
+pub fn check(
+    format: choices.Format,
+    transparent: bool,
+    width: u32,
+    height: u32,
+    diagnostic: *Diagnostic,
+) error{InputOutput}!void {
+    if (@max(width, height) > sideMax(format)) return diagnostic.fail(
+        error.InputOutput,
+        "a {t} file has {d} pixels on a side at most",
+        .{ format, sideMax(format) },
+    );
+    const channel_count: u64 = if (formOf(format, transparent) == .rgba) 4 else 3;
+    const by_library = format != .ppm and format != .pfm;
+    const value_count = (width * channel_count + 1) * height;
+    if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
+        error.InputOutput,
+        "{d}x{d} pixels are too many for a {t} file; .ppm and .pfm hold them",
+        .{ width, height, format },
+    );
+}
 
 /// Encodes the frame and moves it to its place. Closes the target in any case.
 pub fn write(
@@ -53,76 +84,106 @@ pub fn write(
     diagnostic: *Diagnostic,
 ) Error!void {
     defer target.abandon();
-    assert(settings.thread_count >= 1 and settings.thread_count <= parallel.thread_count_max);
-    const has_alpha = settings.transparent and settings.format == .png;
+    const format = settings.format;
+    try check(format, settings.transparent, image.width, image.height, diagnostic);
+    const form = formOf(format, settings.transparent);
     const rows: tonemap.Rows = .{
         .image = image,
-        .scale = if (settings.format == .pfm) 1 else switch (settings.exposure) {
-            .ev => |ev| tonemap.scaleOf(ev),
-            .auto => try tonemap.autoScale(gpa, image),
+        .form = form,
+        .scale = switch (form) {
+            .linear, .radiance => 1,
+            .rgb, .rgba => switch (settings.exposure) {
+                .ev => |ev| tonemap.scaleOf(ev),
+                .auto => try tonemap.autoScale(gpa, image),
+            },
         },
-        .channel_count = if (has_alpha) 4 else 3,
     };
-    return switch (settings.format) {
-        .png => encode(png.Encoder, gpa, rows, settings, target, diagnostic),
-        .ppm => encode(ppm.Encoder, gpa, rows, settings, target, diagnostic),
-        .pfm => encode(pfm.Encoder, gpa, rows, settings, target, diagnostic),
+    const pixels = try encodeRows(gpa, rows, settings.pool, format == .pfm);
+    defer huge_pages.free(gpa, pixels);
+
+    var buffer: [48]u8 = undefined;
+    const size = .{ image.width, image.height };
+    // Two numbers of 10 digits and 10 bytes more fit.
+    return switch (format) {
+        .ppm => target.finish(&.{
+            std.mem.print(&buffer, "P6\n{d} {d}\n255\n", size) catch unreachable, pixels,
+        }, diagnostic),
+        // A negative scale says little-endian.
+        .pfm => target.finish(&.{
+            std.mem.print(&buffer, "PF\n{d} {d}\n-1.0\n", size) catch unreachable, pixels,
+        }, diagnostic),
+        inline .png, .jpg, .tga, .bmp, .hdr => |coded| {
+            const file = try stb_image_write.encode(gpa, @field(
+                stb_image_write.Codec,
+                @tagName(coded),
+            ), .{
+                .width = image.width,
+                .height = image.height,
+                .channel_count = if (form == .rgba) 4 else 3,
+                .pixels = pixels,
+                .quality = settings.jpeg_quality,
+            });
+            defer gpa.free(file);
+            return target.finish(&.{file}, diagnostic);
+        },
     };
 }
 
-/// Encodes by all threads, then writes.
-fn encode(
-    comptime Encoder: type,
+/// All rows, by all threads; the caller frees them.
+fn encodeRows(
     gpa: Allocator,
     rows: tonemap.Rows,
-    settings: Settings,
-    target: *Target,
-    diagnostic: *Diagnostic,
-) Error!void {
-    var encoder: Encoder = try .init(gpa, rows, settings.thread_count);
-    defer encoder.deinit(gpa);
-    var work: Work(Encoder) = .{ .encoder = &encoder };
-    const thread_count = @min(settings.thread_count, encoder.threadCount());
-    parallel.share(thread_count, &work, Work(Encoder).run);
-    return target.finish(encoder.finish(), diagnostic);
-}
-
-/// Stretches of a file, each to one thread.
-fn Work(comptime Encoder: type) type {
-    return struct {
-        encoder: *Encoder,
-        next: std.atomic.Value(u32) = .init(0),
-
-        fn run(work: *@This(), thread_index: usize) void {
-            while (true) {
-                const index = work.next.fetchAdd(1, .monotonic);
-                if (index >= work.encoder.stretch_count) return;
-                work.encoder.encodeStretch(index, thread_index);
-            }
-        }
+    pool: *parallel.Pool,
+    from_bottom: bool,
+) Error![]align(64) u8 {
+    comptime assert(@import("builtin").cpu.arch.endian() == .little);
+    const height = rows.image.height;
+    const byte_count = std.math.mul(usize, rows.byteCount(), height) catch
+        return error.OutOfMemory;
+    const work: Work = .{
+        .rows = rows,
+        .from_bottom = from_bottom,
+        .bytes = try huge_pages.alloc(gpa, u8, byte_count),
     };
+    errdefer huge_pages.free(gpa, work.bytes);
+    try pool.forEach(height, &work, Work.encodeRow);
+    return work.bytes;
 }
+
+const Work = struct {
+    rows: tonemap.Rows,
+    from_bottom: bool,
+    bytes: []align(64) u8,
+
+    fn encodeRow(work: *const Work, y: usize, _: usize) void {
+        const row_bytes = work.rows.byteCount();
+        const place = if (work.from_bottom) work.rows.image.height - 1 - y else y;
+        work.rows.encode(@intCast(y), work.bytes[place * row_bytes ..][0..row_bytes]);
+    }
+};
 
 test {
-    _ = @import("output/checksum.zig");
-    _ = @import("output/deflate.zig");
-    _ = @import("output/filter.zig");
-    _ = @import("output/huffman.zig");
-    _ = pfm;
-    _ = png;
-    _ = ppm;
+    _ = stb_image_write;
     _ = target_file;
     _ = @import("output/temporary.zig");
     _ = tonemap;
 }
+
+const TestSettings = struct {
+    format: choices.Format = .png,
+    exposure: choices.Exposure = .{ .ev = 0 },
+    transparent: bool = false,
+};
 
 /// What `write` leaves in a file called `name`; the caller frees it.
 fn writeForTest(
     folder: std.Io.Dir,
     name: []const u8,
     image: *const Image,
-    settings: Settings,
+    settings: TestSettings,
 ) ![]u8 {
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
     const gpa = std.testing.allocator;
     const io = std.testing.io;
     var path_buffer: [std.fs.max_path_bytes]u8 = undefined;
@@ -132,7 +193,12 @@ fn writeForTest(
     var diagnostic: Diagnostic = .{};
     var temporaries: TemporaryFiles = .{};
     var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
-    try write(gpa, image, settings, &target, &diagnostic);
+    try write(gpa, image, .{
+        .format = settings.format,
+        .exposure = settings.exposure,
+        .transparent = settings.transparent,
+        .pool = &pool,
+    }, &target, &diagnostic);
     return folder.readFileAlloc(io, name, gpa, .unlimited);
 }
 
@@ -182,14 +248,16 @@ test "memory that runs out leaves no file, whenever it does" {
     const folder_path = path_buffer[0..try folder.dir.realPath(io, &path_buffer)];
     const path = try std.fs.path.join(std.testing.allocator, &.{ folder_path, "a" });
     defer std.testing.allocator.free(path);
-    for (std.enums.values(Format)) |format| {
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    for (std.enums.values(choices.Format)) |format| {
         var failing: std.testing.FailingAllocator = .init(std.testing.allocator, .{
             .fail_index = 0,
         });
         var diagnostic: Diagnostic = .{};
         var temporaries: TemporaryFiles = .{};
         var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
-        const settings: Settings = .{ .format = format, .exposure = .auto };
+        const settings: Settings = .{ .format = format, .exposure = .auto, .pool = &pool };
         const result = write(failing.allocator(), &image, settings, &target, &diagnostic);
         try std.testing.expectError(error.OutOfMemory, result);
         var entries = folder.dir.iterate();

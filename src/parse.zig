@@ -1,33 +1,20 @@
 //! Stage 1: a scene file becomes a `Scene`.
 //!
-//! In: the path of a glTF 2.0 file, JSON or binary, or of a PBRT scene, or `builtin:NAME`. Out: a
-//! checked `Scene`, or one line that says what is wrong. The format is chosen here and nowhere
-//! else.
+//! In: the path of a glTF 2.0 file, JSON or binary, or of a PBRT scene. Out: a checked `Scene`, or
+//! one line that says what is wrong. The format is chosen here and nowhere else.
 
 const std = @import("std");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Scene = @import("scene.zig").Scene;
 const gltf = @import("parse/gltf.zig");
 const pbrt = @import("parse/pbrt.zig");
-const settings_file = @import("parse/settings.zig");
+const Settings = @import("settings.zig").Load;
 const Allocator = std.mem.Allocator;
-
-/// Scenes that need no file.
-pub const builtin = @import("builtin.zig");
+const Resources = @import("parse/resource.zig");
 
 /// `InputOutput`: a file is missing or cannot be read. `InvalidInput`: it is read, but it is not
 /// what it should be, or it needs what is not supported.
-pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
-
-/// What the user allows a file to do, and how finely curved shapes are cut.
-pub const Settings = settings_file.Settings;
-
-/// Bounds of `Settings.tessellation`.
-pub const tessellation_default = settings_file.tessellation_default;
-pub const tessellation_min = settings_file.tessellation_min;
-pub const tessellation_max = settings_file.tessellation_max;
-
-const builtin_prefix = "builtin:";
+pub const Error = Resources.Error;
 
 /// Reads the scene at `path`. On an error the diagnostic holds one line without the path in it;
 /// what is odd but harmless becomes warnings there. The caller frees the scene with `deinit`.
@@ -38,35 +25,54 @@ pub fn parse(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!Scene {
-    if (std.mem.startsWith(u8, path, builtin_prefix)) {
-        return builtin.build(gpa, path[builtin_prefix.len..], diagnostic);
-    }
-    if (std.ascii.endsWithIgnoreCase(path, ".pbrt")) {
-        return pbrt.parse(gpa, io, path, settings, diagnostic);
-    }
-    return gltf.parse(gpa, io, path, settings, diagnostic);
+    var scene = try Resources.open(gpa, io, path, settings, diagnostic);
+    defer scene.close();
+    if (std.ascii.endsWithIgnoreCase(path, ".pbrt"))
+        return pbrt.read(&scene.resources, path, scene.main, diagnostic);
+    return gltf.read(&scene.resources, scene.main.bytes, diagnostic);
 }
 
 /// Reads a glTF file that is in memory, JSON or binary; what it names is looked for in `folder`.
 /// Otherwise like `parse`.
-pub const parseBytes = gltf.parseBytes;
+pub fn parseBytes(
+    gpa: Allocator,
+    io: std.Io,
+    bytes: []const u8,
+    folder: std.Io.Dir,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error!Scene {
+    var resources: Resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings };
+    return gltf.read(&resources, bytes, diagnostic);
+}
 
 /// The same for a PBRT text.
-pub const parsePbrt = pbrt.parseBytes;
+pub fn parsePbrt(
+    gpa: Allocator,
+    io: std.Io,
+    bytes: []const u8,
+    folder: std.Io.Dir,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error!Scene {
+    const copy = try gpa.dupeSentinel(u8, bytes, 0);
+    defer gpa.free(copy);
+    var resources: Resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings };
+    resources.bytes_read = bytes.len;
+    return pbrt.read(&resources, "text", .{ .bytes = copy, .identity = null }, diagnostic);
+}
 
 test {
-    _ = builtin;
+    _ = Resources;
+    _ = @import("parse/cgltf.zig");
     _ = gltf;
     _ = pbrt;
 }
 
-test "a scene is chosen by its prefix or its extension" {
+test "a format is chosen by its extension" {
     const gpa = std.testing.allocator;
     const io = std.testing.io;
     var diagnostic: Diagnostic = .{};
-    const unknown = parse(gpa, io, "builtin:no such", .{}, &diagnostic);
-    try std.testing.expectError(error.InvalidInput, unknown);
-    try std.testing.expect(diagnostic.message.text().len > 0);
     for ([_][]const u8{ "does not exist.glb", "a.pbrt", "A.PBRT" }) |path| {
         const missing = parse(gpa, io, path, .{}, &diagnostic);
         try std.testing.expectError(error.InputOutput, missing);

@@ -6,6 +6,7 @@
 
 const std = @import("std");
 const builtin = @import("builtin");
+const choices = @import("settings.zig");
 const math = @import("math.zig");
 const parallel = @import("parallel.zig");
 const scene = @import("scene.zig");
@@ -25,22 +26,16 @@ const assert = std.debug.assert;
 const Clock = std.Io.Clock;
 const Scene = scene.Scene;
 const StageTimes = statistics.StageTimes;
+const TreeQuality = choices.TreeQuality;
 const World = world.World;
 
-/// How the user chooses a camera.
-pub const CameraChoice = view.CameraChoice;
-
-/// How much care is taken over the tree: the same picture in any case.
-pub const TreeQuality = bvh_input.Quality;
-
-/// What the user may decide.
+/// What the user may decide, and who does the work.
 pub const Settings = struct {
     /// Width of the tree's nodes and triangle blocks: 4, 8 or 16.
     lanes: u8,
-    /// 1..`parallel.thread_count_max`.
-    thread_count: usize,
+    pool: *parallel.Pool,
     tree_quality: TreeQuality = .default,
-    camera: CameraChoice = .default,
+    camera: choices.Camera = .default,
     /// Width and height in pixels, at least 1 each.
     resolution: ?[2]u32 = null,
     /// Radiance from everywhere, at least 0.
@@ -51,7 +46,7 @@ pub const Settings = struct {
 
 /// `CameraUnknown`: no camera has that name or index. `SceneTooLarge`: more than some 2 billion
 /// triangles or vertices.
-pub const Error = error{ OutOfMemory, CameraUnknown, SceneTooLarge };
+pub const Error = error{ OutOfMemory, CameraUnknown, SceneTooLarge } || parallel.Error;
 
 /// Makes the world of a scene, whose memory comes from `gpa` by way of an arena: its few large
 /// arrays are a block of `gpa` each, of which the arena asks for half as much again but touches
@@ -65,7 +60,6 @@ pub fn prepare(
     diagnostic: *Diagnostic,
     times: *StageTimes,
 ) Error!World {
-    assert(settings.thread_count >= 1 and settings.thread_count <= parallel.thread_count_max);
     assert(settings.lanes == 4 or settings.lanes == 8 or settings.lanes == 16);
     const mode = simd.setFlushToZero();
     defer simd.setFloatControl(mode);
@@ -100,7 +94,7 @@ noinline fn placeAll(
     defer posed.deinit(gpa);
     const maps = posed.maps;
     const materials = try material.convertAll(arena, from.materials);
-    const surface = try flatten.flatten(gpa, arena, from, maps, settings.thread_count, diagnostic);
+    const surface = try flatten.flatten(gpa, arena, from, maps, settings.pool, diagnostic);
     const seen = try view.choose(
         gpa,
         from,
@@ -171,7 +165,7 @@ pub noinline fn buildTree(
         .triangles = geometry.triangles,
         .centroid_bounds = geometry.centroid_bounds,
         .padding = geometry.padding,
-        .thread_count = settings.thread_count,
+        .pool = settings.pool,
         .quality = settings.tree_quality,
     };
     const facts = &result.facts.tree;
@@ -218,10 +212,22 @@ const TestScene = struct {
     }
 };
 
-fn testPrepare(from: *const Scene, settings: Settings) !World {
+const TestSettings = struct {
+    lanes: u8,
+    thread_count: usize,
+    tree_quality: TreeQuality = .default,
+};
+
+fn testPrepare(from: *const Scene, settings: TestSettings) !World {
     var diagnostic: Diagnostic = .{};
     var times: StageTimes = .{};
-    return prepare(std.testing.allocator, std.testing.io, from, settings, &diagnostic, &times);
+    var pool: parallel.Pool = .init(settings.thread_count);
+    defer pool.deinit();
+    return prepare(std.testing.allocator, std.testing.io, from, .{
+        .lanes = settings.lanes,
+        .pool = &pool,
+        .tree_quality = settings.tree_quality,
+    }, &diagnostic, &times);
 }
 
 /// Prepares and checks in all widths and qualities and with several thread counts, which must all
@@ -235,7 +241,7 @@ fn testEverywhere(from: *const Scene) !usize {
 }
 
 fn testThreads(from: *const Scene, lanes: u8, quality: TreeQuality) !usize {
-    var settings: Settings = .{ .lanes = lanes, .thread_count = 1, .tree_quality = quality };
+    var settings: TestSettings = .{ .lanes = lanes, .thread_count = 1, .tree_quality = quality };
     var reference = try testPrepare(from, settings);
     defer reference.deinit();
     try check.check(std.testing.allocator, &reference);
@@ -361,7 +367,7 @@ test "more care, less cost" {
     for ([_]u8{ 4, 16 }) |lanes| {
         var costs: std.enums.EnumArray(TreeQuality, f64) = .initFill(0);
         for (std.enums.values(TreeQuality)) |quality| {
-            const settings: Settings = .{
+            const settings: TestSettings = .{
                 .lanes = lanes,
                 .thread_count = 1,
                 .tree_quality = quality,
@@ -558,9 +564,11 @@ test "memory that runs out is an error that leaks nothing" {
         fn one(failing: std.mem.Allocator, scene_from: *const Scene) !void {
             var diagnostic: Diagnostic = .{};
             var times: StageTimes = .{};
+            var pool: parallel.Pool = .init(1);
+            defer pool.deinit();
             const settings: Settings = .{
                 .lanes = 4,
-                .thread_count = 1,
+                .pool = &pool,
                 .tree_quality = .high,
             };
             var result = try prepare(

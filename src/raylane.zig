@@ -7,25 +7,35 @@
 const std = @import("std");
 
 pub const bench = @import("bench.zig");
+pub const builtin = @import("builtin.zig");
+pub const cli = @import("cli.zig");
 pub const diagnostic = @import("diagnostic.zig");
 pub const energy = @import("energy.zig");
 pub const film = @import("film.zig");
 pub const huge_pages = @import("huge_pages.zig");
 pub const identity = @import("identity.zig");
 pub const image = @import("image.zig");
+/// The project's licence and those of what a program is made of.
+pub const licenses = @import("licenses").text;
 pub const math = @import("math.zig");
-pub const options = @import("options.zig");
+pub const memory_account = @import("memory_account.zig");
 pub const output = @import("output.zig");
 pub const parallel = @import("parallel.zig");
 pub const parse = @import("parse.zig");
 pub const prepare = @import("prepare.zig");
 pub const report = @import("report.zig");
 pub const scene = @import("scene.zig");
+pub const session = @import("session.zig");
+pub const settings = @import("settings.zig");
 pub const simd = @import("simd.zig");
 pub const statistics = @import("statistics.zig");
 pub const trace = @import("trace.zig");
 pub const variant = @import("variant.zig");
 pub const world = @import("world.zig");
+
+comptime {
+    @export(&trace.link.panicOfKernel, .{ .name = "rl_kernel_panic" });
+}
 
 test {
     std.testing.refAllDecls(@This());

@@ -1,9 +1,10 @@
 //! What a frame cost, as text for people and as JSON for programs.
 //!
-//! In: plain values that `main` collects from the stages. Out: a few aligned lines, or one JSON
-//! object in one line. Keys of the JSON grow in number but never change their meaning.
+//! In: plain values that the session collects. Out: a few aligned lines, or one JSON object in one
+//! line. Keys of the JSON grow in number but never change their meaning.
 
 const std = @import("std");
+const Stringify = std.json.Stringify;
 const Writer = std.Io.Writer;
 const printable = @import("diagnostic.zig").printable;
 const statistics = @import("statistics.zig");
@@ -11,11 +12,11 @@ const statistics = @import("statistics.zig");
 /// One frame.
 pub const Report = struct {
     /// Of the program.
-    version: []const u8,
+    version: []const u8 = "",
     /// As on the command line.
-    scene: []const u8,
+    scene: []const u8 = "",
     /// Where the image went, as on the command line.
-    output: []const u8,
+    output: []const u8 = "",
     triangle_count: u64,
     width: u32,
     height: u32,
@@ -32,7 +33,7 @@ pub const Report = struct {
     bvh: Bvh,
     memory_peak_bytes: u64,
     image_hash: u64,
-    warnings: []const []const u8,
+    warnings: []const []const u8 = &.{},
 
     /// Facts about the tree.
     pub const Bvh = struct {
@@ -146,89 +147,76 @@ fn writeRate(writer: *Writer, count: u64, time_ns: u64) Writer.Error!void {
 /// Writes the report as one JSON object and a line end.
 pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
     const times = &report.times;
-    try writer.writeAll("{\"version\":");
-    try writeString(writer, report.version);
-    try writer.writeAll(",\"scene\":");
-    try writeString(writer, report.scene);
-    try writer.print(",\"triangles\":{d},\"width\":{d},\"height\":{d},\"samples\":{d}", .{
-        report.triangle_count, report.width, report.height, report.sample_count,
-    });
-    try writer.print(",\"depth\":{d},\"threads\":{d},\"variant\":", .{
-        report.depth, report.thread_count,
-    });
-    try writeString(writer, report.variant);
-    try writer.writeAll(",\"time_ms\":{");
-    inline for (.{
-        .{ "parse", times.parse_ns },
-        .{ "prepare", times.prepare_ns },
-        .{ "bvh_build", times.bvh_build_ns },
-        .{ "trace", times.trace_ns },
-        .{ "output", times.output_ns },
-        .{ "total", times.total_ns },
-    }, 0..) |row, index| {
-        if (index > 0) try writer.writeByte(',');
-        try writer.print("\"" ++ row[0] ++ "\":{d:.6}", .{milliseconds(row[1])});
-    }
-    try writer.writeByte('}');
-    try writer.print(",\"rays\":{{\"primary\":{d},\"shadow\":{d},\"secondary\":{d}}}", .{
-        report.rays.primary, report.rays.shadow, report.rays.secondary,
-    });
-    if (report.tests) |tests| {
-        try writer.print(",\"tests\":{{\"box_issued\":{d},\"box_useful\":{d}", .{
-            tests.box_issued, tests.box_useful,
-        });
-        try writer.print(",\"triangle_issued\":{d},\"triangle_useful\":{d}}}", .{
-            tests.triangle_issued, tests.triangle_useful,
-        });
-    } else {
-        try writer.writeAll(",\"tests\":null");
-    }
-    try writer.print(",\"bvh\":{{\"nodes\":{d},\"depth\":{d},\"sah_cost\":", .{
-        report.bvh.node_count, report.bvh.depth,
-    });
-    // JSON has no infinity, which the cost of a degenerate tree may reach.
-    if (std.math.isFinite(report.bvh.sah_cost)) {
-        try writer.print("{d:.6}", .{report.bvh.sah_cost});
-    } else {
-        try writer.writeAll("null");
-    }
-    try writer.print(",\"bytes\":{d}}},\"memory_peak_bytes\":{d},\"image_hash\":\"{x:0>16}\"", .{
-        report.bvh.bytes, report.memory_peak_bytes, report.image_hash,
-    });
-    try writer.writeAll(",\"warnings\":[");
-    for (report.warnings, 0..) |warning, index| {
-        if (index > 0) try writer.writeByte(',');
-        try writeString(writer, warning);
-    }
-    try writer.writeAll("]}\n");
+    const cost = report.bvh.sah_cost;
+    var hash: [16]u8 = undefined;
+    var hash_writer: Writer = .fixed(&hash);
+    try hash_writer.print("{x:0>16}", .{report.image_hash});
+    try Stringify.value(.{
+        .version = Text{ .bytes = report.version },
+        .scene = Text{ .bytes = report.scene },
+        .triangles = report.triangle_count,
+        .width = report.width,
+        .height = report.height,
+        .samples = report.sample_count,
+        .depth = report.depth,
+        .threads = report.thread_count,
+        .variant = Text{ .bytes = report.variant },
+        .time_ms = .{
+            .parse = milliseconds(times.parse_ns),
+            .prepare = milliseconds(times.prepare_ns),
+            .bvh_build = milliseconds(times.bvh_build_ns),
+            .trace = milliseconds(times.trace_ns),
+            .output = milliseconds(times.output_ns),
+            .total = milliseconds(times.total_ns),
+        },
+        .rays = report.rays,
+        .tests = report.tests,
+        .bvh = .{
+            .nodes = report.bvh.node_count,
+            .depth = report.bvh.depth,
+            // JSON has no infinity, which the cost of a degenerate tree may reach.
+            .sah_cost = if (std.math.isFinite(cost)) cost else null,
+            .bytes = report.bvh.bytes,
+        },
+        .memory_peak_bytes = report.memory_peak_bytes,
+        .image_hash = Text{ .bytes = &hash },
+        .warnings = Texts{ .list = report.warnings },
+    }, .{}, writer);
+    try writer.writeByte('\n');
 }
 
 /// A JSON string. Bytes that are not UTF-8, which a file name may hold, become U+FFFD.
-fn writeString(writer: *Writer, text: []const u8) Writer.Error!void {
-    try writer.writeByte('"');
-    var index: usize = 0;
-    while (index < text.len) {
-        const byte = text[index];
-        switch (byte) {
-            '"', '\\' => try writer.writeAll(&.{ '\\', byte }),
-            0...0x1f, 0x7f => try writer.print("\\u{x:0>4}", .{byte}),
-            else => if (sequenceLength(text[index..])) |length| {
-                try writer.writeAll(text[index..][0..length]);
-                index += length;
-                continue;
-            } else try writer.writeAll("\u{fffd}"),
-        }
-        index += 1;
-    }
-    try writer.writeByte('"');
-}
+const Text = struct {
+    bytes: []const u8,
 
-/// Bytes of the UTF-8 sequence at the start of `text`, or null.
-fn sequenceLength(text: []const u8) ?usize {
-    const length = std.unicode.utf8ByteSequenceLength(text[0]) catch return null;
-    if (length > text.len) return null;
-    return if (std.unicode.utf8ValidateSlice(text[0..length])) length else null;
-}
+    /// Called by `Stringify`.
+    pub fn jsonStringify(text: Text, json: *Stringify) Writer.Error!void {
+        try json.beginWriteRaw();
+        try json.writer.writeByte('"');
+        var rest = text.bytes;
+        while (rest.len > 0) {
+            const length = std.unicode.utf8ByteSequenceLength(rest[0]) catch 1;
+            const sequence = rest[0..@min(length, rest.len)];
+            const is_valid = std.unicode.utf8ValidateSlice(sequence);
+            const shown = if (is_valid) sequence else "\u{fffd}";
+            try Stringify.encodeJsonStringChars(shown, .{}, json.writer);
+            rest = rest[if (is_valid) sequence.len else 1..];
+        }
+        try json.writer.writeByte('"');
+        json.endWriteRaw();
+    }
+};
+
+const Texts = struct {
+    list: []const []const u8,
+
+    /// Called by `Stringify`.
+    pub fn jsonStringify(texts: Texts, json: *Stringify) Writer.Error!void {
+        try json.beginArray();
+        for (texts.list) |bytes| try json.write(Text{ .bytes = bytes });
+        try json.endArray();
+    }
+};
 
 fn milliseconds(time_ns: u64) f64 {
     return float(time_ns) / 1e6;

@@ -10,6 +10,12 @@ const assert = std.debug.assert;
 const AffineD = math.AffineD;
 const Vec3 = math.Vec3;
 
+/// Grows a `Scene`.
+pub const Builder = @import("scene/builder.zig");
+
+/// How points in rows become triangles.
+pub const Grid = @import("scene/grid.zig");
+
 /// Index that stands for "none".
 pub const none: u32 = std.math.maxInt(u32);
 
@@ -34,7 +40,7 @@ pub const Mesh = struct {
     material: u32,
 };
 
-/// One showing of a mesh.
+/// A mesh at a node.
 pub const Instance = struct {
     mesh: u32,
     node: u32,
@@ -174,6 +180,11 @@ pub const Scene = struct {
         assert(scene.camera_default == none or scene.camera_default < scene.cameras.len);
     }
 };
+
+test {
+    _ = Builder;
+    _ = Grid;
+}
 
 test "an empty scene is a scene" {
     var scene: Scene = .init(std.testing.allocator);

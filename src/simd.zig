@@ -3,7 +3,7 @@
 //! In: a comptime backend and lane count. Out: value types with equal surfaces in every backend,
 //! which a comptime check holds; the same bits from every exact operation, on every target, in
 //! threads that called `setFlushToZero`. Inexact ones (`mulAdd`, `minFast`, `maxFast`, those named
-//! `OrNegative`, `isNegative`, the estimates) are for culling only, never for what reaches a pixel.
+//! `OrNegative`, `isNegative`) are for culling only, never for what reaches a pixel.
 //!
 //! Every operation is inline and counts as one evaluated branch: a function with some hundreds of
 //! them starts with `@setEvalBranchQuota`.
@@ -29,12 +29,6 @@ pub const setFloatControl = flush_to_zero.setFloatControl;
 /// Makes denormals zeros in the calling thread; returns the state before.
 pub const setFlushToZero = flush_to_zero.setFlushToZero;
 
-/// Greatest relative error of `reciprocalEstimate` and `reciprocalSqrtEstimate`.
-pub const estimate_error: f32 = 0x1p-20;
-
-/// Magnitudes of operands for which `estimate_error` holds.
-pub const estimate_range: [2]f32 = .{ 0x1p-100, 0x1p100 };
-
 /// The lane types of a backend. One lane is always the scalar backend, so that code for single
 /// values exists once. Asserts (comptime) that `lanes` is 1, 4, 8 or 16, and 4 for intrinsics.
 pub fn Lanes(comptime backend: Backend, comptime lanes: comptime_int) type {
@@ -53,22 +47,6 @@ fn LanesOf(comptime chosen: Backend, comptime lanes: comptime_int) type {
         pub const I32 = Operations.I32x(lanes);
         pub const Mask = Operations.Mask(lanes);
         pub const Vec3 = vec3.Vec3x(F32, Mask);
-
-        /// Rows to columns: lane r of result c is lane c of `rows[r]`. Turns four structures of
-        /// four floats into four lane values. Asserts (comptime) 4 lanes.
-        pub inline fn transpose4x4(rows: [4]F32) [4]F32 {
-            comptime assert(lanes == 4);
-            const even_low = rows[0].interleaveLow(rows[2]);
-            const even_high = rows[0].interleaveHigh(rows[2]);
-            const odd_low = rows[1].interleaveLow(rows[3]);
-            const odd_high = rows[1].interleaveHigh(rows[3]);
-            return .{
-                even_low.interleaveLow(odd_low),
-                even_low.interleaveHigh(odd_low),
-                even_high.interleaveLow(odd_high),
-                even_high.interleaveHigh(odd_high),
-            };
-        }
 
         /// The least lane of every vector, that of `vectors[l]` in lane l, by a third of the
         /// instructions of as many reductions. For culling only, as `minFast`. Asserts (comptime)

@@ -5,16 +5,19 @@
 //! picture is the same bits for every variant, thread count and tile size.
 
 const std = @import("std");
+const choices = @import("settings.zig");
 const world_file = @import("world.zig");
 const variant_file = @import("variant.zig");
-const path = @import("trace/integrate/path.zig");
 const tiles = @import("trace/integrate/tiles.zig");
 const Film = @import("film.zig").Film;
-const Whitted = @import("trace/integrate/whitted.zig").Whitted;
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Frame = world_file.Frame;
 
+/// How kernels are found.
+pub const link = @import("trace/link.zig");
+/// Whitted's ray tracing, by one kernel.
+pub const Whitted = @import("trace/integrate/whitted.zig").Whitted;
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
 pub const kernel = @import("trace/traverse/kernel.zig");
 /// Rays in lanes.
@@ -47,12 +50,19 @@ pub const beam = struct {
     pub const shadow_plane = @import("trace/traverse/beam/shadow_plane.zig");
     pub const shadow_receivers = @import("trace/traverse/beam/shadow_receivers.zig");
 };
+/// What tests of traversal ask of a kernel.
+pub const searches = @import("trace/traverse/searches.zig");
 /// A bundle in the variant's own way.
 pub const dispatch = @import("trace/traverse/dispatch.zig");
 
-/// Bounces at most.
-pub const depth_limit = path.depth_limit;
+/// The searches of a kernel, where the build has kernels show them.
+pub fn searchesOf(comptime Kernel: type) *const searches.Searches(Kernel) {
+    const Face = searches.Searches(Kernel);
+    return @extern(*const Face, .{ .name = link.symbolOf(Face, Kernel.variant, false) });
+}
 
+/// A kernel's face.
+pub const Integrator = tiles.Integrator;
 pub const Settings = tiles.Settings;
 pub const Statistics = tiles.Statistics;
 pub const Error = tiles.Error;
@@ -89,28 +99,31 @@ fn run(
     settings: *const Settings,
 ) Error!Statistics {
     assert(film.image.width == frame.view.width and film.image.height == frame.view.height);
-    assert(settings.sample_count >= 1 and settings.depth_max <= depth_limit);
-    inline for (variant_file.compiled, 0..) |variant, index| {
-        if (index == variant_index) {
-            comptime var chosen = variant;
-            if (counting) chosen.backend = variant_file.counting_backend;
-            const Integrator = Whitted(kernel.Kernel(chosen, counting));
-            return tiles.render(Integrator, gpa, frame, film, settings);
+    assert(settings.sample_count >= 1 and choices.depth.holds(settings.depth_max));
+    const integrators = comptime integrators: {
+        var list: [variant_file.compiled.len]*const Integrator = undefined;
+        for (&list, variant_file.compiled) |*to, held| {
+            const chosen = if (counting) variant_file.countingOf(held) else held;
+            const symbol = link.symbolOf(Integrator, chosen, counting);
+            to.* = @extern(*const Integrator, .{ .name = symbol });
         }
-    }
-    unreachable; // Asserts that the index is one of `compiled`.
+        break :integrators list;
+    };
+    return tiles.render(integrators[variant_index], gpa, frame, film, settings);
 }
 
 test {
+    _ = link;
     _ = kernel;
     _ = ray;
     _ = triangle;
     _ = single;
     _ = traversal_ray;
     _ = stream;
+    _ = @import("trace/traverse/stack.zig");
     _ = bundle;
     _ = dispatch;
-    _ = path;
+    _ = @import("trace/integrate/path.zig");
     _ = tiles;
     _ = @import("trace/traverse/beam/budget.zig");
     _ = @import("trace/traverse/beam/tile_depth_buffer.zig");

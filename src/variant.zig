@@ -1,11 +1,11 @@
 //! What a tracer is made of: the arithmetic backend, the way rays are bundled, and the SIMD width.
 //!
-//! In: the build options (`-Dbackend= -Dtraversal= -Dlanes= -Dvariants=`). Out: the comptime list
-//! of variants that this binary holds, the default one first. Everything from `simd` to `trace` is
-//! generic over a comptime `Variant`; the name is looked up once, at start.
+//! In: the names of the variants that the build chose by `-Dbackend= -Dtraversal= -Dlanes=
+//! -Dvariants=`. Out: the comptime list of variants that this binary holds, the default one first.
+//! Everything from `simd` to `trace` is generic over a comptime `Variant` and compiled by variant
+//! into a kernel (`kernel.zig`); the name is looked up once, at start.
 
 const std = @import("std");
-const builtin = @import("builtin");
 const config = @import("config");
 const assert = std.debug.assert;
 
@@ -39,50 +39,44 @@ pub const Variant = struct {
     }
 };
 
-/// The variant of the build options, the first of `compiled`.
-pub const default: Variant = .{
-    .backend = std.enums.fromInt(Backend, @backingInt(config.backend)).?,
-    .traversal = std.enums.fromInt(Traversal, @backingInt(config.traversal)).?,
-    .lanes = config.lanes,
-};
+/// Every variant in this binary, the default first.
+pub const compiled: []const Variant = listOf(config.variants);
 
-/// Lane counts that a binary with all variants holds: the wide ones pay on x86 only.
-const lane_counts: []const u8 = if (builtin.cpu.arch.isX86()) &.{ 4, 8, 16 } else &.{4};
+/// The variant of the build options.
+pub const default: Variant = compiled[0];
 
-/// Whether a binary with all variants holds this one. Wide scalar loops tell nothing that narrow
-/// ones do not, but take longest to compile; they are built by name (`-Dbackend=scalar -Dlanes=8`).
-fn isInAll(variant: Variant) bool {
-    return variant.isSupported() and (variant.backend != .scalar or variant.lanes == 4);
+/// Whether there are no others.
+pub const are_all = config.are_all;
+
+/// The variant that counts the tests of this one: how many there are depends on the traversal and
+/// the lanes alone.
+pub fn countingOf(comptime variant: Variant) Variant {
+    comptime {
+        for (listOf(config.counting)) |other| {
+            if (other.traversal == variant.traversal and other.lanes == variant.lanes) return other;
+        }
+        unreachable; // Asserts that it is one of `compiled`.
+    }
 }
 
-/// Every variant in this binary, the default first.
-pub const compiled: []const Variant = list: {
-    if (!default.isSupported()) @compileError(
-        "no such variant: " ++ default.name() ++
-            " (lanes are 4, 8 or 16; intrinsics and packet2x2 have 4 lanes only)",
-    );
-    var list: []const Variant = &.{default};
-    if (config.variants == .one) break :list list;
-    for (lane_counts) |lanes| {
-        for (std.enums.values(Backend)) |backend| {
-            for (std.enums.values(Traversal)) |traversal| {
-                const variant: Variant = .{
-                    .backend = backend,
-                    .traversal = traversal,
-                    .lanes = lanes,
-                };
-                if (!isInAll(variant) or std.meta.eql(variant, default)) continue;
-                list = list ++ .{variant};
-            }
+fn listOf(comptime list_names: []const []const u8) []const Variant {
+    comptime {
+        @setEvalBranchQuota(100_000);
+        var list: []const Variant = &.{};
+        for (list_names) |name| {
+            var parts = std.mem.tokenizeScalar(u8, name, '-');
+            const variant: Variant = .{
+                .backend = std.meta.stringToEnum(Backend, parts.next().?).?,
+                .traversal = std.meta.stringToEnum(Traversal, parts.next().?).?,
+                .lanes = std.fmt.parseInt(u8, parts.next().?, 10) catch unreachable,
+            };
+            if (!variant.isSupported()) @compileError("no such variant: " ++ name ++
+                " (lanes are 4, 8 or 16; intrinsics and packet2x2 have 4 lanes only)");
+            list = list ++ .{variant};
         }
+        return list;
     }
-    break :list list;
-};
-
-/// The backend that counts tests: how many there are depends on the traversal and the lanes alone,
-/// so one backend counts for all where all are there.
-pub const counting_backend: Backend =
-    if (config.variants == .one) default.backend else .vector;
+}
 
 /// Names of `compiled`, in the same order.
 pub const names: []const []const u8 = list: {

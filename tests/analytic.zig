@@ -22,7 +22,7 @@ test "a plane lit from the eye: albedo / pi, cosine, inverse square" {
     try builder.addQuad(fixture.matte(.{ 0.5, 0.25, 1 }), .{ 0, 0, 0 }, .{ 9, 0, 0 }, .{ 0, 9, 0 });
     try builder.addCamera(.{ 0, 0, 3 }, 1);
     try builder.addPointLight(.{ 0, 0, 3 }, 20);
-    var scene = builder.finish();
+    var scene = try builder.finish();
     defer scene.deinit();
     var image = try fixture.render(&scene, .{ .width = 33, .height = 33 });
     defer image.deinit(gpa);
@@ -46,7 +46,7 @@ test "a sphere covers the disc that it should, with smooth shading" {
     try builder.addSphere(fixture.matte(.{ 1, 1, 1 }), .{ 0, 0, -5 }, 2, 48);
     try builder.addCamera(.{ 0, 0, 0 }, 0.5);
     try builder.addPointLight(.{ 0, 0, 0 }, 9);
-    var scene = builder.finish();
+    var scene = try builder.finish();
     defer scene.deinit();
     var image = try fixture.render(&scene, .{ .width = 64, .height = 64 });
     defer image.deinit(gpa);
@@ -82,7 +82,7 @@ test "a flat mirror shows the mirrored scene" {
     try builder.addQuad(red, .{ -50, 0, 5 }, .{ 0, 50, 0 }, .{ 50, 0, 0 });
     try builder.addQuad(green, .{ 50, 0, 5 }, .{ 0, 50, 0 }, .{ 50, 0, 0 });
     try builder.addCamera(.{ 0, 0, 0 }, 1);
-    var scene = builder.finish();
+    var scene = try builder.finish();
     defer scene.deinit();
     var image = try fixture.render(&scene, .{ .ambient = 0 });
     defer image.deinit(gpa);
@@ -170,7 +170,7 @@ test "a shadow falls where the light is hidden, and colours behind glass" {
     try builder.addPointLight(.{ 0, 0, 0 }, 1000);
     // Seen from between the panes and the wall.
     try builder.addCamera(.{ 0, 0, -6 }, 2);
-    var scene = builder.finish();
+    var scene = try builder.finish();
     defer scene.deinit();
     const size = 160;
     var image = try fixture.render(&scene, .{ .width = size, .height = size });
@@ -214,7 +214,7 @@ test "closed furnace: walls of radiance 1 around black things look the same ever
     try builder.addSphere(chrome, .{ 0.3, 0.2, -1 }, 0.4, 16);
     try builder.addCamera(.{ 0, 0, 1.5 }, 2);
     try builder.addPointLight(.{ 0, 1, 1 }, 0);
-    var scene = builder.finish();
+    var scene = try builder.finish();
     defer scene.deinit();
     // The mirrored sphere shows the room or itself; at the last bounce what is black would end.
     var image = try fixture.render(&scene, .{ .ambient = 1, .width = 64, .height = 64 });
@@ -250,7 +250,7 @@ test "open furnace: in ambient light of radiance 1 whatever absorbs nothing cann
         try builder.addCamera(.{ 0, 0, 0 }, 0.5);
         // A light of no strength keeps the default rig away.
         try builder.addPointLight(.{ 0, 0, 0 }, 0);
-        var scene = builder.finish();
+        var scene = try builder.finish();
         defer scene.deinit();
         var image = try fixture.render(&scene, .{
             .ambient = 1,
@@ -269,7 +269,7 @@ test "vertex alpha makes no hole in what is opaque" {
     var builder: Builder = try .init();
     try builder.addQuad(fixture.flat(.{ 1, 1, 1 }), .{ 0, 0, -2 }, .{ 9, 0, 0 }, .{ 0, 9, 0 });
     try builder.addCamera(.{ 0, 0, 0 }, 1);
-    var scene = builder.finish();
+    var scene = try builder.finish();
     defer scene.deinit();
     const colors: [6][4]f32 = @splat(.{ 1, 1, 1, -2 });
     var meshes = [_]raylane.scene.Mesh{scene.meshes[0]};
@@ -296,7 +296,7 @@ test "a hole shows what is behind it, a culled back too, and transparency leaves
     // Twice the same place: the lower number comes first, and each counts once.
     try builder.addQuad(veil, .{ 0, 0, -4 }, .{ 9, 0, 0 }, .{ 0, 9, 0 });
     try builder.addCamera(.{ 0, 0, 0 }, 1);
-    var scene = builder.finish();
+    var scene = try builder.finish();
     defer scene.deinit();
     var image = try fixture.render(&scene, .{ .background = .{ 0, 0, 1 } });
     defer image.deinit(gpa);

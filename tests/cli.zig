@@ -1,8 +1,9 @@
 //! Tests of the command line: the real program, in a fresh folder, under qemu where it is foreign.
 //!
-//! In: the environment, RAYLANE_PROGRAM (the program's path) and RAYLANE_EMULATOR (what runs it,
-//! with its arguments, if anything does), as build/tests.zig sets them. Each test opens a `Sandbox`
-//! and looks at exit codes, at both output streams and at the files left behind.
+//! In: the environment, RAYLANE_PROGRAM (the program's path), RAYLANE_OPTIMIZE (its mode) and
+//! RAYLANE_EMULATOR (what runs it, with its arguments, if anything does), as build/tests.zig sets
+//! them. Each test opens a `Sandbox` and looks at exit codes, at both output streams and at the
+//! files left behind.
 
 const std = @import("std");
 const Io = std.Io;
@@ -221,6 +222,23 @@ test "--version prints one line to stdout" {
     try testing.expectEqualStrings("", ending.stderr);
 }
 
+test "--licenses prints the project's licence and those of all libraries" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const ending = try sandbox.expectExit(0, &.{"--licenses"});
+    try testing.expectEqualStrings("", ending.stderr);
+    try testing.expectStringStartsWith(ending.stdout, "MIT License\n");
+    for ([_][]const u8{
+        "The Raylane authors", "\ncgltf ",             "Johannes Kuhlmann", "Serge A. Zaitsev",
+        "\nlibdeflate ",       "Eric Biggers",         "Google LLC",        "\nstb_image_write ",
+        "Sean Barrett",        "\nmusl as a whole is", "Rich Felker",
+    }) |part| {
+        errdefer std.debug.print("{s}\n", .{part});
+        try testing.expect(std.mem.find(u8, ending.stdout, part) != null);
+    }
+    try sandbox.expectEmpty();
+}
+
 test "an unknown flag is a usage error" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
@@ -237,7 +255,10 @@ test "mistakes on the command line are usage errors in one line" {
         &.{},
         &.{"render"},
         &.{ "builtin:cornell", "builtin:cornell" },
-        &.{ "builtin:cornell", "-o", "a.jpg" },
+        &.{ "builtin:cornell", "-o", "a.tif" },
+        &.{ "builtin:cornell", "--jpeg-quality=0" },
+        &.{ "builtin:cornell", "--jpeg-quality=101" },
+        &.{ "builtin:cornell", "--max-memory=much" },
         &.{ "builtin:cornell", "-o" },
         &.{ "builtin:cornell", "-r", "0x1" },
         &.{ "builtin:cornell", "--threads=0" },
@@ -404,6 +425,43 @@ test "-o - puts the image and nothing else on stdout" {
     try testing.expectStringStartsWith(ppm.stdout, "P6\n8 8\n255\n");
     try testing.expectEqual(11 + 8 * 8 * 3, ppm.stdout.len);
     try testing.expectEqual(8, (try statsOf(&sandbox, ppm.stderr)).width);
+    try sandbox.expectEmpty();
+}
+
+test "every format by its name or by --format, JPEG smaller with less quality" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    for ([_][2][]const u8{
+        .{ "a.png", "\x89PNG" },    .{ "a.jpg", "\xff\xd8\xff" }, .{ "b.jpeg", "\xff\xd8\xff" },
+        .{ "a.bmp", "BM" },         .{ "a.hdr", "#?RADIANCE\n" }, .{ "a.ppm", "P6\n16 9\n" },
+        .{ "a.pfm", "PF\n16 9\n" }, .{ "a.tga", "\x00\x00\x0a" },
+    }) |case| {
+        errdefer std.debug.print("{s}\n", .{case[0]});
+        _ = try sandbox.expectExit(0, &.{ "builtin:cornell", "-r16x9", "-q", "-o", case[0] });
+        try testing.expectStringStartsWith(try sandbox.read(case[0]), case[1]);
+        try sandbox.folder.dir.deleteFile(io, case[0]);
+    }
+    const to_stdout = [_][]const u8{ "builtin:cornell", "-r64x64", "-o-", "--format=jpeg" };
+    const usual = try sandbox.expectExit(0, &to_stdout);
+    const ninety = try sandbox.expectExit(0, &(to_stdout ++ .{"--jpeg-quality=90"}));
+    try testing.expectEqualSlices(u8, usual.stdout, ninety.stdout);
+    const poor = try sandbox.expectExit(0, &(to_stdout ++ .{"--jpeg-quality=10"}));
+    try testing.expect(poor.stdout.len < usual.stdout.len / 2);
+    _ = try sandbox.expectExit(0, &.{ "builtin:cornell", "-r8x8", "-q", "--format=jpg" });
+    try sandbox.expectFiles(&.{"cornell.jpg"});
+}
+
+test "a picture that the format cannot hold is an error before it is rendered" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    // Enough samples for an hour.
+    const ending = try sandbox.expectExit(1, &.{
+        "builtin:cornell", "-r65536x16", "--spp=4096", "-o", "a.jpg",
+    });
+    try testing.expectEqualStrings(
+        "raylane: a.jpg: a jpg file has 65535 pixels on a side at most\n",
+        ending.stderr,
+    );
     try sandbox.expectEmpty();
 }
 
@@ -576,6 +634,40 @@ test "closed standard files do not turn the image into a log" {
     try testing.expectEqualSlices(u8, "P6\n1 1\n255\n\x00\x00\x00", try sandbox.read("a.ppm"));
 }
 
+test "--max-memory is kept to in every stage, or is an error in one line" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("empty.gltf", empty_scene);
+    // Memory runs out while a scene is read, while it is prepared, before the picture, after it.
+    for ([_]struct { []const u8, []const u8, []const []const u8, []const u8 }{
+        .{ "builtin:atrium", "-r64x64", &.{ "1", "300K", "1M", "4M", "8M", "14M" }, "256M" },
+        .{ "empty.gltf", "-r1024x1024", &.{ "1M", "16M", "18M", "21M", "23M" }, "64M" },
+    }) |case| {
+        const arguments = [_][]const u8{ case[0], case[1], "-t2", "-q", "-o", "a.png" };
+        for (case[2]) |limit| {
+            errdefer std.debug.print("{s} {s}\n", .{ case[0], limit });
+            const ending = try sandbox.expectExit(1, &(arguments ++ .{ "--max-memory", limit }));
+            try expectOneErrorLine(ending);
+            const count = std.mem.trimEnd(u8, limit, "KM");
+            const unit = limit[count.len..];
+            const expected = try sandbox.arena_state.allocator().print("than the {s} {s}{s} of", .{
+                count, unit, if (unit.len == 0) "bytes" else "iB",
+            });
+            try testing.expect(std.mem.find(u8, ending.stderr, expected) != null);
+            try sandbox.expectFiles(&.{"empty.gltf"});
+        }
+        _ = try sandbox.expectExit(0, &(arguments ++ .{ "--max-memory", case[3] }));
+        const within = try sandbox.read("a.png");
+        _ = try sandbox.expectExit(0, &arguments);
+        try testing.expectEqualSlices(u8, try sandbox.read("a.png"), within);
+        try sandbox.folder.dir.deleteFile(io, "a.png");
+    }
+    const before = try sandbox.run(&.{ "empty.gltf", "-r1024x1024", "--max-memory=8M", "-q" });
+    try testing.expect(std.mem.find(u8, before.stderr, ", 16 MiB more asked for)") != null);
+    const after = try sandbox.run(&.{ "empty.gltf", "-r1024x1024", "--max-memory=18M", "-q" });
+    try testing.expect(std.mem.find(u8, after.stderr, ", 3 MiB more asked for)") != null);
+}
+
 test "exhausted memory is an error in one line" {
     // An emulator needs the address space itself.
     if (testing.environ.getPosix("RAYLANE_EMULATOR") != null) return error.SkipZigTest;
@@ -589,6 +681,35 @@ test "exhausted memory is an error in one line" {
     try expectOneErrorLine(ending);
     try testing.expect(std.mem.find(u8, ending.stderr, "out of memory") != null);
     try sandbox.expectEmpty();
+}
+
+test "a small stack is enough for every command" {
+    // Unoptimised code gives each value a place of its own.
+    const mode = testing.environ.getPosix("RAYLANE_OPTIMIZE") orelse return error.ModeNotNamed;
+    const limit_kib: u32 = if (std.mem.eql(u8, mode, "debug")) 2048 else 256;
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const arena = sandbox.arena_state.allocator();
+    // An emulator needs the limit for itself, and has another for the program.
+    const script = if (testing.environ.getPosix("RAYLANE_EMULATOR") != null)
+        try arena.print("QEMU_STACK_SIZE={d} exec \"$@\"", .{limit_kib << 10})
+    else
+        try arena.print("ulimit -s {d}; exec \"$@\"", .{limit_kib});
+    try sandbox.write("empty.gltf", empty_scene);
+    const variant = try firstVariant(&sandbox);
+    for ([_][]const []const u8{
+        &.{"--help"},
+        &.{"--list-variants"},
+        &.{ "empty.gltf", "-r1x1" },
+        // Mirrors, glass and shadows through it, by the caller's thread and by another.
+        &.{ "builtin:cornell", "-r64x64", "-t1", "--bvh=high", "--count-tests" },
+        &.{ "builtin:cornell", "-r64x64", "-t2" },
+        &.{ "bench", "builtin:cornell", "-r16x16", "-q", "--no-energy", "--rounds=2", variant },
+    }) |arguments| {
+        const ending = try sandbox.runShell(script, arguments);
+        errdefer std.debug.print("{s}: {s}\n", .{ arguments[0], ending.stderr });
+        try testing.expectEqual(0, ending.exit_code);
+    }
 }
 
 /// Starts a render that does not end by itself, by a script as `runShell` takes it, and waits until

@@ -8,36 +8,24 @@ const raylane = @import("raylane");
 const Affine = raylane.math.Affine;
 const Scene = raylane.scene.Scene;
 const Image = raylane.image.Image;
+const Session = raylane.session.Session;
 const World = raylane.world.World;
 const vec3 = raylane.math.vec3;
 const gpa = std.testing.allocator;
 
-/// A scene under construction.
+/// A scene of simple things; node 0 is the world's origin.
 pub const Builder = struct {
-    scene: Scene,
-    nodes: std.ArrayList(raylane.scene.Node) = .empty,
-    meshes: std.ArrayList(raylane.scene.Mesh) = .empty,
-    instances: std.ArrayList(raylane.scene.Instance) = .empty,
-    materials: std.ArrayList(raylane.scene.Material) = .empty,
-    lights: std.ArrayList(raylane.scene.Light) = .empty,
-    cameras: std.ArrayList(raylane.scene.Camera) = .empty,
+    scene: raylane.scene.Builder,
 
-    /// Node 0 is the world's origin.
     pub fn init() !Builder {
         var builder: Builder = .{ .scene = .init(gpa) };
         _ = try builder.addNode(.identity);
         return builder;
     }
 
-    fn arena(builder: *Builder) std.mem.Allocator {
-        return builder.scene.arena.allocator();
-    }
-
     /// A root node.
     pub fn addNode(builder: *Builder, local: Affine) !u32 {
-        const parent = raylane.scene.none;
-        try builder.nodes.append(builder.arena(), .{ .parent = parent, .local = .of(local) });
-        return @intCast(builder.nodes.items.len - 1);
+        return builder.scene.addNode(raylane.scene.none, .of(local));
     }
 
     /// Triangles with flat faces, or with the given normals.
@@ -48,16 +36,14 @@ pub const Builder = struct {
         normals: ?[]const [3]f32,
         triangles: []const [3]u32,
     ) !void {
-        const allocator = builder.arena();
-        try builder.materials.append(allocator, material);
-        try builder.meshes.append(allocator, .{
-            .positions = try allocator.dupe([3]f32, positions),
-            .normals = if (normals) |n| try allocator.dupe([3]f32, n) else null,
-            .triangles = try allocator.dupe([3]u32, triangles),
-            .material = @intCast(builder.materials.items.len - 1),
+        const arena = builder.scene.arena();
+        const mesh = try builder.scene.addMesh(.{
+            .positions = try arena.dupe([3]f32, positions),
+            .normals = if (normals) |n| try arena.dupe([3]f32, n) else null,
+            .triangles = try arena.dupe([3]u32, triangles),
+            .material = try builder.scene.addMaterial(material),
         });
-        const mesh: u32 = @intCast(builder.meshes.items.len - 1);
-        try builder.instances.append(allocator, .{ .mesh = mesh, .node = 0 });
+        try builder.scene.addInstance(mesh, 0);
     }
 
     /// The parallelogram center +- across +- upward; its front is across x upward.
@@ -88,7 +74,7 @@ pub const Builder = struct {
         const ring_count = rows - 1;
         var normals: [ring_count * columns + 2][3]f32 = undefined;
         var triangles: std.ArrayList([3]u32) = .empty;
-        const allocator = builder.arena();
+        const arena = builder.scene.arena();
         const elementary = raylane.math.elementary;
         for (0..ring_count) |ring| for (0..columns) |column| {
             const polar = std.math.pi * @as(f64, @floatFromInt(ring + 1)) / rows;
@@ -106,14 +92,14 @@ pub const Builder = struct {
         for (0..columns) |column_index| {
             const column: u32 = @intCast(column_index);
             const next = (column + 1) % columns;
-            try triangles.append(allocator, .{ north, column, next });
+            try triangles.append(arena, .{ north, column, next });
             const last = (ring_count - 1) * columns;
-            try triangles.append(allocator, .{ south, last + next, last + column });
+            try triangles.append(arena, .{ south, last + next, last + column });
             for (0..ring_count - 1) |ring_index| {
                 const upper: u32 = @intCast(ring_index * columns);
                 const lower = upper + columns;
-                try triangles.append(allocator, .{ upper + column, lower + column, lower + next });
-                try triangles.append(allocator, .{ upper + column, lower + next, upper + next });
+                try triangles.append(arena, .{ upper + column, lower + column, lower + next });
+                try triangles.append(arena, .{ upper + column, lower + next, upper + next });
             }
         }
         var positions: [normals.len][3]f32 = undefined;
@@ -125,24 +111,15 @@ pub const Builder = struct {
 
     /// A point light.
     pub fn addPointLight(builder: *Builder, position: [3]f32, intensity: f32) !void {
-        var map: Affine = .identity;
-        map.translation = position;
-        const node = try builder.addNode(map);
-        try builder.lights.append(builder.arena(), .{
-            .kind = .point,
-            .node = node,
-            .intensity = intensity,
-        });
+        const node = try builder.addNode(.translate(position));
+        try builder.scene.addLight(.{ .kind = .point, .node = node, .intensity = intensity });
     }
 
     /// A camera at `eye` that looks along -z with a vertical angle of 2 atan(`half_height`).
     pub fn addCamera(builder: *Builder, eye: [3]f32, half_height: f32) !void {
-        var map: Affine = .identity;
-        map.translation = eye;
-        const node = try builder.addNode(map);
-        try builder.cameras.append(builder.arena(), .{
+        try builder.scene.addCamera(.{
             .name = "",
-            .node = node,
+            .node = try builder.addNode(.translate(eye)),
             .projection = .{ .perspective = .{
                 .y_fov_rad = 2 * std.math.atan(half_height),
                 .aspect = null,
@@ -151,16 +128,10 @@ pub const Builder = struct {
     }
 
     /// The scene, checked; the builder is used up.
-    pub fn finish(builder: *Builder) Scene {
-        builder.scene.nodes = builder.nodes.items;
-        builder.scene.meshes = builder.meshes.items;
-        builder.scene.instances = builder.instances.items;
-        builder.scene.materials = builder.materials.items;
-        builder.scene.lights = builder.lights.items;
-        builder.scene.cameras = builder.cameras.items;
-        if (builder.cameras.items.len > 0) builder.scene.camera_default = 0;
-        builder.scene.check();
-        return builder.scene;
+    pub fn finish(builder: *Builder) !Scene {
+        const scene = try builder.scene.finish();
+        scene.check();
+        return scene;
     }
 };
 
@@ -172,7 +143,7 @@ pub const Options = struct {
     sample_count: u32 = 1,
     tile_size: u32 = 16,
     thread_count: usize = 1,
-    tree_quality: raylane.prepare.TreeQuality = .default,
+    tree_quality: raylane.settings.TreeQuality = .default,
     ambient: ?f32 = null,
     background: ?[3]f32 = null,
     transparent: bool = false,
@@ -183,42 +154,53 @@ pub const Options = struct {
 /// The world of a scene in the given width of tree.
 pub fn prepare(scene: *const Scene, lanes: u8, options: Options) !World {
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
-    var times: raylane.statistics.StageTimes = .{};
+    var session: Session = .init(gpa, std.testing.io, options.thread_count, &diagnostic);
+    defer session.deinit();
+    try view(&session, scene, lanes, options);
+    defer session.world = null; // The caller's now.
+    return session.world.?;
+}
+
+/// Makes a session ready to trace a scene by variants of the given width of tree.
+pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options) !void {
     const mode = raylane.simd.setFlushToZero();
     defer raylane.simd.setFloatControl(mode);
-    return raylane.prepare.prepare(gpa, std.testing.io, scene, .{
-        .lanes = lanes,
-        .thread_count = options.thread_count,
-        .tree_quality = options.tree_quality,
+    session.adopt(scene.*, .borrowed);
+    try session.pose(.{ .lanes = lanes, .tree_quality = options.tree_quality });
+    try session.view(.{
         .resolution = .{ options.width, options.height },
         .ambient = options.ambient,
-        .background = options.background,
-    }, &diagnostic, &times);
+        .background = if (options.transparent)
+            .transparent
+        else if (options.background) |color| .{ .linear = color } else .default,
+    });
+}
+
+/// Traces what a session sees. The image is the session's.
+pub fn trace(session: *Session, options: Options) !*Image {
+    const layers: raylane.film.Layers = .init(.{ .color = true });
+    if (session.film == null)
+        session.film = try .init(gpa, options.width, options.height, layers);
+    // Every pixel must be written.
+    @memset(session.film.?.image.pixels, @splat(std.math.nan(f32)));
+    try session.render(.{
+        .variant = options.variant,
+        .sample_count = options.sample_count,
+        .depth = options.depth_max,
+        .tile_size = options.tile_size,
+    });
+    try std.testing.expectEqual(0, session.traced.non_finite_count);
+    return &session.film.?.image;
 }
 
 /// The picture of a scene.
 pub fn render(scene: *const Scene, options: Options) !Image {
-    const lanes = raylane.variant.compiled[options.variant].lanes;
-    var world = try prepare(scene, lanes, options);
-    defer world.deinit();
-    return renderWorld(&world, options);
-}
-
-/// The picture of a world that has the variant's width of tree.
-pub fn renderWorld(world: *const World, options: Options) !Image {
-    const layers: raylane.film.Layers = .init(.{ .color = true, .alpha = options.transparent });
-    var film: raylane.film.Film = try .init(gpa, world.view.width, world.view.height, layers);
-    errdefer film.deinit(gpa);
-    // Every pixel must be written.
-    @memset(film.image.pixels, @splat(std.math.nan(f32)));
-    const traced = try raylane.trace.trace(gpa, options.variant, &world.frame(), &film, .{
-        .thread_count = options.thread_count,
-        .sample_count = options.sample_count,
-        .depth_max = options.depth_max,
-        .tile_size = options.tile_size,
-    });
-    try std.testing.expectEqual(0, traced.non_finite_count);
-    return film.image;
+    var diagnostic: raylane.diagnostic.Diagnostic = .{};
+    var session: Session = .init(gpa, std.testing.io, options.thread_count, &diagnostic);
+    defer session.deinit();
+    try view(&session, scene, raylane.variant.compiled[options.variant].lanes, options);
+    defer session.film = null; // The caller's now.
+    return (try trace(&session, options)).*;
 }
 
 /// A material without reflection, lit or shining by itself only.
@@ -242,7 +224,7 @@ pub fn flat(color: [3]f32) raylane.scene.Material {
 test "a sphere is closed and faces outward" {
     var builder: Builder = try .init();
     try builder.addSphere(matte(.{ 1, 1, 1 }), .{ 0, 0, 0 }, 1, 6);
-    var scene = builder.finish();
+    var scene = try builder.finish();
     defer scene.deinit();
     const mesh = scene.meshes[0];
     try std.testing.expectEqual(2 * 12 * 5, mesh.triangles.len);

@@ -708,7 +708,7 @@ test "buffers beside the scene, inside its folder and outside" {
         const text = try replace(document, uri, case[0]);
         defer gpa.free(text);
         var said: Diagnostic = .{};
-        const settings: parse.Settings = .{ .allow_outside = case[1] };
+        const settings: raylane.settings.Load = .{ .allow_outside = case[1] };
         if (parse.parseBytes(gpa, io, text, inner, settings, &said)) |parsed| {
             var scene = parsed;
             scene.deinit();

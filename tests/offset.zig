@@ -89,7 +89,7 @@ const Frame = struct {
 
     fn addCamera(frame: *const Frame, builder: *Builder, from: [3]f32, half_height: f32) !void {
         const node = try frame.addView(builder, from, .{ 0, 0, 0 });
-        try builder.cameras.append(builder.scene.arena.allocator(), .{
+        try builder.scene.addCamera(.{
             .name = "",
             .node = node,
             .projection = .{ .perspective = .{
@@ -118,13 +118,13 @@ test "a plane in pieces, twice in the same place, does not shadow itself" {
         const from = vec3.scale(.{ @cos(turn), @sin(turn), height }, distance);
         const node = try frame.addView(&builder, from, .{ 0, 0, 0 });
         const is_parallel = round % 4 < 2;
-        try builder.lights.append(builder.scene.arena.allocator(), .{
+        try builder.scene.addLight(.{
             .kind = if (is_parallel) .directional else .point,
             .node = node,
             .intensity = if (is_parallel) 1 else unit * unit * distance * distance,
         });
         try frame.addCamera(&builder, .{ 0.1, -0.7, 1.5 }, 0.3);
-        var scene = builder.finish();
+        var scene = try builder.finish();
         defer scene.deinit();
         var image = try fixture.render(&scene, .{ .width = 24, .height = 24 });
         defer image.deinit(gpa);
@@ -164,7 +164,7 @@ test "a room is closed wherever it stands and however large it is" {
             try builder.addSphere(chrome, frame.point(.{ 0.3, 0.2, -1 }), 0.4 * unit, 16);
             try builder.addCamera(frame.point(.{ 0, 0, 1.5 }), 2);
             try builder.addPointLight(frame.point(.{ 0, 1, 1 }), 0);
-            var scene = builder.finish();
+            var scene = try builder.finish();
             defer scene.deinit();
             var image = try fixture.render(&scene, .{ .width = 48, .height = 48, .ambient = 1 });
             defer image.deinit(gpa);
@@ -192,8 +192,7 @@ fn cardScene(far_m: f32) !raylane.scene.Scene {
     try addFarTriangle(&builder, far_m);
     const tilted = [4]f32{ 0, -0.5, 0, 0.8660254 };
     const node = try builder.addNode(.fromTrs(.{ 0, 0, 0 }, tilted, .{ 1, 1, 1 }));
-    const arena = builder.scene.arena.allocator();
-    try builder.lights.append(arena, .{ .kind = .directional, .node = node, .intensity = 1 });
+    try builder.scene.addLight(.{ .kind = .directional, .node = node, .intensity = 1 });
     try builder.addCamera(.{ 0, 0, 0.6 }, 1e-4);
     return builder.finish();
 }

@@ -3,56 +3,64 @@
 
 const std = @import("std");
 const raylane = @import("raylane");
-const stb_image = @import("stb_image");
+const stb_image = @import("stb_image.zig");
 const testing = std.testing;
 const Image = raylane.image.Image;
 const srgb = raylane.math.srgb;
 
-/// A decoded picture; freed by `deinit`.
-const Decoded = struct {
-    width: usize,
-    height: usize,
-    channel_count: usize,
-    pixels: []u8,
+/// A decoded picture of bytes or floats; freed by `deinit`.
+fn Decoded(comptime Channel: type) type {
+    return struct {
+        width: usize,
+        height: usize,
+        channel_count: usize,
+        pixels: []Channel,
 
-    fn init(file: []const u8) !Decoded {
-        var width: c_int = 0;
-        var height: c_int = 0;
-        var channels: c_int = 0;
-        const pixels = stb_image.stbi_load_from_memory(
-            file.ptr,
-            @intCast(file.len),
-            &width,
-            &height,
-            &channels,
-            0,
-        );
-        if (pixels == null) return error.NotDecoded;
-        var decoded: Decoded = .{
-            .width = @intCast(width),
-            .height = @intCast(height),
-            .channel_count = @intCast(channels),
-            .pixels = undefined,
-        };
-        decoded.pixels = pixels[0 .. decoded.width * decoded.height * decoded.channel_count];
-        return decoded;
-    }
+        fn init(file: []const u8) !@This() {
+            var width: c_int = 0;
+            var height: c_int = 0;
+            var channels: c_int = 0;
+            const load = switch (Channel) {
+                u8 => stb_image.stbi_load_from_memory,
+                f32 => stb_image.stbi_loadf_from_memory,
+                else => comptime unreachable,
+            };
+            const length: c_int = @intCast(file.len);
+            const pixels = load(file.ptr, length, &width, &height, &channels, 0) orelse
+                return error.NotDecoded;
+            const count: usize = @intCast(width * height * channels);
+            return .{
+                .width = @intCast(width),
+                .height = @intCast(height),
+                .channel_count = @intCast(channels),
+                .pixels = pixels[0..count],
+            };
+        }
 
-    fn deinit(decoded: *Decoded) void {
-        stb_image.stbi_image_free(decoded.pixels.ptr);
-        decoded.* = undefined;
-    }
+        fn deinit(decoded: *@This()) void {
+            stb_image.stbi_image_free(decoded.pixels.ptr);
+            decoded.* = undefined;
+        }
+    };
+}
+
+const Settings = struct {
+    format: raylane.settings.Format = .png,
+    exposure: raylane.settings.Exposure = .{ .ev = 0 },
+    transparent: bool = false,
+    jpeg_quality: u8 = raylane.settings.jpeg_quality.default,
+    thread_count: usize = 1,
 };
 
-/// Writes the image as a PNG and decodes it.
-fn roundTrip(image: *const Image, settings: raylane.output.Settings) !Decoded {
+/// Writes the image and decodes it.
+fn roundTrip(image: *const Image, settings: Settings) !Decoded(u8) {
     const file = try written(image, settings);
     defer testing.allocator.free(file);
     return .init(file);
 }
 
 /// The file that the image becomes; the caller frees it.
-fn written(image: *const Image, settings: raylane.output.Settings) ![]u8 {
+fn written(image: *const Image, settings: Settings) ![]u8 {
     const gpa = testing.allocator;
     const io = testing.io;
     var folder = testing.tmpDir(.{});
@@ -65,7 +73,15 @@ fn written(image: *const Image, settings: raylane.output.Settings) ![]u8 {
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
     var temporaries: raylane.output.TemporaryFiles = .{};
     var target: raylane.output.Target = try .openFile(io, &temporaries, path, &diagnostic);
-    try raylane.output.write(gpa, image, settings, &target, &diagnostic);
+    var pool: raylane.parallel.Pool = .init(settings.thread_count);
+    defer pool.deinit();
+    try raylane.output.write(gpa, image, .{
+        .format = settings.format,
+        .exposure = settings.exposure,
+        .transparent = settings.transparent,
+        .jpeg_quality = settings.jpeg_quality,
+        .pool = &pool,
+    }, &target, &diagnostic);
     return folder.dir.readFileAlloc(io, "a.png", gpa, .unlimited);
 }
 
@@ -85,14 +101,21 @@ fn testImage(gpa: std.mem.Allocator, width: u32, height: u32) !Image {
     return image;
 }
 
-test "an opaque PNG holds the encoded colours" {
-    const sizes = [_][2]u32{
-        .{ 1, 1 }, .{ 1, 300 }, .{ 300, 1 }, .{ 65, 33 }, .{ 257, 191 }, .{ 30_000, 3 },
-    };
-    for (sizes) |size| {
+const odd_sizes = [_][2]u32{
+    .{ 1, 1 }, .{ 1, 300 }, .{ 300, 1 }, .{ 65, 33 }, .{ 257, 191 }, .{ 30_000, 3 },
+};
+
+test "PNG, TGA and BMP hold the encoded colours" {
+    for (odd_sizes) |size| for ([_]raylane.settings.Format{ .png, .tga, .bmp }) |format| {
+        errdefer std.debug.print("{t} {d}x{d}\n", .{ format, size[0], size[1] });
         var image = try testImage(testing.allocator, size[0], size[1]);
         defer image.deinit(testing.allocator);
-        var decoded = try roundTrip(&image, .{ .exposure = .{ .ev = 1 } });
+        var decoded = try roundTrip(&image, .{
+            .format = format,
+            .exposure = .{ .ev = 1 },
+            // Alpha is left out where the format has none.
+            .transparent = format == .bmp,
+        });
         defer decoded.deinit();
         try testing.expectEqual(size[0], decoded.width);
         try testing.expectEqual(size[1], decoded.height);
@@ -103,13 +126,160 @@ test "an opaque PNG holds the encoded colours" {
                 try testing.expectEqual(expected, decoded.pixels[index * 3 + channel]);
             }
         }
+    };
+}
+
+test "JPEG comes near to the colours, nearer with more quality" {
+    for (odd_sizes) |size| {
+        var image: Image = try .init(testing.allocator, size[0], size[1]);
+        defer image.deinit(testing.allocator);
+        // Gradients, which a JPEG can hold.
+        for (image.pixels, 0..) |*pixel, index| {
+            const x: f32 = @floatFromInt(index % size[0]);
+            const y: f32 = @floatFromInt(index / size[0]);
+            pixel.* = .{ x / 1000, y / 1000, (x + y) / 2000, 0.5 };
+            for (pixel[0..3]) |*value| value.* -= @floor(value.*);
+        }
+        var errors: [3]f64 = @splat(0);
+        for (&errors, [_]u8{ 1, 90, 100 }) |*sum, quality| {
+            var decoded = try roundTrip(&image, .{
+                .format = .jpg,
+                .jpeg_quality = quality,
+                .transparent = true,
+            });
+            defer decoded.deinit();
+            try testing.expectEqual([3]usize{ size[0], size[1], 3 }, [3]usize{
+                decoded.width, decoded.height, decoded.channel_count,
+            });
+            for (image.pixels, 0..) |pixel, index| for (0..3) |channel| {
+                const expected: f64 = @floatFromInt(srgb.encode(pixel[channel]));
+                const found: f64 = @floatFromInt(decoded.pixels[index * 3 + channel]);
+                sum.* += @abs(expected - found);
+            };
+            sum.* /= @floatFromInt(image.pixels.len * 3);
+        }
+        errdefer std.debug.print("{d}x{d}: {any}\n", .{ size[0], size[1], errors });
+        try testing.expect(errors[1] < 4 and errors[2] < 1.5);
+        try testing.expect(errors[2] <= errors[1] and errors[1] <= errors[0]);
+    }
+}
+
+test "HDR holds radiance to its eight bits, whatever the exposure" {
+    const sizes = odd_sizes ++ .{ .{ 7, 5 }, .{ 8, 5 } };
+    for (sizes) |size| {
+        var image = try testImage(testing.allocator, size[0], size[1]);
+        defer image.deinit(testing.allocator);
+        // What no exponent holds, or what is none.
+        image.pixels[0] = .{ std.math.floatMax(f32), 1, -1, 1 };
+        image.pixels[image.pixels.len - 1] = .{ -2, 0, std.math.floatMin(f32), 0 };
+        const file = try written(&image, .{
+            .format = .hdr,
+            .exposure = .auto,
+            .transparent = true,
+        });
+        defer testing.allocator.free(file);
+        var decoded: Decoded(f32) = try .init(file);
+        defer decoded.deinit();
+        try testing.expectEqual([3]usize{ size[0], size[1], 3 }, [3]usize{
+            decoded.width, decoded.height, decoded.channel_count,
+        });
+        for (image.pixels, 0..) |pixel, index| {
+            const largest = @min(@max(pixel[0], pixel[1], pixel[2]), 0x1.fep127);
+            for (pixel[0..3], decoded.pixels[index * 3 ..][0..3]) |wanted, found| {
+                try testing.expect(found >= 0 and found <= @max(wanted, 0));
+                // One of 256 steps up to the power of two above the largest.
+                const held = @min(@max(wanted, 0), 0x1.fep126);
+                try testing.expect(found >= held - largest / 128 - 1e-32);
+            }
+        }
+    }
+}
+
+test "PFM holds every bit, rows from the bottom" {
+    var image = try testImage(testing.allocator, 2, 3);
+    defer image.deinit(testing.allocator);
+    image.pixels[0] = .{ std.math.floatTrueMin(f32), -1, 1e30, 0.25 };
+    const file = try written(&image, .{ .format = .pfm, .exposure = .{ .ev = 3 } });
+    defer testing.allocator.free(file);
+    const header = "PF\n2 3\n-1.0\n";
+    try testing.expectStringStartsWith(file, header);
+    try testing.expectEqual(header.len + 2 * 3 * 3 * 4, file.len);
+    for ([_]usize{ 4, 5, 2, 3, 0, 1 }, 0..) |pixel, place| for (0..3) |channel| {
+        const at = header.len + (place * 3 + channel) * 4;
+        const bits: u32 = @bitCast(image.pixels[pixel][channel]);
+        try testing.expectEqual(bits, std.mem.readInt(u32, file[at..][0..4], .little));
+    };
+}
+
+/// Colours and alpha of integers alone: no random numbers, no rounding.
+fn checkers(gpa: std.mem.Allocator) !Image {
+    const image: Image = try .init(gpa, 61, 47);
+    for (image.pixels, 0..) |*pixel, index| {
+        const x = index % 61;
+        const y = index / 61;
+        const alpha: f32 = if ((x / 8 + y / 8) % 2 == 0) 1 else 0.5;
+        for (pixel[0..3], [_]usize{ x * 4 + y, y * 5, x * y }) |*value, code| {
+            value.* = srgb.decoded[code % 256] * alpha;
+        }
+        pixel[3] = alpha;
+    }
+    return image;
+}
+
+test "every format has the same bytes on every machine" {
+    var image = try checkers(testing.allocator);
+    defer image.deinit(testing.allocator);
+    const expected = [_]struct { raylane.settings.Format, u64 }{
+        .{ .png, 0xd9aa232445eb57fd }, .{ .jpg, 0xf6f4e06efab8dc20 },
+        .{ .tga, 0x27a4b70272305b9a }, .{ .bmp, 0xc0a9f1c2ed9ec202 },
+        .{ .hdr, 0x7e1e5a338bf0dcc9 }, .{ .ppm, 0x90c7a2393d5f932d },
+        .{ .pfm, 0x1434cae8ac8e82c3 },
+    };
+    for (expected) |case| for ([_]usize{ 1, 3 }) |thread_count| {
+        const file = try written(&image, .{
+            .format = case[0],
+            .transparent = true,
+            .thread_count = thread_count,
+        });
+        defer testing.allocator.free(file);
+        const hash = std.hash.XxHash64.hash(0, file);
+        errdefer std.debug.print("{t}: 0x{x}, {d} bytes\n", .{ case[0], hash, file.len });
+        try testing.expectEqual(case[1], hash);
+    };
+}
+
+test "what a format cannot hold is refused" {
+    const Case = struct { raylane.settings.Format, u32, u32, ?[]const u8 };
+    for ([_]Case{
+        .{ .png, 65_536, 4096, null },
+        .{ .png, 16_384, 16_384, null },
+        .{ .hdr, 16_384, 16_384, null },
+        .{ .jpg, 65_535, 1, null },
+        .{ .jpg, 65_536, 1, "a jpg file has 65535 pixels on a side at most" },
+        .{ .tga, 1, 65_536, "a tga file has 65535 pixels" },
+        .{ .bmp, 65_536, 1, null },
+        .{ .png, 65_536, 65_536, "65536x65536 pixels are too many for a png file" },
+        .{ .bmp, 30_000, 30_000, "too many for a bmp file; .ppm and .pfm hold them" },
+        .{ .hdr, 30_000, 30_000, "too many for a hdr file" },
+        .{ .pfm, 65_536, 65_536, null },
+    }) |case| {
+        var diagnostic: raylane.diagnostic.Diagnostic = .{};
+        const result = raylane.output.check(case[0], false, case[1], case[2], &diagnostic);
+        const needle = case[3] orelse {
+            try result;
+            continue;
+        };
+        try testing.expectError(error.InputOutput, result);
+        const text = diagnostic.message.text();
+        errdefer std.debug.print("{s}\n", .{text});
+        try testing.expect(std.mem.find(u8, text, needle) != null);
     }
 }
 
 test "the bytes do not depend on the number of threads" {
     var image = try testImage(testing.allocator, 500, 400);
     defer image.deinit(testing.allocator);
-    for (std.enums.values(raylane.output.Format)) |format| {
+    for (std.enums.values(raylane.settings.Format)) |format| {
         const alone = try written(&image, .{ .format = format });
         defer testing.allocator.free(alone);
         for ([_]usize{ 2, 7, 256 }) |thread_count| {
@@ -120,20 +290,23 @@ test "the bytes do not depend on the number of threads" {
     }
 }
 
-test "a transparent PNG holds alpha and colours that are not premultiplied" {
+test "a transparent PNG or TGA holds alpha and colours that are not premultiplied" {
     var image = try testImage(testing.allocator, 70, 40);
     defer image.deinit(testing.allocator);
     image.pixels[0] = .{ 0, 0, 0, 0 };
-    var decoded = try roundTrip(&image, .{ .transparent = true });
-    defer decoded.deinit();
-    try testing.expectEqual(4, decoded.channel_count);
-    for (image.pixels, 0..) |pixel, index| {
-        const bytes = decoded.pixels[index * 4 ..][0..4];
-        const alpha: f32 = @as(f32, @floatFromInt(bytes[3])) / 255;
-        try testing.expectApproxEqAbs(pixel[3], alpha, 0.5001 / 255.0);
-        for (0..3) |channel| {
-            const expected: u8 = if (bytes[3] == 0) 0 else srgb.encode(pixel[channel] / pixel[3]);
-            try testing.expectEqual(expected, bytes[channel]);
+    for ([_]raylane.settings.Format{ .png, .tga }) |format| {
+        var decoded = try roundTrip(&image, .{ .format = format, .transparent = true });
+        defer decoded.deinit();
+        try testing.expectEqual(4, decoded.channel_count);
+        for (image.pixels, 0..) |pixel, index| {
+            const bytes = decoded.pixels[index * 4 ..][0..4];
+            const alpha: f32 = @as(f32, @floatFromInt(bytes[3])) / 255;
+            try testing.expectApproxEqAbs(pixel[3], alpha, 0.5001 / 255.0);
+            for (0..3) |channel| {
+                const expected: u8 =
+                    if (bytes[3] == 0) 0 else srgb.encode(pixel[channel] / pixel[3]);
+                try testing.expectEqual(expected, bytes[channel]);
+            }
         }
     }
 }

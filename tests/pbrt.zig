@@ -263,7 +263,7 @@ test "quadrics, whole and in part, look outwards" {
 test "the tolerance is the user's" {
     var said: Diagnostic = .{};
     for ([_]u32{ 4, 16, 64 }) |steps| {
-        const settings: parse.Settings = .{ .tessellation = steps };
+        const settings: raylane.settings.Load = .{ .tessellation = steps };
         const text = comptime world("Shape \"sphere\"");
         var scene = try parse.parsePbrt(gpa, io, text, .cwd(), settings, &said);
         defer scene.deinit();
@@ -882,7 +882,7 @@ const Folder = struct {
     }
 
     fn read(folder: *Folder, text: []const u8, outside: bool, said: *Diagnostic) !Scene {
-        const settings: parse.Settings = .{ .allow_outside = outside };
+        const settings: raylane.settings.Load = .{ .allow_outside = outside };
         var scene = try parse.parsePbrt(gpa, io, text, folder.temporary.dir, settings, said);
         scene.check();
         return scene;
@@ -1162,7 +1162,7 @@ const everything =
 /// Reads whatever it is, coarsely; an error has its line.
 fn tryAnything(allocator: std.mem.Allocator, text: []const u8) !void {
     var said: Diagnostic = .{};
-    const settings: parse.Settings = .{ .tessellation = 4 };
+    const settings: raylane.settings.Load = .{ .tessellation = 4 };
     var scene = parse.parsePbrt(allocator, io, text, .cwd(), settings, &said) catch |err| {
         if (err != error.OutOfMemory) try expect(said.message.text().len > 0);
         return err;

@@ -78,21 +78,15 @@ fn expectVariant(
     expected: []const Hit,
 ) !void {
     const Kernel = raylane.trace.kernel.Kernel(variant, false);
+    const searches = raylane.trace.searchesOf(Kernel);
     var counts: raylane.statistics.TestCounts = .{};
     for (queries, expected) |query, hit| {
         var ray = query.ray();
-        const found = raylane.trace.single.trace(
-            Kernel,
-            .closest_hit,
-            &world.geometry,
-            &ray,
-            &counts,
-        );
+        const found = searches.one_closest(&world.geometry, &ray, &counts);
         try expectHit(hit, ray.closest.t.lane(0), ray.closest.primitive.lane(0));
         try std.testing.expectEqual(hit.primitive != ray_file.no_primitive, found);
         var shadow = query.ray();
-        const blocked = raylane.trace.single
-            .trace(Kernel, .any_hit, &world.geometry, &shadow, &counts);
+        const blocked = searches.one_any(&world.geometry, &shadow, &counts);
         try std.testing.expectEqual(found, blocked);
     }
     const size = Kernel.group_count * Kernel.ray_count;
@@ -121,7 +115,7 @@ fn expectMultiHit(
         material.transmission = transmission;
         var counts: raylane.statistics.TestCounts = .{};
         var bundle = makeBundle(Kernel, queries);
-        lists.trace(&bundle, &counts);
+        raylane.trace.searchesOf(Kernel).hit_lists(lists, &bundle, &counts);
         for (queries, expected, 0..) |query, hit, index| {
             if (!isActive(index)) continue;
             const group = index / Kernel.ray_count;
@@ -131,7 +125,8 @@ fn expectMultiHit(
             try std.testing.expectEqual(transmission == 0 and met, stopped);
             // Brute force takes its time.
             if (transmission == 0 or index % 8 != 0) continue;
-            try expectList(world, query, &lists.lists[group][lane]);
+            const list = lists.hits[group][lane][0..lists.counts[group][lane]];
+            try expectList(world, query, list);
         }
     }
 }
@@ -140,14 +135,14 @@ fn expectMultiHit(
 fn expectList(
     world: *const World,
     query: Query,
-    list: *const raylane.trace.multi_hit.HitList,
+    list: []const raylane.trace.multi_hit.Hit,
 ) !void {
     var next = query;
-    for (list.hits[0..list.count]) |hit| {
+    for (list) |hit| {
         next.tnear = bruteForce(world, next);
         try expectHit(next.tnear, hit.t, hit.primitive);
     }
-    if (list.count == list.hits.len) return;
+    if (list.len == raylane.trace.multi_hit.hits_max) return;
     try std.testing.expectEqual(ray_file.no_primitive, bruteForce(world, next).primitive);
 }
 
@@ -157,8 +152,7 @@ fn expectBundles(
     queries: []const Query,
     expected: []const Hit,
 ) !void {
-    const dispatch = raylane.trace.dispatch;
-    const interval_packet = raylane.trace.interval_packet;
+    const searches = raylane.trace.searchesOf(Kernel);
     const geometry = &world.geometry;
     var counts: raylane.statistics.TestCounts = .{};
     const size = Kernel.group_count * Kernel.ray_count;
@@ -170,13 +164,12 @@ fn expectBundles(
         if (Kernel.variant.traversal == .beam) for ([_]i32{ 0, 1, 3, 12 }) |balance| {
             // Without budget all go as streams; with little, packets run out of it on their way.
             var poor = bundle;
-            var budget: interval_packet.PacketBudget = .{ .balance = balance };
-            interval_packet.trace(Kernel, .any_hit, geometry, &poor, &budget, &counts);
+            var budget: raylane.trace.interval_packet.PacketBudget = .{ .balance = balance };
+            searches.packets_any.?(geometry, &poor, &budget, &counts);
             try expectBlocked(Kernel, &poor, expected[first..][0..part.len]);
         };
-        const coherence = dispatch.closestHit(Kernel, geometry, &bundle, null, &counts);
-        try std.testing.expect(coherence == .none);
-        dispatch.anyHit(Kernel, geometry, &shadows, &no_light, coherence, &counts);
+        try std.testing.expect(!searches.closest_hit(geometry, &bundle, null, &counts));
+        searches.any_hit(geometry, &shadows, &no_light, &.none, &counts);
         try expectBlocked(Kernel, &shadows, expected[first..][0..part.len]);
         for (0..part.len) |index| {
             if (!isActive(index)) continue;
@@ -252,7 +245,20 @@ fn inLanes(comptime Rays: type, v: [3][Rays.count]f32) Rays.Vec3 {
 pub const Corners = std.ArrayList([3]f32);
 
 /// Kinds of triangles that break careless code.
-pub const Soup = enum { uniform, tiny_and_huge, coplanar, slivers, stacked, far_away, grid };
+pub const Soup = enum {
+    uniform,
+    tiny_and_huge,
+    coplanar,
+    slivers,
+    stacked,
+    /// Many, and some that are 1e5 away.
+    far_away,
+    grid,
+    /// One corner far away on one side.
+    stray,
+    /// Triangles of millimetres among some of a hundred kilometres.
+    mixed_scales,
+};
 
 /// Appends three corners for each triangle.
 pub fn addTriangles(soup: Soup, corners: *Corners, random: std.Random, count: usize) !void {
@@ -273,8 +279,16 @@ pub fn addTriangles(soup: Soup, corners: *Corners, random: std.Random, count: us
                 .stacked => if (index % 4 != 0) {
                     p = corners.items[corners.items.len - 3];
                 },
-                .far_away => for (&p) |*x| {
+                .far_away => if (index % 8 < 3) for (&p) |*x| {
                     x.* += 1e5;
+                },
+                .stray => if (index == 5 and corners.items.len % 3 == 1) {
+                    p = .{ 1e4, 0, 0 };
+                },
+                .mixed_scales => {
+                    const size: f32 = if (index % 8 == 0) 1e5 else 1e-3;
+                    const place: f32 = @floatFromInt(index % 3);
+                    for (&p) |*x| x.* = x.* * size + place;
                 },
                 .grid => for (&p) |*x| {
                     x.* = @round(x.* * 2);
@@ -295,6 +309,8 @@ fn addQueries(soup: Soup, queries: []Query, corners: []const [3]f32, random: std
         // The first half starts at one point, as primary rays do.
         if (index >= queries.len / 2) for (&query.origin) |*x| {
             x.* = center + random.floatNorm(f32) * 4;
+            // Some of the others a thousand kilometres away.
+            if (index % 16 == 0) x.* = random.floatNorm(f32) * 1e6;
         };
         // And every other block's rays go much the same way from much the same place.
         const led = index % 32 < 16 and index % 16 > 0;
@@ -402,7 +418,7 @@ test "a tree without triangles and one with a single triangle" {
             triangles[0..triangle_count],
         );
         try builder.addCamera(.{ 0, 0, 7 }, 1);
-        var scene = builder.finish();
+        var scene = try builder.finish();
         defer scene.deinit();
         const queries = [_]Query{.{ .origin = .{ 0.2, 0.2, 1 }, .direction = .{ 0, 0, -1 } }};
         const hit: Hit = if (triangle_count == 0)
@@ -422,8 +438,10 @@ test "a closed surface stops every ray that aims at its edges and corners, near 
         var builder: fixture.Builder = try .init();
         const center: [3]f32 = .{ distance, -distance, distance };
         try builder.addSphere(fixture.matte(.{ 1, 1, 1 }), center, 1, 12);
+        // Most of the scene is elsewhere, so that it stays where it is.
+        try builder.addSphere(fixture.matte(.{ 1, 1, 1 }), .{ 0, 0, 0 }, 1, 14);
         try builder.addCamera(.{ 0, 0, 7 }, 1);
-        var scene = builder.finish();
+        var scene = try builder.finish();
         defer scene.deinit();
         const lanes = raylane.variant.compiled[0].lanes;
         var world = try fixture.prepare(&scene, lanes, .{});
@@ -454,13 +472,8 @@ test "a closed surface stops every ray that aims at its edges and corners, near 
             var ray = (Query{ .origin = origin, .direction = direction }).ray();
             var counts: raylane.statistics.TestCounts = .{};
             const Kernel = raylane.trace.kernel.Kernel(raylane.variant.compiled[0], false);
-            const hit = raylane.trace.single.trace(
-                Kernel,
-                .closest_hit,
-                &world.geometry,
-                &ray,
-                &counts,
-            );
+            const searches = raylane.trace.searchesOf(Kernel);
+            const hit = searches.one_closest(&world.geometry, &ray, &counts);
             lost_count += @intFromBool(!hit);
         }
         if (lost_count > 0) std.debug.print("{d} of {d} lost at {d}\n", .{

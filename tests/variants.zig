@@ -9,19 +9,22 @@ const fixture = @import("fixture.zig");
 const raylane = @import("raylane");
 const gpa = std.testing.allocator;
 
-const Golden = struct { scene: []const u8, width: u32, height: u32, hash: u64 };
+const Golden = struct { scene: []const u8, size: [2]u32, hash: u64 };
 
 /// Small pictures of scenes that take every path of shading and traversal.
 const goldens = [_]Golden{
-    .{ .scene = "builtin:cornell", .width = 61, .height = 47, .hash = 0x786fc2c79a965f00 },
-    .{ .scene = "builtin:atrium", .width = 53, .height = 40, .hash = 0xc71228fd03d18869 },
-    .{ .scene = "builtin:nave", .width = 53, .height = 40, .hash = 0xb3f44d630da93019 },
-    .{ .scene = "builtin:handles", .width = 40, .height = 53, .hash = 0xd1f7064ed445c955 },
+    .{ .scene = "builtin:cornell", .size = .{ 61, 47 }, .hash = 0x786fc2c79a965f00 },
+    .{ .scene = "builtin:atrium", .size = .{ 53, 40 }, .hash = 0xc71228fd03d18869 },
+    .{ .scene = "builtin:nave", .size = .{ 53, 40 }, .hash = 0xb3f44d630da93019 },
+    .{ .scene = "builtin:handles", .size = .{ 40, 53 }, .hash = 0xd1f7064ed445c955 },
+    .{ .scene = "tests/pictures/solids.gltf", .size = .{ 50, 40 }, .hash = 0xeca7519afeb767a5 },
+    .{ .scene = "tests/pictures/shapes.pbrt", .size = .{ 60, 40 }, .hash = 0x41ed4c6a9947061b },
+    .{ .scene = "tests/pictures/view.pbrt", .size = .{ 48, 32 }, .hash = 0x3afc7b59342d46f4 },
 };
 
 fn parse(name: []const u8) !raylane.scene.Scene {
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
-    return raylane.parse.parse(gpa, std.testing.io, name, .{}, &diagnostic);
+    return raylane.session.loadScene(gpa, std.testing.io, name, .{}, &diagnostic);
 }
 
 fn expectHash(expected: u64, image: *const raylane.image.Image, what: []const u8) !void {
@@ -32,28 +35,28 @@ fn expectHash(expected: u64, image: *const raylane.image.Image, what: []const u8
 
 fn expectAllVariants(scene: *const raylane.scene.Scene, base: fixture.Options, hash: u64) !void {
     inline for (.{ 4, 8, 16 }) |lanes| {
-        var world: ?raylane.world.World = null;
-        defer if (world) |*prepared| prepared.deinit();
+        var diagnostic: raylane.diagnostic.Diagnostic = .{};
+        var session: raylane.session.Session =
+            .init(gpa, std.testing.io, base.thread_count, &diagnostic);
+        defer session.deinit();
         for (raylane.variant.compiled, raylane.variant.names, 0..) |variant, name, index| {
             if (variant.lanes != lanes) continue;
-            if (world == null) world = try fixture.prepare(scene, lanes, base);
+            if (session.world == null) try fixture.view(&session, scene, lanes, base);
             var options = base;
             options.variant = index;
-            var image = try fixture.renderWorld(&world.?, options);
-            defer image.deinit(gpa);
-            try expectHash(hash, &image, name);
+            try expectHash(hash, try fixture.trace(&session, options), name);
         }
     }
 }
 
-test "every variant renders the built-in scenes to the golden hash" {
+test "every variant renders built-in scenes and files to the golden hash" {
     for (goldens) |golden| {
         var scene = try parse(golden.scene);
         defer scene.deinit();
         errdefer std.debug.print("scene {s}\n", .{golden.scene});
         try expectAllVariants(&scene, .{
-            .width = golden.width,
-            .height = golden.height,
+            .width = golden.size[0],
+            .height = golden.size[1],
             .thread_count = 2,
         }, golden.hash);
     }
@@ -98,7 +101,7 @@ test "the quality of the tree changes nothing in the picture, by any variant" {
         var options: fixture.Options = .{ .width = 32, .height = 32, .thread_count = 2 };
         var first = try fixture.render(&scene, options);
         defer first.deinit(gpa);
-        for (std.enums.values(raylane.prepare.TreeQuality)) |quality| {
+        for (std.enums.values(raylane.settings.TreeQuality)) |quality| {
             options.tree_quality = quality;
             try expectAllVariants(&scene, options, first.hash());
         }
@@ -131,10 +134,9 @@ test "orthographic views, directional and spot lights, holes, veils and absorbin
     try builder.addQuad(veil, .{ 0.4, 0.2, -2 }, .{ 0.8, 0.1, 0 }, .{ 0, 0.7, 0.2 });
     try builder.addQuad(hole, .{ 0, 0, -1 }, .{ 4, 0, 0 }, .{ 0, 4, 0 });
     try builder.addPointLight(.{ 1, 3, -1 }, 30);
-    const arena = builder.scene.arena.allocator();
     const tilted = try builder.addNode(.fromTrs(.{ -2, 3, 0 }, .{ -0.6, 0, 0, 0.8 }, .{ 1, 1, 1 }));
-    try builder.lights.append(arena, .{ .kind = .directional, .node = tilted, .intensity = 1.5 });
-    try builder.lights.append(arena, .{
+    try builder.scene.addLight(.{ .kind = .directional, .node = tilted, .intensity = 1.5 });
+    try builder.scene.addLight(.{
         .kind = .spot,
         .node = tilted,
         .intensity = 60,
@@ -142,10 +144,10 @@ test "orthographic views, directional and spot lights, holes, veils and absorbin
         .inner_cone_rad = 0.2,
         .outer_cone_rad = 0.9,
     });
-    try builder.cameras.append(arena, .{ .name = "flat", .node = 0, .projection = .{
+    try builder.scene.addCamera(.{ .name = "flat", .node = 0, .projection = .{
         .orthographic = .{ .half_width = 2, .half_height = 1.6 },
     } });
-    var scene = builder.finish();
+    var scene = try builder.finish();
     defer scene.deinit();
     const base: fixture.Options = .{ .width = 50, .height = 40, .ambient = 0.2 };
     var first = try fixture.render(&scene, base);

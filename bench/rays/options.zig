@@ -5,7 +5,7 @@
 const std = @import("std");
 const raylane = @import("raylane");
 const batch_file = @import("batch.zig");
-const TreeQuality = raylane.prepare.TreeQuality;
+const TreeQuality = raylane.settings.TreeQuality;
 const assert = std.debug.assert;
 
 pub const help =

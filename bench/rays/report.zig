@@ -8,7 +8,7 @@ const raylane = @import("raylane");
 const phases = @import("phases.zig");
 const observer = @import("observer.zig");
 const Phase = phases.Phase;
-const Quality = raylane.prepare.TreeQuality;
+const Quality = raylane.settings.TreeQuality;
 const Writer = std.Io.Writer;
 
 /// The least and the middle of some repetitions.

@@ -45,7 +45,7 @@ pub const Setup = struct {
 pub const Settings = struct {
     /// Bounces at most.
     depth_max: u32,
-    thread_count: usize,
+    pool: *raylane.parallel.Pool,
     mode: phases.Mode,
     processors: []const u32,
 };
@@ -87,7 +87,7 @@ pub fn Workload(comptime Kernel: type) type {
             observer: ?*Observer,
         ) Times {
             assert(pixels.len == @as(usize, setup.size) * setup.size);
-            assert(observer == null or settings.thread_count == 1);
+            assert(observer == null or settings.pool.thread_count == 1);
             var workload: Self = .{
                 .setup = setup,
                 .settings = settings,
@@ -97,17 +97,17 @@ pub fn Workload(comptime Kernel: type) type {
             };
             const start = std.Io.Clock.awake.now(io);
             const start_ticks = phases.ticks();
-            raylane.parallel.run(settings.thread_count, &workload, work);
+            settings.pool.run(&workload, work);
             const ticks: f64 = @floatFromInt(phases.ticks() - start_ticks);
             const total_ns: u64 = @intCast(start.untilNow(io, .awake).toNanoseconds());
 
             var times: Times = .{ .total_ns = total_ns, .by_phase_ns = .initFill(0) };
-            for (workload.spent[0..settings.thread_count]) |*spent| {
+            for (workload.spent[0..settings.pool.thread_count]) |*spent| {
                 for (&times.by_phase_ns.values, spent.values) |*sum, part| {
                     sum.* += @as(f64, @floatFromInt(part));
                 }
             }
-            const thread_count: f64 = @floatFromInt(settings.thread_count);
+            const thread_count: f64 = @floatFromInt(settings.pool.thread_count);
             const tick_ns = @as(f64, @floatFromInt(total_ns)) / (ticks * thread_count);
             for (&times.by_phase_ns.values) |*sum| sum.* *= tick_ns;
             return times;
@@ -308,7 +308,7 @@ pub fn Workload(comptime Kernel: type) type {
                         const number = numbers[part * 4 + lane];
                         row.* = .loadAligned(@alignCast(&normals[@intCast(number + 1)]));
                     }
-                    const columns = Four.transpose4x4(rows);
+                    const columns = transposed(Four.F32, rows);
                     inline for (&arrays, columns[0..3]) |*axis, column| {
                         column.store(axis[part * 4 ..][0..4]);
                     }
@@ -362,4 +362,18 @@ fn everyOther(code: u32) u32 {
     bits = (bits | bits >> 2) & 0x0f0f_0f0f;
     bits = (bits | bits >> 4) & 0x00ff_00ff;
     return (bits | bits >> 8) & 0x0000_ffff;
+}
+
+/// Rows to columns: lane r of result c is lane c of `rows[r]`.
+inline fn transposed(comptime F32: type, rows: [4]F32) [4]F32 {
+    const even_low = rows[0].interleaveLow(rows[2]);
+    const even_high = rows[0].interleaveHigh(rows[2]);
+    const odd_low = rows[1].interleaveLow(rows[3]);
+    const odd_high = rows[1].interleaveHigh(rows[3]);
+    return .{
+        even_low.interleaveLow(odd_low),
+        even_low.interleaveHigh(odd_low),
+        even_high.interleaveLow(odd_high),
+        even_high.interleaveHigh(odd_high),
+    };
 }

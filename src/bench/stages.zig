@@ -5,107 +5,84 @@
 
 const std = @import("std");
 const energy = @import("../energy.zig");
-const parse = @import("../parse.zig");
-const prepare_file = @import("../prepare.zig");
 const rounds = @import("rounds.zig");
+const settings_file = @import("../settings.zig");
 const statistics = @import("../statistics.zig");
-const trace_file = @import("../trace.zig");
 const variant_file = @import("../variant.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
-const Identity = @import("../identity.zig").Identity;
-const Film = @import("../film.zig").Film;
-const World = @import("../world.zig").World;
+const Session = @import("../session.zig").Session;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
 
 /// What is the same for all variants.
 pub const Settings = struct {
     scene: []const u8,
-    allow_outside: bool,
-    output: ?Identity,
-    width: u32,
-    height: u32,
-    thread_count: usize,
+    load: settings_file.Load,
+    tree_quality: settings_file.TreeQuality,
+    view: settings_file.View,
     sample_count: u32,
     depth: u32,
-    tree_quality: prepare_file.TreeQuality,
 };
 
 pub const Stages = struct {
-    gpa: Allocator,
-    io: Io,
+    session: Session,
     settings: Settings,
-    diagnostic: *Diagnostic,
     meter: ?*energy.Meter,
     progress: std.Progress.Node,
-    film: Film,
-    world: ?World = null,
-    triangle_count: u64 = 0,
     /// By variant; tests depend on traversal and lanes alone.
     counts: [variant_file.compiled.len]?statistics.TestCounts = @splat(null),
 
-    pub const Error = parse.Error || prepare_file.Error || trace_file.Error;
+    pub const Error = Session.Error;
 
-    /// Takes memory for the film.
+    /// Must stay where it is.
     pub fn init(
         gpa: Allocator,
         io: Io,
         settings: Settings,
+        thread_count: usize,
         diagnostic: *Diagnostic,
         meter: ?*energy.Meter,
         progress: std.Progress.Node,
-    ) error{OutOfMemory}!Stages {
+    ) Stages {
         return .{
-            .gpa = gpa,
-            .io = io,
+            .session = .init(gpa, io, thread_count, diagnostic),
             .settings = settings,
-            .diagnostic = diagnostic,
             .meter = meter,
             .progress = progress,
-            .film = try .init(gpa, settings.width, settings.height, .init(.{ .color = true })),
         };
     }
 
     pub fn deinit(stages: *Stages) void {
-        if (stages.world) |*world| world.deinit();
-        stages.film.deinit(stages.gpa);
+        stages.session.deinit();
         stages.* = undefined;
     }
 
     /// Reads the scene and builds the tree of a variant's width.
     pub fn prepare(stages: *Stages, variant: usize) Error!rounds.Prepared {
+        const session = &stages.session;
         const settings = &stages.settings;
-        if (stages.world) |*world| world.deinit();
-        stages.world = null;
-        var times: statistics.StageTimes = .{};
-        const start_ns = stages.now();
-        var scene = try parse.parse(stages.gpa, stages.io, settings.scene, .{
-            .allow_outside = settings.allow_outside,
-            .output = settings.output,
-        }, stages.diagnostic);
-        defer scene.deinit();
-        stages.triangle_count = scene.triangleCount();
-        const parsed_ns = stages.now();
-        stages.world = try prepare_file.prepare(stages.gpa, stages.io, &scene, .{
+        try session.load(settings.scene, settings.load);
+        try session.pose(.{
             .lanes = variant_file.compiled[variant].lanes,
-            .thread_count = settings.thread_count,
             .tree_quality = settings.tree_quality,
-            .resolution = .{ settings.width, settings.height },
-        }, stages.diagnostic, &times);
+        });
+        try session.view(settings.view);
+        session.dropScene();
         return .{
-            .parse_ns = parsed_ns - start_ns,
-            .prepare_ns = times.prepare_ns,
-            .bvh_build_ns = times.bvh_build_ns,
+            .parse_ns = session.times.parse_ns,
+            .prepare_ns = session.times.prepare_ns,
+            .bvh_build_ns = session.times.bvh_build_ns,
         };
     }
 
     /// Traces the image by a variant for whose width the tree was built.
     pub fn trace(stages: *Stages, variant: usize, thread_count: usize) Error!rounds.Traced {
-        const start_ns = stages.now();
-        const frame = stages.world.?.frame();
-        const settings = stages.traceSettings(thread_count);
-        const traced = try trace_file.trace(stages.gpa, variant, &frame, &stages.film, settings);
-        return .{ .trace_ns = stages.now() - start_ns, .rays = traced.rays };
+        const session = &stages.session;
+        const all_count = session.pool.thread_count;
+        session.pool.thread_count = thread_count;
+        defer session.pool.thread_count = all_count;
+        try session.render(stages.renderSettings(variant));
+        return .{ .trace_ns = session.times.trace_ns, .rays = session.traced.rays };
     }
 
     /// Tests of boxes and triangles, by a pass that is not timed.
@@ -116,29 +93,26 @@ pub const Stages = struct {
             if (other.lanes != compiled[variant].lanes) continue;
             if (counted) |tests| return tests;
         }
-        const frame = stages.world.?.frame();
-        const settings = stages.traceSettings(stages.settings.thread_count);
-        const traced = try trace_file
-            .traceCounting(stages.gpa, variant, &frame, &stages.film, settings);
-        stages.counts[variant] = traced.tests;
-        return traced.tests.?;
+        const tests = try stages.session.countTests(stages.renderSettings(variant));
+        stages.counts[variant] = tests;
+        return tests;
     }
 
-    fn traceSettings(stages: *const Stages, thread_count: usize) trace_file.Settings {
+    fn renderSettings(stages: *const Stages, variant: usize) settings_file.Render {
         return .{
-            .thread_count = thread_count,
+            .variant = variant,
             .sample_count = stages.settings.sample_count,
-            .depth_max = stages.settings.depth,
+            .depth = stages.settings.depth,
         };
     }
 
     pub fn hash(stages: *const Stages) u64 {
-        return stages.film.image.hash();
+        return stages.session.film.?.image.hash();
     }
 
     /// A clock that never goes back, in nanoseconds.
     pub fn now(stages: *const Stages) u64 {
-        return @intCast(Io.Clock.awake.now(stages.io).nanoseconds);
+        return @intCast(Io.Clock.awake.now(stages.session.io).nanoseconds);
     }
 
     pub fn mark(stages: *const Stages) ?energy.Mark {

@@ -11,13 +11,15 @@ const masonry = @import("masonry.zig");
 const sky = @import("sky.zig");
 const elementary = @import("../math.zig").elementary;
 const MeshBuilder = @import("mesh_builder.zig");
-const SceneBuilder = @import("scene_builder.zig");
-const Material = @import("../scene.zig").Material;
-const Scene = @import("../scene.zig").Scene;
+const placing = @import("placing.zig");
+const scene_data = @import("../scene.zig");
 const Arch = masonry.Arch;
 const Outline = masonry.Outline;
 const Place = geometry.Place;
 const Point = geometry.Point;
+const Builder = scene_data.Builder;
+const Material = scene_data.Material;
+const Scene = scene_data.Scene;
 const Allocator = std.mem.Allocator;
 
 const half_x = 10.5;
@@ -90,9 +92,9 @@ const materials: std.EnumArray(Part, Material) = .init(.{
 
 /// The scene, owned by the caller.
 pub fn build(gpa: Allocator) Allocator.Error!Scene {
-    var scene: SceneBuilder = .init(gpa);
-    errdefer scene.deinit();
-    var parts: Parts = .init(scene.arena());
+    var builder: Builder = .init(gpa);
+    errdefer builder.deinit();
+    var parts: Parts = .init(builder.arena());
     for (0..4) |side| {
         const along_x = side % 2 == 0;
         const length: f64 = if (along_x) 2 * half_x else 2 * half_z;
@@ -111,9 +113,9 @@ pub fn build(gpa: Allocator) Allocator.Error!Scene {
     }
     try addShrub(&parts, .{ 8.5, 0, -4 });
     try addShrub(&parts, .{ 8.5, 0, 4 });
-    try parts.finish(&scene, materials);
+    try parts.finish(&builder, materials);
 
-    try sky.add(&scene, .{
+    try sky.add(&builder, .{
         .radius = 60,
         .azimuth_deg = 20,
         .half_width_deg = 118,
@@ -122,19 +124,20 @@ pub fn build(gpa: Allocator) Allocator.Error!Scene {
         .low_color = .{ 0.75, 0.86, 0.95 },
         .high_color = .{ 0.16, 0.34, 0.68 },
     });
-    try scene.addDirectionalLight(.{ -0.5, 0.82, 0.42 }, .{ 1, 0.9, 0.74 }, 4.4);
-    try scene.addDirectionalLight(.{ -0.15, 0.97, -0.15 }, .{ 0.7, 0.85, 1 }, 0.7);
-    try scene.addPointLight(.{ 0.4, 1.1, -3.9 }, .{ 1, 0.82, 0.6 }, 9);
-    try scene.addPointLight(.{ -3, 2.9, half_z + gallery_middle }, .{ 1, 0.72, 0.42 }, 7);
-    scene.setAmbient(0.21);
-    try scene.addCamera(.{
+    try placing.addDirectionalLight(&builder, .{ -0.5, 0.82, 0.42 }, .{ 1, 0.9, 0.74 }, 4.4);
+    try placing.addDirectionalLight(&builder, .{ -0.15, 0.97, -0.15 }, .{ 0.7, 0.85, 1 }, 0.7);
+    try placing.addPointLight(&builder, .{ 0.4, 1.1, -3.9 }, .{ 1, 0.82, 0.6 }, 9);
+    const lantern: Point = .{ -3, 2.9, half_z + gallery_middle };
+    try placing.addPointLight(&builder, lantern, .{ 1, 0.72, 0.42 }, 7);
+    builder.scene.ambient = 0.21;
+    try placing.addCamera(&builder, .{
         .name = "court",
         .eye = .{ -9.1, 1.75, 1.7 },
         .target = .{ 3, 3.5, -0.7 },
         .y_fov_deg = 60,
         .aspect = 1.5,
     });
-    return scene.finish();
+    return builder.finish();
 }
 
 /// One side of the court, both storeys, with the gallery behind and the corner at its left end.
@@ -615,7 +618,7 @@ fn addFountain(parts: *Parts) Allocator.Error!void {
 
 /// A clipped shrub in a pot.
 fn addShrub(parts: *Parts, origin: Point) Allocator.Error!void {
-    parts.setPlace(.at(origin));
+    parts.setPlace(.translate(origin));
     var pot: Outline = .from(.{ 0.26, 0 });
     pot.line(&.{ .{ 0.3, 0.04 }, .{ 0.27, 0.1 } });
     pot.curve(.{ 0.38, 0.3 }, .{ 0.4, 0.54 }, 4);

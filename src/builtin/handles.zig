@@ -10,11 +10,13 @@ const elementary = @import("../math.zig").elementary;
 const geometry = @import("geometry.zig");
 const isosurface = @import("isosurface.zig");
 const MeshBuilder = @import("mesh_builder.zig");
-const SceneBuilder = @import("scene_builder.zig");
-const Scene = @import("../scene.zig").Scene;
+const placing = @import("placing.zig");
+const scene_data = @import("../scene.zig");
 const Place = geometry.Place;
 const Point = geometry.Point;
 const Slope = isosurface.Slope;
+const Builder = scene_data.Builder;
+const Scene = scene_data.Scene;
 const Allocator = std.mem.Allocator;
 const assert = std.debug.assert;
 
@@ -38,21 +40,21 @@ const grid: isosurface.Grid = .{
 
 /// The scene, owned by the caller.
 pub fn build(gpa: Allocator) Allocator.Error!Scene {
-    var scene: SceneBuilder = .init(gpa);
-    errdefer scene.deinit();
-    const lowest = try addSculpture(&scene, gpa);
-    try addStudio(&scene, lowest);
-    try scene.addDirectionalLight(.{ -0.55, 0.75, 0.5 }, .{ 1, 0.95, 0.87 }, 3.4);
-    try scene.addPointLight(.{ 3.5, 2.5, 3 }, .{ 0.7, 0.82, 1 }, 7);
-    scene.setAmbient(0.22);
-    try scene.addCamera(.{
+    var builder: Builder = .init(gpa);
+    errdefer builder.deinit();
+    const lowest = try addSculpture(&builder, gpa);
+    try addStudio(&builder, lowest);
+    try placing.addDirectionalLight(&builder, .{ -0.55, 0.75, 0.5 }, .{ 1, 0.95, 0.87 }, 3.4);
+    try placing.addPointLight(&builder, .{ 3.5, 2.5, 3 }, .{ 0.7, 0.82, 1 }, 7);
+    builder.scene.ambient = 0.22;
+    try placing.addCamera(&builder, .{
         .name = "sculpture",
         .eye = .{ 0.4, 1.5, 6.2 },
         .target = .{ 0, -0.12, 0 },
         .y_fov_deg = 36,
         .aspect = 4.0 / 3.0,
     });
-    return scene.finish();
+    return builder.finish();
 }
 
 /// How the torus, whose axis is y, is turned for the view: leaning back and to the side.
@@ -60,14 +62,14 @@ const pose: Place = .{
     .x = .{ 0.936, 0.352, 0 },
     .y = .{ -0.2112, 0.5616, 0.8 },
     .z = .{ 0.2816, -0.7488, 0.6 },
-    .origin = .{ 0, 0, 0 },
+    .translation = .{ 0, 0, 0 },
 };
 
 /// Adds the sculpture about the origin and returns the height of its lowest point.
-fn addSculpture(scene: *SceneBuilder, gpa: Allocator) Allocator.Error!f64 {
+fn addSculpture(builder: *Builder, gpa: Allocator) Allocator.Error!f64 {
     var surface = try isosurface.build(gpa, grid, Tubes.init());
     defer surface.deinit(gpa);
-    var mesh: MeshBuilder = .init(scene.arena());
+    var mesh: MeshBuilder = .init(builder.arena());
     mesh.place = pose;
     var lowest: f64 = 0;
     for (surface.positions, surface.normals) |position, normal| {
@@ -76,19 +78,19 @@ fn addSculpture(scene: *SceneBuilder, gpa: Allocator) Allocator.Error!f64 {
         if (height < lowest) lowest = height;
     }
     for (surface.triangles) |t| try mesh.triangle(t[0], t[1], t[2]);
-    const material = try scene.addMaterial(.{
+    const material = try builder.addMaterial(.{
         .base_color = .{ 0.03, 0.33, 0.40, 1 },
         .metallic = 0,
         .roughness = 0.22,
     });
-    try scene.addMesh(try mesh.finish(material));
+    try builder.addWorldMesh(try mesh.finish(material));
     return lowest;
 }
 
 /// Adds a floor that bends up into a wall behind, as photographers use.
-fn addStudio(scene: *SceneBuilder, floor_y: f64) Allocator.Error!void {
-    var mesh: MeshBuilder = .init(scene.arena());
-    mesh.place = .at(.{ 0, floor_y, 0 });
+fn addStudio(builder: *Builder, floor_y: f64) Allocator.Error!void {
+    var mesh: MeshBuilder = .init(builder.arena());
+    mesh.place = .translate(.{ 0, floor_y, 0 });
     const bend = 3.0;
     const bend_z = -3.5;
     const segments = 16;
@@ -107,12 +109,12 @@ fn addStudio(scene: *SceneBuilder, floor_y: f64) Allocator.Error!void {
     points[2 * segments + 4] = .{ -half_width, 9, bend_z - bend };
     points[2 * segments + 5] = .{ half_width, 9, bend_z - bend };
     try mesh.patch(.{ .points = &points, .columns = 2 });
-    const material = try scene.addMaterial(.{
+    const material = try builder.addMaterial(.{
         .base_color = .{ 0.55, 0.57, 0.6, 1 },
         .metallic = 0,
         .roughness = 0.9,
     });
-    try scene.addMesh(try mesh.finish(material));
+    try builder.addWorldMesh(try mesh.finish(material));
 }
 
 /// A circle in space.

@@ -1,4 +1,4 @@
-//! Grows one mesh of a procedural scene: vertices, faces, curved patches and the simple solids.
+//! A mesh builder of procedural scenes: vertices, faces, curved patches and the simple solids.
 //!
 //! Everything is described in the space of `place` and put into the world by it. Faces wind
 //! counter-clockwise seen from their visible side. A vertex of a flat face carries a zero normal,
@@ -9,7 +9,9 @@ const std = @import("std");
 const math = @import("../math.zig");
 const elementary = math.elementary;
 const geometry = @import("geometry.zig");
-const Mesh = @import("../scene.zig").Mesh;
+const scene_data = @import("../scene.zig");
+const Grid = scene_data.Grid;
+const Mesh = scene_data.Mesh;
 const Place = geometry.Place;
 const Point = geometry.Point;
 const Vec3 = math.Vec3;
@@ -129,8 +131,8 @@ pub fn sphere(
         for (0..rows - 2) |row_index| {
             const lower = first + @as(u32, @intCast(row_index)) * columns;
             const upper = lower + columns;
-            try builder.triangle(lower + column, lower + next, upper + next);
-            try builder.triangle(lower + column, upper + next, upper + column);
+            const corners = [4]u32{ lower + column, lower + next, upper + next, upper + column };
+            for (Grid.cut(corners)) |t| try builder.triangle(t[0], t[1], t[2]);
         }
         const last = first + (rows - 2) * columns;
         try builder.triangle(last + column, last + next, top);
@@ -211,87 +213,65 @@ pub fn prism(builder: *MeshBuilder, outline: []const OutlinePoint) Allocator.Err
 
 /// Adds a patch. Where faces meet at more than the crease, vertices are doubled.
 pub fn patch(builder: *MeshBuilder, surface: Patch) Allocator.Error!void {
-    const layout: PatchLayout = .init(surface);
-    if (surface.crease_cos == null) return builder.patchFlat(surface, layout);
-
+    const grid = gridOf(surface);
+    if (surface.crease_cos == null) {
+        const first: u32 = @intCast(builder.positions.items.len);
+        for (surface.points) |point| _ = try builder.vertex(point, null);
+        return builder.gridFaces(grid, first);
+    }
     var face_normals: [patch_quad_max]Point = undefined;
-    for (0..layout.quad_rows) |row| {
-        for (0..layout.quad_columns) |column| {
-            const corners = layout.corners(row, column);
-            const points = surface.points;
-            face_normals[row * layout.quad_columns + column] = geometry.cross(
-                points[corners[2]] - points[corners[0]],
-                points[corners[3]] - points[corners[1]],
+    for (0..grid.rows) |row| {
+        for (0..grid.columns) |column| {
+            const a, const b, const c, const d = grid.corners(row, column);
+            face_normals[row * grid.columns + column] = geometry.cross(
+                surface.points[c] - surface.points[a],
+                surface.points[d] - surface.points[b],
             );
         }
     }
     var corner_vertices: [patch_quad_max][4]u32 = undefined;
     for (surface.points, 0..) |_, point_index| {
-        try builder.patchPoint(surface, layout, point_index, &face_normals, &corner_vertices);
+        try builder.patchPoint(surface, grid, point_index, &face_normals, &corner_vertices);
     }
-    for (corner_vertices[0 .. layout.quad_rows * layout.quad_columns]) |corners| {
-        try builder.triangle(corners[0], corners[1], corners[2]);
-        try builder.triangle(corners[0], corners[2], corners[3]);
+    for (corner_vertices[0 .. grid.rows * grid.columns]) |corners| {
+        for (Grid.cut(corners)) |t| try builder.triangle(t[0], t[1], t[2]);
+    }
+}
+
+/// Adds the faces of a grid whose points are vertices from `first` on.
+pub fn gridFaces(builder: *MeshBuilder, grid: Grid, first: u32) Allocator.Error!void {
+    for (0..grid.rows) |row| {
+        for (0..grid.columns) |column| for (Grid.cut(grid.corners(row, column))) |t| {
+            try builder.triangle(first + t[0], first + t[1], first + t[2]);
+        };
     }
 }
 
 /// How the quadrilaterals of a patch lie on its points.
-const PatchLayout = struct {
-    columns: usize,
-    quad_rows: usize,
-    quad_columns: usize,
-    closed: bool,
+fn gridOf(surface: Patch) Grid {
+    assert(surface.columns >= 2 and surface.points.len % surface.columns == 0);
+    const rows = surface.points.len / surface.columns;
+    assert(rows >= 2);
+    const columns = if (surface.closed) surface.columns else surface.columns - 1;
+    assert((rows - 1) * columns <= patch_quad_max);
+    return .{
+        .columns = @intCast(columns),
+        .rows = @intCast(rows - 1),
+        .closed = surface.closed,
+    };
+}
 
-    fn init(surface: Patch) PatchLayout {
-        assert(surface.columns >= 2 and surface.points.len % surface.columns == 0);
-        const rows = surface.points.len / surface.columns;
-        assert(rows >= 2);
-        const quad_columns = if (surface.closed) surface.columns else surface.columns - 1;
-        assert((rows - 1) * quad_columns <= patch_quad_max);
-        return .{
-            .columns = surface.columns,
-            .quad_rows = rows - 1,
-            .quad_columns = quad_columns,
-            .closed = surface.closed,
-        };
-    }
-
-    /// Indices of the points of a quadrilateral, counter-clockwise from the lower left.
-    fn corners(layout: PatchLayout, row: usize, column: usize) [4]usize {
-        const next = if (column + 1 == layout.columns) 0 else column + 1;
-        const lower = row * layout.columns;
-        const upper = lower + layout.columns;
-        return .{ lower + column, lower + next, upper + next, upper + column };
-    }
-
-    /// The quadrilateral that has the point (row, column) as its corner number `corner`.
-    fn quadAt(layout: PatchLayout, row: usize, column: usize, corner: usize) ?usize {
-        const below = corner >= 2;
-        const left = corner == 1 or corner == 2;
-        if (below and row == 0) return null;
-        if (!below and row == layout.quad_rows) return null;
-        if (left and column == 0 and !layout.closed) return null;
-        if (!left and column == layout.quad_columns) return null;
-        const quad_row = if (below) row - 1 else row;
-        const to_left = if (column == 0) layout.columns - 1 else column - 1;
-        const quad_column = if (left) to_left else column;
-        return quad_row * layout.quad_columns + quad_column;
-    }
-};
-
-fn patchFlat(builder: *MeshBuilder, surface: Patch, layout: PatchLayout) Allocator.Error!void {
-    const first: u32 = @intCast(builder.positions.items.len);
-    for (surface.points) |point| _ = try builder.vertex(point, null);
-    for (0..layout.quad_rows) |row| {
-        for (0..layout.quad_columns) |column| {
-            var corners: [4]u32 = undefined;
-            for (layout.corners(row, column), &corners) |point_index, *corner| {
-                corner.* = first + @as(u32, @intCast(point_index));
-            }
-            try builder.triangle(corners[0], corners[1], corners[2]);
-            try builder.triangle(corners[0], corners[2], corners[3]);
-        }
-    }
+/// The quadrilateral that has the point (row, column) as its corner number `corner`.
+fn quadAt(grid: Grid, row: usize, column: usize, corner: usize) ?usize {
+    const below = corner >= 2;
+    const left = corner == 1 or corner == 2;
+    if (below and row == 0) return null;
+    if (!below and row == grid.rows) return null;
+    if (left and column == 0 and !grid.closed) return null;
+    if (!left and column == grid.columns) return null;
+    const quad_row = if (below) row - 1 else row;
+    const to_left = if (column == 0) grid.columns - 1 else column - 1;
+    return quad_row * grid.columns + (if (left) to_left else column);
 }
 
 /// Adds the vertices of one point, one for each group of faces that meet smoothly there, and
@@ -299,20 +279,20 @@ fn patchFlat(builder: *MeshBuilder, surface: Patch, layout: PatchLayout) Allocat
 fn patchPoint(
     builder: *MeshBuilder,
     surface: Patch,
-    layout: PatchLayout,
+    grid: Grid,
     point_index: usize,
     face_normals: *const [patch_quad_max]Point,
     corner_vertices: *[patch_quad_max][4]u32,
 ) Allocator.Error!void {
-    const row = point_index / layout.columns;
-    const column = point_index % layout.columns;
+    const row = point_index / grid.stride();
+    const column = point_index % grid.stride();
     var groups: [4]struct { normal: Point, vertex: u32 } = undefined;
     var group_count: usize = 0;
     for (0..4) |corner| {
-        const own = layout.quadAt(row, column, corner) orelse continue;
+        const own = quadAt(grid, row, column, corner) orelse continue;
         var sum: Point = .{ 0, 0, 0 };
         for (0..4) |other_corner| {
-            const other = layout.quadAt(row, column, other_corner) orelse continue;
+            const other = quadAt(grid, row, column, other_corner) orelse continue;
             const a = face_normals[own];
             const b = face_normals[other];
             const lengths = geometry.length(a) * geometry.length(b);
@@ -385,12 +365,12 @@ test "solids face outwards" {
     }
     const outline = [_]OutlinePoint{ .{ 0, 0 }, .{ 1, 0 }, .{ 1, 2 }, .{ 0, 2 } };
     var square: MeshBuilder = .init(arena.allocator());
-    square.place = .at(.{ 3, 0, 0 });
+    square.place = .translate(.{ 3, 0, 0 });
     try square.prism(&outline);
     const square_mesh = try square.finish(0);
     try std.testing.expectApproxEqRel(@as(f32, 6 * 8), volumeSixfold(square_mesh), 1e-5);
     var cylinder: MeshBuilder = .init(arena.allocator());
-    cylinder.place = geometry.Place.at(.{ 9, 1, 2 }).turned(1);
+    cylinder.place = geometry.Place.translate(.{ 9, 1, 2 }).turned(1);
     try cylinder.revolve(&outline, 64);
     const cylinder_mesh = try cylinder.finish(0);
     const volume: f32 = 6 * 2 * std.math.pi;

@@ -5,7 +5,7 @@ const std = @import("std");
 const geometry = @import("geometry.zig");
 const scene_data = @import("../scene.zig");
 const MeshBuilder = @import("mesh_builder.zig");
-const SceneBuilder = @import("scene_builder.zig");
+const Builder = scene_data.Builder;
 const Allocator = std.mem.Allocator;
 
 /// A mesh for each tag of the enum `Part`.
@@ -33,12 +33,12 @@ pub fn MeshSet(comptime Part: type) type {
         /// Adds the meshes with their materials to the scene. Asserts that none is empty.
         pub fn finish(
             set: *Set,
-            scene: *SceneBuilder,
+            builder: *Builder,
             materials: std.EnumArray(Part, scene_data.Material),
         ) Allocator.Error!void {
             for (&set.meshes.values, materials.values) |*mesh, look| {
-                const material = try scene.addMaterial(look);
-                try scene.addMesh(try mesh.finish(material));
+                const material = try builder.addMaterial(look);
+                try builder.addWorldMesh(try mesh.finish(material));
             }
         }
     };
@@ -46,21 +46,21 @@ pub fn MeshSet(comptime Part: type) type {
 
 test "meshes keep to their materials" {
     const Part = enum { stone, wood };
-    var scene: SceneBuilder = .init(std.testing.allocator);
-    defer scene.deinit();
-    var set: MeshSet(Part) = .init(scene.arena());
-    set.setPlace(.at(.{ 1, 2, 3 }));
+    var builder: Builder = .init(std.testing.allocator);
+    defer builder.deinit();
+    var set: MeshSet(Part) = .init(builder.arena());
+    set.setPlace(.translate(.{ 1, 2, 3 }));
     try set.get(.stone).box(.{ 0, 0, 0 }, .{ 1, 1, 1 });
     try set.get(.wood).quad(.{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 1, 1, 0 }, .{ 0, 1, 0 });
-    try set.finish(&scene, .init(.{
+    try set.finish(&builder, .init(.{
         .stone = .{ .roughness = 0.5 },
         .wood = .{ .roughness = 0.25 },
     }));
-    const meshes = scene.meshes.items;
+    const meshes = builder.meshes.items;
     try std.testing.expectEqual(10, meshes[0].triangles.len);
     try std.testing.expectEqual(2, meshes[1].triangles.len);
     try std.testing.expectEqual([3]f32{ 1, 2, 3 }, meshes[1].positions[0]);
-    const materials = scene.materials.items;
+    const materials = builder.materials.items;
     try std.testing.expectEqual(0.5, materials[meshes[0].material].roughness);
     try std.testing.expectEqual(0.25, materials[meshes[1].material].roughness);
 }

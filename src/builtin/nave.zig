@@ -11,13 +11,15 @@ const masonry = @import("masonry.zig");
 const sky = @import("sky.zig");
 const elementary = @import("../math.zig").elementary;
 const MeshBuilder = @import("mesh_builder.zig");
-const SceneBuilder = @import("scene_builder.zig");
-const Material = @import("../scene.zig").Material;
-const Scene = @import("../scene.zig").Scene;
+const placing = @import("placing.zig");
+const scene_data = @import("../scene.zig");
 const Arch = masonry.Arch;
 const Outline = masonry.Outline;
 const Place = geometry.Place;
 const Point = geometry.Point;
+const Builder = scene_data.Builder;
+const Material = scene_data.Material;
+const Scene = scene_data.Scene;
 const Allocator = std.mem.Allocator;
 
 const bay = 5.0;
@@ -67,10 +69,10 @@ const materials: std.EnumArray(Part, Material) = .init(.{
 
 /// The scene, owned by the caller.
 pub fn build(gpa: Allocator) Allocator.Error!Scene {
-    var scene: SceneBuilder = .init(gpa);
-    errdefer scene.deinit();
-    var parts: Parts = .init(scene.arena());
-    try addSide(&parts, Place.at(.{ -half_length, 0, -pier_z }));
+    var builder: Builder = .init(gpa);
+    errdefer builder.deinit();
+    var parts: Parts = .init(builder.arena());
+    try addSide(&parts, Place.translate(.{ -half_length, 0, -pier_z }));
     try addSide(&parts, Place.identity.turned(2).moved(.{ -half_length, 0, -pier_z }));
     try addVaults(&parts);
     try addApse(&parts);
@@ -79,13 +81,13 @@ pub fn build(gpa: Allocator) Allocator.Error!Scene {
     try addChoir(&parts);
     for (0..10) |row| {
         const x = -11.5 + 1.45 * @as(f64, @floatFromInt(row));
-        for ([_]f64{ -2.35, 2.35 }) |z| try addPew(parts.get(.wood), .at(.{ x, 0, z }));
+        for ([_]f64{ -2.35, 2.35 }) |z| try addPew(parts.get(.wood), .translate(.{ x, 0, z }));
     }
     const lamps = [_]Point{ .{ -5, 5.4, 0 }, .{ 5, 5.4, 0 } };
-    for (lamps) |lamp| try addChandelier(&parts, .at(lamp));
-    try parts.finish(&scene, materials);
+    for (lamps) |lamp| try addChandelier(&parts, .translate(lamp));
+    try parts.finish(&builder, materials);
 
-    try sky.add(&scene, .{
+    try sky.add(&builder, .{
         .radius = 60,
         .azimuth_deg = 40,
         .half_width_deg = 130,
@@ -94,22 +96,22 @@ pub fn build(gpa: Allocator) Allocator.Error!Scene {
         .low_color = .{ 0.85, 0.92, 1 },
         .high_color = .{ 0.4, 0.6, 0.95 },
     });
-    try scene.addDirectionalLight(.{ -0.42, 0.6, 0.62 }, .{ 1, 0.86, 0.64 }, 9);
+    try placing.addDirectionalLight(&builder, .{ -0.42, 0.6, 0.62 }, .{ 1, 0.86, 0.64 }, 9);
     for (lamps) |lamp| {
         // Beside the rod, so that its knob does not darken the crown of the vault.
         const flames = lamp + Point{ -0.3, 0.8, 0 };
-        try scene.addPointLight(flames, .{ 1, 0.78, 0.52 }, 30);
+        try placing.addPointLight(&builder, flames, .{ 1, 0.78, 0.52 }, 30);
     }
-    try scene.addPointLight(.{ 14.2, 4.5, 0 }, .{ 1, 0.85, 0.65 }, 20);
-    scene.setAmbient(0.12);
-    try scene.addCamera(.{
+    try placing.addPointLight(&builder, .{ 14.2, 4.5, 0 }, .{ 1, 0.85, 0.65 }, 20);
+    builder.scene.ambient = 0.12;
+    try placing.addCamera(&builder, .{
         .name = "nave",
         .eye = .{ -14, 2.3, 0.5 },
         .target = .{ 4, 5.2, -0.2 },
         .y_fov_deg = 62,
         .aspect = 1.5,
     });
-    return scene.finish();
+    return builder.finish();
 }
 
 /// Arcade, wall and aisle of one side.
@@ -500,7 +502,7 @@ fn addDiagonalRibs(
             .x = geometry.scale(place.x, cosine) + geometry.scale(place.z, sine),
             .y = place.y,
             .z = geometry.scale(place.z, cosine) - geometry.scale(place.x, sine),
-            .origin = place.origin,
+            .translation = place.translation,
         };
         try masonry.addRib(stone, .{
             .arch = arch,
@@ -515,7 +517,7 @@ fn addDiagonalRibs(
 fn addVaults(parts: *Parts) Allocator.Error!void {
     for (0..bay_count + 1) |index| {
         const x = bay * @as(f64, @floatFromInt(index)) - half_length;
-        parts.get(.stone).place = Place.at(.{ x, vault_spring, 0 }).turned(1);
+        parts.get(.stone).place = Place.translate(.{ x, vault_spring, 0 }).turned(1);
         try masonry.addRib(parts.get(.stone), .{
             .arch = vault,
             .half_across = nave_half,
@@ -523,7 +525,7 @@ fn addVaults(parts: *Parts) Allocator.Error!void {
             .section = &transverse_section,
         });
         if (index == bay_count) break;
-        const middle: Place = .at(.{ x + bay / 2.0, vault_spring, 0 });
+        const middle: Place = .translate(.{ x + bay / 2.0, vault_spring, 0 });
         parts.get(.wall).place = middle;
         try masonry.groinVault(parts.get(.wall), vault, bay / 2.0, nave_half, vault_rise);
         try addDiagonalRibs(parts.get(.stone), middle, vault, nave_half, vault_rise);
@@ -555,7 +557,7 @@ fn addApse(parts: *Parts) Allocator.Error!void {
             .x = .{ -outward[2], 0, outward[0] },
             .y = .{ 0, 1, 0 },
             .z = -outward,
-            .origin = center + geometry.scale(outward, distance),
+            .translation = center + geometry.scale(outward, distance),
         };
         try addApseWall(parts, on_wall, half_width, @intCast(side));
         try addApseWeb(parts, on_wall, half_width, distance);
@@ -566,12 +568,12 @@ fn addApse(parts: *Parts) Allocator.Error!void {
         const outward: Point = .{ elementary.cos(azimuth_rad), 0, elementary.sin(azimuth_rad) };
         try addApseRib(parts.get(.stone), center, outward);
     }
-    try addBoss(parts.get(.stone), .at(.{ half_length, vault_spring, 0 }));
+    try addBoss(parts.get(.stone), .translate(.{ half_length, vault_spring, 0 }));
 }
 
 /// A shaft in a corner of the apse and the rib that it carries to the middle.
 fn addApseRib(stone: *MeshBuilder, center: Point, outward: Point) Allocator.Error!void {
-    stone.place = .at(center + geometry.scale(outward, nave_half));
+    stone.place = .translate(center + geometry.scale(outward, nave_half));
     var outline: Outline = .from(.{ 0.24, 0 });
     outline.line(&.{ .{ 0.24, 0.5 }, .{ 0.16, 0.6 }, .{ 0.16, vault_spring - 0.6 } });
     outline.line(&.{ .{ 0.2, vault_spring - 0.56 }, .{ 0.16, vault_spring - 0.52 } });
@@ -582,7 +584,7 @@ fn addApseRib(stone: *MeshBuilder, center: Point, outward: Point) Allocator.Erro
         .x = -outward,
         .y = .{ 0, 1, 0 },
         .z = geometry.cross(-outward, .{ 0, 1, 0 }),
-        .origin = center + Point{ 0, vault_spring, 0 },
+        .translation = center + Point{ 0, vault_spring, 0 },
     };
     try masonry.addRib(stone, .{
         .arch = vault,
@@ -740,9 +742,9 @@ fn addChoir(parts: *Parts) Allocator.Error!void {
     candlestick.torus(0.03, 0.08, 2);
     candlestick.line(&.{ .{ 0.03, 2.2 }, .{ 0.09, 2.28 }, .{ 0.09, 2.3 }, .{ 0.02, 2.3 } });
     for ([_]f64{ -1.35, -0.95, -0.55, 0.55, 0.95, 1.35 }) |z| {
-        parts.setPlace(.at(.{ 16.2, 0, z }));
+        parts.setPlace(.translate(.{ 16.2, 0, z }));
         try parts.get(.gold).revolve(candlestick.points(), 10);
-        try addCandle(parts, Place.at(.{ 16.2, 2.3, z }), 0.4);
+        try addCandle(parts, Place.translate(.{ 16.2, 2.3, z }), 0.4);
     }
     parts.setPlace(.identity);
     try parts.get(.gold).box(.{ 16.15, 1.8, -0.2 }, .{ 16.35, 1.9, 0.2 });
@@ -787,7 +789,7 @@ fn addChandelier(parts: *Parts, place: Place) Allocator.Error!void {
         .{ radius - 0.05, 0.06 },  .{ radius - 0.04, -0.06 }, .{ radius, -0.1 },
         .{ radius + 0.04, -0.06 }, .{ radius + 0.05, 0.06 },  .{ radius - 0.05, 0.06 },
     }, 32);
-    const top = vault_spring + vault_rise - place.origin[1];
+    const top = vault_spring + vault_rise - place.translation[1];
     try parts.get(.gold).revolve(&.{ .{ 0.02, 1.3 }, .{ 0.02, top } }, 5);
     try parts.get(.gold).revolve(&.{
         .{ 0, 1.16 }, .{ 0.08, 1.22 }, .{ 0.1, 1.3 }, .{ 0.06, 1.38 }, .{ 0, 1.42 },

@@ -1,13 +1,14 @@
-//! A part of a sky: an unlit dome behind what the camera sees, from the horizon up.
+//! A sky dome: unlit, behind what the camera sees, from the horizon up.
 //!
 //! It shines by its colour alone. Like everything else it casts shadows, so it is to be left open
 //! where the scene's directional lights come from.
 
 const std = @import("std");
 const elementary = @import("../math.zig").elementary;
+const scene_data = @import("../scene.zig");
 const MeshBuilder = @import("mesh_builder.zig");
-const SceneBuilder = @import("scene_builder.zig");
 const Vec3 = @import("../math.zig").Vec3;
+const Builder = scene_data.Builder;
 const Allocator = std.mem.Allocator;
 const assert = std.debug.assert;
 
@@ -29,9 +30,9 @@ const columns = 24;
 const rows = 8;
 
 /// Adds the sky as a mesh of its own, seen from inside.
-pub fn add(scene: *SceneBuilder, sky: Sky) Allocator.Error!void {
+pub fn add(builder: *Builder, sky: Sky) Allocator.Error!void {
     assert(sky.half_width_deg > 0 and sky.half_width_deg < 180 and sky.radius > 0);
-    var mesh: MeshBuilder = .init(scene.arena());
+    var mesh: MeshBuilder = .init(builder.arena());
     for (0..rows + 1) |row| {
         const height = @as(f64, @floatFromInt(row)) / rows;
         const elevation_deg = sky.elevation_min_deg +
@@ -52,22 +53,15 @@ pub fn add(scene: *SceneBuilder, sky: Sky) Allocator.Error!void {
             }, null);
         }
     }
-    for (0..rows) |row| {
-        for (0..columns) |column| {
-            const lower: u32 = @intCast(row * (columns + 1) + column);
-            const upper = lower + columns + 1;
-            try mesh.triangle(lower, lower + 1, upper + 1);
-            try mesh.triangle(lower, upper + 1, upper);
-        }
-    }
-    const material = try scene.addMaterial(.{ .metallic = 0, .unlit = true });
-    try scene.addMesh(try mesh.finish(material));
+    try mesh.gridFaces(.{ .columns = columns, .rows = rows }, 0);
+    const material = try builder.addMaterial(.{ .metallic = 0, .unlit = true });
+    try builder.addWorldMesh(try mesh.finish(material));
 }
 
 test "the sky is seen from the origin" {
-    var scene: SceneBuilder = .init(std.testing.allocator);
-    defer scene.deinit();
-    try add(&scene, .{
+    var builder: Builder = .init(std.testing.allocator);
+    defer builder.deinit();
+    try add(&builder, .{
         .radius = 10,
         .azimuth_deg = 0,
         .half_width_deg = 90,
@@ -77,7 +71,7 @@ test "the sky is seen from the origin" {
         .high_color = .{ 0, 0, 1 },
     });
     const vec3 = @import("../math.zig").vec3;
-    const mesh = scene.meshes.items[0];
+    const mesh = builder.meshes.items[0];
     try std.testing.expectEqual(2 * columns * rows, mesh.triangles.len);
     for (mesh.triangles) |t| {
         const a = mesh.positions[t[0]];

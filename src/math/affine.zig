@@ -50,7 +50,9 @@ pub fn Affine(comptime V: type) type {
         pub fn of(from: anytype) Self {
             var map: Self = undefined;
             inline for (.{ "x", "y", "z", "translation" }) |name| {
-                for (&@field(map, name), @field(from, name)) |*to, value| to.* = @floatCast(value);
+                inline for (0..3) |axis| {
+                    @field(map, name)[axis] = @floatCast(@field(from, name)[axis]);
+                }
             }
             return map;
         }
@@ -114,6 +116,24 @@ pub fn Affine(comptime V: type) type {
             return map;
         }
 
+        /// This map after a move by `offset`: moved in its own axes.
+        pub fn moved(map: Self, offset: V) Self {
+            var result = map;
+            result.translation = map.point(offset);
+            return result;
+        }
+
+        /// This map after quarter turns from x towards z: turned about its own y.
+        pub fn turned(map: Self, quarters: u2) Self {
+            var result = map;
+            for (0..quarters) |_| {
+                const old_x = result.x;
+                result.x = result.z;
+                result.z = vec.neg(old_x);
+            }
+            return result;
+        }
+
         /// The map back, or null where there is none.
         pub fn inverse(map: Self) ?Self {
             const volume = map.determinant();
@@ -133,16 +153,6 @@ pub fn Affine(comptime V: type) type {
             };
             result.translation = vec.scale(result.direction(map.translation), -1);
             return result;
-        }
-
-        /// Rounded to f32 as in `vec3.toSingle`.
-        pub fn toSingle(map: Self) Affine([3]f32) {
-            return .{
-                .x = vec.toSingle(map.x),
-                .y = vec.toSingle(map.y),
-                .z = vec.toSingle(map.z),
-                .translation = vec.toSingle(map.translation),
-            };
         }
 
         const Self = @This();
@@ -178,6 +188,15 @@ test "compose equals doing one after the other, normals stay perpendicular" {
     for (n, again) |p, q| try std.testing.expectApproxEqAbs(p, q, 1e-4);
 }
 
+test "maps move and turn in their own axes" {
+    const quarter = Single.translate(.{ 1, 2, 3 }).turned(1);
+    try std.testing.expectEqual([3]f32{ 0, 2, 3 }, quarter.point(.{ 0, 0, 1 }));
+    try std.testing.expectEqual([3]f32{ 1, 2, 4 }, quarter.point(.{ 1, 0, 0 }));
+    const moved = quarter.moved(.{ 1, 0, 0 });
+    try std.testing.expectEqual([3]f32{ 1, 7, 4 }, moved.point(.{ 0, 5, 0 }));
+    try std.testing.expectEqual(Single.identity, Single.identity.turned(3).turned(1));
+}
+
 test "a map and its inverse are nothing, in either precision" {
     const Double = Affine(@Vector(3, f64));
     const map: Double = .compose(.fromTrs(.{ 1, 2, 3 }, .{ 0.6, 0, 0, 0.8 }, .{ 1, -2, 0.5 }), .{
@@ -190,7 +209,7 @@ test "a map and its inverse are nothing, in either precision" {
     inline for (.{ 0.3, -0.7, 2 }, 0..) |expected, axis| {
         try std.testing.expectApproxEqAbs(expected, back[axis], 1e-14);
     }
-    const single = map.toSingle();
+    const single: Single = .of(map);
     const single_back = single.inverse().?.point(single.point(.{ 0.3, -0.7, 2 }));
     for ([3]f32{ 0.3, -0.7, 2 }, single_back) |expected, component| {
         try std.testing.expectApproxEqAbs(expected, component, 2e-6);

@@ -13,6 +13,7 @@
 const std = @import("std");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Identity = @import("../identity.zig").Identity;
+const systemReason = @import("../diagnostic.zig").systemReason;
 const temporary_files = @import("temporary.zig");
 const Io = std.Io;
 const TemporaryFile = temporary_files.TemporaryFile;
@@ -132,7 +133,7 @@ const Place = struct {
         const folder_path = std.fs.path.dirname(path) orelse ".";
         const folder = place.folder.openDir(io, folder_path, .{}) catch |err|
             return diagnostic.fail(error.InputOutput, "no access to its folder: {s}", .{
-                reason(err),
+                systemReason(err),
             });
         place.closeFolder(io);
         place.folder = folder;
@@ -268,40 +269,9 @@ fn syncFolder(io: Io, folder: Io.Dir) void {
     _ = std.c.fsync(readable.handle);
 }
 
-const reasons: std.StaticStringMap([]const u8) = .initComptime(.{
-    .{ "AccessDenied", "permission denied" },
-    .{ "BadPathName", "not a file name" },
-    .{ "BrokenPipe", "nobody reads it" },
-    .{ "Canceled", "the program is ending" },
-    .{ "DeviceBusy", "device busy" },
-    .{ "DiskQuota", "disk quota exceeded" },
-    .{ "FileBusy", "it is in use" },
-    .{ "FileNotFound", "no such file or directory" },
-    .{ "FileTooBig", "file too large" },
-    .{ "InputOutput", "input/output error" },
-    .{ "IsDir", "it is a directory" },
-    .{ "NameTooLong", "name too long" },
-    .{ "NoDevice", "no such device" },
-    .{ "NoSpaceLeft", "no space left on the device" },
-    .{ "NotDir", "not a directory" },
-    .{ "NotOpenForWriting", "it is closed" },
-    .{ "PermissionDenied", "permission denied" },
-    .{ "ProcessFdQuotaExceeded", "too many open files" },
-    .{ "ReadOnlyFileSystem", "read-only file system" },
-    .{ "SymLinkLoop", "too many symbolic links" },
-    .{ "SystemFdQuotaExceeded", "too many open files" },
-    .{ "SystemResources", "the system is out of resources" },
-});
-
-/// An error of the file system in words.
-fn reason(err: anytype) []const u8 {
-    const name = @errorName(err);
-    return reasons.get(name) orelse name;
-}
-
 /// Says why nothing can be written.
 fn fail(err: anytype, diagnostic: *Diagnostic) Error {
-    return diagnostic.fail(error.InputOutput, "cannot write: {s}", .{reason(err)});
+    return diagnostic.fail(error.InputOutput, "cannot write: {s}", .{systemReason(err)});
 }
 
 /// A folder for a test, paths into it, and its temporary files.

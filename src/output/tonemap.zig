@@ -1,18 +1,17 @@
 //! From linear radiance to bytes: exposure, clamping, the sRGB encoding.
 //!
 //! In: rows of premultiplied linear RGBA, finite. Out: rows of RGB (over black) or RGBA bytes
-//! (not premultiplied). A multiplication and an exact encoding: the same bytes on every target.
+//! (not premultiplied), or of the floats themselves. A multiplication and an exact encoding: the
+//! same bytes on every target.
 
 const std = @import("std");
 const Allocator = std.mem.Allocator;
 const Image = @import("../image.zig").Image;
 const math = @import("../math.zig");
+const settings = @import("../settings.zig");
 const assert = std.debug.assert;
 
-/// Brightness that `autoScale` gives to its percentile.
-const auto_brightness: f32 = 0.8;
-/// Share of the pixels, in percent, that are to be no brighter.
-const auto_percentile = 95;
+const auto = settings.auto_exposure;
 
 /// The factor of an exposure in stops, 2^ev. Asserts that it is within f32's normal range.
 pub fn scaleOf(ev: f32) f32 {
@@ -35,7 +34,7 @@ pub fn autoScale(gpa: Allocator, image: *const Image) error{OutOfMemory}!f32 {
         pixel_count += 1;
     }
     if (pixel_count == 0) return 1;
-    const rank = (pixel_count * auto_percentile + 99) / 100 - 1;
+    const rank = (pixel_count * auto.percentile + 99) / 100 - 1;
     const upper = select(counts, rank);
     @memset(counts, 0);
     for (image.pixels) |pixel| {
@@ -45,7 +44,7 @@ pub fn autoScale(gpa: Allocator, image: *const Image) error{OutOfMemory}!f32 {
     const lower = select(counts, upper.rank);
     const luminance: f32 = @bitCast(upper.index << 16 | lower.index);
     if (luminance < std.math.floatMin(f32)) return 1;
-    const scale = auto_brightness / luminance;
+    const scale = auto.brightness / luminance;
     return if (scale < std.math.floatMin(f32)) std.math.floatMin(f32) else scale;
 }
 
@@ -65,31 +64,60 @@ fn luminanceBits(pixel: [4]f32) u32 {
     return if (luminance > 0) @bitCast(luminance) else 0;
 }
 
+/// What a row becomes.
+pub const Form = enum {
+    /// sRGB bytes, over black.
+    rgb,
+    /// With alpha, not premultiplied.
+    rgba,
+    /// Floats as they are, over black.
+    linear,
+    /// Floats that a pixel of Radiance HDR can hold: none below 0, none that has no exponent there.
+    radiance,
+};
+
 /// The frame as rows of bytes.
 pub const Rows = struct {
     image: *const Image,
-    /// Exposure.
+    /// Exposure, of sRGB bytes.
     scale: f32,
-    /// 3: over black; 4: with alpha, not premultiplied.
-    channel_count: u8,
+    form: Form,
 
     /// Bytes of a row.
     pub fn byteCount(rows: Rows) usize {
-        assert(rows.channel_count == 3 or rows.channel_count == 4);
-        return @as(usize, rows.image.width) * rows.channel_count;
+        return @as(usize, rows.image.width) * bytesOf(rows.form);
     }
 
     /// Encodes row y. Asserts that `bytes` has the length of one.
     pub fn encode(rows: Rows, y: u32, bytes: []u8) void {
         assert(y < rows.image.height and bytes.len == rows.byteCount());
         const row = rows.image.pixels[@as(usize, y) * rows.image.width ..][0..rows.image.width];
-        if (rows.channel_count == 4) {
-            encodeRgba(row, rows.scale, std.mem.bytesAsSlice([4]u8, bytes));
-        } else {
-            encodeRgb(row, rows.scale, std.mem.bytesAsSlice([3]u8, bytes));
+        switch (rows.form) {
+            .rgb => encodeRgb(row, rows.scale, std.mem.bytesAsSlice([3]u8, bytes)),
+            .rgba => encodeRgba(row, rows.scale, std.mem.bytesAsSlice([4]u8, bytes)),
+            .linear => for (row, std.mem.bytesAsSlice([3]f32, bytes)) |pixel, *out| {
+                out.* = pixel[0..3].*;
+            },
+            .radiance => for (row, std.mem.bytesAsSlice([3]f32, bytes)) |pixel, *out| {
+                for (out, pixel[0..3]) |*held, value| {
+                    held.* = if (value > 0) @min(value, radiance_max) else 0;
+                }
+            },
         }
     }
 };
+
+/// Bytes of a pixel.
+pub fn bytesOf(form: Form) u8 {
+    return switch (form) {
+        .rgb => 3,
+        .rgba => 4,
+        .linear, .radiance => @sizeOf([3]f32),
+    };
+}
+
+/// The largest mantissa and exponent of RGBE.
+const radiance_max: f32 = 0x1.fep126;
 
 const Pixel = @Vector(4, f32);
 

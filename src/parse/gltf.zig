@@ -1,14 +1,13 @@
 //! glTF 2.0 and GLB: a file becomes a `Scene`.
 //!
-//! In: a path. Out: a checked `Scene`; nothing of the file or of cgltf remains. The order is that
-//! of trust: container, JSON text, document, extensions, buffers, accessors, and only then the
-//! parts.
+//! In: a file's bytes. Out: a checked `Scene`; nothing of the file or of cgltf remains. The order
+//! is that of trust: container, JSON text, document, extensions, buffers, accessors, and only then
+//! the parts.
 
 const std = @import("std");
 const accessors = @import("gltf/accessors.zig");
 const asset = @import("gltf/asset.zig");
 const container = @import("gltf/container.zig");
-const file = @import("file.zig");
 const escapes = @import("json/escapes.zig");
 const json = @import("json.zig");
 const limits = @import("gltf/limits.zig");
@@ -22,62 +21,17 @@ const Buffers = @import("gltf/buffers.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Document = @import("gltf/document.zig");
 const Meshes = @import("gltf/meshes.zig");
+const Resources = @import("resource.zig");
 const Scene = scene_data.Scene;
-const Settings = @import("settings.zig").Settings;
 const Skins = @import("gltf/skins.zig");
 const Source = @import("gltf/source.zig");
 
 /// See parse.zig.
 pub const Error = Source.Error;
 
-/// Reads the file at `path`; see `parse.parse`.
-pub fn parse(
-    gpa: Allocator,
-    io: std.Io,
-    path: []const u8,
-    settings: Settings,
-    diagnostic: *Diagnostic,
-) Error!Scene {
-    const bytes = try readFile(gpa, io, path, settings, diagnostic);
-    defer gpa.free(bytes);
-    const folder_path = std.fs.path.dirname(path) orelse ".";
-    const folder = std.Io.Dir.cwd().openDir(io, folder_path, .{}) catch
-        return diagnostic.fail(error.InputOutput, "its folder cannot be opened", .{});
-    defer folder.close(io);
-    return parseBytes(gpa, io, bytes, folder, settings, diagnostic);
-}
-
-fn readFile(
-    gpa: Allocator,
-    io: std.Io,
-    path: []const u8,
-    settings: Settings,
-    diagnostic: *Diagnostic,
-) Error![]u8 {
-    var reason: []const u8 = "";
-    const opened = file.open(io, .cwd(), path, settings.output, &reason) catch
-        return diagnostic.fail(error.InputOutput, "{s}", .{reason});
-    defer opened.close(io);
-    return file.read(gpa, io, opened, limits.file_bytes_max, &reason) catch |err| switch (err) {
-        error.OutOfMemory => error.OutOfMemory,
-        error.InputOutput, error.NotRegular => diagnostic.fail(error.InputOutput, "{s}", .{reason}),
-        error.TooLarge => diagnostic.fail(
-            error.InvalidInput,
-            "is over the limit of {d} bytes",
-            .{limits.file_bytes_max},
-        ),
-    };
-}
-
-/// Reads a file that is in memory; what it names is looked for in `folder`.
-pub fn parseBytes(
-    gpa: Allocator,
-    io: std.Io,
-    bytes: []const u8,
-    folder: std.Io.Dir,
-    settings: Settings,
-    diagnostic: *Diagnostic,
-) Error!Scene {
+/// Reads a file that is in memory; what it names comes from `resources`.
+pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) Error!Scene {
+    const gpa = resources.gpa;
     const parts = try container.open(bytes, diagnostic);
     const simplified = try escapes.simplifyEscapes(gpa, parts.json);
     defer if (simplified) |copy| gpa.free(copy);
@@ -87,31 +41,27 @@ pub fn parseBytes(
     defer document.deinit();
     const doubles = try json.readDoubles(gpa, text, &schema.document, &checked);
     defer gpa.free(doubles);
-    var scene: Scene = .init(gpa);
-    errdefer scene.deinit();
+    var builder: scene_data.Builder = .init(gpa);
+    errdefer builder.deinit();
     var source: Source = .{
         .gpa = gpa,
-        .arena = scene.arena.allocator(),
+        .builder = &builder,
+        .arena = builder.arena(),
         .data = document.data,
         .doubles = doubles,
         .diagnostic = diagnostic,
     };
     defer source.deinit();
     try asset.check(&source);
-    var buffers: Buffers = try .load(gpa, document.data, .{
-        .io = io,
-        .folder = folder,
-        .allow_outside = settings.allow_outside,
-        .output = settings.output,
-        .binary = parts.binary,
-    }, diagnostic);
+    var buffers: Buffers = try .load(resources, document.data, parts.binary, diagnostic);
     defer buffers.deinit();
     var input_bytes: u64 = bytes.len;
     for (buffers.owned.items) |owned| input_bytes += owned.len;
     source.buffers = buffers.list;
     source.decoded_bytes_left = limits.decodedBytesMax(input_bytes);
     try accessors.checkAll(&source);
-    try fill(&source, &scene);
+    try fill(&source);
+    const scene = try builder.finish();
     warnOfGaps(&source, &scene);
     return scene;
 }
@@ -148,50 +98,36 @@ fn parseDocument(
 }
 
 /// Puts the parts of the document into the scene.
-fn fill(source: *Source, scene: *Scene) Error!void {
-    const gpa = source.gpa;
-    const hierarchy = try nodes.collect(source);
-    defer gpa.free(hierarchy.origins);
+fn fill(source: *Source) Error!void {
+    const builder = source.builder;
+    const origins = try nodes.collect(source);
+    defer source.gpa.free(origins);
     var meshes: Meshes = .{ .source = source };
     defer meshes.deinit();
     var skins: Skins = .{ .source = source };
     defer skins.deinit();
     try skins.checkAll();
-    var instances: std.ArrayList(scene_data.Instance) = .empty;
-    defer instances.deinit(gpa);
-    var cameras: std.ArrayList(scene_data.Camera) = .empty;
-    defer cameras.deinit(gpa);
-    var lights: std.ArrayList(scene_data.Light) = .empty;
-    defer lights.deinit(gpa);
-    for (hierarchy.origins, 0..) |origin, index| {
+    for (origins, 0..) |origin, index| {
         const node = Source.item(source.data.nodes, origin);
         const node_index: u32 = @intCast(index);
         if (node.mesh) |mesh| {
             const mesh_index = Source.indexOf(source.data.meshes, mesh);
             try skins.checkNode(node, mesh_index);
             const range = try meshes.get(mesh_index);
-            if (instances.items.len + range.count > limits.instance_count_max) return source.fail(
-                "over {d} showings of meshes",
-                .{limits.instance_count_max},
-            );
+            if (builder.instances.items.len + range.count > limits.instance_count_max)
+                return source.fail("over {d} instances of meshes", .{limits.instance_count_max});
             for (range.first..range.first + range.count) |drawn| {
-                try instances.append(gpa, .{ .mesh = @intCast(drawn), .node = node_index });
+                try builder.addInstance(@intCast(drawn), node_index);
             }
         }
         if (node.camera) |raw| {
-            try cameras.append(gpa, try views.readCamera(source, raw, node.name, node_index));
+            try builder.addCamera(try views.readCamera(source, raw, node.name, node_index));
         }
         if (node.light) |raw| {
-            if (views.readLight(source, raw, node_index)) |light| try lights.append(gpa, light);
+            if (views.readLight(source, raw, node_index)) |light| try builder.addLight(light);
         }
     }
-    scene.nodes = hierarchy.list;
-    scene.meshes = try source.arena.dupe(scene_data.Mesh, meshes.list.items);
-    scene.instances = try source.arena.dupe(scene_data.Instance, instances.items);
-    scene.materials = try materials.read(source, meshes.default_material_used);
-    scene.cameras = try source.arena.dupe(scene_data.Camera, cameras.items);
-    scene.lights = try source.arena.dupe(scene_data.Light, lights.items);
-    if (cameras.items.len > 0) scene.camera_default = 0;
+    try materials.read(source, meshes.default_material_used);
 }
 
 /// Says what the picture will lack.

@@ -1,4 +1,4 @@
-//! JSON text, checked before anything believes it.
+//! A JSON validator: the text is checked before anything believes it.
 //!
 //! In: bytes and a `Rule` that says what a document may hold where. Out: nothing, or one line with
 //! the place and what is wrong. One linear scan with an explicit stack, strict about the grammar
@@ -6,11 +6,11 @@
 //! only has to be JSON.
 
 const std = @import("std");
-const diagnostic = @import("../diagnostic.zig");
+const diagnostic_data = @import("../diagnostic.zig");
 const escapes = @import("json/escapes.zig");
 const numbers = @import("json/numbers.zig");
 const Allocator = std.mem.Allocator;
-const Diagnostic = diagnostic.Diagnostic;
+const Diagnostic = diagnostic_data.Diagnostic;
 const assert = std.debug.assert;
 
 /// Deepest nesting of arrays and objects.
@@ -99,13 +99,17 @@ pub const Lengths = [list_count_max]u64;
 
 /// Checks a whole document and counts its lists and doubles. References are not compared with the
 /// lists' lengths.
-pub fn check(text: []const u8, rule: *const Rule, said: *Diagnostic) error{InvalidInput}!Checked {
-    if (!std.unicode.utf8ValidateSlice(text)) return said.fail(
+pub fn check(
+    text: []const u8,
+    rule: *const Rule,
+    diagnostic: *Diagnostic,
+) error{InvalidInput}!Checked {
+    if (!std.unicode.utf8ValidateSlice(text)) return diagnostic.fail(
         error.InvalidInput,
         "the JSON text is not UTF-8",
         .{},
     );
-    var scanner: Scanner = .{ .text = text, .said = said };
+    var scanner: Scanner = .{ .text = text, .diagnostic = diagnostic };
     try scanner.run(rule);
     return .{ .lengths = scanner.lengths, .double_count = scanner.double_count };
 }
@@ -119,7 +123,7 @@ pub fn checkReferences(
     rule: *const Rule,
     lengths: Lengths,
     noun: []const u8,
-    said: *Diagnostic,
+    diagnostic: *Diagnostic,
 ) error{ OutOfMemory, InvalidInput }!void {
     var length: usize = 0;
     for (lengths) |list_length| length = @max(length, @as(usize, @intCast(list_length)));
@@ -130,15 +134,15 @@ pub fn checkReferences(
     var unheard: Diagnostic = .{}; // The warnings have been given.
     var scanner: Scanner = .{
         .text = text,
-        .said = &unheard,
+        .diagnostic = &unheard,
         .references = .{ .lengths = lengths, .children = &children, .roots = &roots },
     };
     scanner.run(rule) catch |err| {
-        said.message = unheard.message;
+        diagnostic.message = unheard.message;
         return err;
     };
     roots.setIntersection(children);
-    if (roots.findFirstSet()) |index| return said.fail(
+    if (roots.findFirstSet()) |index| return diagnostic.fail(
         error.InvalidInput,
         "{s} {d} is a root and a child at once",
         .{ noun, index },
@@ -155,7 +159,7 @@ pub fn readDoubles(
     const doubles = try gpa.alloc(Double, checked.double_count);
     if (doubles.len == 0) return doubles;
     var unheard: Diagnostic = .{}; // The warnings have been given.
-    var scanner: Scanner = .{ .text = text, .said = &unheard, .doubles = doubles };
+    var scanner: Scanner = .{ .text = text, .diagnostic = &unheard, .doubles = doubles };
     scanner.run(rule) catch unreachable; // It has been passed.
     assert(scanner.double_count == doubles.len);
     return doubles;
@@ -187,7 +191,7 @@ const Frame = struct {
 
 const Scanner = struct {
     text: []const u8,
-    said: *Diagnostic,
+    diagnostic: *Diagnostic,
     references: ?References = null,
     offset: usize = 0,
     stack: [depth_max]Frame = undefined,
@@ -301,7 +305,7 @@ const Scanner = struct {
     }
 
     fn push(scanner: *Scanner, frame: Frame) error{InvalidInput}!void {
-        if (scanner.depth == depth_max) return scanner.said.fail(
+        if (scanner.depth == depth_max) return scanner.diagnostic.fail(
             error.InvalidInput,
             "the JSON text is nested over {d} deep",
             .{depth_max},
@@ -330,8 +334,8 @@ const Scanner = struct {
             .word => |words| {
                 const content = try scanner.readString();
                 for (words) |known| if (std.mem.eql(u8, known, content)) return;
-                scanner.said.warn("{f}: {f} is not known, ignored", .{
-                    Path{ .scanner = scanner }, diagnostic.quote(content),
+                scanner.diagnostic.warn("{f}: {f} is not known, ignored", .{
+                    Path{ .scanner = scanner }, diagnostic_data.quote(content),
                 });
             },
             else => return scanner.unexpected(rule),
@@ -353,7 +357,7 @@ const Scanner = struct {
         if (rule.* == .number or rule.* == .positive) {
             const float = numbers.parseFloat(digits) orelse
                 return scanner.wrong("{s} is out of range", .{digits});
-            if (rule.* == .positive and !(float > 0)) scanner.said.warn(
+            if (rule.* == .positive and !(float > 0)) scanner.diagnostic.warn(
                 "{f}: {s} is not above 0, ignored",
                 .{ Path{ .scanner = scanner }, digits },
             );
@@ -489,7 +493,7 @@ const Scanner = struct {
     fn syntax(scanner: *const Scanner, comptime what: []const u8) error{InvalidInput} {
         const before = scanner.text[0..scanner.offset];
         const line_start = if (std.mem.findScalarLast(u8, before, '\n')) |index| index + 1 else 0;
-        return scanner.said.fail(error.InvalidInput, "JSON line {d}, byte {d}: " ++ what, .{
+        return scanner.diagnostic.fail(error.InvalidInput, "JSON line {d}, byte {d}: " ++ what, .{
             std.mem.countScalar(u8, before, '\n') + 1, scanner.offset - line_start + 1,
         });
     }
@@ -501,7 +505,7 @@ const Scanner = struct {
         arguments: anytype,
     ) error{InvalidInput} {
         const path: Path = .{ .scanner = scanner };
-        return scanner.said.fail(error.InvalidInput, "{f}: " ++ what, .{path} ++ arguments);
+        return scanner.diagnostic.fail(error.InvalidInput, "{f}: " ++ what, .{path} ++ arguments);
     }
 
     fn unexpected(scanner: *const Scanner, rule: *const Rule) error{InvalidInput} {
@@ -536,13 +540,13 @@ const Path = struct {
             if (index > 0) try writer.writeByte('.');
             if (isPlain(frame.key)) {
                 try writer.writeAll(frame.key);
-            } else try writer.print("{f}", .{diagnostic.quote(frame.key)});
+            } else try writer.print("{f}", .{diagnostic_data.quote(frame.key)});
         }
     }
 
     fn isPlain(key: []const u8) bool {
         for (key) |byte| if (!std.ascii.isAlphanumeric(byte) and byte != '_') return false;
-        return key.len > 0 and key.len <= diagnostic.name_bytes_max;
+        return key.len > 0 and key.len <= diagnostic_data.name_bytes_max;
     }
 };
 
@@ -573,8 +577,8 @@ test "the grammar is JSON's, no more and no less" {
         "{\"a\":1,\"a\":2}", "\"\u{10ffff}\"",            "\"0123456789abcdef0123456789\"",
     };
     for (good) |text| {
-        var said: Diagnostic = .{};
-        _ = try check(text, &.any, &said);
+        var diagnostic: Diagnostic = .{};
+        _ = try check(text, &.any, &diagnostic);
     }
     const bad = [_][]const u8{
         "",         " ",        "{",                "[1,]",      "{\"a\":1,}",  "[1 2]",
@@ -586,18 +590,18 @@ test "the grammar is JSON's, no more and no less" {
         "{1:2}",    "[,1]",     "\"\xed\xa0\x80\"", "/**/1",     "1/",          "true1",
     };
     for (bad) |text| {
-        var said: Diagnostic = .{};
-        try std.testing.expectError(error.InvalidInput, check(text, &.any, &said));
-        try std.testing.expect(said.message.text().len > 0);
+        var diagnostic: Diagnostic = .{};
+        try std.testing.expectError(error.InvalidInput, check(text, &.any, &diagnostic));
+        try std.testing.expect(diagnostic.message.text().len > 0);
     }
 }
 
 test "depth has a limit" {
-    var said: Diagnostic = .{};
+    var diagnostic: Diagnostic = .{};
     const open: [depth_max]u8 = @splat('[');
     const shut: [depth_max]u8 = @splat(']');
-    _ = try check(&(open ++ shut), &.any, &said);
-    const deeper = check("[" ++ open ++ shut ++ "]", &.any, &said);
+    _ = try check(&(open ++ shut), &.any, &diagnostic);
+    const deeper = check("[" ++ open ++ shut ++ "]", &.any, &diagnostic);
     try std.testing.expectError(error.InvalidInput, deeper);
 }
 
@@ -629,16 +633,20 @@ test "a rule is held, and the message names the place" {
         .{ "{\n\"list\": tru}", "JSON line 2, byte 9: a value is expected" },
     };
     for (cases) |case| {
-        var said: Diagnostic = .{};
-        try std.testing.expectError(error.InvalidInput, check(case[0], &test_rule, &said));
-        try std.testing.expectEqualStrings(case[1], said.message.text());
+        var diagnostic: Diagnostic = .{};
+        try std.testing.expectError(error.InvalidInput, check(case[0], &test_rule, &diagnostic));
+        try std.testing.expectEqualStrings(case[1], diagnostic.message.text());
     }
-    var said: Diagnostic = .{};
+    var diagnostic: Diagnostic = .{};
     const text = "{\"size\":400e-2,\"list\":[{\"x\":{}},{}],\"mode\":\"C\",\"range\":0}";
-    const lengths = (try check(text, &test_rule, &said)).lengths;
+    const lengths = (try check(text, &test_rule, &diagnostic)).lengths;
     try std.testing.expectEqual(2, lengths[3]);
-    try std.testing.expectEqualStrings("mode: 'C' is not known, ignored", said.warnings[0].text());
-    try std.testing.expectEqualStrings("range: 0 is not above 0, ignored", said.warnings[1].text());
+    const warnings = [_][]const u8{
+        "mode: 'C' is not known, ignored", "range: 0 is not above 0, ignored",
+    };
+    for (warnings, diagnostic.warnings[0..2]) |expected, *warning| {
+        try std.testing.expectEqualStrings(expected, warning.text());
+    }
 }
 
 test checkReferences {
@@ -653,13 +661,13 @@ test checkReferences {
         },
     };
     for (cases) |case| {
-        var said: Diagnostic = .{};
-        const lengths = (try check(case[0], &test_rule, &said)).lengths;
-        if (checkReferences(gpa, case[0], &test_rule, lengths, "node", &said)) {
+        var diagnostic: Diagnostic = .{};
+        const lengths = (try check(case[0], &test_rule, &diagnostic)).lengths;
+        if (checkReferences(gpa, case[0], &test_rule, lengths, "node", &diagnostic)) {
             try std.testing.expectEqualStrings("", case[1]);
         } else |err| {
             try std.testing.expectEqual(error.InvalidInput, err);
-            try std.testing.expectEqualStrings(case[1], said.message.text());
+            try std.testing.expectEqualStrings(case[1], diagnostic.message.text());
         }
     }
 }

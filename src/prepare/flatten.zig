@@ -21,7 +21,7 @@ const AffineD = math.AffineD;
 const Box3 = math.Box3;
 const Vec3 = math.Vec3;
 
-pub const Error = error{ OutOfMemory, SceneTooLarge };
+pub const Error = error{ OutOfMemory, SceneTooLarge } || parallel.Error;
 
 /// Largest |coordinate| of a corner, in metres: the products of three differences that the
 /// triangle test forms stay within an f32 up to here.
@@ -81,7 +81,7 @@ pub fn flatten(
     arena: std.mem.Allocator,
     from: *const scene.Scene,
     maps: []const AffineD,
-    thread_count: usize,
+    pool: *parallel.Pool,
     diagnostic: *Diagnostic,
 ) Error!Surface {
     assert(maps.len == from.nodes.len);
@@ -102,17 +102,15 @@ pub fn flatten(
         .chunks = try gpa.alloc(ChunkResult, chunkCount(size.triangle_count)),
     };
     defer gpa.free(work.chunks);
-    const vertex_chunk_count = chunkCount(size.vertex_count);
-    parallel.share(@min(thread_count, @max(vertex_chunk_count, 1)), &work, Work.placeVertices);
-    work.next.store(0, .monotonic);
-    parallel.share(@min(thread_count, @max(work.chunks.len, 1)), &work, Work.placeTriangles);
+    try pool.forEach(chunkCount(size.vertex_count), &work, Work.placeVertices);
+    try pool.forEach(work.chunks.len, &work, Work.placeTriangles);
     return work.finish(diagnostic);
 }
 
 const Size = struct { vertex_count: u32 = 0, triangle_count: u32 = 0, has_colors: bool = false };
 
 fn chunkCount(count: usize) usize {
-    return (count + chunk_size - 1) / chunk_size;
+    return @divCeil(count, chunk_size);
 }
 
 /// Fills `draws` and adds up their sizes.
@@ -224,24 +222,18 @@ const Work = struct {
     colors: [][4]f32,
     triangles: []world.Triangle,
     chunks: []ChunkResult,
-    next: std.atomic.Value(u32) = .init(0),
 
-    fn placeVertices(work: *Work, thread_index: usize) void {
-        assert(thread_index < parallel.thread_count_max);
-        while (true) {
-            const chunk = work.next.fetchAdd(1, .monotonic);
-            const begin = @as(usize, chunk) * chunk_size;
-            if (begin >= work.positions.len) return;
-            const end = @min(begin + chunk_size, work.positions.len);
-            var draw_index = lastAtOrBefore(work.draws, "vertex_target", begin);
-            var from = begin;
-            while (from < end) : (draw_index += 1) {
-                const draw = &work.draws[draw_index];
-                const to = @min(end, @as(usize, draw.vertex_target) + draw.vertex_count);
-                if (to > from) {
-                    work.placeDrawVertices(draw, from, to);
-                    from = to;
-                }
+    fn placeVertices(work: *Work, chunk: usize, _: usize) void {
+        const begin = chunk * chunk_size;
+        const end = @min(begin + chunk_size, work.positions.len);
+        var draw_index = lastAtOrBefore(work.draws, "vertex_target", begin);
+        var from = begin;
+        while (from < end) : (draw_index += 1) {
+            const draw = &work.draws[draw_index];
+            const to = @min(end, @as(usize, draw.vertex_target) + draw.vertex_count);
+            if (to > from) {
+                work.placeDrawVertices(draw, from, to);
+                from = to;
             }
         }
     }
@@ -269,28 +261,23 @@ const Work = struct {
         }
     }
 
-    fn placeTriangles(work: *Work, thread_index: usize) void {
-        assert(thread_index < parallel.thread_count_max);
-        while (true) {
-            const chunk = work.next.fetchAdd(1, .monotonic);
-            if (chunk >= work.chunks.len) return;
-            const begin = @as(usize, chunk) * chunk_size;
-            const end = @min(begin + chunk_size, work.triangles.len);
-            var result: ChunkResult = .{};
-            var draw_index = lastAtOrBefore(work.draws, "triangle_target", begin);
-            var from = begin;
-            while (from < end) : (draw_index += 1) {
-                const draw = &work.draws[draw_index];
-                const to = @min(end, @as(usize, draw.triangle_target) + draw.mesh.triangles.len);
-                if (to > from) {
-                    const source = from - draw.triangle_target;
-                    const triangles = draw.mesh.triangles[source..][0 .. to - from];
-                    work.placeDrawTriangles(draw, triangles, begin, &result);
-                    from = to;
-                }
+    fn placeTriangles(work: *Work, chunk: usize, _: usize) void {
+        const begin = chunk * chunk_size;
+        const end = @min(begin + chunk_size, work.triangles.len);
+        var result: ChunkResult = .{};
+        var draw_index = lastAtOrBefore(work.draws, "triangle_target", begin);
+        var from = begin;
+        while (from < end) : (draw_index += 1) {
+            const draw = &work.draws[draw_index];
+            const to = @min(end, @as(usize, draw.triangle_target) + draw.mesh.triangles.len);
+            if (to > from) {
+                const source = from - draw.triangle_target;
+                const triangles = draw.mesh.triangles[source..][0 .. to - from];
+                work.placeDrawTriangles(draw, triangles, begin, &result);
+                from = to;
             }
-            work.chunks[chunk] = result;
         }
+        work.chunks[chunk] = result;
     }
 
     /// Appends those of the triangles that can be hit to what the chunk from `begin` on holds.

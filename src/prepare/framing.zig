@@ -13,7 +13,8 @@ const Surface = @import("flatten.zig").Surface;
 const assert = std.debug.assert;
 const vec3 = math.vec3;
 const Vec3 = math.Vec3;
-const Double3 = [3]f64;
+const Vec3d = math.Vec3d;
+const vec3d = math.vec3d;
 
 /// Share of the picture's width or height that stays free on each side.
 pub const margin = 0.04;
@@ -56,7 +57,7 @@ const visible_share_min = 0.5;
 const sample_count_max = 1 << 16;
 
 /// Three axes of unit length, right-handed: right x up = back.
-const Basis = struct { right: Double3, up: Double3, forward: Double3 };
+const Basis = struct { right: Vec3d, up: Vec3d, forward: Vec3d };
 
 /// The camera. `aspect` is width over height; memory from `gpa` is returned before the end.
 pub fn frame(
@@ -77,10 +78,10 @@ pub fn frame(
     }
     return .{
         .orthographic = false,
-        .origin = rounded(origin),
-        .right = rounded(scaled(basis.right, half[0])),
-        .up = rounded(scaled(basis.up, half[1])),
-        .forward = rounded(basis.forward),
+        .origin = vec3d.toSingle(origin),
+        .right = vec3d.toSingle(vec3d.scale(basis.right, half[0])),
+        .up = vec3d.toSingle(vec3d.scale(basis.up, half[1])),
+        .forward = vec3d.toSingle(basis.forward),
     };
 }
 
@@ -114,7 +115,7 @@ fn basisOf(direction: Direction) Basis {
 fn chooseDirection(surface: *const Surface, materials: []const scene.Material) usize {
     var toward: [directions.len]Vec3 = undefined;
     for (directions, &toward) |direction, *to| {
-        to.* = vec3.neg(rounded(basisOf(direction).forward));
+        to.* = vec3.neg(vec3d.toSingle(basisOf(direction).forward));
     }
     var visible: [directions.len]f64 = @splat(0);
     const stride = surface.triangles.len / sample_count_max + 1;
@@ -142,7 +143,7 @@ fn chooseDirection(surface: *const Surface, materials: []const scene.Material) u
 
 /// The vertices that triangles use, along the axes of a camera: relative to the middle of the
 /// scene, in units of its size, right, up and forward.
-const Points = struct { vertices: []Double3, center: Double3, size: f64 };
+const Points = struct { vertices: []Vec3d, center: Vec3d, size: f64 };
 
 fn usedVertices(
     gpa: std.mem.Allocator,
@@ -150,7 +151,7 @@ fn usedVertices(
     basis: Basis,
 ) error{OutOfMemory}!Points {
     if (surface.triangles.len == 0) {
-        const vertices = try gpa.alloc(Double3, 1);
+        const vertices = try gpa.alloc(Vec3d, 1);
         vertices[0] = .{ 0, 0, 0 };
         return .{ .vertices = vertices, .center = .{ 0, 0, 0 }, .size = 1 };
     }
@@ -160,7 +161,7 @@ fn usedVertices(
         for (triangle.corner) |vertex| used.set(vertex);
     }
     var points: Points = .{
-        .vertices = try gpa.alloc(Double3, used.count()),
+        .vertices = try gpa.alloc(Vec3d, used.count()),
         .center = undefined,
         .size = 0,
     };
@@ -172,12 +173,14 @@ fn usedVertices(
     assert(points.size > 0); // Triangles without an extent have no area.
     var iterator = used.iterator(.{});
     for (points.vertices) |*vertex| {
-        var relative: Double3 = undefined;
+        var relative: Vec3d = undefined;
         for (&relative, surface.positions[iterator.next().?], points.center) |*to, from, middle| {
             to.* = (from - middle) / points.size;
         }
         vertex.* = .{
-            dot(relative, basis.right), dot(relative, basis.up), dot(relative, basis.forward),
+            vec3d.dot(relative, basis.right),
+            vec3d.dot(relative, basis.up),
+            vec3d.dot(relative, basis.forward),
         };
     }
     return points;
@@ -189,7 +192,7 @@ fn usedVertices(
 /// A side plane of the frame through the camera c, of slope s = extent_max * half, holds a point p
 /// when p.x - s p.z <= c.x - s c.z, its opposite when -p.x - s p.z <= -c.x - s c.z. The sum of both
 /// bounds c.z alone; the axis that binds is centred when both are equalities.
-fn fit(points: []const Double3, half: [2]f64) Double3 {
+fn fit(points: []const Vec3d, half: [2]f64) Vec3d {
     assert(points.len > 0);
     const slope: [2]f64 = .{ half[0] * extent_max, half[1] * extent_max };
     var side: [2][2]f64 = @splat(@splat(-std.math.inf(f64)));
@@ -202,7 +205,7 @@ fn fit(points: []const Double3, half: [2]f64) Double3 {
         }
         nearest = if (p[2] < nearest) p[2] else nearest;
     }
-    var place: Double3 = .{ 0, 0, nearest - 0.01 }; // A point has no size to be framed by.
+    var place: Vec3d = .{ 0, 0, nearest - 0.01 }; // A point has no size to be framed by.
     for (0..2) |axis| {
         const z = -(side[axis][0] + side[axis][1]) / (2 * slope[axis]);
         place[2] = if (z < place[2]) z else place[2];
@@ -217,11 +220,11 @@ fn fit(points: []const Double3, half: [2]f64) Double3 {
 /// The coordinate along `axis` from which the outermost points of both sides are seen equally far
 /// from the middle, by a camera at depth `camera_z`. From a guess, the pair of points that are
 /// outermost is centred, until the pair stays the same.
-fn center(points: []const Double3, axis: usize, guess: f64, camera_z: f64) f64 {
+fn center(points: []const Vec3d, axis: usize, guess: f64, camera_z: f64) f64 {
     var place = guess;
     for (0..centering_round_max) |_| {
-        var low: Double3 = points[0];
-        var high: Double3 = points[0];
+        var low: Vec3d = points[0];
+        var high: Vec3d = points[0];
         var lowest: f64 = std.math.inf(f64);
         var highest: f64 = -std.math.inf(f64);
         for (points) |p| {
@@ -248,18 +251,6 @@ fn center(points: []const Double3, axis: usize, guess: f64, camera_z: f64) f64 {
 
 fn larger(a: f64, b: f64) f64 {
     return if (a > b) a else b;
-}
-
-fn dot(a: Double3, b: Double3) f64 {
-    return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
-}
-
-fn scaled(a: Double3, factor: f64) Double3 {
-    return .{ a[0] * factor, a[1] * factor, a[2] * factor };
-}
-
-fn rounded(a: Double3) Vec3 {
-    return .{ @floatCast(a[0]), @floatCast(a[1]), @floatCast(a[2]) };
 }
 
 const TestShape = struct {

@@ -7,6 +7,7 @@
 const std = @import("std");
 const math = @import("../math.zig");
 const scene = @import("../scene.zig");
+const settings = @import("../settings.zig");
 const pose = @import("pose.zig");
 const world = @import("../world.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
@@ -15,9 +16,6 @@ const vec3 = math.vec3;
 const vec3d = math.vec3d;
 const AffineD = math.AffineD;
 const Vec3 = math.Vec3;
-
-/// Ambient radiance with the default rig.
-pub const ambient_default: f32 = 0.35;
 
 /// One light of the default rig: the way it travels in the camera's right, up and forward, and its
 /// illuminance in lux.
@@ -152,7 +150,7 @@ pub fn environment(
     background: ?Vec3,
 ) world.Environment {
     const radiance = ambient orelse scene_ambient orelse
-        if (lights_are_default) ambient_default else 0;
+        if (lights_are_default) settings.ambient_default else 0;
     assert(radiance >= 0);
     const shown: f32 = if (lights_are_default) radiance else 0;
     return .{ .ambient = radiance, .background = background orelse @splat(shown) };

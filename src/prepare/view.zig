@@ -8,6 +8,7 @@
 const std = @import("std");
 const math = @import("../math.zig");
 const scene = @import("../scene.zig");
+const settings = @import("../settings.zig");
 const world = @import("../world.zig");
 const diagnostic_module = @import("../diagnostic.zig");
 const framing = @import("framing.zig");
@@ -20,23 +21,9 @@ const AffineD = math.AffineD;
 const Diagnostic = diagnostic_module.Diagnostic;
 const Vec3 = math.Vec3;
 
-/// How the user chooses a camera.
-pub const CameraChoice = union(enum) {
-    /// The file's own, or a framing where it has none.
-    default,
-    /// A framing of all there is.
-    auto,
-    /// By position among the file's cameras.
-    index: u32,
-    /// By name.
-    name: []const u8,
-};
-
 pub const Error = error{ OutOfMemory, CameraUnknown };
 
-/// Pixels along the longer side of the picture where the user does not say.
-pub const size_default = 1024;
-
+const size_default = settings.side.default;
 const aspect_default = 4.0 / 3.0;
 
 /// What the picture shows.
@@ -54,7 +41,7 @@ pub fn choose(
     from: *const scene.Scene,
     maps: []const AffineD,
     surface: *const Surface,
-    choice: CameraChoice,
+    choice: settings.Camera,
     resolution: ?[2]u32,
     diagnostic: *Diagnostic,
 ) Error!View {
@@ -81,7 +68,7 @@ pub fn choose(
 /// Index of the camera to use, null for a framing.
 fn find(
     from: *const scene.Scene,
-    choice: CameraChoice,
+    choice: settings.Camera,
     diagnostic: *Diagnostic,
 ) error{CameraUnknown}!?u32 {
     switch (choice) {
@@ -226,7 +213,7 @@ test "orthographic cameras keep their height" {
     }};
     var diagnostic: Diagnostic = .{};
     const maps = [_]AffineD{.identity};
-    const choice: CameraChoice = .{ .index = 0 };
+    const choice: settings.Camera = .{ .index = 0 };
     const view = try choose(gpa, &from, &maps, &test_surface, choice, null, &diagnostic);
     try std.testing.expect(view.camera.orthographic);
     try std.testing.expectEqual(256, view.width);
@@ -246,13 +233,13 @@ test "cameras are found by index and name, or the message lists them" {
     try std.testing.expectEqual(1, (try find(&from, .{ .name = "main" }, &diagnostic)).?);
     try std.testing.expectEqual(null, try find(&from, .auto, &diagnostic));
     try std.testing.expectEqual(null, try find(&from, .default, &diagnostic));
-    const by_name: CameraChoice = .{ .name = "mian" };
+    const by_name: settings.Camera = .{ .name = "mian" };
     try std.testing.expectError(error.CameraUnknown, find(&from, by_name, &diagnostic));
     try std.testing.expectEqualStrings(
         "no camera 'mian'; the file has 0, 1 'main'",
         diagnostic.message.text(),
     );
-    const by_index: CameraChoice = .{ .index = 2 };
+    const by_index: settings.Camera = .{ .index = 2 };
     try std.testing.expectError(error.CameraUnknown, find(&from, by_index, &diagnostic));
     from.cameras = &.{};
     try std.testing.expectError(error.CameraUnknown, find(&from, by_index, &diagnostic));

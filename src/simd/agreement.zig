@@ -1,4 +1,4 @@
-//! The tests that hold the backends together: each against plain expressions of single values.
+//! Tests of the backends' agreement: each against plain expressions of single values.
 //!
 //! In: every backend and lane count that the target compiles, nasty values and random bits. Out: a
 //! failed test that names backend, lanes, operation and operands. All run with flush-to-zero, as
@@ -262,27 +262,16 @@ fn checkIntegers(comptime L: type) anyerror!void {
     while (first < pair_count) : (first += L.count) {
         const a, const b = operands(L.I32, i32, first);
         const found = [_][L.count]i32{
-            a.add(b).toArray(),                  a.sub(b).toArray(),
-            a.mul(b).toArray(),                  a.min(b).toArray(),
-            a.max(b).toArray(),                  a.bitAnd(b).toArray(),
-            a.bitOr(b).toArray(),                a.bitXor(b).toArray(),
-            a.bitNot().toArray(),                a.shiftLeft(7).toArray(),
-            a.shiftRightArithmetic(7).toArray(), a.shiftRightLogical(7).toArray(),
-            a.shiftLeft(31).toArray(),           a.shiftRightArithmetic(31).toArray(),
-            a.shiftRightLogical(31).toArray(),   a.shiftRightArithmetic(0).toArray(),
+            a.add(b).toArray(),       a.sub(b).toArray(),
+            a.min(b).toArray(),       a.max(b).toArray(),
+            a.bitAnd(b).toArray(),    a.bitOr(b).toArray(),
+            a.shiftLeft(7).toArray(), a.shiftLeft(31).toArray(),
+            a.shiftLeft(0).toArray(),
         };
         for (0..L.count) |lane| {
             const x, const y = .{ a.lane(lane), b.lane(lane) };
-            const word: u32 = @bitCast(x);
             const wanted = [_]i32{
-                x +% y,               x -% y,
-                x *% y,               @min(x, y),
-                @max(x, y),           x & y,
-                x | y,                x ^ y,
-                ~x,                   x << 7,
-                x >> 7,               @bitCast(word >> 7),
-                x << 31,              x >> 31,
-                @bitCast(word >> 31), x,
+                x +% y, x -% y, @min(x, y), @max(x, y), x & y, x | y, x << 7, x << 31, x,
             };
             for (wanted, found, 0..) |w, f, operation| {
                 if (w != f[lane]) return disagree(L, "integer", .{ operation, x, y }, f[lane]);
@@ -322,34 +311,11 @@ test "conversions agree with single values" {
     try forAll(checkConversions);
 }
 
-/// Random magnitude within `simd.estimate_range`, all bits random, sign too.
+/// Random magnitude from 2^-100 to 2^100, all bits random, sign too.
 fn randomOrdinary(index: usize) f32 {
     const bits: u32 = @truncate(randomBits(index));
     const exponent = 127 - 100 + (bits >> 23) % 200;
     return @bitCast((bits & 0x8000_0000) | (exponent << 23) | (bits & 0x7f_ffff));
-}
-
-fn checkEstimates(comptime L: type) anyerror!void {
-    for (0..20_000) |index| {
-        const x = randomOrdinary(index);
-        const found = L.F32.splat(x).reciprocalEstimate().lane(index % L.count);
-        const wanted = 1 / @as(f64, x);
-        if (!isNear(wanted, found)) return disagree(L, "reciprocalEstimate", .{x}, found);
-
-        const found_sqrt = L.F32.splat(@abs(x)).reciprocalSqrtEstimate().lane(index % L.count);
-        const wanted_sqrt = 1 / @sqrt(@as(f64, @abs(x)));
-        if (!isNear(wanted_sqrt, found_sqrt)) {
-            return disagree(L, "reciprocalSqrtEstimate", .{@abs(x)}, found_sqrt);
-        }
-    }
-}
-
-fn isNear(wanted: f64, found: f32) bool {
-    return @abs(found - wanted) <= @as(f64, simd.estimate_error) * @abs(wanted);
-}
-
-test "estimates keep their error bound" {
-    try forAll(checkEstimates);
 }
 
 fn checkFast(comptime L: type) anyerror!void {
@@ -394,11 +360,11 @@ fn checkMasks(comptime L: type) anyerror!void {
         const y: u32 = @truncate(randomBits(index + 1000) & keep);
         const a: L.Mask, const b: L.Mask = .{ .fromBits(x), .fromBits(y) };
         const found = [_]u32{
-            a.bits(),           a.bitAnd(b).bits(),                   a.bitOr(b).bits(),
-            a.bitXor(b).bits(), a.bitNot().bits(),                    a.andNot(b).bits(),
-            a.popCount(),       L.Mask.fromArray(a.toArray()).bits(),
+            a.bits(),                             a.bitAnd(b).bits(), a.bitOr(b).bits(),
+            a.bitNot().bits(),                    a.andNot(b).bits(), a.popCount(),
+            L.Mask.fromArray(a.toArray()).bits(),
         };
-        const wanted = [_]u32{ x, x & y, x | y, x ^ y, ~x & keep, x & ~y, @popCount(x), x };
+        const wanted = [_]u32{ x, x & y, x | y, ~x & keep, x & ~y, @popCount(x), x };
         for (wanted, found, 0..) |w, f, operation| {
             if (w != f) return disagree(L, "mask", .{ operation, x, y }, f);
         }
@@ -409,9 +375,6 @@ fn checkMasks(comptime L: type) anyerror!void {
             try expect(truth == ((x >> @intCast(lane)) & 1 != 0));
             try expect(truth == a.lane(lane));
         }
-    }
-    for (0..L.count + 1) |n| {
-        try expect(L.Mask.firstN(n).bits() == (@as(u32, 1) << @intCast(n)) - 1);
     }
     try expect(L.Mask.splat(true).all() and L.Mask.splat(false).none());
     try expect(L.Mask.fromBits((1 << L.count) - 1).all());
@@ -494,7 +457,7 @@ fn checkMoves(comptime L: type) anyerror!void {
     const numbers: L.F32 = .loadAligned(floats[0..n]);
     try expect(numbers.eq(.iota()).all());
     try expect(numbers.toI32().eq(.iota()).all());
-    try expect(numbers.extract(n - 1) == n - 1 and numbers.lane(n - 1) == n - 1);
+    try expect(numbers.lane(n - 1) == n - 1);
     try expect(numbers.laneIn(n - 1) == n - 1 and numbers.laneIn(0) == 0);
     numbers.add(.splat(1)).storeAligned(floats[0..n]);
     try expect(floats[0] == 1 and floats[n - 1] == n and L.F32.zero().eq(.splat(-0.0)).all());
@@ -502,13 +465,11 @@ fn checkMoves(comptime L: type) anyerror!void {
     var integers: [n]i32 align(64) = undefined;
     L.I32.iota().shiftLeft(1).storeAligned(&integers);
     const indices: L.I32 = .load(&integers);
-    const gathered: L.F32 = .gather(&floats, indices.min(.splat(2 * n)));
-    for (gathered.toArray(), 0..) |value, lane| try expect(value == floats[2 * lane]);
-    try expect(L.I32.gather(&integers, .iota()).eq(indices).all());
+    for (indices.toArray(), 0..) |value, lane| try expect(value == 2 * lane);
     try expect(L.I32.zero().eq(indices.sub(.loadAligned(&integers))).all());
 }
 
-test "loads, stores and gathers" {
+test "loads and stores" {
     try forAll(checkMoves);
 }
 
@@ -522,17 +483,9 @@ fn checkShuffles(comptime L: type) anyerror!void {
         try expect(low == base);
         try expect(high == base + n / 2);
     }
-    if (n != 4) return;
-    var rows: [4]L.F32 = undefined;
-    for (&rows, 0..) |*row, index| row.* = a.add(.splat(@floatFromInt(10 * index)));
-    for (L.transpose4x4(rows), 0..) |column, c| {
-        for (column.toArray(), 0..) |value, r| {
-            try expect(value == @as(f32, @floatFromInt(10 * r + c)));
-        }
-    }
 }
 
-test "interleaving and transposing" {
+test "interleaving" {
     try forAll(checkShuffles);
 }
 
@@ -565,8 +518,6 @@ fn checkVectors(comptime L: type) anyerror!void {
                 }
             }
         }
-        const least, const greatest = .{ a.reduceMin(), a.reduceMax() };
-        try expect(isSame(a.y.reduceMin(), least[1]) and isSame(a.z.reduceMax(), greatest[2]));
     }
 }
 

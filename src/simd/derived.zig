@@ -1,4 +1,4 @@
-//! What follows from a backend's primitives and is the same text in every backend.
+//! Derived operations: they follow from primitives and are the same text in every backend.
 //!
 //! In: a lane type of a backend, whose field `v` is an array or a vector of its lanes. Out: the
 //! declarations that the backend's type re-exports.
@@ -57,12 +57,6 @@ pub fn Moves(comptime Self: type, comptime Element: type, comptime lanes: compti
         /// As `store`, to memory aligned to all the lanes together.
         pub inline fn storeAligned(a: Self, target: *align(alignment) [lanes]Element) void {
             @as(*align(alignment) Lanes, @ptrCast(target)).* = a.v;
-        }
-
-        /// The value of a lane known at compile time. Asserts (comptime) `index < count`.
-        pub inline fn extract(a: Self, comptime index: comptime_int) Element {
-            comptime assert(index < lanes);
-            return a.v[index];
         }
 
         /// The value of one lane; goes through memory. Asserts `index < count`.
@@ -137,11 +131,6 @@ pub fn Floats(comptime Self: type, comptime I32: type, comptime Mask: type) type
         pub inline fn leOrNegative(a: Self, b: Self) Mask {
             return a.bitcast().le(b.bitcast());
         }
-
-        /// `base[index]` of every lane of `indices`: a load a lane. Asserts that none is negative.
-        pub inline fn gather(base: [*]const f32, indices: I32) Self {
-            return .fromArray(gathered(f32, Self.count, base, indices.toArray()));
-        }
     };
 }
 
@@ -157,23 +146,12 @@ pub fn Integers(comptime Self: type, comptime F32: type, comptime Mask: type) ty
         pub inline fn bitcast(a: Self) F32 {
             return .{ .v = @bitCast(a.v) };
         }
-
-        /// `base[index]` of every lane of `indices`: a load a lane. Asserts that none is negative.
-        pub inline fn gather(base: [*]const i32, indices: Self) Self {
-            return .fromArray(gathered(i32, Self.count, base, indices.toArray()));
-        }
     };
 }
 
 /// Operations of a mask type `Self` that are others' twins.
-pub fn Truths(comptime Self: type, comptime I32: type) type {
+pub fn Truths(comptime Self: type) type {
     return struct {
-        /// Set in lanes 0 to n - 1. Asserts n <= count.
-        pub inline fn firstN(n: usize) Self {
-            assert(n <= Self.count);
-            return I32.iota().lt(.splat(@intCast(n)));
-        }
-
         /// Whether no lane is set.
         pub inline fn none(a: Self) bool {
             return !a.any();
@@ -185,18 +163,4 @@ pub fn Truths(comptime Self: type, comptime I32: type) type {
             return (a.bits() >> @intCast(index)) & 1 != 0;
         }
     };
-}
-
-inline fn gathered(
-    comptime Element: type,
-    comptime lanes: comptime_int,
-    base: [*]const Element,
-    indices: [lanes]i32,
-) [lanes]Element {
-    var result: [lanes]Element = undefined;
-    for (&result, indices) |*element, index| {
-        assert(index >= 0);
-        element.* = base[@intCast(index)];
-    }
-    return result;
 }

@@ -1,4 +1,4 @@
-//! What the target's instruction set offers, as far as the SIMD library chooses code by it.
+//! Features of the target's instruction set, as far as the SIMD library chooses code by them.
 //!
 //! Out: comptime constants only. Backends ask here, so that the tests of CPU features stand in
 //! one place.

@@ -34,7 +34,6 @@ pub fn F32x(comptime lanes: comptime_int) type {
         pub const loadAligned = moves.loadAligned;
         pub const store = moves.store;
         pub const storeAligned = moves.storeAligned;
-        pub const extract = moves.extract;
         pub const lane = moves.lane;
         pub const laneIn = moves.laneIn;
         pub const gt = floats.gt;
@@ -45,7 +44,6 @@ pub fn F32x(comptime lanes: comptime_int) type {
         pub const maxOrNegative = floats.maxOrNegative;
         pub const isNegative = floats.isNegative;
         pub const leOrNegative = floats.leOrNegative;
-        pub const gather = floats.gather;
 
         /// a + b, exact.
         pub inline fn add(a: Self, b: Self) Self {
@@ -112,18 +110,6 @@ pub fn F32x(comptime lanes: comptime_int) type {
         /// unspecified which comes where either is NaN or both are zeros.
         pub inline fn maxFast(a: Self, b: Self) Self {
             return .{ .v = rl_f32x4_max_fast(a.v, b.v) };
-        }
-
-        /// 1 / a within `simd.estimate_error` of it, for culling only. Unspecified where |a| is
-        /// not within `simd.estimate_range`.
-        pub inline fn reciprocalEstimate(a: Self) Self {
-            return .{ .v = rl_f32x4_reciprocal_estimate(a.v) };
-        }
-
-        /// 1 / sqrt(a) within `simd.estimate_error` of it, for culling only. Unspecified where a
-        /// is not within `simd.estimate_range`.
-        pub inline fn reciprocalSqrtEstimate(a: Self) Self {
-            return .{ .v = rl_f32x4_reciprocal_sqrt_estimate(a.v) };
         }
 
         /// a == b; false where either is NaN.
@@ -196,12 +182,10 @@ pub fn I32x(comptime lanes: comptime_int) type {
         pub const loadAligned = moves.loadAligned;
         pub const store = moves.store;
         pub const storeAligned = moves.storeAligned;
-        pub const extract = moves.extract;
         pub const lane = moves.lane;
         pub const laneIn = moves.laneIn;
         pub const gt = integers.gt;
         pub const bitcast = integers.bitcast;
-        pub const gather = integers.gather;
 
         /// a + b, wrapping.
         pub inline fn add(a: Self, b: Self) Self {
@@ -211,11 +195,6 @@ pub fn I32x(comptime lanes: comptime_int) type {
         /// a - b, wrapping.
         pub inline fn sub(a: Self, b: Self) Self {
             return .{ .v = rl_i32x4_sub(a.v, b.v) };
-        }
-
-        /// a * b, wrapping.
-        pub inline fn mul(a: Self, b: Self) Self {
-            return .{ .v = rl_i32x4_mul(a.v, b.v) };
         }
 
         /// The lesser, signed.
@@ -238,29 +217,9 @@ pub fn I32x(comptime lanes: comptime_int) type {
             return .{ .v = rl_i32x4_or(a.v, b.v) };
         }
 
-        /// Bits set in one only.
-        pub inline fn bitXor(a: Self, b: Self) Self {
-            return .{ .v = rl_i32x4_xor(a.v, b.v) };
-        }
-
-        /// Every bit flipped.
-        pub inline fn bitNot(a: Self) Self {
-            return .{ .v = rl_i32x4_not(a.v) };
-        }
-
         /// Shifted left by `amount` bits, zeros from the right.
         pub inline fn shiftLeft(a: Self, comptime amount: u5) Self {
             return .{ .v = rl_i32x4_shift_left(a.v, amount) };
-        }
-
-        /// Shifted right by `amount` bits, copies of the sign from the left.
-        pub inline fn shiftRightArithmetic(a: Self, comptime amount: u5) Self {
-            return .{ .v = rl_i32x4_shift_right_arithmetic(a.v, amount) };
-        }
-
-        /// Shifted right by `amount` bits, zeros from the left.
-        pub inline fn shiftRightLogical(a: Self, comptime amount: u5) Self {
-            return .{ .v = rl_i32x4_shift_right_logical(a.v, amount) };
         }
 
         /// a == b.
@@ -297,10 +256,9 @@ pub fn Mask(comptime lanes: comptime_int) type {
         v: WordQuad,
 
         const Self = @This();
-        const truths = derived.Truths(Self, I32x(lanes));
+        const truths = derived.Truths(Self);
         pub const count = lanes;
 
-        pub const firstN = truths.firstN;
         pub const none = truths.none;
         pub const lane = truths.lane;
 
@@ -323,11 +281,6 @@ pub fn Mask(comptime lanes: comptime_int) type {
         /// Set where either is.
         pub inline fn bitOr(a: Self, b: Self) Self {
             return .{ .v = rl_mask4_or(a.v, b.v) };
-        }
-
-        /// Set where they differ.
-        pub inline fn bitXor(a: Self, b: Self) Self {
-            return .{ .v = rl_mask4_xor(a.v, b.v) };
         }
 
         /// Set where `a` is not.
@@ -391,8 +344,6 @@ extern fn rl_f32x4_min(a: FloatQuad, b: FloatQuad) callconv(.c) FloatQuad;
 extern fn rl_f32x4_max(a: FloatQuad, b: FloatQuad) callconv(.c) FloatQuad;
 extern fn rl_f32x4_min_fast(a: FloatQuad, b: FloatQuad) callconv(.c) FloatQuad;
 extern fn rl_f32x4_max_fast(a: FloatQuad, b: FloatQuad) callconv(.c) FloatQuad;
-extern fn rl_f32x4_reciprocal_estimate(a: FloatQuad) callconv(.c) FloatQuad;
-extern fn rl_f32x4_reciprocal_sqrt_estimate(a: FloatQuad) callconv(.c) FloatQuad;
 extern fn rl_f32x4_eq(a: FloatQuad, b: FloatQuad) callconv(.c) WordQuad;
 extern fn rl_f32x4_lt(a: FloatQuad, b: FloatQuad) callconv(.c) WordQuad;
 extern fn rl_f32x4_le(a: FloatQuad, b: FloatQuad) callconv(.c) WordQuad;
@@ -404,16 +355,11 @@ extern fn rl_f32x4_reduce_max(a: FloatQuad) callconv(.c) f32;
 extern fn rl_f32x4_to_i32(a: FloatQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_add(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_sub(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
-extern fn rl_i32x4_mul(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_min(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_max(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_and(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_or(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
-extern fn rl_i32x4_xor(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
-extern fn rl_i32x4_not(a: IntegerQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_shift_left(a: IntegerQuad, amount: u32) callconv(.c) IntegerQuad;
-extern fn rl_i32x4_shift_right_arithmetic(a: IntegerQuad, amount: u32) callconv(.c) IntegerQuad;
-extern fn rl_i32x4_shift_right_logical(a: IntegerQuad, amount: u32) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_eq(a: IntegerQuad, b: IntegerQuad) callconv(.c) WordQuad;
 extern fn rl_i32x4_lt(a: IntegerQuad, b: IntegerQuad) callconv(.c) WordQuad;
 extern fn rl_i32x4_le(a: IntegerQuad, b: IntegerQuad) callconv(.c) WordQuad;
@@ -421,7 +367,6 @@ extern fn rl_i32x4_select(mask: WordQuad, a: IntegerQuad, b: IntegerQuad) callco
 extern fn rl_i32x4_to_f32(a: IntegerQuad) callconv(.c) FloatQuad;
 extern fn rl_mask4_and(a: WordQuad, b: WordQuad) callconv(.c) WordQuad;
 extern fn rl_mask4_or(a: WordQuad, b: WordQuad) callconv(.c) WordQuad;
-extern fn rl_mask4_xor(a: WordQuad, b: WordQuad) callconv(.c) WordQuad;
 extern fn rl_mask4_not(a: WordQuad) callconv(.c) WordQuad;
 extern fn rl_mask4_and_not(a: WordQuad, b: WordQuad) callconv(.c) WordQuad;
 extern fn rl_mask4_from_bits(bits: u32) callconv(.c) WordQuad;

@@ -36,19 +36,6 @@ rl_f32x4 rl_f32x4_max(rl_f32x4 a, rl_f32x4 b) { return vbslq_f32(vcgtq_f32(a, b)
 rl_f32x4 rl_f32x4_min_fast(rl_f32x4 a, rl_f32x4 b) { return vminq_f32(a, b); }
 rl_f32x4 rl_f32x4_max_fast(rl_f32x4 a, rl_f32x4 b) { return vmaxq_f32(a, b); }
 
-/* The estimates have 8 bits; each of two steps of Newton doubles them. */
-rl_f32x4 rl_f32x4_reciprocal_estimate(rl_f32x4 a) {
-    const float32x4_t start = vrecpeq_f32(a);
-    const float32x4_t better = vmulq_f32(start, vrecpsq_f32(a, start));
-    return vmulq_f32(better, vrecpsq_f32(a, better));
-}
-
-rl_f32x4 rl_f32x4_reciprocal_sqrt_estimate(rl_f32x4 a) {
-    const float32x4_t start = vrsqrteq_f32(a);
-    const float32x4_t better = vmulq_f32(start, vrsqrtsq_f32(vmulq_f32(a, start), start));
-    return vmulq_f32(better, vrsqrtsq_f32(vmulq_f32(a, better), better));
-}
-
 rl_u32x4 rl_f32x4_eq(rl_f32x4 a, rl_f32x4 b) { return vceqq_f32(a, b); }
 rl_u32x4 rl_f32x4_lt(rl_f32x4 a, rl_f32x4 b) { return vcltq_f32(a, b); }
 rl_u32x4 rl_f32x4_le(rl_f32x4 a, rl_f32x4 b) { return vcleq_f32(a, b); }
@@ -78,25 +65,13 @@ rl_i32x4 rl_f32x4_to_i32(rl_f32x4 a) { return vcvtq_s32_f32(a); }
 
 rl_i32x4 rl_i32x4_add(rl_i32x4 a, rl_i32x4 b) { return vaddq_s32(a, b); }
 rl_i32x4 rl_i32x4_sub(rl_i32x4 a, rl_i32x4 b) { return vsubq_s32(a, b); }
-rl_i32x4 rl_i32x4_mul(rl_i32x4 a, rl_i32x4 b) { return vmulq_s32(a, b); }
 rl_i32x4 rl_i32x4_min(rl_i32x4 a, rl_i32x4 b) { return vminq_s32(a, b); }
 rl_i32x4 rl_i32x4_max(rl_i32x4 a, rl_i32x4 b) { return vmaxq_s32(a, b); }
 rl_i32x4 rl_i32x4_and(rl_i32x4 a, rl_i32x4 b) { return vandq_s32(a, b); }
 rl_i32x4 rl_i32x4_or(rl_i32x4 a, rl_i32x4 b) { return vorrq_s32(a, b); }
-rl_i32x4 rl_i32x4_xor(rl_i32x4 a, rl_i32x4 b) { return veorq_s32(a, b); }
-rl_i32x4 rl_i32x4_not(rl_i32x4 a) { return vmvnq_s32(a); }
 
 rl_i32x4 rl_i32x4_shift_left(rl_i32x4 a, uint32_t amount) {
     return vshlq_s32(a, vdupq_n_s32((int32_t)amount));
-}
-
-/* NEON shifts right by shifting left a negative amount. */
-rl_i32x4 rl_i32x4_shift_right_arithmetic(rl_i32x4 a, uint32_t amount) {
-    return vshlq_s32(a, vdupq_n_s32(-(int32_t)amount));
-}
-
-rl_i32x4 rl_i32x4_shift_right_logical(rl_i32x4 a, uint32_t amount) {
-    return (rl_i32x4)vshlq_u32((rl_u32x4)a, vdupq_n_s32(-(int32_t)amount));
 }
 
 rl_u32x4 rl_i32x4_eq(rl_i32x4 a, rl_i32x4 b) { return vceqq_s32(a, b); }
@@ -107,7 +82,6 @@ rl_f32x4 rl_i32x4_to_f32(rl_i32x4 a) { return vcvtq_f32_s32(a); }
 
 rl_u32x4 rl_mask4_and(rl_u32x4 a, rl_u32x4 b) { return vandq_u32(a, b); }
 rl_u32x4 rl_mask4_or(rl_u32x4 a, rl_u32x4 b) { return vorrq_u32(a, b); }
-rl_u32x4 rl_mask4_xor(rl_u32x4 a, rl_u32x4 b) { return veorq_u32(a, b); }
 rl_u32x4 rl_mask4_not(rl_u32x4 a) { return vmvnq_u32(a); }
 rl_u32x4 rl_mask4_and_not(rl_u32x4 a, rl_u32x4 b) { return vbicq_u32(a, b); }
 

@@ -34,19 +34,6 @@ rl_f32x4 rl_f32x4_max(rl_f32x4 a, rl_f32x4 b) { return _mm_max_ps(a, b); }
 rl_f32x4 rl_f32x4_min_fast(rl_f32x4 a, rl_f32x4 b) { return _mm_min_ps(a, b); }
 rl_f32x4 rl_f32x4_max_fast(rl_f32x4 a, rl_f32x4 b) { return _mm_max_ps(a, b); }
 
-/* rcpps and rsqrtps have 12 bits; one step of Newton doubles them. */
-rl_f32x4 rl_f32x4_reciprocal_estimate(rl_f32x4 a) {
-    const __m128 start = _mm_rcp_ps(a);
-    return _mm_mul_ps(start, _mm_sub_ps(_mm_set1_ps(2.0f), _mm_mul_ps(a, start)));
-}
-
-rl_f32x4 rl_f32x4_reciprocal_sqrt_estimate(rl_f32x4 a) {
-    const __m128 start = _mm_rsqrt_ps(a);
-    const __m128 half = _mm_mul_ps(_mm_set1_ps(0.5f), start);
-    const __m128 rest = _mm_sub_ps(_mm_set1_ps(3.0f), _mm_mul_ps(_mm_mul_ps(a, start), start));
-    return _mm_mul_ps(half, rest);
-}
-
 rl_u32x4 rl_f32x4_eq(rl_f32x4 a, rl_f32x4 b) { return U32(_mm_cmpeq_ps(a, b)); }
 rl_u32x4 rl_f32x4_lt(rl_f32x4 a, rl_f32x4 b) { return U32(_mm_cmplt_ps(a, b)); }
 rl_u32x4 rl_f32x4_le(rl_f32x4 a, rl_f32x4 b) { return U32(_mm_cmple_ps(a, b)); }
@@ -79,8 +66,6 @@ rl_i32x4 rl_i32x4_add(rl_i32x4 a, rl_i32x4 b) { return I32(_mm_add_epi32(INT(a),
 rl_i32x4 rl_i32x4_sub(rl_i32x4 a, rl_i32x4 b) { return I32(_mm_sub_epi32(INT(a), INT(b))); }
 rl_i32x4 rl_i32x4_and(rl_i32x4 a, rl_i32x4 b) { return I32(_mm_and_si128(INT(a), INT(b))); }
 rl_i32x4 rl_i32x4_or(rl_i32x4 a, rl_i32x4 b) { return I32(_mm_or_si128(INT(a), INT(b))); }
-rl_i32x4 rl_i32x4_xor(rl_i32x4 a, rl_i32x4 b) { return I32(_mm_xor_si128(INT(a), INT(b))); }
-rl_i32x4 rl_i32x4_not(rl_i32x4 a) { return I32(_mm_xor_si128(INT(a), _mm_set1_epi32(-1))); }
 
 rl_u32x4 rl_i32x4_eq(rl_i32x4 a, rl_i32x4 b) { return U32(_mm_cmpeq_epi32(INT(a), INT(b))); }
 rl_u32x4 rl_i32x4_lt(rl_i32x4 a, rl_i32x4 b) { return U32(_mm_cmplt_epi32(INT(a), INT(b))); }
@@ -88,14 +73,6 @@ rl_u32x4 rl_i32x4_le(rl_i32x4 a, rl_i32x4 b) { return ~U32(_mm_cmpgt_epi32(INT(a
 
 rl_i32x4 rl_i32x4_select(rl_u32x4 mask, rl_i32x4 a, rl_i32x4 b) {
     return I32(rl_f32x4_select(mask, F32(a), F32(b)));
-}
-
-rl_i32x4 rl_i32x4_mul(rl_i32x4 a, rl_i32x4 b) {
-#ifdef __SSE4_1__
-    return I32(_mm_mullo_epi32(INT(a), INT(b)));
-#else
-    return I32(U32(a) * U32(b));
-#endif
 }
 
 rl_i32x4 rl_i32x4_min(rl_i32x4 a, rl_i32x4 b) {
@@ -118,20 +95,11 @@ rl_i32x4 rl_i32x4_shift_left(rl_i32x4 a, uint32_t amount) {
     return I32(_mm_slli_epi32(INT(a), (int)amount));
 }
 
-rl_i32x4 rl_i32x4_shift_right_arithmetic(rl_i32x4 a, uint32_t amount) {
-    return I32(_mm_srai_epi32(INT(a), (int)amount));
-}
-
-rl_i32x4 rl_i32x4_shift_right_logical(rl_i32x4 a, uint32_t amount) {
-    return I32(_mm_srli_epi32(INT(a), (int)amount));
-}
-
 rl_f32x4 rl_i32x4_to_f32(rl_i32x4 a) { return _mm_cvtepi32_ps(INT(a)); }
 
 rl_u32x4 rl_mask4_and(rl_u32x4 a, rl_u32x4 b) { return U32(_mm_and_ps(F32(a), F32(b))); }
 rl_u32x4 rl_mask4_or(rl_u32x4 a, rl_u32x4 b) { return U32(_mm_or_ps(F32(a), F32(b))); }
-rl_u32x4 rl_mask4_xor(rl_u32x4 a, rl_u32x4 b) { return U32(_mm_xor_ps(F32(a), F32(b))); }
-rl_u32x4 rl_mask4_not(rl_u32x4 a) { return U32(rl_i32x4_not(I32(a))); }
+rl_u32x4 rl_mask4_not(rl_u32x4 a) { return ~a; }
 rl_u32x4 rl_mask4_and_not(rl_u32x4 a, rl_u32x4 b) { return U32(_mm_andnot_ps(F32(b), F32(a))); }
 
 rl_u32x4 rl_mask4_from_bits(uint32_t bits) {

@@ -31,7 +31,6 @@ pub fn F32x(comptime lanes: comptime_int) type {
         pub const loadAligned = moves.loadAligned;
         pub const store = moves.store;
         pub const storeAligned = moves.storeAligned;
-        pub const extract = moves.extract;
         pub const lane = moves.lane;
         pub const laneIn = moves.laneIn;
         pub const gt = floats.gt;
@@ -43,7 +42,6 @@ pub fn F32x(comptime lanes: comptime_int) type {
         pub const maxOrNegative = maxFast;
         pub const leOrNegative = le;
         pub const isNegative = floats.isNegative;
-        pub const gather = floats.gather;
 
         /// a + b, exact.
         pub inline fn add(a: Self, b: Self) Self {
@@ -146,18 +144,6 @@ pub fn F32x(comptime lanes: comptime_int) type {
             return result;
         }
 
-        /// 1 / a within `simd.estimate_error` of it, for culling only. Unspecified where |a| is
-        /// not within `simd.estimate_range`.
-        pub inline fn reciprocalEstimate(a: Self) Self {
-            return Self.splat(1).div(a);
-        }
-
-        /// 1 / sqrt(a) within `simd.estimate_error` of it, for culling only. Unspecified where a
-        /// is not within `simd.estimate_range`.
-        pub inline fn reciprocalSqrtEstimate(a: Self) Self {
-            return Self.splat(1).div(a.sqrt());
-        }
-
         /// a == b; false where either is NaN.
         pub inline fn eq(a: Self, b: Self) Truths {
             var result: Truths = undefined;
@@ -257,12 +243,10 @@ pub fn I32x(comptime lanes: comptime_int) type {
         pub const loadAligned = moves.loadAligned;
         pub const store = moves.store;
         pub const storeAligned = moves.storeAligned;
-        pub const extract = moves.extract;
         pub const lane = moves.lane;
         pub const laneIn = moves.laneIn;
         pub const gt = integers.gt;
         pub const bitcast = integers.bitcast;
-        pub const gather = integers.gather;
 
         /// a + b, wrapping.
         pub inline fn add(a: Self, b: Self) Self {
@@ -275,13 +259,6 @@ pub fn I32x(comptime lanes: comptime_int) type {
         pub inline fn sub(a: Self, b: Self) Self {
             var result: Self = undefined;
             for (&result.v, a.v, b.v) |*r, x, y| r.* = x -% y;
-            return result;
-        }
-
-        /// a * b, wrapping.
-        pub inline fn mul(a: Self, b: Self) Self {
-            var result: Self = undefined;
-            for (&result.v, a.v, b.v) |*r, x, y| r.* = x *% y;
             return result;
         }
 
@@ -313,38 +290,10 @@ pub fn I32x(comptime lanes: comptime_int) type {
             return result;
         }
 
-        /// Bits set in one only.
-        pub inline fn bitXor(a: Self, b: Self) Self {
-            var result: Self = undefined;
-            for (&result.v, a.v, b.v) |*r, x, y| r.* = x ^ y;
-            return result;
-        }
-
-        /// Every bit flipped.
-        pub inline fn bitNot(a: Self) Self {
-            var result: Self = undefined;
-            for (&result.v, a.v) |*r, x| r.* = ~x;
-            return result;
-        }
-
         /// Shifted left by `amount` bits, zeros from the right.
         pub inline fn shiftLeft(a: Self, comptime amount: u5) Self {
             var result: Self = undefined;
             for (&result.v, a.v) |*r, x| r.* = x << amount;
-            return result;
-        }
-
-        /// Shifted right by `amount` bits, copies of the sign from the left.
-        pub inline fn shiftRightArithmetic(a: Self, comptime amount: u5) Self {
-            var result: Self = undefined;
-            for (&result.v, a.v) |*r, x| r.* = x >> amount;
-            return result;
-        }
-
-        /// Shifted right by `amount` bits, zeros from the left.
-        pub inline fn shiftRightLogical(a: Self, comptime amount: u5) Self {
-            var result: Self = undefined;
-            for (&result.v, a.v) |*r, x| r.* = @bitCast(@as(u32, @bitCast(x)) >> amount);
             return result;
         }
 
@@ -391,10 +340,9 @@ pub fn Mask(comptime lanes: comptime_int) type {
         v: [lanes]bool,
 
         const Self = @This();
-        const truths = derived.Truths(Self, I32x(lanes));
+        const truths = derived.Truths(Self);
         pub const count = lanes;
 
-        pub const firstN = truths.firstN;
         pub const none = truths.none;
         pub const lane = truths.lane;
 
@@ -424,13 +372,6 @@ pub fn Mask(comptime lanes: comptime_int) type {
         pub inline fn bitOr(a: Self, b: Self) Self {
             var result: Self = undefined;
             for (&result.v, a.v, b.v) |*r, x, y| r.* = x or y;
-            return result;
-        }
-
-        /// Set where they differ.
-        pub inline fn bitXor(a: Self, b: Self) Self {
-            var result: Self = undefined;
-            for (&result.v, a.v, b.v) |*r, x, y| r.* = x != y;
             return result;
         }
 

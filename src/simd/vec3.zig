@@ -92,16 +92,6 @@ pub fn Vec3x(comptime F32: type, comptime Mask: type) type {
             };
         }
 
-        /// The least of all lanes, component by component; `F32.reduceMin`'s order.
-        pub inline fn reduceMin(a: Self) [3]f32 {
-            return .{ a.x.reduceMin(), a.y.reduceMin(), a.z.reduceMin() };
-        }
-
-        /// The greatest of all lanes, component by component; `F32.reduceMax`'s order.
-        pub inline fn reduceMax(a: Self) [3]f32 {
-            return .{ a.x.reduceMax(), a.y.reduceMax(), a.z.reduceMax() };
-        }
-
         /// The vector in one lane; goes through memory. Asserts `lane_index < count`.
         pub inline fn lane(a: Self, lane_index: usize) [3]f32 {
             return .{ a.x.lane(lane_index), a.y.lane(lane_index), a.z.lane(lane_index) };

@@ -39,7 +39,6 @@ pub fn F32x(comptime lanes: comptime_int) type {
         pub const loadAligned = moves.loadAligned;
         pub const store = moves.store;
         pub const storeAligned = moves.storeAligned;
-        pub const extract = moves.extract;
         pub const lane = moves.lane;
         pub const laneIn = moves.laneIn;
         pub const gt = floats.gt;
@@ -50,7 +49,6 @@ pub fn F32x(comptime lanes: comptime_int) type {
         pub const maxOrNegative = floats.maxOrNegative;
         pub const isNegative = floats.isNegative;
         pub const leOrNegative = floats.leOrNegative;
-        pub const gather = floats.gather;
 
         /// a + b, exact.
         pub inline fn add(a: Self, b: Self) Self {
@@ -121,18 +119,6 @@ pub fn F32x(comptime lanes: comptime_int) type {
         /// unspecified which comes where either is NaN or both are zeros.
         pub inline fn maxFast(a: Self, b: Self) Self {
             return if (hardware.arch == .aarch64) .{ .v = @max(a.v, b.v) } else a.max(b);
-        }
-
-        /// 1 / a within `simd.estimate_error` of it, for culling only. Unspecified where |a| is
-        /// not within `simd.estimate_range`.
-        pub inline fn reciprocalEstimate(a: Self) Self {
-            return Self.splat(1).div(a);
-        }
-
-        /// 1 / sqrt(a) within `simd.estimate_error` of it, for culling only. Unspecified where a
-        /// is not within `simd.estimate_range`.
-        pub inline fn reciprocalSqrtEstimate(a: Self) Self {
-            return Self.splat(1).div(a.sqrt());
         }
 
         /// a == b; false where either is NaN.
@@ -240,12 +226,10 @@ pub fn I32x(comptime lanes: comptime_int) type {
         pub const loadAligned = moves.loadAligned;
         pub const store = moves.store;
         pub const storeAligned = moves.storeAligned;
-        pub const extract = moves.extract;
         pub const lane = moves.lane;
         pub const laneIn = moves.laneIn;
         pub const gt = integers.gt;
         pub const bitcast = integers.bitcast;
-        pub const gather = integers.gather;
 
         /// a + b, wrapping.
         pub inline fn add(a: Self, b: Self) Self {
@@ -255,11 +239,6 @@ pub fn I32x(comptime lanes: comptime_int) type {
         /// a - b, wrapping.
         pub inline fn sub(a: Self, b: Self) Self {
             return .{ .v = a.v -% b.v };
-        }
-
-        /// a * b, wrapping.
-        pub inline fn mul(a: Self, b: Self) Self {
-            return .{ .v = a.v *% b.v };
         }
 
         /// The lesser, signed.
@@ -282,29 +261,9 @@ pub fn I32x(comptime lanes: comptime_int) type {
             return .{ .v = a.v | b.v };
         }
 
-        /// Bits set in one only.
-        pub inline fn bitXor(a: Self, b: Self) Self {
-            return .{ .v = a.v ^ b.v };
-        }
-
-        /// Every bit flipped.
-        pub inline fn bitNot(a: Self) Self {
-            return .{ .v = ~a.v };
-        }
-
         /// Shifted left by `amount` bits, zeros from the right.
         pub inline fn shiftLeft(a: Self, comptime amount: u5) Self {
             return .{ .v = a.v << @splat(amount) };
-        }
-
-        /// Shifted right by `amount` bits, copies of the sign from the left.
-        pub inline fn shiftRightArithmetic(a: Self, comptime amount: u5) Self {
-            return .{ .v = a.v >> @splat(amount) };
-        }
-
-        /// Shifted right by `amount` bits, zeros from the left.
-        pub inline fn shiftRightLogical(a: Self, comptime amount: u5) Self {
-            return .{ .v = @bitCast(@as(Unsigned, @bitCast(a.v)) >> @splat(amount)) };
         }
 
         /// a == b.
@@ -340,7 +299,7 @@ pub fn Mask(comptime lanes: comptime_int) type {
         v: if (in_mask_register) Bools else Words,
 
         const Self = @This();
-        const truths = derived.Truths(Self, I32x(lanes));
+        const truths = derived.Truths(Self);
         const Bools = @Vector(lanes, bool);
         const Words = @Vector(lanes, u32);
         const Signed = @Vector(lanes, i32);
@@ -355,7 +314,6 @@ pub fn Mask(comptime lanes: comptime_int) type {
         const weights: Words = @as(Words, @splat(1)) << std.simd.iota(u5, lanes);
         pub const count = lanes;
 
-        pub const firstN = truths.firstN;
         pub const none = truths.none;
         pub const lane = truths.lane;
 
@@ -380,11 +338,6 @@ pub fn Mask(comptime lanes: comptime_int) type {
         /// Set where either is.
         pub inline fn bitOr(a: Self, b: Self) Self {
             return .{ .v = a.v | b.v };
-        }
-
-        /// Set where they differ.
-        pub inline fn bitXor(a: Self, b: Self) Self {
-            return .{ .v = a.v ^ b.v };
         }
 
         /// Set where `a` is not.

@@ -5,7 +5,7 @@
 //! below 2^31, strides below 2^8, offsets below 2^53 (glTF 2.0, sections 3.6.2.4 and 3.6.2.3).
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const limits = @import("limits.zig");
 const accessors = @import("../accessor.zig");
 const Source = @import("source.zig");

@@ -1,10 +1,10 @@
-//! Whether this reader may read a document at all: its version and the extensions it requires.
+//! Version and required extensions of a document: whether this reader may read it at all.
 //!
 //! In: `asset` and `extensionsRequired` (glTF 2.0, sections 3.2 and 3.12). Out: an error that names
 //! what is not supported, warnings for what changes the picture but not the shapes.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
 const Source = @import("source.zig");
 const Error = Source.Error;

@@ -1,11 +1,11 @@
-//! Which accessors a primitive draws from, and whether they are of the right kind.
+//! Vertex attributes: the accessors that a primitive draws from, each of the right kind.
 //!
 //! In: a primitive's attributes, indices and morph targets. Out: the accessors of its positions,
 //! normals and colours. The kinds are those of glTF 2.0, section 3.7.2.1, and of
 //! KHR_mesh_quantization; an attribute that is not drawn has to be of its kind as well.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const accessors = @import("../accessor.zig");
 const asset = @import("asset.zig");
 const diagnostic = @import("../../diagnostic.zig");

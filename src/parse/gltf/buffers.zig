@@ -1,39 +1,28 @@
 //! The bytes of glTF's buffers: from the GLB, from data URIs, from files beside the scene.
 //!
-//! In: the document, the GLB's binary chunk, the folder of the scene. Out: for each buffer as many
+//! In: the document, the GLB's binary chunk, the files of the scene. Out: for each buffer as many
 //! bytes as its byteLength says (glTF 2.0, section 3.6.1). Images are not opened.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const limits = @import("limits.zig");
-const file = @import("../file.zig");
 const escapes = @import("../json/escapes.zig");
-const uri = @import("../uri.zig");
-const diagnostic = @import("../../diagnostic.zig");
+const uri = @import("uri.zig");
+const diagnostic_data = @import("../../diagnostic.zig");
 const Source = @import("source.zig");
-const Identity = @import("../../identity.zig").Identity;
+const Resources = @import("../resource.zig");
 const Allocator = std.mem.Allocator;
-const Diagnostic = diagnostic.Diagnostic;
+const Diagnostic = diagnostic_data.Diagnostic;
 const Error = Source.Error;
+const quote = diagnostic_data.quote;
+
 const Buffers = @This();
 
 gpa: Allocator,
 /// As many bytes as byteLength says; null where the file gives none.
 list: []?[]const u8,
 /// What `list` points into, other than the GLB.
-owned: std.ArrayList([]u8) = .empty,
-
-/// Where buffers may come from.
-pub const Origin = struct {
-    io: std.Io,
-    /// The folder of the scene.
-    folder: std.Io.Dir,
-    allow_outside: bool,
-    /// See parse/settings.zig.
-    output: ?Identity,
-    /// The GLB's BIN chunk.
-    binary: ?[]const u8,
-};
+owned: std.ArrayList([:0]const u8) = .empty,
 
 /// Frees what has been read and decoded.
 pub fn deinit(buffers: *Buffers) void {
@@ -43,86 +32,88 @@ pub fn deinit(buffers: *Buffers) void {
     buffers.* = undefined;
 }
 
-/// Reads all buffers of the document.
+/// Reads all buffers of the document; `binary` is the GLB's BIN chunk.
 pub fn load(
-    gpa: Allocator,
+    resources: *Resources,
     data: *const c.cgltf_data,
-    origin: Origin,
-    said: *Diagnostic,
+    binary: ?[]const u8,
+    diagnostic: *Diagnostic,
 ) Error!Buffers {
+    const gpa = resources.gpa;
     const list = try gpa.alloc(?[]const u8, data.buffers_count);
     var buffers: Buffers = .{ .gpa = gpa, .list = list };
     errdefer buffers.deinit();
     var total: u64 = 0;
     for (list, Source.slice(data.buffers, data.buffers_count), 0..) |*bytes, *buffer, index| {
         total +|= buffer.size;
-        if (total > limits.buffer_bytes_max) return said.fail(
+        if (total > limits.buffer_bytes_max) return diagnostic.fail(
             error.InvalidInput,
             "buffer {d}: {d} bytes of buffers are over the limit of {d}",
             .{ index, total, limits.buffer_bytes_max },
         );
-        if (buffer.size == 0) return said.fail(
+        if (buffer.size == 0) return diagnostic.fail(
             error.InvalidInput,
             "buffer {d}: byteLength is 0",
             .{index},
         );
-        bytes.* = try buffers.loadOne(buffer, index, origin, said);
+        bytes.* = if (buffer.uri != null)
+            try buffers.loadUri(buffer, index, resources, diagnostic)
+        else if (index == 0 and binary != null)
+            // A buffer without URI is the GLB's if it is the first, else an extension's.
+            try whole(binary.?, buffer.size, index, diagnostic)
+        else
+            null;
     }
     return buffers;
 }
 
-fn loadOne(
+fn loadUri(
     buffers: *Buffers,
     buffer: *const c.cgltf_buffer,
     index: usize,
-    origin: Origin,
-    said: *Diagnostic,
-) Error!?[]const u8 {
+    resources: *Resources,
+    diagnostic: *Diagnostic,
+) Error![]const u8 {
     const gpa = buffers.gpa;
-    if (buffer.uri == null) {
-        // A buffer without URI is the GLB's if it is the first, else an extension's.
-        const binary = if (index == 0) origin.binary else null;
-        return try whole(binary orelse return null, buffer.size, index, said);
-    }
     const text = std.mem.span(@as([*:0]const u8, buffer.uri));
     switch (uri.classify(text)) {
         .base64 => |digits| {
             // Before anything of that size is allocated.
-            if (buffer.size > digits.len / 4 * 3 + 3) return said.fail(
+            if (buffer.size > digits.len / 4 * 3 + 3) return diagnostic.fail(
                 error.InvalidInput,
                 "buffer {d}: byteLength {d} is more than its data URI holds",
                 .{ index, buffer.size },
             );
             const bytes = uri.decodeBase64(gpa, digits) catch |err| return switch (err) {
                 error.OutOfMemory => error.OutOfMemory,
-                error.NotBase64 => said.fail(
+                error.NotBase64 => diagnostic.fail(
                     error.InvalidInput,
                     "buffer {d}: its data URI is not valid base64",
                     .{index},
                 ),
             };
             try buffers.own(bytes);
-            return try whole(bytes, buffer.size, index, said);
+            return try whole(bytes, buffer.size, index, diagnostic);
         },
-        .data_not_base64 => return said.fail(
+        .data_not_base64 => return diagnostic.fail(
             error.InvalidInput,
             "buffer {d}: its data URI is not base64",
             .{index},
         ),
-        .scheme => |scheme| return said.fail(
+        .scheme => |scheme| return diagnostic.fail(
             error.InvalidInput,
             "buffer {d}: URIs of the scheme {f} are not read, only files and data",
-            .{ index, diagnostic.quote(scheme) },
+            .{ index, quote(scheme) },
         ),
         .path => |encoded| {
-            const bytes = try buffers.loadFile(encoded, index, origin, said);
-            return try whole(bytes, buffer.size, index, said);
+            const bytes = try buffers.loadFile(encoded, index, resources, diagnostic);
+            return try whole(bytes, buffer.size, index, diagnostic);
         },
     }
 }
 
 /// Takes over `bytes`, which are freed even when this fails.
-fn own(buffers: *Buffers, bytes: []u8) error{OutOfMemory}!void {
+fn own(buffers: *Buffers, bytes: [:0]const u8) error{OutOfMemory}!void {
     errdefer buffers.gpa.free(bytes);
     try buffers.owned.append(buffers.gpa, bytes);
 }
@@ -131,88 +122,38 @@ fn loadFile(
     buffers: *Buffers,
     encoded: []const u8,
     index: usize,
-    origin: Origin,
-    said: *Diagnostic,
+    resources: *Resources,
+    diagnostic: *Diagnostic,
 ) Error![]const u8 {
     const gpa = buffers.gpa;
     const text = try escapes.decodeString(gpa, encoded);
     defer gpa.free(text);
-    const name = diagnostic.quote(text);
-    const path = uri.decodePath(gpa, text, origin.allow_outside) catch |err| return switch (err) {
+    const path = uri.decodePath(gpa, text) catch |err| return switch (err) {
         error.OutOfMemory => error.OutOfMemory,
-        error.Outside => said.fail(
-            error.InvalidInput,
-            "buffer {d}: {f} is outside the scene's folder (see --allow-outside)",
-            .{ index, name },
-        ),
-        error.BadEscape, error.HasNul, error.Empty => said.fail(
+        error.BadEscape => diagnostic.fail(
             error.InvalidInput,
             "buffer {d}: {f} is not a valid path",
-            .{ index, name },
+            .{ index, quote(text) },
         ),
     };
     defer gpa.free(path);
-    var reason: []const u8 = "";
-    const opened = file.open(origin.io, origin.folder, path, origin.output, &reason) catch |err|
-        return fileError(err, index, name, reason, said);
-    defer opened.close(origin.io);
-    if (!origin.allow_outside) try checkBelow(opened, index, name, origin, said);
-    const bytes = file.read(gpa, origin.io, opened, limits.file_bytes_max, &reason) catch |err|
-        return fileError(err, index, name, reason, said);
-    try buffers.own(bytes);
-    return bytes;
-}
-
-fn fileError(
-    err: file.Error,
-    index: usize,
-    name: diagnostic.Quoted,
-    reason: []const u8,
-    said: *Diagnostic,
-) Error {
-    switch (err) {
-        error.OutOfMemory => return error.OutOfMemory,
-        error.InputOutput => {},
-        error.NotRegular, error.TooLarge => return said.fail(
-            error.InvalidInput,
-            "buffer {d}: {f} {s}",
-            .{ index, name, reason },
-        ),
-    }
-    return said.fail(error.InputOutput, "buffer {d}: {f} {s}", .{ index, name, reason });
-}
-
-/// Links may lead out of the folder as well; the open file says where it really is.
-fn checkBelow(
-    opened: std.Io.File,
-    index: usize,
-    name: diagnostic.Quoted,
-    origin: Origin,
-    said: *Diagnostic,
-) Error!void {
-    var folder_buffer: [file.path_bytes_max]u8 = undefined;
-    var file_buffer: [file.path_bytes_max]u8 = undefined;
-    const below = below: {
-        const folder_length = origin.folder.realPath(origin.io, &folder_buffer) catch
-            break :below false;
-        const file_length = opened.realPath(origin.io, &file_buffer) catch break :below false;
-        break :below uri.isBelow(file_buffer[0..file_length], folder_buffer[0..folder_length]);
-    };
-    if (!below) return said.fail(
-        error.InvalidInput,
-        "buffer {d}: {f} is a link that leads outside the scene's folder (see --allow-outside)",
-        .{ index, name },
-    );
+    var reason: diagnostic_data.Message = .{};
+    const file = resources.read(path, &reason) catch |err| return if (err == error.OutOfMemory)
+        err
+    else
+        diagnostic.fail(err, "buffer {d}: {f} {s}", .{ index, quote(text), reason.text() });
+    try buffers.own(file.bytes);
+    return file.bytes;
 }
 
 fn whole(
     bytes: []const u8,
     byte_length: u64,
     index: usize,
-    said: *Diagnostic,
+    diagnostic: *Diagnostic,
 ) error{InvalidInput}![]const u8 {
     if (bytes.len >= byte_length) return bytes[0..@intCast(byte_length)];
-    return said.fail(
+    return diagnostic.fail(
         error.InvalidInput,
         "buffer {d}: has {d} bytes, its byteLength is {d}",
         .{ index, bytes.len, byte_length },

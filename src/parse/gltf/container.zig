@@ -133,11 +133,11 @@ test "lengths and kinds of chunks" {
         header ++ "\x24\x00\x00\x00" ++ chunk ++ "\x04\x00\x00\x00what1234",
     };
     for (good, [_]bool{ false, true, false }) |bytes, has_binary| {
-        var said: Diagnostic = .{};
-        const container = try open(bytes, &said);
+        var diagnostic: Diagnostic = .{};
+        const container = try open(bytes, &diagnostic);
         try std.testing.expectEqualStrings("{}  ", container.json);
         try std.testing.expectEqual(has_binary, container.binary != null);
-        try std.testing.expectEqual(0, said.warning_count);
+        try std.testing.expectEqual(0, diagnostic.warning_count);
     }
     const bad = [_][]const u8{
         "",
@@ -150,18 +150,18 @@ test "lengths and kinds of chunks" {
         header ++ "\x18\x00\x00\x00" ++ "\x03\x00\x00\x00JSON{}  ",
     };
     for (bad) |bytes| {
-        var said: Diagnostic = .{};
-        try std.testing.expectError(error.InvalidInput, open(bytes, &said));
-        try std.testing.expect(said.message.text().len > 0);
+        var diagnostic: Diagnostic = .{};
+        try std.testing.expectError(error.InvalidInput, open(bytes, &diagnostic));
+        try std.testing.expect(diagnostic.message.text().len > 0);
     }
 }
 
 test "marks and padding are left out with a warning" {
-    var said: Diagnostic = .{};
-    const text = try open("\xef\xbb\xbf{}", &said);
+    var diagnostic: Diagnostic = .{};
+    const text = try open("\xef\xbb\xbf{}", &diagnostic);
     try std.testing.expectEqualStrings("{}", text.json);
     const padded = "glTF\x02\x00\x00\x00\x18\x00\x00\x00\x04\x00\x00\x00JSON{}\x00\x00";
-    const binary = try open(padded, &said);
+    const binary = try open(padded, &diagnostic);
     try std.testing.expectEqualStrings("{}", binary.json);
-    try std.testing.expectEqual(2, said.warning_count);
+    try std.testing.expectEqual(2, diagnostic.warning_count);
 }

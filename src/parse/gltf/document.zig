@@ -5,7 +5,7 @@
 //! ask for hundreds of bytes, and our conversion of numbers, which knows no locale.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const numbers = @import("../json/numbers.zig");
 const limits = @import("limits.zig");
 const Allocator = std.mem.Allocator;

@@ -1,9 +1,7 @@
-//! How much a glTF file may ask for, so that a short file cannot take all memory.
+//! Limits of glTF: how much a file may ask for, so that a short one cannot take all memory.
 //!
 //! Each limit has its own message where it is checked. Real files stay far below.
 
-/// A scene file or a buffer file, in bytes.
-pub const file_bytes_max: u64 = 2 << 30;
 /// The JSON text, data URIs included, in bytes.
 pub const json_bytes_max: u64 = 1 << 30;
 /// All buffers of a file together, in bytes.
@@ -12,7 +10,7 @@ pub const buffer_bytes_max: u64 = 8 << 30;
 pub const accessor_count_max: u64 = (1 << 31) - 1;
 /// Elements of an accessor without data, which stand in no relation to the file's size.
 pub const zero_count_max: u64 = 1 << 24;
-/// Showings of meshes in a scene.
+/// Instances of meshes in a scene.
 pub const instance_count_max: u64 = 1 << 24;
 
 /// Bytes that cgltf may allocate for a JSON text of `json_bytes`.

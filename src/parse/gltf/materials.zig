@@ -1,12 +1,12 @@
 //! glTF's materials: metallic-roughness factors and those of the extensions that are traced.
 //!
 //! In: materials (glTF 2.0, section 3.9; KHR_materials_ior, _transmission, _volume,
-//! _emissive_strength, _unlit). Out: `scene.Material`s with every factor in its range, in the order
-//! of the file. Textures are not read: where one would decide, the factor stands alone, and what
-//! would be wrong at its full value (metal, glow) counts as absent.
+//! _emissive_strength, _unlit). Out: the scene's materials with every factor in its range, in the
+//! order of the file. Textures are not read: where one would decide, the factor stands alone, and
+//! what would be wrong at its full value (metal, glow) counts as absent.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const Source = @import("source.zig");
@@ -18,16 +18,14 @@ const ior_total = 1e6;
 
 const float_max = std.math.floatMax(f32);
 
-/// Reads all materials; `default_added` puts glTF's default material behind them.
-pub fn read(source: *const Source, default_added: bool) Error![]const scene.Material {
-    const count = source.data.materials_count;
-    const list = try source.arena.alloc(scene.Material, count + @intFromBool(default_added));
-    for (list[0..count], 0..) |*material, index| {
+/// Adds all materials to the scene; `default_added` puts glTF's default material behind them.
+pub fn read(source: *const Source, default_added: bool) Error!void {
+    for (0..source.data.materials_count) |index| {
         const reader: Reader = .{ .source = source, .index = index };
-        material.* = reader.read(Source.item(source.data.materials, index));
+        const material = reader.read(Source.item(source.data.materials, index));
+        _ = try source.builder.addMaterial(material);
     }
-    if (default_added) list[count] = .{};
-    return list;
+    if (default_added) _ = try source.builder.addMaterial(.{});
 }
 
 const Reader = struct {

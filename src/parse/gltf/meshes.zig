@@ -2,10 +2,10 @@
 //!
 //! In: primitives (glTF 2.0, section 3.7.2). Out: `scene.Mesh`es in the scene's memory. What
 //! several primitives share is decoded once. Every index has been compared with the number of
-//! vertices, every number is finite; strips and fans are spread out (section 3.7.2.1).
+//! vertices, every number is finite; strips and fans are taken apart (section 3.7.2.1).
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const accessors = @import("../accessor.zig");
@@ -18,8 +18,7 @@ const Meshes = @This();
 const assert = std.debug.assert;
 
 source: *Source,
-list: std.ArrayList(scene.Mesh) = .empty,
-/// Index into `list` of a glTF mesh's first primitive, and how many are drawn.
+/// Index in the scene of a glTF mesh's first primitive, and how many are drawn.
 ranges: std.AutoHashMapUnmanaged(u32, Range) = .empty,
 positions: std.AutoHashMapUnmanaged(u32, []const Vec3) = .empty,
 normals: std.AutoHashMapUnmanaged(u32, []const Vec3) = .empty,
@@ -45,7 +44,6 @@ const Mode = enum { triangles, strip, fan };
 /// Frees what is not the scene's.
 pub fn deinit(meshes: *Meshes) void {
     const gpa = meshes.source.gpa;
-    meshes.list.deinit(gpa);
     meshes.ranges.deinit(gpa);
     meshes.positions.deinit(gpa);
     meshes.normals.deinit(gpa);
@@ -59,13 +57,14 @@ pub fn get(meshes: *Meshes, mesh_index: u32) Error!Range {
     const gpa = meshes.source.gpa;
     if (meshes.ranges.get(mesh_index)) |range| return range;
     const mesh = Source.item(meshes.source.data.meshes, mesh_index);
-    const first: u32 = @intCast(meshes.list.items.len);
+    const builder = meshes.source.builder;
+    const first: u32 = @intCast(builder.meshes.items.len);
     for (Source.slice(mesh.primitives, mesh.primitives_count), 0..) |*primitive, index| {
         const place: Place = .{ .mesh = mesh_index, .primitive = @intCast(index) };
         const decoded = try meshes.decode(primitive, place) orelse continue;
-        try meshes.list.append(gpa, decoded);
+        _ = try builder.addMesh(decoded);
     }
-    const count: u32 = @intCast(meshes.list.items.len - first);
+    const count: u32 = @intCast(builder.meshes.items.len - first);
     try meshes.ranges.put(gpa, mesh_index, .{ .first = first, .count = count });
     return .{ .first = first, .count = count };
 }
@@ -224,7 +223,7 @@ fn connect(
         const vertices = try source.gpa.alloc(u32, count);
         defer source.gpa.free(vertices);
         try number(source, connection, accessor, vertices);
-        spread(mode, vertices, triangles);
+        assemble(mode, vertices, triangles);
     }
     try meshes.triangles.put(source.gpa, connection, triangles);
     return triangles;
@@ -249,7 +248,7 @@ fn number(
 }
 
 /// Strips and fans turn so that every triangle keeps the winding of the first.
-fn spread(mode: Mode, vertices: []const u32, triangles: [][3]u32) void {
+fn assemble(mode: Mode, vertices: []const u32, triangles: [][3]u32) void {
     for (triangles, 0..) |*triangle, index| triangle.* = switch (mode) {
         .triangles => vertices[3 * index ..][0..3].*,
         .strip => .{
@@ -270,16 +269,16 @@ test clampColors {
     try std.testing.expectEqual(expected, colors);
 }
 
-test spread {
+test assemble {
     const Triangles = [3][3]u32;
     const vertices = [_]u32{ 10, 11, 12, 13, 14 };
     var triangles: Triangles = undefined;
-    spread(.strip, &vertices, &triangles);
+    assemble(.strip, &vertices, &triangles);
     const strip: Triangles = .{ .{ 10, 11, 12 }, .{ 11, 13, 12 }, .{ 12, 13, 14 } };
     try std.testing.expectEqual(strip, triangles);
-    spread(.fan, &vertices, &triangles);
+    assemble(.fan, &vertices, &triangles);
     const fan: Triangles = .{ .{ 11, 12, 10 }, .{ 12, 13, 10 }, .{ 13, 14, 10 } };
     try std.testing.expectEqual(fan, triangles);
-    spread(.triangles, &.{ 0, 1, 2, 3, 4, 5, 6 }, triangles[0..2]);
+    assemble(.triangles, &.{ 0, 1, 2, 3, 4, 5, 6 }, triangles[0..2]);
     try std.testing.expectEqual([3]u32{ 3, 4, 5 }, triangles[1]);
 }

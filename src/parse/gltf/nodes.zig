@@ -1,11 +1,10 @@
 //! The node hierarchy of the shown scene, in an order where parents come before their children.
 //!
-//! In: glTF's nodes and scenes (glTF 2.0, section 3.5). Out: `scene.Node`s, and for each the glTF
-//! node it comes from. Explicit stacks: a chain may be as deep as the file is long. Every node of
-//! the file has to be in a tree, shown or not.
+//! In: glTF's nodes and scenes (glTF 2.0, section 3.5). Out: the scene's nodes, and for each the
+//! glTF node it comes from. Explicit stacks: a chain may be as deep as the file is long. Every node
+//! of the file has to be in a tree, shown or not.
 
 const std = @import("std");
-const c = @import("cgltf");
 const json = @import("../json.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
@@ -17,20 +16,12 @@ const Error = Source.Error;
 const Vec3 = math.Vec3;
 const assert = std.debug.assert;
 
-/// The nodes that the shown scene reaches.
-pub const Nodes = struct {
-    /// In the scene's memory.
-    list: []const scene.Node,
-    /// Index of the glTF node of each; freed by the caller.
-    origins: []const u32,
-};
-
 /// A node that waits for its turn.
 const Pending = struct { origin: u32, parent: u32 };
 
-/// Collects the nodes of the scene that the file shows: `scene`, else the first one, else every
-/// root. The caller frees `origins` with the source's `gpa`.
-pub fn collect(source: *Source) Error!Nodes {
+/// Adds the nodes of the scene that the file shows: `scene`, else the first one, else every root.
+/// Returns the index of the glTF node of each, which the caller frees with the source's `gpa`.
+pub fn collect(source: *const Source) Error![]const u32 {
     const gpa = source.gpa;
     const node_count = source.data.nodes_count;
     try checkTrees(source);
@@ -42,12 +33,10 @@ pub fn collect(source: *Source) Error!Nodes {
 
     var origins: std.ArrayList(u32) = .empty;
     errdefer origins.deinit(gpa);
-    var parents: std.ArrayList(u32) = .empty;
-    defer parents.deinit(gpa);
     while (stack.pop()) |pending| {
-        const index: u32 = @intCast(origins.items.len);
+        const local = try localTransform(source, pending.origin);
+        const index = try source.builder.addNode(pending.parent, local);
         try origins.append(gpa, pending.origin);
-        try parents.append(gpa, pending.parent);
         const node = Source.item(source.data.nodes, pending.origin);
         const children = Source.slice(node.children, node.children_count);
         try stack.ensureUnusedCapacity(gpa, children.len);
@@ -57,12 +46,7 @@ pub fn collect(source: *Source) Error!Nodes {
         });
     }
     assert(origins.items.len <= node_count);
-
-    const list = try source.arena.alloc(scene.Node, origins.items.len);
-    for (list, origins.items, parents.items) |*node, origin, parent| {
-        node.* = .{ .parent = parent, .local = try localTransform(source, origin) };
-    }
-    return .{ .list = list, .origins = try origins.toOwnedSlice(gpa) };
+    return origins.toOwnedSlice(gpa);
 }
 
 /// The roots of the shown scene, the first on top.

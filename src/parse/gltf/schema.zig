@@ -1,4 +1,4 @@
-//! What glTF 2.0 holds where, as far as this reader and cgltf look at it.
+//! The schema of glTF 2.0: what stands where, as far as this reader and cgltf look at it.
 //!
 //! A table for json.zig: the types of the properties, which of them have to be there, and which
 //! whole numbers name elements of which list. cgltf takes a string for "no index" and loses its

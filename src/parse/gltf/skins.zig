@@ -4,7 +4,7 @@
 //! not fit the meshes that are drawn with them, a warning that they are not applied.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const accessors = @import("../accessor.zig");
 const gltf_accessors = @import("accessors.zig");
 const Source = @import("source.zig");

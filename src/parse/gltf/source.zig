@@ -1,18 +1,20 @@
-//! What the parts of the glTF reader share: the document, its buffers, where results go.
+//! State of the glTF reader that its parts share: the document, its buffers, where results go.
 //!
 //! Nothing is checked here but that a reference is one. Memory from `arena` is the scene's and
 //! stays; memory from `gpa` is given back before the reader ends.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const json = @import("../json.zig");
+const scene = @import("../../scene.zig");
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
 const Allocator = std.mem.Allocator;
 const assert = std.debug.assert;
 const Source = @This();
 
 gpa: Allocator,
-/// The scene's memory.
+/// The scene that results go to, and its memory.
+builder: *scene.Builder,
 arena: Allocator,
 data: *const c.cgltf_data,
 /// Bytes of each buffer, as many as its byteLength says; null where the file gives none.
@@ -28,7 +30,7 @@ sparse_checked: bool = false,
 finite: std.AutoHashMapUnmanaged(u32, void) = .empty,
 
 /// See parse.zig.
-pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
+pub const Error = @import("../resource.zig").Error;
 
 /// Frees what the reader has noted.
 pub fn deinit(source: *Source) void {

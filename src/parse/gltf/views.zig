@@ -1,11 +1,11 @@
-//! Cameras and lights: what a node may carry besides a mesh.
+//! Cameras and punctual lights: what a node may carry besides a mesh.
 //!
 //! In: a glTF camera (glTF 2.0, section 3.10) or a light (KHR_lights_punctual) and the scene node
 //! that carries it. Out: `scene.Camera`, `scene.Light`, every number finite and in its range. What
 //! can be clamped is, with a warning; a camera that sees nothing is an error.
 
 const std = @import("std");
-const c = @import("cgltf");
+const c = @import("../cgltf.zig");
 const escapes = @import("../json/escapes.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");

@@ -99,9 +99,9 @@ fn spectrumFile(colors: *Colors, position: usize, name: []const u8) Error!?Vec3 
     const input = colors.input;
     if (colors.files.get(name)) |known| return known;
     var value: ?Vec3 = null;
-    if (input.readFile(position, name, null)) |bytes| {
-        defer input.gpa.free(bytes);
-        value = try colors.parsePairs(bytes);
+    if (input.readFile(position, name)) |file| {
+        defer input.gpa.free(file.bytes);
+        value = try colors.parsePairs(file.bytes);
         if (value == null) try input.warn(
             position,
             "spectrum file",

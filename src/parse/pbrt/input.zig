@@ -1,4 +1,4 @@
-//! The texts of a scene: the file that is read, the files that wait for it, and where we are.
+//! A stack of texts: the file that is read, the files that include it, and where we are.
 //!
 //! In: the first text, names of files to include. Out: a cursor over the top text, and errors and
 //! warnings with file, line and column. Included files lie on a stack of our own, at most
@@ -6,14 +6,12 @@
 
 const std = @import("std");
 const diagnostic_file = @import("../../diagnostic.zig");
-const file_reader = @import("../file.zig");
 const limits = @import("limits.zig");
 const number = @import("number.zig");
-const uri = @import("../uri.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = diagnostic_file.Diagnostic;
 const Identity = @import("../../identity.zig").Identity;
-const Settings = @import("../settings.zig").Settings;
+const Resources = @import("../resource.zig");
 const assert = std.debug.assert;
 const printable = diagnostic_file.printable;
 const quote = diagnostic_file.quote;
@@ -21,54 +19,49 @@ const quote = diagnostic_file.quote;
 const Input = @This();
 
 /// See parse.zig.
-pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
+pub const Error = Resources.Error;
 
 /// A text that is open.
 const Text = struct {
-    /// As messages call it. Owned, like the bytes.
+    /// As messages call it. Owned, like the bytes, but for those of the first text.
     name: []const u8,
     bytes: [:0]const u8,
     cursor: usize = 0,
-    /// Tells files apart; null for a text that is none.
+    /// Null for a text that is no file.
     identity: ?Identity,
 };
 
 gpa: Allocator,
-io: std.Io,
-/// Folder of the scene, to which all names are relative, as in PBRT.
-folder: std.Io.Dir,
-/// The path of that folder as the user wrote it, for messages.
+resources: *Resources,
+/// The path of the scene's folder as the user wrote it, for messages.
 folder_name: []const u8,
-settings: Settings,
 diagnostic: *Diagnostic,
 texts: std.ArrayList(Text) = .empty,
 included_count: u32 = 0,
-/// Bytes of all texts and data files so far.
-bytes_read: u64 = 0,
-/// Kinds of warnings that have been said.
-said: std.AutoHashMapUnmanaged(u64, void) = .empty,
+/// Hashes of the kinds of warnings that have been given.
+warned: std.AutoHashMapUnmanaged(u64, void) = .empty,
 
 /// Frees everything.
 pub fn deinit(input: *Input) void {
     while (input.texts.items.len > 0) input.pop();
     input.texts.deinit(input.gpa);
-    input.said.deinit(input.gpa);
+    input.warned.deinit(input.gpa);
     input.* = undefined;
 }
 
-/// Reads from `bytes` next, which it takes over in any case; `name` is copied.
-pub fn push(input: *Input, name: []const u8, bytes: [:0]u8, identity: ?Identity) Error!void {
-    errdefer input.gpa.free(bytes);
+/// Reads from a file next; `name` is copied. The bytes of all but the first are taken over.
+pub fn push(input: *Input, name: []const u8, file: Resources.File) Error!void {
     const copy = try input.gpa.dupe(u8, name);
     errdefer input.gpa.free(copy);
-    try input.texts.append(input.gpa, .{ .name = copy, .bytes = bytes, .identity = identity });
+    const text: Text = .{ .name = copy, .bytes = file.bytes, .identity = file.identity };
+    try input.texts.append(input.gpa, text);
 }
 
 /// Leaves the top text for the one that included it.
 pub fn pop(input: *Input) void {
     const text = input.texts.pop().?;
     input.gpa.free(text.name);
-    input.gpa.free(text.bytes);
+    if (input.texts.items.len > 0) input.gpa.free(text.bytes);
 }
 
 /// The text that is read.
@@ -163,7 +156,7 @@ pub fn warn(
     comptime format: []const u8,
     arguments: anytype,
 ) Allocator.Error!void {
-    const entry = try input.said.getOrPut(input.gpa, std.hash.Wyhash.hash(0, kind));
+    const entry = try input.warned.getOrPut(input.gpa, std.hash.Wyhash.hash(0, kind));
     if (entry.found_existing) return;
     if (input.diagnostic.warning_count == diagnostic_file.warning_count_max) {
         // Not worth looking for its line.
@@ -206,84 +199,32 @@ pub fn include(input: *Input, position: usize, path: []const u8) Error!void {
         "over {d} files are included",
         .{limits.include_count_max},
     );
-    var identity: ?Identity = null;
-    const bytes = try input.readFile(position, path, &identity);
+    const file = try input.readFile(position, path);
+    errdefer input.gpa.free(file.bytes);
     for (input.texts.items) |text| {
-        if (!Identity.eql(text.identity, identity)) continue;
-        input.gpa.free(bytes);
+        if (!Identity.eql(text.identity, file.identity)) continue;
         return input.fail(position, "{f} includes itself", .{quote(path)});
     }
-    const name = std.fs.path.join(input.gpa, &.{ input.folder_name, path }) catch |err| {
-        input.gpa.free(bytes);
-        return err;
-    };
+    const name = try std.fs.path.join(input.gpa, &.{ input.folder_name, path });
     defer input.gpa.free(name);
-    try input.push(name, bytes, identity);
+    try input.push(name, file);
 }
 
-/// Reads a file that the scene names at `position`: a regular one within the scene's folder, if
-/// the user does not allow others. The caller frees it. `identity`, where given, tells it apart.
-pub fn readFile(
-    input: *Input,
-    position: usize,
-    path: []const u8,
-    identity: ?*?Identity,
-) Error![:0]u8 {
-    const name = quote(path);
-    if (path.len == 0 or std.mem.findScalar(u8, path, 0) != null)
-        return input.fail(position, "{f} is not a valid path", .{name});
-    if (!input.settings.allow_outside and uri.leavesFolder(path)) return input.fail(
-        position,
-        "{f} is outside the scene's folder (see --allow-outside)",
-        .{name},
-    );
-    var reason: []const u8 = "";
-    const output = input.settings.output;
-    const opened = file_reader.open(input.io, input.folder, path, output, &reason) catch |err|
-        return input.failFile(position, err, name, reason);
-    defer opened.close(input.io);
-    if (!input.settings.allow_outside and !input.isBelow(opened)) return input.fail(
-        position,
-        "{f} is a link that leads outside the scene's folder (see --allow-outside)",
-        .{name},
-    );
-    if (identity) |to| to.* = .of(opened.handle);
-    const bytes = file_reader.readTerminated(
-        input.gpa,
-        input.io,
-        opened,
-        limits.file_bytes_max,
-        &reason,
-    ) catch |err| return input.failFile(position, err, name, reason);
-    errdefer input.gpa.free(bytes);
-    input.bytes_read += bytes.len;
-    if (input.bytes_read > limits.text_bytes_max) return input.fail(
+/// Reads a file that the scene names at `position`. The caller frees its bytes.
+pub fn readFile(input: *Input, position: usize, path: []const u8) Error!Resources.File {
+    var reason: diagnostic_file.Message = .{};
+    const file = input.resources.read(path, &reason) catch |err| {
+        if (err == error.OutOfMemory) return err;
+        input.fail(position, "{f} {s}", .{ quote(path), reason.text() }) catch {};
+        return err;
+    };
+    errdefer input.gpa.free(file.bytes);
+    if (input.resources.bytes_read > limits.text_bytes_max) return input.fail(
         position,
         "the files of the scene are over {d} bytes together",
         .{limits.text_bytes_max},
     );
-    return bytes;
-}
-
-fn failFile(
-    input: *Input,
-    position: usize,
-    err: file_reader.Error,
-    name: diagnostic_file.Quoted,
-    reason: []const u8,
-) Error {
-    if (err == error.OutOfMemory) return error.OutOfMemory;
-    const invalid = input.fail(position, "{f} {s}", .{ name, reason });
-    return if (err == error.InputOutput) error.InputOutput else invalid;
-}
-
-/// Links may lead out of the folder as well; the open file says where it really is.
-fn isBelow(input: *Input, opened: std.Io.File) bool {
-    var folder_buffer: [file_reader.path_bytes_max]u8 = undefined;
-    var file_buffer: [file_reader.path_bytes_max]u8 = undefined;
-    const folder_length = input.folder.realPath(input.io, &folder_buffer) catch return false;
-    const file_length = opened.realPath(input.io, &file_buffer) catch return false;
-    return uri.isBelow(file_buffer[0..file_length], folder_buffer[0..folder_length]);
+    return file;
 }
 
 test placeOf {
@@ -298,17 +239,17 @@ test placeOf {
 test "white space and comments are passed over, strings end on their line" {
     const gpa = std.testing.allocator;
     var diagnostic: Diagnostic = .{};
+    var resources: Resources =
+        .{ .gpa = gpa, .io = std.testing.io, .folder = .cwd(), .settings = .{} };
     var input: Input = .{
         .gpa = gpa,
-        .io = std.testing.io,
-        .folder = .cwd(),
+        .resources = &resources,
         .folder_name = "",
-        .settings = .{},
         .diagnostic = &diagnostic,
     };
     defer input.deinit();
     const text = " # one \"\n\t\"a b\" word#two\n\"c\\\"d\" \"open\n\" #end";
-    try input.push("x.pbrt", try gpa.dupeSentinel(u8, text, 0), null);
+    try input.push("x.pbrt", .{ .bytes = text, .identity = null });
     try std.testing.expectEqual('"', input.peek());
     try std.testing.expectEqualStrings("a b", try input.string());
     try std.testing.expectEqualStrings("word", input.word());

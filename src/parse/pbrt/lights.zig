@@ -14,14 +14,15 @@ const math = @import("../../math.zig");
 const quote = @import("../../diagnostic.zig").quote;
 const scene = @import("../../scene.zig");
 const spectra = @import("spectra.zig");
-const Assembly = @import("assembly.zig");
+const SceneBuilder = @import("scene_builder.zig");
 const Colors = @import("colors.zig");
 const Input = @import("input.zig");
 const Parameters = @import("parameters.zig");
-const Transform = @import("transform.zig");
+const vec3d = math.vec3d;
+const Transform = math.AffineD;
 const Error = Input.Error;
 const Vec3 = math.Vec3;
-const Vector = Transform.Vector;
+const Vector = math.Vec3d;
 
 /// Points that a shining shape becomes, where there are not too many of them.
 pub const points_per_shape = 16;
@@ -40,7 +41,7 @@ const emitter_cosine = 0.75;
 /// Directive and place of a light that is being read.
 pub const Source = struct {
     colors: *Colors,
-    assembly: *Assembly,
+    builder: *SceneBuilder,
     parameters: *const Parameters,
     place: *const Transform,
     position: usize,
@@ -82,7 +83,7 @@ pub fn add(source: *const Source, name: []const u8) Error!void {
         infinite,
         exinfinite,
     };
-    const assembly = source.assembly;
+    const builder = source.builder;
     const kind = std.meta.stringToEnum(Kind, name) orelse
         return source.note(name, "is not supported and left out");
     if (source.parameters.find("power") != null or source.parameters.find("illuminance") != null)
@@ -91,7 +92,7 @@ pub fn add(source: *const Source, name: []const u8) Error!void {
         .point, .goniometric => {
             if (kind == .goniometric) try source.note(name, "shines evenly, its map is not read");
             const origin = source.point("from", .{ 0, 0, 0 });
-            try assembly.addLight(origin, .{ 0, 0, -1 }, .{
+            try builder.addLight(origin, .{ 0, 0, -1 }, .{
                 .kind = .point,
                 .node = undefined,
                 .color = try source.color("I"),
@@ -101,10 +102,10 @@ pub fn add(source: *const Source, name: []const u8) Error!void {
         .distant => {
             const from = source.point("from", .{ 0, 0, 0 });
             const to = source.point("to", .{ 0, 0, 1 });
-            const way = Transform.subtract(to, from);
-            if (Transform.normalize(way) == null)
+            const way = vec3d.sub(to, from);
+            if (vec3d.normalize(way) == null)
                 return source.colors.input.fail(source.position, "the light has no direction", .{});
-            try assembly.addLight(.{ 0, 0, 0 }, way, .{
+            try builder.addLight(.{ 0, 0, 0 }, way, .{
                 .kind = .directional,
                 .node = undefined,
                 .color = try source.color("L"),
@@ -115,13 +116,13 @@ pub fn add(source: *const Source, name: []const u8) Error!void {
                 source.parameters.find("filename") != null)
             {
                 try source.note(name, "its map is not read, a grey sky stands for it");
-                assembly.has_unknown_sky = true;
+                builder.has_unknown_sky = true;
                 return;
             }
             const radiance = try source.color("L");
-            var sum = assembly.sky orelse Vec3{ 0, 0, 0 };
+            var sum = builder.sky orelse Vec3{ 0, 0, 0 };
             for (&sum, radiance) |*to, part| to.* = @min(to.* + part, sky_max);
-            assembly.sky = sum;
+            builder.sky = sum;
         },
     }
 }
@@ -134,8 +135,8 @@ fn addSpot(source: *const Source, name: []const u8, is_projection: bool) Error!v
         source.place.point(.{ 0, 0, 1 })
     else
         source.point("to", .{ 0, 0, 1 });
-    const way = Transform.subtract(target, origin);
-    if (Transform.normalize(way) == null)
+    const way = vec3d.sub(target, origin);
+    if (vec3d.normalize(way) == null)
         return source.colors.input.fail(source.position, "the light has no direction", .{});
     var outer_deg = parameters.float("coneangle", 30);
     var inner_deg = outer_deg - parameters.float("conedeltaangle", 5);
@@ -146,7 +147,7 @@ fn addSpot(source: *const Source, name: []const u8, is_projection: bool) Error!v
     }
     const outer = std.math.clamp(outer_deg, 0.1, 90) * (std.math.pi / 180.0);
     const inner = std.math.clamp(inner_deg, 0, 90) * (std.math.pi / 180.0);
-    try source.assembly.addLight(origin, way, .{
+    try source.builder.addLight(origin, way, .{
         .kind = .spot,
         .node = undefined,
         .color = try source.color("I"),
@@ -156,40 +157,40 @@ fn addSpot(source: *const Source, name: []const u8, is_projection: bool) Error!v
 }
 
 /// Makes lights of all shapes that shine.
-pub fn placeEmitters(assembly: *Assembly) Error!void {
-    const emitters = assembly.emitters.items;
+pub fn placeEmitters(builder: *SceneBuilder) Error!void {
+    const emitters = builder.emitters.items;
     if (emitters.len == 0) return;
     const share = @max(1, point_count_aim / emitters.len);
     const count: u32 = @intCast(@min(points_per_shape, share));
-    for (emitters) |*emitter| try placeEmitter(assembly, emitter, count);
+    for (emitters) |*emitter| try placeEmitter(builder, emitter, count);
 }
 
 /// Twice the area of a triangle in the world, and its normal of that length.
-fn facing(emitter: *const Assembly.Emitter, triangle: [3]u32) Vector {
+fn facing(emitter: *const SceneBuilder.Emitter, triangle: [3]u32) Vector {
     var corners: [3]Vector = undefined;
     for (&corners, triangle) |*corner, vertex| corner.* = cornerAt(emitter, vertex);
-    const normal = Transform.cross(
-        Transform.subtract(corners[1], corners[0]),
-        Transform.subtract(corners[2], corners[0]),
+    const normal = vec3d.cross(
+        vec3d.sub(corners[1], corners[0]),
+        vec3d.sub(corners[2], corners[0]),
     );
     // Normals do not turn where the place mirrors.
-    return if (emitter.place.determinant() < 0) Transform.scaled(normal, -1) else normal;
+    return if (emitter.place.determinant() < 0) vec3d.scale(normal, -1) else normal;
 }
 
-fn cornerAt(emitter: *const Assembly.Emitter, vertex: u32) Vector {
+fn cornerAt(emitter: *const SceneBuilder.Emitter, vertex: u32) Vector {
     const position = emitter.geometry.positions[vertex];
     return emitter.place.point(.{ position[0], position[1], position[2] });
 }
 
 fn placeEmitter(
-    assembly: *Assembly,
-    emitter: *const Assembly.Emitter,
+    builder: *SceneBuilder,
+    emitter: *const SceneBuilder.Emitter,
     count: u32,
 ) Error!void {
     var area: f64 = 0;
     for (emitter.geometry.triangles) |triangle| {
         const normal = facing(emitter, triangle);
-        area += 0.5 * @sqrt(Transform.dot(normal, normal));
+        area += 0.5 * vec3d.length(normal);
     }
     if (!(area > 0 and area < 1e30)) return;
     const step = area / @as(f64, @floatFromInt(count));
@@ -199,19 +200,19 @@ fn placeEmitter(
     var made: u32 = 0;
     for (emitter.geometry.triangles) |triangle| {
         const normal = facing(emitter, triangle);
-        const doubled = @sqrt(Transform.dot(normal, normal));
+        const doubled = vec3d.length(normal);
         passed += 0.5 * doubled;
         while (made < count and (@as(f64, @floatFromInt(made)) + 0.5) * step < passed) {
             const at = pointWithin(emitter, triangle, made);
             made += 1;
-            const unit = Transform.normalize(normal) orelse continue;
-            try addPoint(assembly, emitter, at, Transform.scaled(unit, lift), step);
+            const unit = vec3d.normalize(normal) orelse continue;
+            try addPoint(builder, emitter, at, vec3d.scale(unit, lift), step);
         }
     }
 }
 
 /// The point of the sequence's number `index` in a triangle.
-fn pointWithin(emitter: *const Assembly.Emitter, triangle: [3]u32, index: u32) Vector {
+fn pointWithin(emitter: *const SceneBuilder.Emitter, triangle: [3]u32, index: u32) Vector {
     const number: f64 = @floatFromInt(index + 1);
     var u = number * 0.7548776662466927;
     var v = number * 0.5698402909980532;
@@ -222,22 +223,22 @@ fn pointWithin(emitter: *const Assembly.Emitter, triangle: [3]u32, index: u32) V
         v = 1 - v;
     }
     const a = cornerAt(emitter, triangle[0]);
-    const b = Transform.subtract(cornerAt(emitter, triangle[1]), a);
-    const c = Transform.subtract(cornerAt(emitter, triangle[2]), a);
-    return Transform.add(a, Transform.add(Transform.scaled(b, u), Transform.scaled(c, v)));
+    const b = vec3d.sub(cornerAt(emitter, triangle[1]), a);
+    const c = vec3d.sub(cornerAt(emitter, triangle[2]), a);
+    return vec3d.add(a, vec3d.add(vec3d.scale(b, u), vec3d.scale(c, v)));
 }
 
 fn addPoint(
-    assembly: *Assembly,
-    emitter: *const Assembly.Emitter,
+    builder: *SceneBuilder,
+    emitter: *const SceneBuilder.Emitter,
     at: Vector,
     lift: Vector,
     area: f64,
 ) Error!void {
     const sides: usize = if (emitter.two_sided) 2 else 1;
     for (0..sides) |side| {
-        const way = if (side == 0) lift else Transform.scaled(lift, -1);
-        try assembly.addLight(Transform.add(at, way), way, .{
+        const way = if (side == 0) lift else vec3d.scale(lift, -1);
+        try builder.addLight(vec3d.add(at, way), way, .{
             .kind = .spot,
             .node = undefined,
             .color = emitter.radiance,

@@ -1,9 +1,7 @@
-//! How much a PBRT file may ask for, so that a short text cannot take all memory.
+//! Limits of PBRT: how much a text may ask for, so that a short one cannot take all memory.
 //!
 //! Each limit has its own message where it is checked. Real files stay far below.
 
-/// A file of text, PLY or spectra, in bytes.
-pub const file_bytes_max: u64 = 2 << 30;
 /// All text of a scene, each file as often as it is included, in bytes.
 pub const text_bytes_max: u64 = 4 << 30;
 /// Files open at a time, each included by the one before.
@@ -14,16 +12,10 @@ pub const include_count_max = 10_000;
 pub const attribute_depth_max = 1 << 16;
 /// Parameters of one directive.
 pub const parameter_count_max = 256;
-/// Showings of meshes in a scene.
+/// Instances of meshes in a scene.
 pub const instance_count_max: u64 = 1 << 24;
 /// Shapes that emit light.
 pub const emitter_count_max = 4096;
-/// Sides and pixels of a film: those of a picture on the command line.
-pub const film_side_max = 65_536;
-pub const film_pixel_count_max = 1 << 28;
-/// Samples a pixel and bounces that a scene may ask for; more is taken as this.
-pub const sample_count_max = 4096;
-pub const depth_max = 32;
 /// Times that a control mesh is subdivided; more is taken as this.
 pub const subdivision_count_max = 8;
 /// Largest order of a NURBS.

@@ -9,6 +9,7 @@ const quote = @import("../../diagnostic.zig").quote;
 const limits = @import("limits.zig");
 const number = @import("number.zig");
 const Input = @import("input.zig");
+const Resources = @import("../resource.zig");
 const Error = Input.Error;
 const Vec3 = @import("../../math.zig").Vec3;
 
@@ -302,21 +303,20 @@ pub fn vector(parameters: *const Parameters, name: []const u8, default: Vec3) Ve
 
 const TestInput = struct {
     diagnostic: @import("../../diagnostic.zig").Diagnostic = .{},
+    resources: Resources =
+        .{ .gpa = std.testing.allocator, .io = std.testing.io, .folder = .cwd(), .settings = .{} },
     input: Input = undefined,
     parameters: Parameters = .{},
 
-    fn parse(state: *TestInput, text: []const u8) !void {
-        const gpa = std.testing.allocator;
+    fn parse(state: *TestInput, text: [:0]const u8) !void {
         state.input = .{
-            .gpa = gpa,
-            .io = std.testing.io,
-            .folder = .cwd(),
+            .gpa = state.resources.gpa,
+            .resources = &state.resources,
             .folder_name = "",
-            .settings = .{},
             .diagnostic = &state.diagnostic,
         };
         errdefer state.deinit();
-        try state.input.push("x", try gpa.dupeSentinel(u8, text, 0), null);
+        try state.input.push("x", .{ .bytes = text, .identity = null });
         try state.parameters.read(&state.input);
     }
 

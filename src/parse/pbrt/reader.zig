@@ -1,27 +1,29 @@
 //! The directives of a PBRT text, one after the other, and the state that they change.
 //!
-//! In: texts. Out: an `Assembly` of everything they show, and what they ask of the picture.
+//! In: texts. Out: an `SceneBuilder` of everything they show, and what they ask of the picture.
 //! Nothing recurses: attributes, objects and included files lie on stacks with limits.
 
 const std = @import("std");
 const diagnostic_file = @import("../../diagnostic.zig");
 const lights = @import("lights.zig");
+const choices = @import("../../settings.zig");
 const limits = @import("limits.zig");
 const materials = @import("materials.zig");
 const number = @import("number.zig");
 const scene_data = @import("../../scene.zig");
 const shapes = @import("shapes.zig");
 const spectra = @import("spectra.zig");
-const Assembly = @import("assembly.zig");
+const SceneBuilder = @import("scene_builder.zig");
 const Colors = @import("colors.zig");
 const Input = @import("input.zig");
-const Maker = @import("shapes/maker.zig");
+const Tessellator = @import("shapes/tessellator.zig");
 const Parameters = @import("parameters.zig");
-const Transform = @import("transform.zig");
+const math = @import("../../math.zig");
+const transforms = @import("transform.zig");
+const Transform = math.AffineD;
 const View = @import("view.zig");
 const Allocator = std.mem.Allocator;
 const Error = Input.Error;
-const Scene = scene_data.Scene;
 const Vec3 = @import("../../math.zig").Vec3;
 const assert = std.debug.assert;
 const quote = diagnostic_file.quote;
@@ -31,18 +33,18 @@ const Reader = @This();
 /// Everything that AttributeBegin keeps and AttributeEnd brings back.
 const Graphics = struct {
     transform: Transform = .identity,
-    /// Index into `Assembly.materials`, `scene_data.none` for the default one.
+    /// Index into `SceneBuilder.materials`, `scene_data.none` for the default one.
     material: u32 = scene_data.none,
     /// Surfaces only bound a medium and are not shown.
     is_boundary: bool = false,
-    glow: ?Glow = null,
+    area_light: ?AreaLight = null,
     reverse: bool = false,
     /// Whether transformations are those of the time when the shutter opens.
     at_start: bool = true,
 };
 
 /// What AreaLightSource says of the shapes after it.
-const Glow = struct { radiance: Vec3, two_sided: bool };
+const AreaLight = struct { radiance: Vec3, two_sided: bool };
 
 const Kept = struct {
     const Kind = enum {
@@ -70,9 +72,9 @@ const Phase = enum { options, world, done };
 input: *Input,
 /// Lives as long as the scene is read.
 arena: Allocator,
-assembly: *Assembly,
+builder: *SceneBuilder,
 colors: Colors,
-maker: Maker,
+tessellator: Tessellator,
 parameters: Parameters = .{},
 graphics: Graphics = .{},
 stack: std.ArrayList(Kept) = .empty,
@@ -84,7 +86,7 @@ sample_count: ?u32 = null,
 depth: ?u32 = null,
 /// The object that is being defined.
 object: ?struct { name: []const u8, first: usize } = null,
-objects: std.StringHashMapUnmanaged(Assembly.Object) = .empty,
+objects: std.StringHashMapUnmanaged(SceneBuilder.Object) = .empty,
 spaces: std.StringHashMapUnmanaged(Transform) = .empty,
 named: std.StringHashMapUnmanaged(NamedMaterial) = .empty,
 /// Meshes of curved shapes by all that they depend on.
@@ -220,17 +222,17 @@ fn perform(reader: *Reader, directive: Directive, position: usize) Error!void {
     switch (directive) {
         .Identity => try reader.setTransform(position, .identity),
         .Translate => {
-            try reader.transform(position, .translation(try reader.numbers(3)));
+            try reader.transform(position, .translate(try reader.numbers(3)));
         },
-        .Scale => try reader.transform(position, .scaling(try reader.numbers(3))),
+        .Scale => try reader.transform(position, .scale(try reader.numbers(3))),
         .Rotate => {
             const n = try reader.numbers(4);
-            try reader.transform(position, Transform.rotation(n[0], n[1..4].*) orelse
+            try reader.transform(position, transforms.rotation(n[0], n[1..4].*) orelse
                 return reader.input.fail(position, "the axis has no direction", .{}));
         },
         .LookAt => {
             const n = try reader.numbers(9);
-            try reader.transform(position, Transform.lookAt(n[0..3].*, n[3..6].*, n[6..9].*) orelse
+            try reader.transform(position, transforms.lookAt(n[0..3].*, n[3..6].*, n[6..9].*) orelse
                 return reader.input.fail(position, "the three points leave no direction", .{}));
         },
         .Transform => try reader.setTransform(position, try reader.matrix(position)),
@@ -320,12 +322,12 @@ fn performNamed(
         },
         .LightSource => try lights.add(&.{
             .colors = &reader.colors,
-            .assembly = reader.assembly,
+            .builder = reader.builder,
             .parameters = parameters,
             .place = &reader.graphics.transform,
             .position = position,
         }, name),
-        .AreaLightSource => try reader.areaLight(),
+        .AreaLightSource => try reader.areaLightSource(),
         .Shape => try reader.shape(name, position),
         .Volume, .MakeNamedMedium => {
             try reader.note(directive, position, "participating media are not supported");
@@ -365,7 +367,7 @@ fn numbers(reader: *Reader, comptime count: usize) Error![count]f64 {
 
 fn matrix(reader: *Reader, position: usize) Error!Transform {
     const sixteen = try reader.numbers(16);
-    return Transform.fromMatrix(&sixteen) orelse
+    return transforms.fromMatrix(&sixteen) orelse
         reader.input.fail(position, "the matrix is not affine", .{});
 }
 
@@ -395,12 +397,12 @@ fn keep(
 }
 
 fn transform(reader: *Reader, position: usize, inner: Transform) Error!void {
-    try reader.setTransform(position, reader.graphics.transform.compose(&inner));
+    try reader.setTransform(position, reader.graphics.transform.compose(inner));
 }
 
 fn setTransform(reader: *Reader, position: usize, to: Transform) Error!void {
     if (!reader.graphics.at_start) return;
-    if (!to.isFinite())
+    if (!transforms.fitsSingle(&to))
         return reader.input.fail(position, "the transformation is out of range", .{});
     reader.graphics.transform = to;
 }
@@ -449,7 +451,7 @@ fn objectBegin(reader: *Reader, position: usize) Error!void {
     try reader.begin(.object, position);
     reader.object = .{
         .name = try reader.arena.dupe(u8, name),
-        .first = reader.assembly.parts.items.len,
+        .first = reader.builder.parts.items.len,
     };
 }
 
@@ -458,9 +460,9 @@ fn objectEnd(reader: *Reader, position: usize) Error!void {
         return reader.input.fail(position, "no object has begun", .{});
     try reader.end(.object, position);
     reader.object = null;
-    try reader.keep(Assembly.Object, &reader.objects, object.name, .{
+    try reader.keep(SceneBuilder.Object, &reader.objects, object.name, .{
         .first = object.first,
-        .count = reader.assembly.parts.items.len - object.first,
+        .count = reader.builder.parts.items.len - object.first,
     });
 }
 
@@ -470,12 +472,12 @@ fn objectInstance(reader: *Reader, position: usize) Error!void {
         return reader.input.fail(position, "an instance within an object", .{});
     const object = reader.objects.get(name) orelse
         return reader.input.fail(position, "no object {f}", .{quote(name)});
-    try reader.assembly.showObject(object, &reader.graphics.transform);
+    try reader.builder.instantiateObject(object, &reader.graphics.transform);
 }
 
 /// Forgets a world that has only prepared the one that follows.
 fn startAgain(reader: *Reader) void {
-    reader.assembly.clear();
+    reader.builder.clear();
     reader.objects.clearRetainingCapacity();
     reader.known_meshes.clearRetainingCapacity();
     reader.is_preparation = false;
@@ -513,7 +515,8 @@ fn sampler(reader: *Reader) Error!void {
         @as(i64, across.?) * down.?
     else
         parameters.integer("pixelsamples") orelse return;
-    reader.sample_count = @intCast(std.math.clamp(asked, 1, limits.sample_count_max));
+    const range = choices.sample_count;
+    reader.sample_count = @intCast(std.math.clamp(asked, range.min, range.max));
 }
 
 /// All integrators are Whitted's here; "maxdepth" counts rays in his and in direct lighting,
@@ -530,7 +533,7 @@ fn integrator(reader: *Reader, name: []const u8, position: usize) Error!void {
     const asked = reader.parameters.integer("maxdepth") orelse return;
     const counts_rays = std.mem.eql(u8, name, "whitted") or std.mem.eql(u8, name, "directlighting");
     const bounces = @as(i64, asked) - @intFromBool(counts_rays);
-    reader.depth = @intCast(std.math.clamp(bounces, 0, limits.depth_max));
+    reader.depth = @intCast(std.math.clamp(bounces, choices.depth.min, choices.depth.max));
 }
 
 fn makeMaterial(reader: *Reader, name: []const u8, position: usize) Error!NamedMaterial {
@@ -539,7 +542,7 @@ fn makeMaterial(reader: *Reader, name: []const u8, position: usize) Error!NamedM
     else
         try materials.convert(&reader.colors, name, position, &reader.parameters);
     return .{
-        .index = try reader.assembly.addMaterial(made.surface),
+        .index = try reader.builder.scene.addMaterial(made.surface),
         .is_boundary = made.is_boundary,
     };
 }
@@ -560,7 +563,7 @@ fn mixture(reader: *Reader, position: usize) Error!scene_data.Material {
     for (names, &parts) |name, *part| {
         const made = reader.named.get(name) orelse
             return reader.input.fail(position, "no material {f}", .{quote(name)});
-        part.* = reader.assembly.materials.items[made.index];
+        part.* = reader.builder.scene.materials.items[made.index];
     }
     return materials.mix(parts[0], parts[1], second_share);
 }
@@ -573,7 +576,7 @@ fn namedMaterial(reader: *Reader, position: usize) Error!void {
     reader.graphics.is_boundary = made.is_boundary;
 }
 
-fn areaLight(reader: *Reader) Error!void {
+fn areaLightSource(reader: *Reader) Error!void {
     const parameters = &reader.parameters;
     const color = try reader.colors.rgb(parameters, "L", .{ 1, 1, 1 });
     const scale = try reader.colors.rgb(parameters, "scale", .{ 1, 1, 1 });
@@ -583,22 +586,22 @@ fn areaLight(reader: *Reader) Error!void {
         to.* = if (product > 0) @min(product, 1e30) else 0;
     }
     const two_sided = parameters.boolean("twosided", false);
-    reader.graphics.glow = .{ .radiance = radiance, .two_sided = two_sided };
+    reader.graphics.area_light = .{ .radiance = radiance, .two_sided = two_sided };
 }
 
 fn materialIndex(reader: *Reader) Allocator.Error!u32 {
     if (reader.graphics.material != scene_data.none) return reader.graphics.material;
     if (reader.default_material == scene_data.none)
-        reader.default_material = try reader.assembly.addMaterial(materials.matte_default);
+        reader.default_material = try reader.builder.scene.addMaterial(materials.matte_default);
     return reader.default_material;
 }
 
 fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
     const graphics = &reader.graphics;
     const input = reader.input;
-    reader.maker.parameters = &reader.parameters;
-    reader.maker.position = position;
-    reader.maker.name = name;
+    reader.tessellator.parameters = &reader.parameters;
+    reader.tessellator.position = position;
+    reader.tessellator.name = name;
     const kind = std.meta.stringToEnum(shapes.Kind, name) orelse return input.warn(
         position,
         name,
@@ -613,64 +616,72 @@ fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
     }
     if (graphics.is_boundary) return;
     const material = try reader.materialIndex();
-    if (graphics.glow) |glow| {
-        if (reader.object == null) return reader.shine(kind, material, glow);
-        try input.warn(position, "glow", "Shape: objects do not shine", .{});
+    if (graphics.area_light) |area_light| {
+        if (reader.object == null) return reader.addAreaLight(kind, material, area_light);
+        try input.warn(position, "area light", "Shape: objects do not shine", .{});
     }
     const mesh = try reader.meshOf(kind, material);
     if (reader.object == null)
-        try reader.assembly.show(mesh, &graphics.transform)
+        try reader.builder.instantiate(mesh, &graphics.transform)
     else
-        try reader.assembly.addPart(mesh, &graphics.transform);
+        try reader.builder.addPart(mesh, &graphics.transform);
 }
 
 /// The mesh of the shape that the parameters tell; curved ones are made once.
 fn meshOf(reader: *Reader, kind: shapes.Kind, material: u32) Error!u32 {
     if (!kind.isCurved()) {
-        const geometry = try shapes.make(&reader.maker, kind, reader.graphics.reverse);
-        return reader.assembly.addMesh(geometry, material);
+        const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
+        return reader.builder.addMesh(geometry, material);
     }
     const key = shapes.hash(kind, reader.graphics.reverse, &reader.parameters) ^
         (@as(u64, material) *% 0x9e3779b97f4a7c15);
     if (reader.known_meshes.get(key)) |mesh| return mesh;
-    const geometry = try shapes.make(&reader.maker, kind, reader.graphics.reverse);
-    const mesh = try reader.assembly.addMesh(geometry, material);
+    const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
+    const mesh = try reader.builder.addMesh(geometry, material);
     try reader.known_meshes.put(reader.arena, key, mesh);
     return mesh;
 }
 
-/// A shape that shines: seen bright from its front, plain from behind.
-fn shine(reader: *Reader, kind: shapes.Kind, material: u32, glow: Glow) Error!void {
-    const assembly = reader.assembly;
+/// A shape that is an area light: bright from its front, plain from behind.
+fn addAreaLight(
+    reader: *Reader,
+    kind: shapes.Kind,
+    material: u32,
+    area_light: AreaLight,
+) Error!void {
+    const builder = reader.builder;
     const place = &reader.graphics.transform;
-    const geometry = try shapes.make(&reader.maker, kind, reader.graphics.reverse);
-    var bright = assembly.materials.items[material];
-    bright.emissive = glow.radiance;
-    bright.double_sided = glow.two_sided;
-    const front = try assembly.addMesh(geometry, try assembly.addMaterial(bright));
-    try assembly.show(front, place);
-    if (!glow.two_sided) {
-        var plain = assembly.materials.items[material];
+    const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
+    var bright = builder.scene.materials.items[material];
+    bright.emissive = area_light.radiance;
+    bright.double_sided = area_light.two_sided;
+    const front = try builder.addMesh(geometry, try builder.scene.addMaterial(bright));
+    try builder.instantiate(front, place);
+    if (!area_light.two_sided) {
+        var plain = builder.scene.materials.items[material];
         plain.double_sided = false;
-        const back = try shapes.turned(&reader.maker, &geometry);
-        try assembly.show(try assembly.addMesh(back, try assembly.addMaterial(plain)), place);
+        const back = try shapes.turned(&reader.tessellator, &geometry);
+        const mesh = try builder.addMesh(back, try builder.scene.addMaterial(plain));
+        try builder.instantiate(mesh, place);
     }
-    if (assembly.emitters.items.len >= limits.emitter_count_max) return reader.input.warn(
-        reader.maker.position,
+    if (builder.emitters.items.len >= limits.emitter_count_max) return reader.input.warn(
+        reader.tessellator.position,
         "emitters",
         "Shape: over {d} shapes shine, the others are bright but give no light",
         .{limits.emitter_count_max},
     );
-    try assembly.emitters.append(reader.input.gpa, .{
+    try builder.emitters.append(reader.input.gpa, .{
         .geometry = geometry,
         .place = place.*,
-        .radiance = glow.radiance,
-        .two_sided = glow.two_sided,
+        .radiance = area_light.radiance,
+        .two_sided = area_light.two_sided,
     });
 }
 
-/// Makes the scene of what has been read.
-pub fn finish(reader: *Reader, scene: *Scene) Error!void {
+/// Completes the scene with what is known at the end of the text.
+pub fn finish(reader: *Reader) Error!void {
+    const builder = reader.builder;
+    const scene = &builder.scene.scene;
     const view = &reader.view;
     if (view.place == null) {
         view.place = .identity;
@@ -682,17 +693,17 @@ pub fn finish(reader: *Reader, scene: *Scene) Error!void {
         );
     }
     const projection = try view.projection(reader.input);
-    if (!view.place.?.isFinite())
+    if (!transforms.fitsSingle(&view.place.?))
         return reader.input.fail(0, "the camera's screen is too far away", .{});
-    try lights.placeEmitters(reader.assembly);
+    try lights.placeEmitters(builder);
     scene.resolution = view.size;
     scene.sample_count = reader.sample_count;
     scene.depth = reader.depth;
-    if (reader.assembly.has_unknown_sky and reader.assembly.sky == null and
-        reader.assembly.lights.items.len > 0) reader.assembly.sky = @splat(lights.unknown_sky);
-    if (reader.assembly.sky) |sky| {
+    if (builder.has_unknown_sky and builder.sky == null and builder.scene.lights.items.len > 0)
+        builder.sky = @splat(lights.unknown_sky);
+    if (builder.sky) |sky| {
         scene.background = sky;
         scene.ambient = spectra.luminance(sky);
     }
-    try reader.assembly.finish(&view.place.?, projection);
+    try builder.finish(view.place.?, projection);
 }

@@ -1,6 +1,6 @@
 //! Shapes by their names: each becomes triangles in its own space.
 //!
-//! In: the parameters of a Shape, in a `Maker`. Out: its geometry, turned inside out where
+//! In: the parameters of a Shape, in a `Tessellator`. Out: its geometry, turned inside out where
 //! ReverseOrientation says so. One file a family stands in shapes/.
 
 const std = @import("std");
@@ -9,10 +9,10 @@ const nurbs = @import("shapes/nurbs.zig");
 const ply = @import("shapes/ply.zig");
 const quadrics = @import("shapes/quadrics.zig");
 const subdivision = @import("shapes/subdivision.zig");
-const Maker = @import("shapes/maker.zig");
+const Tessellator = @import("shapes/tessellator.zig");
 const Parameters = @import("parameters.zig");
 const Error = @import("input.zig").Error;
-const Geometry = Maker.Geometry;
+const Geometry = Tessellator.Geometry;
 const Vec3 = @import("../../math.zig").Vec3;
 
 /// Names as they stand in the text.
@@ -39,21 +39,21 @@ pub const Kind = enum {
     }
 };
 
-/// Makes the shape that the maker's parameters tell.
-pub fn make(maker: *Maker, kind: Kind, reverse: bool) Error!Geometry {
+/// Makes the shape that the tessellator's parameters tell.
+pub fn make(tessellator: *Tessellator, kind: Kind, reverse: bool) Error!Geometry {
     const geometry = try switch (kind) {
-        .bilinearmesh => meshes.bilinear(maker),
-        .cone => quadrics.cone(maker),
-        .cylinder => quadrics.cylinder(maker),
-        .disk => quadrics.disk(maker),
-        .heightfield => meshes.heightfield(maker),
-        .hyperboloid => quadrics.hyperboloid(maker),
-        .loopsubdiv => subdivision.loop(maker),
-        .nurbs => nurbs.nurbs(maker),
-        .paraboloid => quadrics.paraboloid(maker),
-        .plymesh => ply.mesh(maker),
-        .sphere => quadrics.sphere(maker),
-        .trianglemesh => meshes.triangles(maker),
+        .bilinearmesh => meshes.bilinear(tessellator),
+        .cone => quadrics.cone(tessellator),
+        .cylinder => quadrics.cylinder(tessellator),
+        .disk => quadrics.disk(tessellator),
+        .heightfield => meshes.heightfield(tessellator),
+        .hyperboloid => quadrics.hyperboloid(tessellator),
+        .loopsubdiv => subdivision.loop(tessellator),
+        .nurbs => nurbs.nurbs(tessellator),
+        .paraboloid => quadrics.paraboloid(tessellator),
+        .plymesh => ply.mesh(tessellator),
+        .sphere => quadrics.sphere(tessellator),
+        .trianglemesh => meshes.triangles(tessellator),
     };
     if (!reverse) return geometry;
     for (geometry.triangles) |*corners| std.mem.swap(u32, &corners[1], &corners[2]);
@@ -64,8 +64,8 @@ pub fn make(maker: *Maker, kind: Kind, reverse: bool) Error!Geometry {
 }
 
 /// The same surface seen from behind, flat.
-pub fn turned(maker: *Maker, geometry: *const Geometry) Error!Geometry {
-    const triangles = try maker.alloc([3]u32, geometry.triangles.len);
+pub fn turned(tessellator: *Tessellator, geometry: *const Geometry) Error!Geometry {
+    const triangles = try tessellator.alloc([3]u32, geometry.triangles.len);
     for (geometry.triangles, triangles) |from, *to| to.* = .{ from[0], from[2], from[1] };
     return .{ .positions = geometry.positions, .triangles = triangles };
 }

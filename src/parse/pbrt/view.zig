@@ -5,12 +5,14 @@
 
 const std = @import("std");
 const elementary = @import("../../math.zig").elementary;
-const limits = @import("limits.zig");
 const quote = @import("../../diagnostic.zig").quote;
 const scene = @import("../../scene.zig");
+const settings = @import("../../settings.zig");
 const Input = @import("input.zig");
 const Parameters = @import("parameters.zig");
-const Transform = @import("transform.zig");
+const math = @import("../../math.zig");
+const transforms = @import("transform.zig");
+const Transform = math.AffineD;
 const Error = Input.Error;
 
 const View = @This();
@@ -37,17 +39,17 @@ pub fn setFilm(
     var size: [2]u32 = .{ 640, 480 };
     for (&size, [_][]const u8{ "xresolution", "yresolution" }) |*side, name| {
         const value = parameters.integer(name) orelse continue;
-        if (value < 1 or value > limits.film_side_max) return input.fail(
+        if (!settings.side.holds(value)) return input.fail(
             position,
-            "{s} is {d}, not 1 to {d}",
-            .{ name, value, limits.film_side_max },
+            "{s} is {d}, not " ++ settings.side.text(),
+            .{ name, value },
         );
         side.* = @intCast(value);
     }
-    if (@as(u64, size[0]) * size[1] > limits.film_pixel_count_max) return input.fail(
+    if (@as(u64, size[0]) * size[1] > settings.pixel_count_max) return input.fail(
         position,
         "the film has over {d} pixels",
-        .{limits.film_pixel_count_max},
+        .{settings.pixel_count_max},
     );
     if (parameters.find("cropwindow") != null or parameters.find("pixelbounds") != null)
         try input.warn(position, "cropwindow", "Film: crop windows are not supported", .{});
@@ -65,7 +67,8 @@ pub fn setCamera(
 ) Error!void {
     const place = to_camera.inverse() orelse
         return input.fail(position, "the camera's transformation has no inverse", .{});
-    if (!place.isFinite()) return input.fail(position, "the camera is too far away", .{});
+    if (!transforms.fitsSingle(&place))
+        return input.fail(position, "the camera is too far away", .{});
     var result: View = .{ .size = view.size, .place = place };
     if (std.mem.eql(u8, name, "orthographic")) {
         result.kind = .orthographic;
@@ -117,7 +120,7 @@ pub fn projection(view: *View, input: *Input) Error!scene.Camera.Projection {
     // Within what a camera can show in the end.
     const half_width = std.math.clamp(0.5 * (window[1] - window[0]), 1e-9, 1e9);
     const half_height = std.math.clamp(0.5 * (window[3] - window[2]), 1e-9, 1e9);
-    const middle: Transform.Vector =
+    const middle: math.Vec3d =
         .{ 0.5 * (window[0] + window[1]), 0.5 * (window[2] + window[3]), 0 };
     if (@abs(half_width / half_height / film - 1) > 0.01) try input.warn(
         0,
@@ -127,7 +130,7 @@ pub fn projection(view: *View, input: *Input) Error!scene.Camera.Projection {
     );
     switch (view.kind) {
         .orthographic => {
-            view.place.?.origin = view.place.?.point(middle);
+            view.place.? = view.place.?.moved(middle);
             return .{ .orthographic = .{
                 .half_width = @floatCast(half_width),
                 .half_height = @floatCast(half_height),

@@ -112,7 +112,7 @@ pub fn build(
     gpa: Allocator,
     input: *const Input,
     comptime pack_size: u32,
-) error{OutOfMemory}!Tree {
+) bvh_input.Error!Tree {
     assert(input.triangles.len > 0 and input.triangles.len <= split.number_limit);
     const count: u32 = @intCast(input.triangles.len);
     var builder: Builder(pack_size) = .{
@@ -131,7 +131,7 @@ pub fn build(
     try builder.cutTop(gpa);
     const stretches = try gpa.alloc(Tree.Stretch, builder.tasks.items.len);
     errdefer gpa.free(stretches);
-    builder.runTasks(stretches);
+    try builder.runTasks(stretches);
     return .{
         .nodes = builder.nodes,
         .references = builder.references,
@@ -195,9 +195,9 @@ fn Builder(comptime pack_size: u32) type {
             builder: *Self,
             gpa: Allocator,
             sets: *std.ArrayList(Set),
-        ) error{OutOfMemory}!void {
+        ) bvh_input.Error!void {
             if (builder.references.len < cells_file.reference_count_min) {
-                return sets.append(gpa, try builder.makeReferences(gpa));
+                return sets.append(gpa, try builder.makeReferences());
             }
             var cells: Cells = try .init(gpa, builder.input);
             defer cells.deinit(gpa);
@@ -211,21 +211,19 @@ fn Builder(comptime pack_size: u32) type {
         }
 
         /// Makes the references in the order of the triangles, and the root.
-        fn makeReferences(builder: *Self, gpa: Allocator) error{OutOfMemory}!Set {
-            const chunk_count = (builder.references.len + chunk_size - 1) / chunk_size;
-            var work: ReferenceWork = .{
+        fn makeReferences(builder: *Self) bvh_input.Error!Set {
+            const work: ReferenceWork = .{
                 .input = builder.input,
                 .references = builder.references,
-                .results = try gpa.alloc([2]Box, chunk_count),
             };
-            defer gpa.free(work.results);
-            const thread_count = @min(builder.input.thread_count, chunk_count);
-            parallel.share(thread_count, &work, ReferenceWork.run);
-            var bounds: [2]Box = @splat(split.box_empty);
-            for (work.results) |result| {
-                for (&bounds, result) |*bound, box| bound.* = split.join(bound.*, box);
-            }
-            return builder.makeRoot(bounds);
+            return builder.makeRoot(try builder.input.pool.reduce(
+                [2]Box,
+                @splat(split.box_empty),
+                ReferenceWork.join,
+                @divCeil(builder.references.len, chunk_size),
+                &work,
+                ReferenceWork.fill,
+            ));
         }
 
         /// The root, of the join of all boxes and that of all `centerBox`es.
@@ -353,7 +351,7 @@ fn Builder(comptime pack_size: u32) type {
         }
 
         /// Makes tasks; cuts sets larger than that level by level.
-        fn cutTop(builder: *Self, gpa: Allocator) error{OutOfMemory}!void {
+        fn cutTop(builder: *Self, gpa: Allocator) bvh_input.Error!void {
             var level: std.ArrayList(Cut) = .empty;
             defer level.deinit(gpa);
             var next: std.ArrayList(Set) = .empty;
@@ -373,13 +371,11 @@ fn Builder(comptime pack_size: u32) type {
                 if (level.items.len == 0) break;
                 var work = try LevelWork.init(gpa, builder, level.items);
                 defer work.deinit(gpa);
-                const thread_count = @min(builder.input.thread_count, work.chunks.len);
-                parallel.share(thread_count, &work, LevelWork.fillBins);
+                const pool = builder.input.pool;
+                try pool.forEach(work.chunks.len, &work, LevelWork.fillBins);
                 work.choose();
-                work.next.store(0, .monotonic);
-                parallel.share(thread_count, &work, LevelWork.partitionChunks);
-                work.next.store(0, .monotonic);
-                parallel.share(thread_count, &work, LevelWork.exchange);
+                try pool.forEach(work.chunks.len, &work, LevelWork.partitionChunk);
+                try pool.forEach(work.chunks.len, &work, LevelWork.exchange);
                 for (work.cuts, 0..) |*cut, index| {
                     try next.appendSlice(gpa, &work.finish(
                         cut,
@@ -391,7 +387,7 @@ fn Builder(comptime pack_size: u32) type {
         }
 
         /// Cuts the sets that are tasks, the largest first.
-        fn runTasks(builder: *Self, stretches: []Tree.Stretch) void {
+        fn runTasks(builder: *Self, stretches: []Tree.Stretch) parallel.Error!void {
             const larger = struct {
                 fn larger(_: void, a: Task, b: Task) bool {
                     return a.end - a.begin > b.end - b.begin;
@@ -399,8 +395,7 @@ fn Builder(comptime pack_size: u32) type {
             }.larger;
             std.mem.sort(Task, builder.tasks.items, {}, larger);
             var work: TaskWork = .{ .builder = builder, .stretches = stretches };
-            const thread_count = @min(builder.input.thread_count, builder.tasks.items.len);
-            parallel.share(thread_count, &work, TaskWork.run);
+            try builder.input.pool.forEach(stretches.len, &work, TaskWork.run);
         }
 
         /// Makes the two children of a set in the given pair. Returns them as sets.
@@ -444,15 +439,9 @@ fn Builder(comptime pack_size: u32) type {
         const TaskWork = struct {
             builder: *Self,
             stretches: []Tree.Stretch,
-            next: std.atomic.Value(u32) = .init(0),
 
-            fn run(work: *TaskWork, thread_index: usize) void {
-                assert(thread_index < parallel.thread_count_max);
-                while (true) {
-                    const index = work.next.fetchAdd(1, .monotonic);
-                    if (index >= work.stretches.len) return;
-                    work.stretches[index] = work.cutTask(&work.builder.tasks.items[index]);
-                }
+            fn run(work: *TaskWork, index: usize, _: usize) void {
+                work.stretches[index] = work.cutTask(&work.builder.tasks.items[index]);
             }
 
             /// Cuts the sets of a task down to leaves. Returns its pairs.
@@ -588,30 +577,25 @@ fn partition(
     return centers;
 }
 
-/// Makes a reference for each triangle.
+/// Makes a reference for each triangle, and the boxes of all references and of their middles.
 const ReferenceWork = struct {
     input: *const Input,
     references: []Box,
-    /// By chunk: box and middles.
-    results: [][2]Box,
-    next: std.atomic.Value(u32) = .init(0),
 
-    fn run(work: *ReferenceWork, thread_index: usize) void {
-        assert(thread_index < parallel.thread_count_max);
-        while (true) {
-            const chunk = work.next.fetchAdd(1, .monotonic);
-            if (chunk >= work.results.len) return;
-            const begin = @as(usize, chunk) * chunk_size;
-            const end = @min(begin + chunk_size, work.references.len);
-            var box = split.box_empty;
-            var centers = split.box_empty;
-            for (work.references[begin..end], begin..) |*reference, number| {
-                reference.* = work.input.reference(number);
-                box = split.join(box, reference.*);
-                centers = split.join(centers, split.centerBox(reference.*));
-            }
-            work.results[chunk] = .{ box, centers };
+    fn fill(work: *const ReferenceWork, chunk: usize, sum: *[2]Box) void {
+        const begin = chunk * chunk_size;
+        const end = @min(begin + chunk_size, work.references.len);
+        var boxes: [2]Box = @splat(split.box_empty);
+        for (work.references[begin..end], begin..) |*reference, number| {
+            reference.* = work.input.reference(number);
+            boxes[0] = split.join(boxes[0], reference.*);
+            boxes[1] = split.join(boxes[1], split.centerBox(reference.*));
         }
+        join(sum, &boxes);
+    }
+
+    fn join(sum: *[2]Box, other: *const [2]Box) void {
+        for (sum, other) |*to, box| to.* = split.join(to.*, box);
     }
 };
 
@@ -647,7 +631,6 @@ fn LevelWorkOf(comptime Self: type, comptime pack_size: u32) type {
         chunks: []Chunk,
         /// By chunk.
         bins: []Bins,
-        next: std.atomic.Value(u32) = .init(0),
 
         const LevelWork = @This();
 
@@ -689,17 +672,11 @@ fn LevelWorkOf(comptime Self: type, comptime pack_size: u32) type {
             return work.chunks[work.cuts[cut_index].chunk_begin..end];
         }
 
-        fn fillBins(work: *LevelWork, thread_index: usize) void {
-            assert(thread_index < parallel.thread_count_max);
-            while (true) {
-                const index = work.next.fetchAdd(1, .monotonic);
-                if (index >= work.chunks.len) return;
-                const chunk = &work.chunks[index];
-                const cut = &work.cuts[chunk.cut];
-                const references = work.builder.references[chunk.begin..chunk.end];
-                work.bins[index].clear(&cut.binning);
-                work.bins[index].add(&cut.binning, references);
-            }
+        fn fillBins(work: *LevelWork, index: usize, _: usize) void {
+            const chunk = &work.chunks[index];
+            const cut = &work.cuts[chunk.cut];
+            work.bins[index].clear(&cut.binning);
+            work.bins[index].add(&cut.binning, work.builder.references[chunk.begin..chunk.end]);
         }
 
         /// Chooses the planes, and with them how many of each chunk's references go left.
@@ -749,57 +726,47 @@ fn LevelWorkOf(comptime Self: type, comptime pack_size: u32) type {
             };
         }
 
-        /// Partitions each chunk by itself.
-        fn partitionChunks(work: *LevelWork, thread_index: usize) void {
-            assert(thread_index < parallel.thread_count_max);
-            while (true) {
-                const index = work.next.fetchAdd(1, .monotonic);
-                if (index >= work.chunks.len) return;
-                const chunk = &work.chunks[index];
-                const cut = &work.cuts[chunk.cut];
-                const references = work.builder.references[chunk.begin..chunk.end];
-                if (cut.split) |*chosen| {
-                    const side: Side = .init(&cut.binning, chosen);
-                    chunk.sides.centers = partition(references, &side, chunk.left_count, true);
-                } else {
-                    for (references, chunk.begin..) |box, at| {
-                        chunk.sides.add(@intFromBool(at >= cut.left_end), box);
-                    }
+        /// Partitions a chunk by itself.
+        fn partitionChunk(work: *LevelWork, index: usize, _: usize) void {
+            const chunk = &work.chunks[index];
+            const cut = &work.cuts[chunk.cut];
+            const references = work.builder.references[chunk.begin..chunk.end];
+            if (cut.split) |*chosen| {
+                const side: Side = .init(&cut.binning, chosen);
+                chunk.sides.centers = partition(references, &side, chunk.left_count, true);
+            } else {
+                for (references, chunk.begin..) |box, at| {
+                    chunk.sides.add(@intFromBool(at >= cut.left_end), box);
                 }
             }
         }
 
         /// Exchanges what stands in the wrong half: the k-th that goes right with the k-th that
         /// goes left, each thread for those of a chunk in the left half.
-        fn exchange(work: *LevelWork, thread_index: usize) void {
-            assert(thread_index < parallel.thread_count_max);
+        fn exchange(work: *LevelWork, index: usize, _: usize) void {
             const references = work.builder.references;
-            while (true) {
-                const index = work.next.fetchAdd(1, .monotonic);
-                if (index >= work.chunks.len) return;
-                const chunk = &work.chunks[index];
-                const cut = &work.cuts[chunk.cut];
-                if (cut.split == null) continue;
-                const rights = wrongRights(chunk, cut.left_end);
-                var skip_count = chunk.wrong_before;
-                var right = rights.begin;
-                for (work.chunksOf(chunk.cut)) |*other| {
-                    if (right >= rights.end) break;
-                    const lefts = wrongLefts(other, cut.left_end);
-                    if (skip_count >= lefts.count()) {
-                        skip_count -= lefts.count();
-                        continue;
-                    }
-                    var left = lefts.begin + skip_count;
-                    skip_count = 0;
-                    while (left < lefts.end and right < rights.end) {
-                        std.mem.swap(Box, &references[left], &references[right]);
-                        left += 1;
-                        right += 1;
-                    }
+            const chunk = &work.chunks[index];
+            const cut = &work.cuts[chunk.cut];
+            if (cut.split == null) return;
+            const rights = wrongRights(chunk, cut.left_end);
+            var skip_count = chunk.wrong_before;
+            var right = rights.begin;
+            for (work.chunksOf(chunk.cut)) |*other| {
+                if (right >= rights.end) break;
+                const lefts = wrongLefts(other, cut.left_end);
+                if (skip_count >= lefts.count()) {
+                    skip_count -= lefts.count();
+                    continue;
                 }
-                assert(right >= rights.end);
+                var left = lefts.begin + skip_count;
+                skip_count = 0;
+                while (left < lefts.end and right < rights.end) {
+                    std.mem.swap(Box, &references[left], &references[right]);
+                    left += 1;
+                    right += 1;
+                }
             }
+            assert(right >= rights.end);
         }
 
         /// The children of a set whose references have been moved.

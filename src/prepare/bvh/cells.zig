@@ -108,7 +108,7 @@ pub const Cells = struct {
     items: []Item,
 
     /// Counts the triangles of `input`, at least `reference_count_min`.
-    pub fn init(gpa: Allocator, input: *const Input) error{OutOfMemory}!Cells {
+    pub fn init(gpa: Allocator, input: *const Input) bvh_input.Error!Cells {
         const count = input.triangles.len;
         assert(count >= reference_count_min);
         const wanted = std.math.log2_int(usize, count / references_per_cell);
@@ -117,7 +117,7 @@ pub const Cells = struct {
         const chunk_count: u32 = @intCast(@min(count / chunk_size_min, chunk_count_max));
         const counts = try gpa.alloc(u32, chunk_count * cell_count);
         errdefer gpa.free(counts);
-        const used_count = @min(input.thread_count, chunk_count);
+        const used_count = input.pool.threadsFor(chunk_count);
         const boxes = try gpa.alloc([2]Box, used_count * cell_count);
         defer gpa.free(boxes);
         var cells: Cells = .{
@@ -129,7 +129,7 @@ pub const Cells = struct {
             .items = &.{},
         };
         var work: CountWork = .{ .cells = &cells, .boxes = boxes };
-        parallel.share(used_count, &work, CountWork.run);
+        try input.pool.forEach(chunk_count, &work, CountWork.run);
         try work.collect(gpa);
         return cells;
     }
@@ -148,7 +148,7 @@ pub const Cells = struct {
 
     /// Writes the references to `target`, cell by cell in the order of `items`. Asserts that there
     /// is one place for each. Spends the counts: once only.
-    pub fn scatter(cells: *Cells, gpa: Allocator, target: []Box) error{OutOfMemory}!void {
+    pub fn scatter(cells: *Cells, gpa: Allocator, target: []Box) bvh_input.Error!void {
         assert(target.len == cells.input.triangles.len);
         const places = try gpa.alloc(u32, cells.cell_count);
         defer gpa.free(places);
@@ -168,8 +168,7 @@ pub const Cells = struct {
             }
         }
         var work: ScatterWork = .{ .cells = cells, .target = target };
-        const thread_count = @min(cells.input.thread_count, cells.chunk_count);
-        parallel.share(thread_count, &work, ScatterWork.run);
+        try cells.input.pool.forEach(cells.chunk_count, &work, ScatterWork.run);
     }
 };
 
@@ -177,30 +176,25 @@ const CountWork = struct {
     cells: *Cells,
     /// By thread and cell: box and middles.
     boxes: [][2]Box,
-    next: std.atomic.Value(u32) = .init(0),
     /// Threads that have made their boxes.
     used: [chunk_count_max]bool = @splat(false),
 
-    fn run(work: *CountWork, thread_index: usize) void {
+    fn run(work: *CountWork, index: usize, thread_index: usize) void {
         const cells = work.cells;
         const boxes = work.boxes[thread_index * cells.cell_count ..][0..cells.cell_count];
-        while (true) {
-            const index = work.next.fetchAdd(1, .monotonic);
-            if (index >= cells.chunk_count) return;
-            if (!work.used[thread_index]) {
-                work.used[thread_index] = true;
-                for (boxes) |*pair| pair.* = @splat(split.box_empty);
-            }
-            const counts = cells.counts[index * cells.cell_count ..][0..cells.cell_count];
-            @memset(counts, 0);
-            for (cells.chunkBegin(index)..cells.chunkBegin(index + 1)) |number| {
-                const box = cells.input.reference(number);
-                const cell = cells.grid.cellOf(box);
-                counts[cell] += 1;
-                const pair = &boxes[cell];
-                pair[0] = split.join(box, split.loadBin(&pair[0]));
-                pair[1] = split.join(split.centerBox(box), split.loadBin(&pair[1]));
-            }
+        if (!work.used[thread_index]) {
+            work.used[thread_index] = true;
+            for (boxes) |*pair| pair.* = @splat(split.box_empty);
+        }
+        const counts = cells.counts[index * cells.cell_count ..][0..cells.cell_count];
+        @memset(counts, 0);
+        for (cells.chunkBegin(index)..cells.chunkBegin(index + 1)) |number| {
+            const box = cells.input.reference(number);
+            const cell = cells.grid.cellOf(box);
+            counts[cell] += 1;
+            const pair = &boxes[cell];
+            pair[0] = split.join(box, split.loadBin(&pair[0]));
+            pair[1] = split.join(split.centerBox(box), split.loadBin(&pair[1]));
         }
     }
 
@@ -241,21 +235,15 @@ const CountWork = struct {
 const ScatterWork = struct {
     cells: *Cells,
     target: []Box,
-    next: std.atomic.Value(u32) = .init(0),
 
-    fn run(work: *ScatterWork, thread_index: usize) void {
-        assert(thread_index < parallel.thread_count_max);
+    fn run(work: *ScatterWork, index: usize, _: usize) void {
         const cells = work.cells;
-        while (true) {
-            const index = work.next.fetchAdd(1, .monotonic);
-            if (index >= cells.chunk_count) return;
-            const places = cells.counts[index * cells.cell_count ..][0..cells.cell_count];
-            for (cells.chunkBegin(index)..cells.chunkBegin(index + 1)) |number| {
-                const box = cells.input.reference(number);
-                const place = &places[cells.grid.cellOf(box)];
-                work.target[place.*] = box;
-                place.* += 1;
-            }
+        const places = cells.counts[index * cells.cell_count ..][0..cells.cell_count];
+        for (cells.chunkBegin(index)..cells.chunkBegin(index + 1)) |number| {
+            const box = cells.input.reference(number);
+            const place = &places[cells.grid.cellOf(box)];
+            work.target[place.*] = box;
+            place.* += 1;
         }
     }
 };
@@ -274,12 +262,14 @@ test "every reference ends up in its cell's place, in the order it had" {
         triangle.* = .{ .corner = @splat(@intCast(index)), .material = 0 };
         centroid_bounds = centroid_bounds.include(math.vec3.scale(position.*, 2));
     }
+    var pool: parallel.Pool = .init(3);
+    defer pool.deinit();
     const input: Input = .{
         .positions = positions,
         .triangles = triangles,
         .centroid_bounds = centroid_bounds,
         .padding = .init(@splat(0), .empty),
-        .thread_count = 3,
+        .pool = &pool,
     };
     const target = try gpa.alloc(Box, positions.len);
     defer gpa.free(target);

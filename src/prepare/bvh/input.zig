@@ -2,20 +2,15 @@
 
 const std = @import("std");
 const math = @import("../../math.zig");
+const parallel = @import("../../parallel.zig");
 const world = @import("../../world.zig");
 const split = @import("split.zig");
 const Box3 = math.Box3;
+const TreeQuality = @import("../../settings.zig").TreeQuality;
 const Vec3 = math.Vec3;
 
-/// How much care is taken over a tree.
-pub const Quality = enum {
-    /// Cut between the cells of a grid as long as there are several, then along the longest axis.
-    fast,
-    /// Cut at the best of the planes along all three axes.
-    default,
-    /// That, and then each subtree moved to where it costs the least (`bvh_reinsert`).
-    high,
-};
+/// `Canceled`: the pool's work was.
+pub const Error = error{OutOfMemory} || parallel.Error;
 
 /// Triangles, by how much their boxes are grown, and how they are to be worked on.
 pub const Input = struct {
@@ -24,8 +19,8 @@ pub const Input = struct {
     /// Box of twice the middles of the triangles' boxes, give or take rounding.
     centroid_bounds: Box3,
     padding: world.Padding,
-    thread_count: usize,
-    quality: Quality = .default,
+    pool: *parallel.Pool,
+    quality: TreeQuality = .default,
 
     /// The reference to a triangle, within its box grown by its pad.
     pub inline fn reference(input: *const Input, number: usize) split.Box {

@@ -12,6 +12,7 @@
 //! it is divided.
 
 const std = @import("std");
+const bvh_input = @import("input.zig");
 const parallel = @import("../../parallel.zig");
 const world = @import("../../world.zig");
 const bvh_build = @import("build.zig");
@@ -58,14 +59,14 @@ const chunk_size = 256;
 pub fn optimize(
     gpa: Allocator,
     tree: *Tree,
-    thread_count: usize,
+    pool: *parallel.Pool,
     comptime pack_size: u32,
-) error{OutOfMemory}!void {
+) bvh_input.Error!void {
     var optimizer: Optimizer(pack_size) = try .init(gpa, tree);
     defer optimizer.deinit(gpa);
     for (0..pass_count_max) |_| {
         const before = optimizer.costs[0];
-        try optimizer.pass(gpa, thread_count);
+        try optimizer.pass(gpa, pool);
         if (!(optimizer.costs[0] < before * (1 - saving_min))) break;
     }
     try optimizer.layOut(gpa, tree);
@@ -177,12 +178,11 @@ fn Optimizer(comptime pack_size: u32) type {
         }
 
         /// Finds where each node would best be, then moves what pays.
-        fn pass(optimizer: *Self, gpa: Allocator, thread_count: usize) error{OutOfMemory}!void {
+        fn pass(optimizer: *Self, gpa: Allocator, pool: *parallel.Pool) bvh_input.Error!void {
             const moves = try gpa.alloc(Move, optimizer.nodes.len);
             defer gpa.free(moves);
             var work: SearchWork = .{ .optimizer = optimizer, .moves = moves };
-            const chunk_count = (moves.len + chunk_size - 1) / chunk_size;
-            parallel.share(@min(thread_count, chunk_count), &work, SearchWork.run);
+            try pool.forEach(@divCeil(moves.len, chunk_size), &work, SearchWork.run);
             var count: usize = 0;
             for (moves) |move| {
                 if (move.saving <= 0) continue;
@@ -198,17 +198,12 @@ fn Optimizer(comptime pack_size: u32) type {
         const SearchWork = struct {
             optimizer: *const Self,
             moves: []Move,
-            next: std.atomic.Value(u32) = .init(0),
 
-            fn run(work: *SearchWork, thread_index: usize) void {
-                assert(thread_index < parallel.thread_count_max);
-                while (true) {
-                    const begin = chunk_size * @as(usize, work.next.fetchAdd(1, .monotonic));
-                    if (begin >= work.moves.len) return;
-                    const end = @min(begin + chunk_size, work.moves.len);
-                    for (work.moves[begin..end], begin..) |*move, index| {
-                        move.* = work.optimizer.search(@intCast(index));
-                    }
+            fn run(work: *SearchWork, chunk: usize, _: usize) void {
+                const begin = chunk_size * chunk;
+                const end = @min(begin + chunk_size, work.moves.len);
+                for (work.moves[begin..end], begin..) |*move, index| {
+                    move.* = work.optimizer.search(@intCast(index));
                 }
             }
         };
@@ -535,7 +530,9 @@ test "a subtree that was put in the wrong place finds the right one" {
         .top_pairs = try gpa.alloc(u32, 0),
     };
     defer tree.deinit(gpa);
-    try optimize(gpa, &tree, 2, 1);
+    var pool: parallel.Pool = .init(2);
+    defer pool.deinit();
+    try optimize(gpa, &tree, &pool, 1);
     // The heaps are the root's children.
     const pair = tree.nodes[0].pair;
     for ([_]u32{ 2 * pair, 2 * pair + 1 }) |child| {

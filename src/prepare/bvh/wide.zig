@@ -39,7 +39,7 @@ pub fn build(
     input: *const Input,
     comptime width: u32,
     statistics: *world.TreeStatistics,
-) error{OutOfMemory}!world.Tree(width) {
+) bvh_input.Error!world.Tree(width) {
     if (input.triangles.len == 0) {
         const Node = world.Node(width);
         const nodes = try arena.alignedAlloc(Node, .@"64", 1);
@@ -50,12 +50,12 @@ pub fn build(
     var binary = try bvh_build.build(gpa, input, width);
     defer binary.deinit(gpa);
     if (input.quality == .high) {
-        try bvh_reinsert.optimize(gpa, &binary, input.thread_count, width);
+        try bvh_reinsert.optimize(gpa, &binary, input.pool, width);
     }
     const costs = try gpa.alloc([width]f32, binary.nodes.len);
     defer gpa.free(costs);
     var collapse: Collapse(width) = .init(input, &binary, costs);
-    collapse.weigh();
+    try collapse.weigh();
     return collapse.emit(gpa, arena, statistics);
 }
 
@@ -92,33 +92,25 @@ fn Collapse(comptime width: u32) type {
         }
 
         /// Fills `costs`, children before parents.
-        fn weigh(collapse: *Self) void {
-            var work: WeighWork = .{ .collapse = collapse };
-            const stretch_count = collapse.binary.stretches.len;
-            parallel.share(@min(collapse.input.thread_count, stretch_count), &work, WeighWork.run);
+        fn weigh(collapse: *Self) parallel.Error!void {
+            try collapse.input.pool.forEach(
+                collapse.binary.stretches.len,
+                collapse,
+                weighStretch,
+            );
             const pairs = collapse.binary.top_pairs;
             for (0..pairs.len) |index| collapse.weighPair(pairs[pairs.len - 1 - index]);
             collapse.weighNode(0);
         }
 
-        const WeighWork = struct {
-            collapse: *Self,
-            next: std.atomic.Value(u32) = .init(0),
-
-            fn run(work: *WeighWork, thread_index: usize) void {
-                assert(thread_index < parallel.thread_count_max);
-                const stretches = work.collapse.binary.stretches;
-                while (true) {
-                    const index = work.next.fetchAdd(1, .monotonic);
-                    if (index >= stretches.len) return;
-                    var pair = stretches[index].end;
-                    while (pair > stretches[index].begin) {
-                        pair -= 1;
-                        work.collapse.weighPair(pair);
-                    }
-                }
+        fn weighStretch(collapse: *Self, index: usize, _: usize) void {
+            const stretch = collapse.binary.stretches[index];
+            var pair = stretch.end;
+            while (pair > stretch.begin) {
+                pair -= 1;
+                collapse.weighPair(pair);
             }
-        };
+        }
 
         fn weighPair(collapse: *Self, pair: u32) void {
             collapse.weighNode(2 * pair);
@@ -241,14 +233,14 @@ fn Collapse(comptime width: u32) type {
             gpa: Allocator,
             arena: Allocator,
             statistics: *world.TreeStatistics,
-        ) error{OutOfMemory}!world.Tree(width) {
+        ) bvh_input.Error!world.Tree(width) {
             const limit: u32 = @intCast(bvh_build.taskSize(collapse.input.triangles.len));
             var parts: std.ArrayList(Part) = .empty;
             defer parts.deinit(gpa);
             try collapse.findParts(gpa, &parts, limit);
             var work: EmitWork = .{ .collapse = collapse, .parts = parts.items, .limit = limit };
-            const thread_count = @min(collapse.input.thread_count, parts.items.len);
-            parallel.share(thread_count, &work, EmitWork.count);
+            const pool = collapse.input.pool;
+            try pool.forEach(parts.items.len, &work, EmitWork.count);
 
             var node_count: u32 = 0;
             var pack_count: u32 = 0;
@@ -264,8 +256,7 @@ fn Collapse(comptime width: u32) type {
             assert(statistics.depth <= world.tree_depth_max);
             work.nodes = try huge_pages.alloc(arena, Node, node_count);
             work.packs = try huge_pages.alloc(arena, Pack, pack_count);
-            work.next.store(0, .monotonic);
-            parallel.share(thread_count, &work, EmitWork.write);
+            try pool.forEach(parts.items.len, &work, EmitWork.write);
             statistics.node_count = node_count;
             statistics.bytes = @as(u64, node_count) * @sizeOf(Node) +
                 @as(u64, pack_count) * @sizeOf(Pack);
@@ -321,23 +312,18 @@ fn Collapse(comptime width: u32) type {
             limit: u32,
             nodes: []align(world.cache_line_bytes) Node = &.{},
             packs: []align(world.cache_line_bytes) Pack = &.{},
-            next: std.atomic.Value(u32) = .init(0),
 
-            fn count(work: *EmitWork, thread_index: usize) void {
-                assert(thread_index < parallel.thread_count_max);
-                while (work.take()) |part_index| work.walk(part_index, false);
+            fn count(work: *EmitWork, turn: usize, _: usize) void {
+                work.walk(work.partAt(turn), false);
             }
 
-            fn write(work: *EmitWork, thread_index: usize) void {
-                assert(thread_index < parallel.thread_count_max);
-                while (work.take()) |part_index| work.walk(part_index, true);
+            fn write(work: *EmitWork, turn: usize, _: usize) void {
+                work.walk(work.partAt(turn), true);
             }
 
-            fn take(work: *EmitWork) ?usize {
-                const turn = work.next.fetchAdd(1, .monotonic);
-                if (turn >= work.parts.len) return null;
-                const thread_count = work.collapse.input.thread_count;
-                return parallel.spread(turn, work.parts.len, thread_count);
+            fn partAt(work: *const EmitWork, turn: usize) usize {
+                const thread_count = work.collapse.input.pool.thread_count;
+                return parallel.interleave(turn, work.parts.len, thread_count);
             }
 
             /// Visits the wide nodes of a part in depth-first order.

@@ -10,8 +10,8 @@ const interaction_file = @import("../shade/interaction.zig");
 const exponential = @import("../shade/exponential.zig");
 const assert = std.debug.assert;
 
-/// Bounces at most, whatever the options say.
-pub const depth_limit = 32;
+/// Bounces at most.
+pub const depth_limit = @import("../../settings.zig").depth.max;
 
 /// Rays to be traced, and what they are worth.
 pub fn PathState(comptime Kernel: type) type {

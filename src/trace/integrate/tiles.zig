@@ -11,8 +11,11 @@
 //!     init(gpa, frame, settings), deinit(gpa)   *I, one a thread
 //!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it
 //!     counts()                                  of all its passes, `Counts`
+//!
+//! which is compiled in an object of its own: `Integrator` is what its kernel shows of it.
 
 const std = @import("std");
+const choices = @import("../../settings.zig");
 const world_file = @import("../../world.zig");
 const statistics = @import("../../statistics.zig");
 const parallel = @import("../../parallel.zig");
@@ -23,15 +26,15 @@ const Film = film_file.Film;
 const Frame = world_file.Frame;
 const Rectangle = film_file.Rectangle;
 
-/// What the options say about tracing.
+/// How a frame is traced, and who does the work.
 pub const Settings = struct {
-    thread_count: usize,
+    pool: *parallel.Pool,
     /// Samples a pixel, at least 1.
-    sample_count: u32 = 1,
-    /// Bounces after the primary ray, at most `depth_limit`.
-    depth_max: u32 = 6,
+    sample_count: u32 = choices.sample_count.default,
+    /// Bounces after the primary ray, at most `settings.depth.max`.
+    depth_max: u32 = choices.depth.default,
     /// Side of a tile in pixels, at least 1.
-    tile_size: u32 = 32,
+    tile_size: u32 = choices.tile_size.default,
     /// Told of every finished tile of a pass.
     progress: std.Progress.Node = .none,
     /// Looked at between tiles: set, it ends the work.
@@ -58,12 +61,74 @@ pub const Statistics = struct {
 };
 
 /// `Canceled`: the film is not finished.
-pub const Error = error{ OutOfMemory, Canceled };
+pub const Error = error{OutOfMemory} || parallel.Error;
+
+/// An integrator behind pointers: only data that the program and the kernel agree on passes here,
+/// and no state but what `init` gives.
+pub const Integrator = extern struct {
+    init: *const fn (*const Allocator, *const Frame, *const Settings) callconv(.c) ?*anyopaque,
+    deinit: *const fn (integrator: *anyopaque, gpa: *const Allocator) callconv(.c) void,
+    /// The next samples of a tile, bundle by bundle.
+    pass: *const fn (*anyopaque, *const Rectangle, u32, u32, *Film) callconv(.c) void,
+    counts: *const fn (integrator: *const anyopaque, counts: *Counts) callconv(.c) void,
+    counts_tests: bool,
+
+    /// Of the type I.
+    pub fn of(comptime I: type) Integrator {
+        const erased = struct {
+            fn init(
+                gpa: *const Allocator,
+                frame: *const Frame,
+                settings: *const Settings,
+            ) callconv(.c) ?*anyopaque {
+                return I.init(gpa.*, frame, settings) catch null;
+            }
+
+            fn deinit(integrator: *anyopaque, gpa: *const Allocator) callconv(.c) void {
+                ofErased(integrator).deinit(gpa.*);
+            }
+
+            fn pass(
+                integrator: *anyopaque,
+                tile: *const Rectangle,
+                first_sample: u32,
+                sample_count: u32,
+                film: *Film,
+            ) callconv(.c) void {
+                var y = tile.y0;
+                while (y < tile.y1) : (y += I.height) {
+                    var x = tile.x0;
+                    while (x < tile.x1) : (x += I.width) ofErased(integrator).pass(.{
+                        .x0 = x,
+                        .y0 = y,
+                        .x1 = @min(x + I.width, tile.x1),
+                        .y1 = @min(y + I.height, tile.y1),
+                    }, first_sample, sample_count, film);
+                }
+            }
+
+            fn counts(integrator: *const anyopaque, result: *Counts) callconv(.c) void {
+                result.* = ofErased(@constCast(integrator)).counts();
+            }
+
+            fn ofErased(integrator: *anyopaque) *I {
+                return @ptrCast(@alignCast(integrator));
+            }
+        };
+        return .{
+            .init = erased.init,
+            .deinit = erased.deinit,
+            .pass = erased.pass,
+            .counts = erased.counts,
+            .counts_tests = I.counts_tests,
+        };
+    }
+};
 
 /// Traces all samples of all pixels. Memory is taken before the work: where there is too little of
 /// it for all threads, some do without the others.
 pub fn render(
-    comptime I: type,
+    integrator: *const Integrator,
     gpa: Allocator,
     frame: *const Frame,
     film: *Film,
@@ -73,85 +138,71 @@ pub fn render(
     tiles.states = try gpa.alloc(Tiles.State, tiles.count);
     defer gpa.free(tiles.states);
     @memset(tiles.states, .{});
-    var integrators: [parallel.thread_count_max]*I = undefined;
-    var job: Job(I) = .{
+    var by_thread: [parallel.thread_count_max]*anyopaque = undefined;
+    var job: Job = .{
         .settings = settings,
         .tiles = &tiles,
         .film = film,
-        .integrators = integrators[0..0],
+        .pass = integrator.pass,
+        .by_thread = by_thread[0..0],
     };
-    defer for (job.integrators) |integrator| integrator.deinit(gpa);
-    while (job.integrators.len < @min(settings.thread_count, tiles.count)) {
-        const integrator = I.init(gpa, frame, settings) catch |e| {
-            if (job.integrators.len == 0) return e;
+    defer for (job.by_thread) |one| integrator.deinit(one, &gpa);
+    while (job.by_thread.len < settings.pool.threadsFor(tiles.count)) {
+        by_thread[job.by_thread.len] = integrator.init(&gpa, frame, settings) orelse {
+            if (job.by_thread.len == 0) return error.OutOfMemory;
             break;
         };
-        integrators[job.integrators.len] = integrator;
-        job.integrators = integrators[0 .. job.integrators.len + 1];
+        job.by_thread = by_thread[0 .. job.by_thread.len + 1];
     }
-    parallel.share(job.integrators.len, &job, Job(I).work);
+    settings.pool.share(job.by_thread.len, &job, Job.work);
     if (settings.isCancelled()) return error.Canceled;
     var total: Statistics = .{ .non_finite_count = tiles.non_finite_count.load(.monotonic) };
     var tests: statistics.TestCounts = .{};
-    for (job.integrators) |integrator| {
-        const counts = integrator.counts();
+    for (job.by_thread) |one| {
+        var counts: Counts = undefined;
+        integrator.counts(one, &counts);
         total.rays.add(counts.rays);
         tests.add(counts.tests);
     }
-    if (I.counts_tests) total.tests = tests;
+    if (integrator.counts_tests) total.tests = tests;
     return total;
 }
 
 /// One frame by one integrator.
-fn Job(comptime I: type) type {
-    return struct {
-        settings: *const Settings,
-        tiles: *Tiles,
-        film: *Film,
-        /// By thread.
-        integrators: []const *I,
+const Job = struct {
+    settings: *const Settings,
+    tiles: *Tiles,
+    film: *Film,
+    pass: @FieldType(Integrator, "pass"),
+    by_thread: []const *anyopaque,
 
-        const Self = @This();
-
-        fn work(job: *Self, thread_index: usize) void {
-            while (!job.settings.isCancelled()) {
-                const number = job.tiles.take() orelse return;
-                const state = &job.tiles.states[number];
-                if (state.due.fetchAdd(1, .acquire) > 0) continue;
-                while (true) {
-                    job.passTile(job.integrators[thread_index], number);
-                    job.settings.progress.completeOne();
-                    if (job.settings.isCancelled()) return;
-                    if (state.due.fetchSub(1, .acq_rel) == 1) break;
-                }
-            }
-        }
-
-        /// The next samples of a tile.
-        fn passTile(job: *Self, integrator: *I, number: u32) void {
+    fn work(job: *Job, thread_index: usize) void {
+        while (!job.settings.isCancelled()) {
+            const number = job.tiles.take() orelse return;
             const state = &job.tiles.states[number];
-            const tile = job.tiles.rectangleOf(number);
-            const left = job.settings.sample_count - state.samples_done;
-            const sample_count = @min(left, job.tiles.samples_per_pass);
-            var y = tile.y0;
-            while (y < tile.y1) : (y += I.height) {
-                var x = tile.x0;
-                while (x < tile.x1) : (x += I.width) {
-                    integrator.pass(.{
-                        .x0 = x,
-                        .y0 = y,
-                        .x1 = @min(x + I.width, tile.x1),
-                        .y1 = @min(y + I.height, tile.y1),
-                    }, state.samples_done, sample_count, job.film);
-                }
+            if (state.due.fetchAdd(1, .acquire) > 0) continue;
+            while (true) {
+                job.passTile(job.by_thread[thread_index], number);
+                job.settings.progress.completeOne();
+                if (job.settings.isCancelled()) return;
+                if (state.due.fetchSub(1, .acq_rel) == 1) break;
             }
-            state.samples_done += sample_count;
-            if (state.samples_done < job.settings.sample_count) return;
-            const non_finite = job.film.finish(tile, job.settings.sample_count);
-            if (non_finite > 0) _ = job.tiles.non_finite_count.fetchAdd(non_finite, .monotonic);
         }
-    };
-}
+    }
+
+    /// The next samples of a tile.
+    fn passTile(job: *Job, integrator: *anyopaque, number: u32) void {
+        const state = &job.tiles.states[number];
+        const tile = job.tiles.rectangleOf(number);
+        const left = job.settings.sample_count - state.samples_done;
+        const sample_count = @min(left, job.tiles.samples_per_pass);
+        job.pass(integrator, &tile, state.samples_done, sample_count, job.film);
+        state.samples_done += sample_count;
+        if (state.samples_done < job.settings.sample_count) return;
+        const non_finite = job.film.finish(tile, job.settings.sample_count);
+        if (non_finite > 0) _ = job.tiles.non_finite_count.fetchAdd(non_finite, .monotonic);
+    }
+};
 
 /// The picture in tiles, each as often as there are passes.
 const Tiles = struct {
@@ -217,10 +268,12 @@ const Tiles = struct {
 };
 
 test "every pixel is in exactly one tile, and every tile is due once a pass" {
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
     for ([_][3]u32{ .{ 1, 1, 1 }, .{ 7, 5, 3 }, .{ 64, 64, 16 }, .{ 3, 100, 256 } }) |case| {
         var covered: [100 * 100]u8 = @splat(0);
         var tiles: Tiles = .init(case[0], case[1], &.{
-            .thread_count = 1,
+            .pool = &pool,
             .tile_size = case[2],
             .sample_count = 3,
         });
@@ -237,8 +290,10 @@ test "every pixel is in exactly one tile, and every tile is due once a pass" {
 }
 
 test "huge pictures have a countable number of tiles" {
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
     const tiles: Tiles = .init(65536, 65536, &.{
-        .thread_count = 1,
+        .pool = &pool,
         .tile_size = 1,
         .sample_count = 4096,
     });
@@ -289,12 +344,14 @@ test "the samples of each pixel come in order, by however many threads; a flag e
     const frame: Frame = undefined;
     for ([_]usize{ 1, 2, 5 }) |thread_count| for ([_]u32{ 1, 3, 40 }) |tile_size| {
         for ([_]bool{ false, true }) |is_cancelled| {
+            var pool: parallel.Pool = .init(thread_count);
+            defer pool.deinit();
             var film: Film = try .init(gpa, 21, 17, .init(.{ .color = true }));
             defer film.deinit(gpa);
             TestIntegrator.bundles_left.store(if (is_cancelled) 3 else -1, .monotonic);
             TestIntegrator.cancel.store(false, .monotonic);
-            const result = render(TestIntegrator, gpa, &frame, &film, &.{
-                .thread_count = thread_count,
+            const result = render(&.of(TestIntegrator), gpa, &frame, &film, &.{
+                .pool = &pool,
                 .sample_count = sample_count,
                 .tile_size = tile_size,
                 .cancel = &TestIntegrator.cancel,

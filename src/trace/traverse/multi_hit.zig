@@ -30,24 +30,20 @@ pub const Hit = struct {
     }
 };
 
-/// The first hits of one ray.
-pub const HitList = struct {
-    count: u32,
-    hits: [hits_max]Hit,
-
-    /// Takes a hit that comes before the last where the list is full.
-    fn insert(list: *HitList, hit: Hit) void {
-        var at = list.count;
-        while (at > 0 and hit.isBefore(list.hits[at - 1])) at -= 1;
-        // A triangle that is in several leaves is met in each, and hit where it was hit before.
-        if (at > 0 and !list.hits[at - 1].isBefore(hit)) return;
-        if (at == hits_max) return;
-        if (list.count < hits_max) list.count += 1;
-        var to = list.count - 1;
-        while (to > at) : (to -= 1) list.hits[to] = list.hits[to - 1];
-        list.hits[at] = hit;
-    }
-};
+/// Takes a hit into a list that is in order and has no more than the first `hits_max`. Returns how
+/// many it then has.
+fn insert(list: *[hits_max]Hit, count: u32, hit: Hit) u32 {
+    var at = count;
+    while (at > 0 and hit.isBefore(list[at - 1])) at -= 1;
+    // A triangle that is in several leaves is met in each, and hit where it was hit before.
+    if (at > 0 and !list[at - 1].isBefore(hit)) return count;
+    if (at == hits_max) return count;
+    const new_count = @min(count + 1, hits_max);
+    var to = new_count - 1;
+    while (to > at) : (to -= 1) list[to] = list[to - 1];
+    list[at] = hit;
+    return new_count;
+}
 
 /// Hits of the rays of a bundle.
 pub fn HitLists(comptime Kernel: type) type {
@@ -57,7 +53,9 @@ pub fn HitLists(comptime Kernel: type) type {
         geometry: *const Geometry,
         materials: []const world_file.Material,
         /// By group and lane; undefined where there was no active ray.
-        lists: [Kernel.group_count][Kernel.ray_count]HitList,
+        counts: [Kernel.group_count][Kernel.ray_count]u32,
+        /// The hits of each in order.
+        hits: [Kernel.group_count][Kernel.ray_count][hits_max]Hit,
         /// By group, the lanes of rays that are stopped.
         stopped: [Kernel.group_count]u32,
 
@@ -67,18 +65,19 @@ pub fn HitLists(comptime Kernel: type) type {
         pub fn trace(
             lists: *Self,
             bundle: *bundle_file.Bundle(Kernel),
-            counts: *TestCounts,
+            tests: *TestCounts,
         ) void {
-            for (&bundle.groups, &lists.lists, &lists.stopped, 0..) |*group, *each, *stop, number| {
+            const all = .{ &bundle.groups, &lists.counts, &lists.stopped };
+            for (all[0], all[1], all[2], 0..) |*group, *each, *stop, number| {
                 if (group.active.none()) continue;
                 stop.* = 0;
-                for (each) |*list| list.count = 0;
+                each.* = @splat(0);
                 if (Kernel.variant.traversal == .beam) continue;
                 const view = bundle_file.viewOf(Rays, &lists.geometry.padding, group);
-                lists.traceEach(bundle, number, &view, counts);
+                lists.traceEach(bundle, number, &view, tests);
             }
             if (Kernel.variant.traversal == .beam)
-                interval_packet.traceMultiHit(Kernel, bundle, lists, counts);
+                interval_packet.traceMultiHit(Kernel, bundle, lists, tests);
         }
 
         /// The hits of active rays of a group that come after `index` others; `no_primitive` where
@@ -94,10 +93,10 @@ pub fn HitLists(comptime Kernel: type) type {
             var bits = active.bits();
             while (bits != 0) : (bits &= bits - 1) {
                 const lane = @ctz(bits);
-                const list = &lists.lists[group][lane];
-                if (list.count <= index) continue;
-                t[lane] = list.hits[index].t;
-                primitive[lane] = list.hits[index].primitive;
+                if (lists.counts[group][lane] <= index) continue;
+                const hit = &lists.hits[group][lane][index];
+                t[lane] = hit.t;
+                primitive[lane] = hit.primitive;
             }
             return .{ .t = .fromArray(t), .primitive = .fromArray(primitive) };
         }
@@ -125,7 +124,7 @@ pub fn HitLists(comptime Kernel: type) type {
             bundle: *const bundle_file.Bundle(Kernel),
             group: usize,
             view: *const bundle_file.Precalculations(Rays),
-            counts: *TestCounts,
+            tests: *TestCounts,
         ) void {
             const rays = &bundle.groups[group];
             var bits = rays.active.bits();
@@ -140,7 +139,7 @@ pub fn HitLists(comptime Kernel: type) type {
                     .limit = ray.limit,
                 };
                 const tree = lists.geometry.tree.get(Kernel.width);
-                _ = walk.walk(Kernel, tree, &search, counts);
+                _ = walk.walk(Kernel, tree, &search, tests);
             }
         }
 
@@ -150,9 +149,9 @@ pub fn HitLists(comptime Kernel: type) type {
             place: Place,
             ray: *TraversalRay,
             pack: *const world_file.TrianglePack(Kernel.width),
-            counts: *TestCounts,
+            tests: *TestCounts,
         ) bool {
-            const hits = ray.hitsOf(pack, &lists.geometry.padding, counts);
+            const hits = ray.hitsOf(pack, &lists.geometry.padding, tests);
             var rest = hits.lanes;
             while (rest != 0) : (rest &= rest - 1) {
                 const lane = @ctz(rest);
@@ -174,9 +173,9 @@ pub fn HitLists(comptime Kernel: type) type {
             view: *const bundle_file.Precalculations(Rays),
             pack: *const world_file.TrianglePack(Kernel.width),
             which: bundle_file.At,
-            counts: *TestCounts,
+            tests: *TestCounts,
         ) bool {
-            const hit = bundle_file.hitsOfLane(Kernel, group, view, pack, which, counts) orelse
+            const hit = bundle_file.hitsOfLane(Kernel, group, view, pack, which, tests) orelse
                 return false;
             var rest = hit.mask.bits();
             if (rest == 0) return false;
@@ -205,9 +204,10 @@ pub fn HitLists(comptime Kernel: type) type {
                 lists.stopped[place.group] |= @as(u32, 1) << @intCast(place.lane);
                 return .{ .t = -std.math.inf(f32), .primitive = hit.primitive };
             }
-            const list = &lists.lists[place.group][place.lane];
-            list.insert(hit);
-            return if (list.count == hits_max) list.hits[hits_max - 1] else null;
+            const list = &lists.hits[place.group][place.lane];
+            const count = &lists.counts[place.group][place.lane];
+            count.* = insert(list, count.*, hit);
+            return if (count.* == hits_max) list[hits_max - 1] else null;
         }
 
         /// A ray on its way through a tree, for `walk.walk`.
@@ -221,17 +221,17 @@ pub fn HitLists(comptime Kernel: type) type {
             pub inline fn meet(
                 search: *const Search,
                 node: *const world_file.Node(Kernel.width),
-                counts: *TestCounts,
+                tests: *TestCounts,
             ) box.Range(Kernel.Boxes) {
-                return search.slabs.meet(false, node, search.limit, counts);
+                return search.slabs.meet(false, node, search.limit, tests);
             }
 
             pub inline fn intersect(
                 search: *Search,
                 pack: *const world_file.TrianglePack(Kernel.width),
-                counts: *TestCounts,
+                tests: *TestCounts,
             ) bool {
-                const stopped = search.lists.take(search.place, search.ray, pack, counts);
+                const stopped = search.lists.take(search.place, search.ray, pack, tests);
                 search.limit = search.ray.limit;
                 return stopped;
             }
@@ -244,7 +244,8 @@ pub fn HitLists(comptime Kernel: type) type {
 }
 
 test "a full list keeps the first hits in order, each once" {
-    var list: HitList = .{ .count = 0, .hits = undefined };
+    var list: [hits_max]Hit = undefined;
+    var count: u32 = 0;
     var random = std.Random.DefaultPrng.init(11);
     var present: [3][9]bool = @splat(@splat(false));
     for (0..200) |_| {
@@ -252,15 +253,15 @@ test "a full list keeps the first hits in order, each once" {
             .t = @floatFromInt(random.random().uintLessThan(u32, 3)),
             .primitive = random.random().uintLessThan(u31, 9),
         };
-        list.insert(hit);
+        count = insert(&list, count, hit);
         present[@intFromFloat(hit.t)][@intCast(hit.primitive)] = true;
         var index: u32 = 0;
         for (present, 0..) |row, t| for (row, 0..) |is_present, primitive| {
             if (!is_present or index == hits_max) continue;
             const expected: Hit = .{ .t = @floatFromInt(t), .primitive = @intCast(primitive) };
-            try std.testing.expectEqual(expected, list.hits[index]);
+            try std.testing.expectEqual(expected, list[index]);
             index += 1;
         };
-        try std.testing.expectEqual(index, list.count);
+        try std.testing.expectEqual(index, count);
     }
 }

@@ -4,9 +4,10 @@
 
 const std = @import("std");
 const limits = @import("../limits.zig");
-const Maker = @import("maker.zig");
+const Tessellator = @import("tessellator.zig");
 const Error = @import("../input.zig").Error;
-const Geometry = Maker.Geometry;
+const Geometry = Tessellator.Geometry;
+const Grid = @import("../../../scene.zig").Grid;
 const Vec3 = @import("../../../math.zig").Vec3;
 
 /// Triples of floats as points.
@@ -16,109 +17,108 @@ pub fn points(floats: []const f32) []const Vec3 {
 }
 
 /// `P`, `indices` and perhaps `N`. One triangle needs no indices.
-pub fn triangles(maker: *Maker) Error!Geometry {
-    const parameters = maker.parameters;
+pub fn triangles(tessellator: *Tessellator) Error!Geometry {
+    const parameters = tessellator.parameters;
     const from = points(parameters.floatsNamed("P") orelse
-        return maker.fail("has no points P", .{}));
+        return tessellator.fail("has no points P", .{}));
     const one = [_]i32{ 0, 1, 2 };
     const indices: []const i32 = if (parameters.find("indices")) |parameter|
         parameters.integersOf(parameter)
-    else if (from.len == 3) &one else return maker.fail("has no indices", .{});
+    else if (from.len == 3) &one else return tessellator.fail("has no indices", .{});
     if (indices.len % 3 != 0)
-        return maker.fail("{d} indices make no whole triangles", .{indices.len});
+        return tessellator.fail("{d} indices make no whole triangles", .{indices.len});
     const result: Geometry = .{
-        .positions = try maker.alloc(Vec3, from.len),
-        .normals = try normals(maker, from.len),
-        .triangles = try maker.alloc([3]u32, indices.len / 3),
+        .positions = try tessellator.alloc(Vec3, from.len),
+        .normals = try normals(tessellator, from.len),
+        .triangles = try tessellator.alloc([3]u32, indices.len / 3),
     };
     @memcpy(result.positions, from);
     for (result.triangles, 0..) |*triangle, index| {
         for (triangle, indices[3 * index ..][0..3]) |*corner, vertex| {
-            corner.* = try checked(maker, vertex, from.len);
+            corner.* = try checked(tessellator, vertex, from.len);
         }
     }
-    Maker.orient(&result);
+    Tessellator.orient(&result);
     return result;
 }
 
 /// `N`, one for each of `vertex_count`, or none.
-fn normals(maker: *Maker, vertex_count: usize) Error!?[]Vec3 {
-    const from = points(maker.parameters.floatsNamed("N") orelse return null);
+fn normals(tessellator: *Tessellator, vertex_count: usize) Error!?[]Vec3 {
+    const from = points(tessellator.parameters.floatsNamed("N") orelse return null);
     if (from.len != vertex_count)
-        return maker.fail("has {d} normals N for {d} points", .{ from.len, vertex_count });
-    const result = try maker.alloc(Vec3, vertex_count);
+        return tessellator.fail("has {d} normals N for {d} points", .{ from.len, vertex_count });
+    const result = try tessellator.alloc(Vec3, vertex_count);
     @memcpy(result, from);
     return result;
 }
 
-inline fn checked(maker: *Maker, vertex: i32, vertex_count: usize) Error!u32 {
+inline fn checked(tessellator: *Tessellator, vertex: i32, vertex_count: usize) Error!u32 {
     // Negative ones are beyond the range as well.
     if (@as(u32, @bitCast(vertex)) < vertex_count) return @intCast(vertex);
-    return maker.fail("index {d} of {d} vertices", .{ vertex, vertex_count });
+    return tessellator.fail("index {d} of {d} vertices", .{ vertex, vertex_count });
 }
 
 /// Patches of four points each, cut into two triangles.
-pub fn bilinear(maker: *Maker) Error!Geometry {
-    const parameters = maker.parameters;
+pub fn bilinear(tessellator: *Tessellator) Error!Geometry {
+    const parameters = tessellator.parameters;
     const from = points(parameters.floatsNamed("P") orelse
-        return maker.fail("has no points P", .{}));
+        return tessellator.fail("has no points P", .{}));
     const one = [_]i32{ 0, 1, 2, 3 };
     const indices: []const i32 = if (parameters.find("indices")) |parameter|
         parameters.integersOf(parameter)
-    else if (from.len == 4) &one else return maker.fail("has no indices", .{});
+    else if (from.len == 4) &one else return tessellator.fail("has no indices", .{});
     if (indices.len % 4 != 0)
-        return maker.fail("{d} indices make no whole patches", .{indices.len});
+        return tessellator.fail("{d} indices make no whole patches", .{indices.len});
     const result: Geometry = .{
-        .positions = try maker.alloc(Vec3, from.len),
-        .normals = try normals(maker, from.len),
-        .triangles = try maker.alloc([3]u32, indices.len / 2),
+        .positions = try tessellator.alloc(Vec3, from.len),
+        .normals = try normals(tessellator, from.len),
+        .triangles = try tessellator.alloc([3]u32, indices.len / 2),
     };
     @memcpy(result.positions, from);
     for (0..indices.len / 4) |patch| {
         var corner: [4]u32 = undefined;
         for (&corner, indices[4 * patch ..][0..4]) |*to, vertex| {
-            to.* = try checked(maker, vertex, from.len);
+            to.* = try checked(tessellator, vertex, from.len);
         }
         // In the order (0, 0), (1, 0), (0, 1), (1, 1).
-        result.triangles[2 * patch] = .{ corner[0], corner[1], corner[3] };
-        result.triangles[2 * patch + 1] = .{ corner[0], corner[3], corner[2] };
+        const quad = [4]u32{ corner[0], corner[1], corner[3], corner[2] };
+        result.triangles[2 * patch ..][0..2].* = Grid.cut(quad);
     }
-    Maker.orient(&result);
+    Tessellator.orient(&result);
     return result;
 }
 
 /// `nu` by `nv` heights `Pz` over the unit square.
-pub fn heightfield(maker: *Maker) Error!Geometry {
-    const parameters = maker.parameters;
-    const columns = parameters.integer("nu") orelse return maker.fail("has no nu", .{});
-    const rows = parameters.integer("nv") orelse return maker.fail("has no nv", .{});
-    const heights = parameters.floatsNamed("Pz") orelse return maker.fail("has no heights Pz", .{});
+pub fn heightfield(tessellator: *Tessellator) Error!Geometry {
+    const parameters = tessellator.parameters;
+    const columns = parameters.integer("nu") orelse return tessellator.fail("has no nu", .{});
+    const rows = parameters.integer("nv") orelse return tessellator.fail("has no nv", .{});
+    const heights = parameters.floatsNamed("Pz") orelse
+        return tessellator.fail("has no heights Pz", .{});
     const side_max = limits.heightfield_side_max;
-    if (columns < 2 or rows < 2 or columns > side_max or rows > side_max) return maker.fail(
+    if (columns < 2 or rows < 2 or columns > side_max or rows > side_max) return tessellator.fail(
         "a height field has 2 to {d} points on each side, not {d} by {d}",
         .{ side_max, columns, rows },
     );
     const wide: u32 = @intCast(columns);
     const high: u32 = @intCast(rows);
-    if (heights.len != @as(u64, wide) * high) return maker.fail(
+    if (heights.len != @as(u64, wide) * high) return tessellator.fail(
         "has {d} heights for {d} by {d} points",
         .{ heights.len, columns, rows },
     );
     const result: Geometry = .{
-        .positions = try maker.alloc(Vec3, heights.len),
-        .triangles = try maker.alloc([3]u32, 2 * @as(u64, wide - 1) * (high - 1)),
+        .positions = try tessellator.alloc(Vec3, heights.len),
+        .triangles = try tessellator.alloc([3]u32, 2 * @as(u64, wide - 1) * (high - 1)),
     };
     for (result.positions, heights, 0..) |*position, height, index| position.* = .{
         share(index % wide, wide - 1),
         share(index / wide, high - 1),
         height,
     };
-    var made: usize = 0;
-    for (0..high - 1) |row| for (0..wide - 1) |column| {
-        const corner: u32 = @intCast(row * wide + column);
-        result.triangles[made] = .{ corner, corner + 1, corner + wide + 1 };
-        result.triangles[made + 1] = .{ corner, corner + wide + 1, corner + wide };
-        made += 2;
+    const grid: Grid = .{ .columns = wide - 1, .rows = high - 1 };
+    for (0..grid.rows) |row| for (0..grid.columns) |column| {
+        const index = row * grid.columns + column;
+        result.triangles[2 * index ..][0..2].* = Grid.cut(grid.corners(row, column));
     };
     return result;
 }

@@ -7,12 +7,14 @@
 
 const std = @import("std");
 const limits = @import("../limits.zig");
-const Maker = @import("maker.zig");
-const Transform = @import("../transform.zig");
+const Tessellator = @import("tessellator.zig");
+const math = @import("../../../math.zig");
+const vec3d = math.vec3d;
 const Error = @import("../input.zig").Error;
-const Geometry = Maker.Geometry;
-const Sample = Maker.Sample;
-const Vector = Transform.Vector;
+const Geometry = Tessellator.Geometry;
+const Grid = @import("../../../scene.zig").Grid;
+const Sample = Tessellator.Sample;
+const Vector = math.Vec3d;
 
 const order_max = limits.nurbs_order_max;
 
@@ -107,15 +109,15 @@ const Surface = struct {
         const by_v = surface.sum(&u, &v, &u.values, &v.slopes);
         const w = if (whole[3] != 0) whole[3] else 1;
         const point: Vector = .{ whole[0] / w, whole[1] / w, whole[2] / w };
-        const normal = Transform.cross(slope(by_u, point), slope(by_v, point));
+        const normal = vec3d.cross(slope(by_u, point), slope(by_v, point));
         if (!isFinite(point)) return .{ .point = .{ 0, 0, 0 }, .normal = .{ 0, 0, 0 } };
-        return .{ .point = point, .normal = Transform.normalize(normal) orelse .{ 0, 0, 0 } };
+        return .{ .point = point, .normal = vec3d.normalize(normal) orelse .{ 0, 0, 0 } };
     }
 
     /// Derivative of a quotient, but for a factor above 0.
     fn slope(homogeneous: [4]f64, point: Vector) Vector {
         const own: Vector = homogeneous[0..3].*;
-        return Transform.subtract(own, Transform.scaled(point, homogeneous[3]));
+        return vec3d.sub(own, vec3d.scale(point, homogeneous[3]));
     }
 
     fn isFinite(point: Vector) bool {
@@ -149,15 +151,15 @@ const Surface = struct {
 };
 
 /// The whole surface.
-pub fn nurbs(maker: *Maker) Error!Geometry {
-    const u = try readDirection(maker, .{ "nu", "uorder", "uknots", "u0", "u1" });
-    const v = try readDirection(maker, .{ "nv", "vorder", "vknots", "v0", "v1" });
-    const weighted = maker.parameters.find("P") == null;
-    const points = maker.parameters.floatsNamed(if (weighted) "Pw" else "P") orelse
-        return maker.fail("has neither points P nor Pw", .{});
+pub fn nurbs(tessellator: *Tessellator) Error!Geometry {
+    const u = try readDirection(tessellator, .{ "nu", "uorder", "uknots", "u0", "u1" });
+    const v = try readDirection(tessellator, .{ "nv", "vorder", "vknots", "v0", "v1" });
+    const weighted = tessellator.parameters.find("P") == null;
+    const points = tessellator.parameters.floatsNamed(if (weighted) "Pw" else "P") orelse
+        return tessellator.fail("has neither points P nor Pw", .{});
     const width: u64 = if (weighted) 4 else 3;
     const needed = @as(u64, u.point_count) * v.point_count;
-    if (points.len != width * needed) return maker.fail(
+    if (points.len != width * needed) return tessellator.fail(
         "has {d} numbers for {d} by {d} points",
         .{ points.len, u.point_count, v.point_count },
     );
@@ -166,37 +168,37 @@ pub fn nurbs(maker: *Maker) Error!Geometry {
         .v = v,
         .points = points,
         .weighted = weighted,
-        .steps = maker.input.settings.tessellation,
+        .steps = tessellator.input.resources.settings.tessellation,
     };
-    const size: Maker.Grid = .{ .columns = surface.steps, .rows = surface.steps };
-    return maker.grid(size, &surface, Surface.sampleAt);
+    const grid: Grid = .{ .columns = surface.steps, .rows = surface.steps };
+    return tessellator.tessellate(.{ .grid = grid }, &surface, Surface.sampleAt);
 }
 
 /// Asserts nothing: all of it is the file's.
-fn readDirection(maker: *Maker, comptime names: [5][]const u8) Error!Direction {
-    const parameters = maker.parameters;
+fn readDirection(tessellator: *Tessellator, comptime names: [5][]const u8) Error!Direction {
+    const parameters = tessellator.parameters;
     const point_count = parameters.integer(names[0]) orelse
-        return maker.fail("has no " ++ names[0], .{});
+        return tessellator.fail("has no " ++ names[0], .{});
     const order = parameters.integer(names[1]) orelse
-        return maker.fail("has no " ++ names[1], .{});
+        return tessellator.fail("has no " ++ names[1], .{});
     const knots = parameters.floatsNamed(names[2]) orelse
-        return maker.fail("has no " ++ names[2], .{});
-    if (order < 2 or order > order_max or point_count < order) return maker.fail(
+        return tessellator.fail("has no " ++ names[2], .{});
+    if (order < 2 or order > order_max or point_count < order) return tessellator.fail(
         names[1] ++ " is {d} for {d} points: it is 2 to {d}, and not above their number",
         .{ order, point_count, order_max },
     );
     if (knots.len != @as(u64, @intCast(point_count)) + @as(u64, @intCast(order)))
-        return maker.fail(
+        return tessellator.fail(
             names[2] ++ " has {d} knots, not {d} + {d}",
             .{ knots.len, point_count, order },
         );
     for (knots[1..], knots[0 .. knots.len - 1]) |knot, before| {
         if (knot >= before) continue;
-        return maker.fail(names[2] ++ " falls from {d} to {d}", .{ before, knot });
+        return tessellator.fail(names[2] ++ " falls from {d} to {d}", .{ before, knot });
     }
     const low = knots[@intCast(order - 1)];
     const high = knots[@intCast(point_count)];
-    if (!(high > low)) return maker.fail(names[2] ++ " leaves no range of parameters", .{});
+    if (!(high > low)) return tessellator.fail(names[2] ++ " leaves no range of parameters", .{});
     const from = std.math.clamp(parameters.float(names[3], low), low, high);
     const to = std.math.clamp(parameters.float(names[4], high), low, high);
     return .{

@@ -9,9 +9,9 @@ const math = @import("../../../math.zig");
 const number = @import("../number.zig");
 const quote = @import("../../../diagnostic.zig").quote;
 const Input = @import("../input.zig");
-const Maker = @import("maker.zig");
+const Tessellator = @import("tessellator.zig");
 const Error = Input.Error;
-const Geometry = Maker.Geometry;
+const Geometry = Tessellator.Geometry;
 const Vec3 = math.Vec3;
 
 const Type = enum {
@@ -71,7 +71,7 @@ const element_count_max = 64;
 const corner_count_max = 1 << 16;
 
 const Reader = struct {
-    maker: *Maker,
+    tessellator: *Tessellator,
     name: []const u8,
     bytes: [:0]const u8,
     cursor: usize = 0,
@@ -85,7 +85,7 @@ const Reader = struct {
     triangles: std.ArrayList([3]u32) = .empty,
 
     fn fail(reader: *Reader, comptime format: []const u8, arguments: anytype) error{InvalidInput} {
-        return reader.maker.fail("{f}: " ++ format, .{quote(reader.name)} ++ arguments);
+        return reader.tessellator.fail("{f}: " ++ format, .{quote(reader.name)} ++ arguments);
     }
 
     /// The next line of the header, without its end.
@@ -243,8 +243,8 @@ const Reader = struct {
             if (property.role == .nx) has_normals = true;
         }
         const count = element.count;
-        reader.positions = try reader.maker.alloc(Vec3, count);
-        if (has_normals) reader.normals = try reader.maker.alloc(Vec3, count);
+        reader.positions = try reader.tessellator.alloc(Vec3, count);
+        if (has_normals) reader.normals = try reader.tessellator.alloc(Vec3, count);
         for (0..@intCast(count)) |index| {
             var values: [6]f32 = @splat(0);
             for (reader.propertiesOf(element)) |property| switch (property.role) {
@@ -262,7 +262,7 @@ const Reader = struct {
     fn readFaces(reader: *Reader, element: *const Element) Error!void {
         if (reader.positions.len == 0) return reader.fail("has faces before vertices", .{});
         try reader.checkCount(element);
-        const gpa = reader.maker.input.gpa;
+        const gpa = reader.tessellator.input.gpa;
         const index_max: u32 = @intCast(reader.positions.len - 1);
         for (0..@intCast(element.count)) |_| {
             for (reader.propertiesOf(element)) |property| {
@@ -298,9 +298,9 @@ const Reader = struct {
 };
 
 /// The mesh of `bytes`, which the scene calls `name`.
-pub fn read(maker: *Maker, name: []const u8, bytes: [:0]const u8) Error!Geometry {
-    var reader: Reader = .{ .maker = maker, .name = name, .bytes = bytes };
-    defer reader.triangles.deinit(maker.input.gpa);
+pub fn read(tessellator: *Tessellator, name: []const u8, bytes: [:0]const u8) Error!Geometry {
+    var reader: Reader = .{ .tessellator = tessellator, .name = name, .bytes = bytes };
+    defer reader.triangles.deinit(tessellator.input.gpa);
     try reader.readHeader();
     for (reader.elements[0..reader.element_count]) |*element| switch (element.kind) {
         .vertex => try reader.readVertices(element),
@@ -312,24 +312,24 @@ pub fn read(maker: *Maker, name: []const u8, bytes: [:0]const u8) Error!Geometry
             }
         },
     };
-    const triangles = try maker.alloc([3]u32, reader.triangles.items.len);
+    const triangles = try tessellator.alloc([3]u32, reader.triangles.items.len);
     @memcpy(triangles, reader.triangles.items);
     const result: Geometry = .{
         .positions = reader.positions,
         .normals = reader.normals,
         .triangles = triangles,
     };
-    Maker.orient(&result);
+    Tessellator.orient(&result);
     return result;
 }
 
 /// `filename`, relative to the scene's folder.
-pub fn mesh(maker: *Maker) Error!Geometry {
-    const parameter = maker.parameters.find("filename") orelse
-        return maker.fail("has no filename", .{});
-    const name = maker.parameters.string("filename") orelse
-        return maker.fail("has no filename", .{});
-    const bytes = try maker.input.readFile(parameter.offset, name, null);
-    defer maker.input.gpa.free(bytes);
-    return read(maker, name, bytes);
+pub fn mesh(tessellator: *Tessellator) Error!Geometry {
+    const parameter = tessellator.parameters.find("filename") orelse
+        return tessellator.fail("has no filename", .{});
+    const name = tessellator.parameters.string("filename") orelse
+        return tessellator.fail("has no filename", .{});
+    const file = try tessellator.input.readFile(parameter.offset, name);
+    defer tessellator.input.gpa.free(file.bytes);
+    return read(tessellator, name, file.bytes);
 }

@@ -5,13 +5,14 @@
 
 const std = @import("std");
 const elementary = @import("../../../math.zig").elementary;
-const Maker = @import("maker.zig");
-const Transform = @import("../transform.zig");
+const Tessellator = @import("tessellator.zig");
+const math = @import("../../../math.zig");
+const vec3d = math.vec3d;
 const Error = @import("../input.zig").Error;
-const Geometry = Maker.Geometry;
-const Grid = Maker.Grid;
-const Sample = Maker.Sample;
-const Vector = Transform.Vector;
+const Geometry = Tessellator.Geometry;
+const Grid = @import("../../../scene.zig").Grid;
+const Sample = Tessellator.Sample;
+const Vector = math.Vec3d;
 
 /// Where the turning curve is, and the normal there: distance from the axis and height each.
 const Outline = struct { radius: f64, height: f64, normal_out: f64, normal_up: f64 };
@@ -20,14 +21,14 @@ const Outline = struct { radius: f64, height: f64, normal_out: f64, normal_up: f
 fn Revolution(comptime Curve: type) type {
     return struct {
         curve: Curve,
-        size: Grid,
+        surface: Tessellator.Surface,
         phi_max: f64,
 
         fn sampleAt(self: *const @This(), column: u32, row: u32) Sample {
-            const phi = share(column, self.size.columns) * self.phi_max;
+            const phi = share(column, self.surface.grid.columns) * self.phi_max;
             const cosine = elementary.cos(phi);
             const sine = elementary.sin(phi);
-            const at = self.curve.at(share(row, self.size.rows));
+            const at = self.curve.at(share(row, self.surface.grid.rows));
             return .{
                 .point = .{ at.radius * cosine, at.radius * sine, at.height },
                 .normal = .{ at.normal_out * cosine, at.normal_out * sine, at.normal_up },
@@ -40,26 +41,37 @@ fn share(index: u32, count: u32) f64 {
     return @as(f64, @floatFromInt(index)) / @as(f64, @floatFromInt(count));
 }
 
-fn revolve(maker: *Maker, curve: anytype, rows: u32, ends: [2]bool) Error!Geometry {
-    const phi_max = try maker.sweep();
+/// Columns around, closed where the turn is whole.
+fn gridOf(tessellator: *const Tessellator, phi_max: f64, rows: u32) Grid {
+    return .{
+        .columns = tessellator.steps(phi_max, 3),
+        .rows = rows,
+        .closed = phi_max > 2 * std.math.pi - 1e-9,
+    };
+}
+
+fn revolve(tessellator: *Tessellator, curve: anytype, rows: u32, ends: [2]bool) Error!Geometry {
+    const phi_max = try tessellator.sweep();
     const revolution: Revolution(@TypeOf(curve)) = .{
         .curve = curve,
         .phi_max = phi_max,
-        .size = .{
-            .columns = maker.steps(phi_max, 3),
-            .rows = rows,
-            .closed = phi_max > 2 * std.math.pi - 1e-9,
+        .surface = .{
+            .grid = gridOf(tessellator, phi_max, rows),
             .first_row_is_point = ends[0],
             .last_row_is_point = ends[1],
         },
     };
-    return maker.grid(revolution.size, &revolution, Revolution(@TypeOf(curve)).sampleAt);
+    return tessellator.tessellate(
+        revolution.surface,
+        &revolution,
+        Revolution(@TypeOf(curve)).sampleAt,
+    );
 }
 
 /// The lower and the higher of two heights, each held between bounds.
-fn heights(maker: *Maker, low_default: f32, high_default: f32) [2]f64 {
-    const a: f64 = maker.parameters.float("zmin", low_default);
-    const b: f64 = maker.parameters.float("zmax", high_default);
+fn heights(tessellator: *Tessellator, low_default: f32, high_default: f32) [2]f64 {
+    const a: f64 = tessellator.parameters.float("zmin", low_default);
+    const b: f64 = tessellator.parameters.float("zmax", high_default);
     return .{ @min(a, b), @max(a, b) };
 }
 
@@ -86,14 +98,14 @@ const SphereCurve = struct {
 
 /// `radius`, cut at `zmin` and `zmax`: rows from the bottom up, as many as there are columns in a
 /// whole sphere.
-pub fn sphere(maker: *Maker) Error!Geometry {
-    const radius = try maker.positive("radius", 1);
-    const z = heights(maker, @floatCast(-radius), @floatCast(radius));
+pub fn sphere(tessellator: *Tessellator) Error!Geometry {
+    const radius = try tessellator.positive("radius", 1);
+    const z = heights(tessellator, @floatCast(-radius), @floatCast(radius));
     const from = angleOf(z[0] / radius);
     const to = angleOf(z[1] / radius);
-    if (!(from > to)) return maker.fail("zmin and zmax leave nothing of the sphere", .{});
-    const rows = maker.steps(2 * (from - to), 2);
-    return revolve(maker, SphereCurve{ .radius = radius, .from = from, .to = to }, rows, .{
+    if (!(from > to)) return tessellator.fail("zmin and zmax leave nothing of the sphere", .{});
+    const rows = tessellator.steps(2 * (from - to), 2);
+    return revolve(tessellator, SphereCurve{ .radius = radius, .from = from, .to = to }, rows, .{
         from > std.math.pi - 1e-9,
         to < 1e-9,
     });
@@ -119,10 +131,10 @@ const CylinderCurve = struct {
 };
 
 /// `radius` from `zmin` to `zmax`, without lids.
-pub fn cylinder(maker: *Maker) Error!Geometry {
-    const radius = try maker.positive("radius", 1);
-    const curve: CylinderCurve = .{ .radius = radius, .z = heights(maker, -1, 1) };
-    return revolve(maker, curve, 1, .{ false, false });
+pub fn cylinder(tessellator: *Tessellator) Error!Geometry {
+    const radius = try tessellator.positive("radius", 1);
+    const curve: CylinderCurve = .{ .radius = radius, .z = heights(tessellator, -1, 1) };
+    return revolve(tessellator, curve, 1, .{ false, false });
 }
 
 const DiskCurve = struct {
@@ -141,12 +153,12 @@ const DiskCurve = struct {
 };
 
 /// At `height`, from `innerradius` to `radius`, looking up.
-pub fn disk(maker: *Maker) Error!Geometry {
-    const radius = try maker.positive("radius", 1);
-    const inner: f64 = std.math.clamp(maker.parameters.float("innerradius", 0), 0, radius);
-    const height = maker.parameters.float("height", 0);
+pub fn disk(tessellator: *Tessellator) Error!Geometry {
+    const radius = try tessellator.positive("radius", 1);
+    const inner: f64 = std.math.clamp(tessellator.parameters.float("innerradius", 0), 0, radius);
+    const height = tessellator.parameters.float("height", 0);
     const curve: DiskCurve = .{ .outer = radius, .inner = inner, .height = height };
-    return revolve(maker, curve, 1, .{ false, inner == 0 });
+    return revolve(tessellator, curve, 1, .{ false, inner == 0 });
 }
 
 const ConeCurve = struct {
@@ -165,10 +177,11 @@ const ConeCurve = struct {
 };
 
 /// `radius` at z = 0, a point at `height`.
-pub fn cone(maker: *Maker) Error!Geometry {
-    const radius = try maker.positive("radius", 1);
-    const height = try maker.positive("height", 1);
-    return revolve(maker, ConeCurve{ .radius = radius, .height = height }, 1, .{ false, true });
+pub fn cone(tessellator: *Tessellator) Error!Geometry {
+    const radius = try tessellator.positive("radius", 1);
+    const height = try tessellator.positive("height", 1);
+    const curve: ConeCurve = .{ .radius = radius, .height = height };
+    return revolve(tessellator, curve, 1, .{ false, true });
 }
 
 const ParaboloidCurve = struct {
@@ -193,34 +206,35 @@ const ParaboloidCurve = struct {
 };
 
 /// z = zmax (r / radius)^2 from `zmin` to `zmax`.
-pub fn paraboloid(maker: *Maker) Error!Geometry {
-    const radius = try maker.positive("radius", 1);
-    const z = heights(maker, 0, 1);
+pub fn paraboloid(tessellator: *Tessellator) Error!Geometry {
+    const radius = try tessellator.positive("radius", 1);
+    const z = heights(tessellator, 0, 1);
     const low = @max(z[0], 0);
-    if (!(z[1] > low)) return maker.fail("zmin and zmax leave nothing of the paraboloid", .{});
-    const rows = maker.steps(std.math.pi, 2);
+    if (!(z[1] > low))
+        return tessellator.fail("zmin and zmax leave nothing of the paraboloid", .{});
+    const rows = tessellator.steps(std.math.pi, 2);
     const curve: ParaboloidCurve = .{ .radius = radius, .top = z[1], .z = .{ low, z[1] } };
-    return revolve(maker, curve, rows, .{ low == 0, false });
+    return revolve(tessellator, curve, rows, .{ low == 0, false });
 }
 
 /// A line that turns about z.
 const Hyperboloid = struct {
     first: Vector,
     last: Vector,
-    size: Grid,
+    surface: Tessellator.Surface,
     phi_max: f64,
 
     fn sampleAt(self: *const Hyperboloid, column: u32, row: u32) Sample {
-        const phi = share(column, self.size.columns) * self.phi_max;
+        const phi = share(column, self.surface.grid.columns) * self.phi_max;
         const cosine = elementary.cos(phi);
         const sine = elementary.sin(phi);
-        const v = share(row, self.size.rows);
-        const along = Transform.subtract(self.last, self.first);
-        const on_line = Transform.add(self.first, Transform.scaled(along, v));
+        const v = share(row, self.surface.grid.rows);
+        const along = vec3d.sub(self.last, self.first);
+        const on_line = vec3d.add(self.first, vec3d.scale(along, v));
         const point = turn(on_line, cosine, sine);
         const across: Vector = .{ -point[1], point[0], 0 };
-        const normal = Transform.cross(across, turn(along, cosine, sine));
-        return .{ .point = point, .normal = Transform.normalize(normal) orelse .{ 0, 0, 0 } };
+        const normal = vec3d.cross(across, turn(along, cosine, sine));
+        return .{ .point = point, .normal = vec3d.normalize(normal) orelse .{ 0, 0, 0 } };
     }
 
     fn turn(vector: Vector, cosine: f64, sine: f64) Vector {
@@ -233,21 +247,19 @@ const Hyperboloid = struct {
 };
 
 /// The line from `p1` to `p2`, turned about z.
-pub fn hyperboloid(maker: *Maker) Error!Geometry {
-    const first = maker.parameters.vector("p1", .{ 0, 0, 0 });
-    const last = maker.parameters.vector("p2", .{ 1, 1, 1 });
-    const phi_max = try maker.sweep();
-    const surface: Hyperboloid = .{
+pub fn hyperboloid(tessellator: *Tessellator) Error!Geometry {
+    const first = tessellator.parameters.vector("p1", .{ 0, 0, 0 });
+    const last = tessellator.parameters.vector("p2", .{ 1, 1, 1 });
+    const phi_max = try tessellator.sweep();
+    const turned: Hyperboloid = .{
         .first = .{ first[0], first[1], first[2] },
         .last = .{ last[0], last[1], last[2] },
         .phi_max = phi_max,
-        .size = .{
-            .columns = maker.steps(phi_max, 3),
-            .rows = maker.steps(std.math.pi, 2),
-            .closed = phi_max > 2 * std.math.pi - 1e-9,
+        .surface = .{
+            .grid = gridOf(tessellator, phi_max, tessellator.steps(std.math.pi, 2)),
             .first_row_is_point = first[0] == 0 and first[1] == 0,
             .last_row_is_point = last[0] == 0 and last[1] == 0,
         },
     };
-    return maker.grid(surface.size, &surface, Hyperboloid.sampleAt);
+    return tessellator.tessellate(turned.surface, &turned, Hyperboloid.sampleAt);
 }

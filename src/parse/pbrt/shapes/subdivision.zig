@@ -10,9 +10,9 @@ const std = @import("std");
 const limits = @import("../limits.zig");
 const math = @import("../../../math.zig");
 const meshes = @import("meshes.zig");
-const Maker = @import("maker.zig");
+const Tessellator = @import("tessellator.zig");
 const Error = @import("../input.zig").Error;
-const Geometry = Maker.Geometry;
+const Geometry = Tessellator.Geometry;
 const Vec3 = math.Vec3;
 const vec3 = math.vec3;
 
@@ -68,28 +68,28 @@ const Ring = struct {
 };
 
 /// Subdivides.
-pub fn loop(maker: *Maker) Error!Geometry {
-    var level: Geometry = try meshes.triangles(maker);
+pub fn loop(tessellator: *Tessellator) Error!Geometry {
+    var level: Geometry = try meshes.triangles(tessellator);
     level.normals = null;
-    const asked = maker.parameters.integer("levels") orelse
-        maker.parameters.integer("nlevels") orelse 3;
+    const asked = tessellator.parameters.integer("levels") orelse
+        tessellator.parameters.integer("nlevels") orelse 3;
     const levels: u32 = @intCast(std.math.clamp(asked, 0, limits.subdivision_count_max));
-    const gpa = maker.input.gpa;
+    const gpa = tessellator.input.gpa;
     for (0..levels) |_| {
-        const edges = try findEdges(maker, level.triangles);
+        const edges = try findEdges(tessellator, level.triangles);
         defer gpa.free(edges.list);
         defer gpa.free(edges.of_face);
-        level = try refine(maker, &level, edges);
+        level = try refine(tessellator, &level, edges);
     }
-    const edges = try findEdges(maker, level.triangles);
+    const edges = try findEdges(tessellator, level.triangles);
     defer gpa.free(edges.list);
     defer gpa.free(edges.of_face);
-    const rings = try findRings(maker, &level, edges.list);
+    const rings = try findRings(tessellator, &level, edges.list);
     defer gpa.free(rings);
     for (level.positions, rings) |*position, *ring| {
         position.* = finite(ring.blend(position.*, ring.gamma(), 1.0 / 6.0));
     }
-    try maker.smooth(&level);
+    try tessellator.smooth(&level);
     return level;
 }
 
@@ -103,9 +103,9 @@ fn finite(position: Vec3) Vec3 {
 /// All edges, and for each face those of its sides. The caller frees both.
 const Edges = struct { list: []Edge, of_face: [][3]u32 };
 
-fn findEdges(maker: *Maker, faces: []const [3]u32) Error!Edges {
-    const gpa = maker.input.gpa;
-    if (faces.len > std.math.maxInt(u32) / 16) return maker.fail("has too many faces", .{});
+fn findEdges(tessellator: *Tessellator, faces: []const [3]u32) Error!Edges {
+    const gpa = tessellator.input.gpa;
+    if (faces.len > std.math.maxInt(u32) / 16) return tessellator.fail("has too many faces", .{});
     const sides = try gpa.alloc(Side, 3 * faces.len);
     defer gpa.free(sides);
     for (faces, 0..) |face, index| for (0..3) |corner| {
@@ -138,8 +138,8 @@ fn findEdges(maker: *Maker, faces: []const [3]u32) Error!Edges {
 }
 
 /// The rings of all vertices. The caller frees them.
-fn findRings(maker: *Maker, level: *const Geometry, edges: []const Edge) Error![]Ring {
-    const rings = try maker.input.gpa.alloc(Ring, level.positions.len);
+fn findRings(tessellator: *Tessellator, level: *const Geometry, edges: []const Edge) Error![]Ring {
+    const rings = try tessellator.input.gpa.alloc(Ring, level.positions.len);
     @memset(rings, .{});
     for (edges) |edge| for (0..2) |end| {
         const ring = &rings[edge.ends[end]];
@@ -154,15 +154,15 @@ fn findRings(maker: *Maker, level: *const Geometry, edges: []const Edge) Error![
 }
 
 /// One level further: the old vertices first, then one for each edge.
-fn refine(maker: *Maker, level: *const Geometry, edges: Edges) Error!Geometry {
+fn refine(tessellator: *Tessellator, level: *const Geometry, edges: Edges) Error!Geometry {
     const vertex_count = level.positions.len;
     if (vertex_count + edges.list.len > std.math.maxInt(u32) / 2)
-        return maker.fail("has too many vertices", .{});
-    const rings = try findRings(maker, level, edges.list);
-    defer maker.input.gpa.free(rings);
+        return tessellator.fail("has too many vertices", .{});
+    const rings = try findRings(tessellator, level, edges.list);
+    defer tessellator.input.gpa.free(rings);
     const result: Geometry = .{
-        .positions = try maker.alloc(Vec3, vertex_count + edges.list.len),
-        .triangles = try maker.alloc([3]u32, 4 * level.triangles.len),
+        .positions = try tessellator.alloc(Vec3, vertex_count + edges.list.len),
+        .triangles = try tessellator.alloc([3]u32, 4 * level.triangles.len),
     };
     for (level.positions, rings, result.positions[0..vertex_count]) |from, *ring, *to| {
         to.* = finite(ring.blend(from, ring.beta(), 1.0 / 8.0));

@@ -7,6 +7,7 @@ const std = @import("std");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const nearest = @import("nearest.zig").nearest;
 const quote = @import("../diagnostic.zig").quote;
+const Range = @import("../settings.zig").Range;
 
 /// One option of a command, by the names of the enumeration `Id`.
 pub fn Flag(comptime Id: type) type {
@@ -16,8 +17,72 @@ pub fn Flag(comptime Id: type) type {
         long: []const u8,
         /// 0: none.
         short: u8 = 0,
-        has_value: bool = true,
+        /// What the help calls its value; empty: it has none.
+        value: []const u8 = "",
+        /// What it does: lines of the help's right column.
+        help: []const u8,
     };
+}
+
+/// The flags under one heading of the help.
+pub fn Section(comptime Id: type) type {
+    return struct { title: []const u8, flags: []const Flag(Id) };
+}
+
+/// The flags of all sections.
+pub fn flagsOf(comptime Id: type, comptime sections: []const Section(Id)) []const Flag(Id) {
+    comptime {
+        var flags: []const Flag(Id) = &.{};
+        for (sections) |section| flags = flags ++ section.flags;
+        return flags;
+    }
+}
+
+/// Where the right column of the help begins.
+const help_column = 27;
+
+/// The part of the help that describes the flags.
+pub fn helpOf(comptime Id: type, comptime sections: []const Section(Id)) []const u8 {
+    comptime {
+        @setEvalBranchQuota(1 << 20);
+        var text: []const u8 = "";
+        for (sections) |section| {
+            text = text ++ "\n" ++ section.title ++ "\n";
+            for (section.flags) |flag| {
+                const letters: []const u8 = &.{ '-', flag.short, ',', ' ' };
+                const short = if (flag.short == 0) "    " else letters;
+                var left: []const u8 = "  " ++ short ++ flag.long;
+                if (flag.value.len > 0) left = left ++ " " ++ flag.value;
+                var lines = std.mem.splitScalar(u8, flag.help, '\n');
+                while (lines.next()) |line| {
+                    const gap: [help_column - left.len]u8 = @splat(' ');
+                    text = text ++ left ++ gap ++ line ++ "\n";
+                    left = "";
+                }
+            }
+        }
+        return text;
+    }
+}
+
+/// `png, ppm or pfm`: the names of an enumeration, for messages.
+pub fn namesOf(comptime Enum: type) []const u8 {
+    comptime {
+        const names = std.meta.fieldNames(Enum);
+        var text: []const u8 = names[0];
+        for (names[1..], 2..) |name, count| {
+            text = text ++ (if (count == names.len) " or " else ", ") ++ name;
+        }
+        return text;
+    }
+}
+
+/// A decimal integer of the range, digits only.
+pub fn integer(text: []const u8, range: Range) ?u32 {
+    if (text.len == 0) return null;
+    for (text) |byte| if (!std.ascii.isDigit(byte)) return null;
+    const value = std.fmt.parseInt(u32, text, 10) catch return null;
+    return if (range.holds(value)) value else null;
 }
 
 /// Reads arguments by a table of flags.
@@ -78,6 +143,37 @@ pub fn Arguments(comptime Id: type, comptime flags: []const Flag(Id)) type {
             });
         }
 
+        /// The value as a number of a range.
+        pub fn number(
+            reader: *const Self,
+            flag: Flag(Id),
+            value: []const u8,
+            comptime range: Range,
+        ) error{UsageInvalid}!u32 {
+            return integer(value, range) orelse reader.bad(flag, value, comptime range.text());
+        }
+
+        /// The value as one of the names of an enumeration.
+        pub fn choice(
+            reader: *const Self,
+            flag: Flag(Id),
+            value: []const u8,
+            comptime Enum: type,
+        ) error{UsageInvalid}!Enum {
+            return std.meta.stringToEnum(Enum, value) orelse
+                reader.bad(flag, value, comptime namesOf(Enum));
+        }
+
+        /// The value as text that is not empty.
+        pub fn text(
+            reader: *const Self,
+            flag: Flag(Id),
+            value: []const u8,
+            comptime expected: []const u8,
+        ) error{UsageInvalid}![]const u8 {
+            return if (value.len > 0) value else reader.bad(flag, value, expected);
+        }
+
         fn take(reader: *Self) ?[]const u8 {
             if (reader.index == reader.arguments.len) return null;
             reader.index += 1;
@@ -91,7 +187,7 @@ pub fn Arguments(comptime Id: type, comptime flags: []const Flag(Id)) type {
             for (flags) |flag| {
                 if (!std.mem.eql(u8, flag.long, name)) continue;
                 const value = if (equals) |at| argument[at + 1 ..] else null;
-                if (flag.has_value) return .{ .flag = .{
+                if (flag.value.len > 0) return .{ .flag = .{
                     .flag = flag,
                     .value = value orelse try reader.valueOf(flag.long),
                 } };
@@ -119,7 +215,7 @@ pub fn Arguments(comptime Id: type, comptime flags: []const Flag(Id)) type {
                 const whole = reader.arguments[reader.index - 1];
                 return reader.fail("unknown option {f}", .{quote(whole)});
             };
-            if (flag.has_value) return .{ .flag = .{
+            if (flag.value.len > 0) return .{ .flag = .{
                 .flag = flag,
                 .value = if (rest.len > 0) rest else try reader.valueOf(&.{ '-', letter }),
             } };

@@ -1,4 +1,4 @@
-//! What every shape needs to become triangles: memory within bounds, and a way to complain.
+//! The tessellator of all shapes: grids of a surface, normals, memory within bounds.
 //!
 //! Geometry lives as long as the scene; what only the making of it needs is given back. Curved
 //! shapes and subdivision make many triangles of few bytes, so that everything is counted before
@@ -10,12 +10,13 @@ const math = @import("../../../math.zig");
 const Input = @import("../input.zig");
 const Parameters = @import("../parameters.zig");
 const Error = Input.Error;
+const Grid = @import("../../../scene.zig").Grid;
 const Vec3 = math.Vec3;
-const Transform = @import("../transform.zig");
-const Vector = Transform.Vector;
+const vec3d = math.vec3d;
+const Vector = math.Vec3d;
 const assert = std.debug.assert;
 
-const Maker = @This();
+const Tessellator = @This();
 
 /// Triangles in the space of the shape.
 pub const Geometry = struct {
@@ -39,43 +40,48 @@ name: []const u8 = "",
 bytes_used: u64 = 0,
 
 /// Fails where the shape stands.
-pub fn fail(maker: *Maker, comptime format: []const u8, arguments: anytype) error{InvalidInput} {
-    return maker.input.fail(maker.position, "{s}: " ++ format, .{maker.name} ++ arguments);
+pub fn fail(
+    tessellator: *Tessellator,
+    comptime format: []const u8,
+    arguments: anytype,
+) error{InvalidInput} {
+    const name = .{tessellator.name};
+    return tessellator.input.fail(tessellator.position, "{s}: " ++ format, name ++ arguments);
 }
 
 /// Memory that lives as long as the scene.
-pub fn alloc(maker: *Maker, comptime Element: type, count: u64) Error![]Element {
-    try maker.reserve(count, @sizeOf(Element));
-    return maker.arena.alloc(Element, @intCast(count));
+pub fn alloc(tessellator: *Tessellator, comptime Element: type, count: u64) Error![]Element {
+    try tessellator.reserve(count, @sizeOf(Element));
+    return tessellator.arena.alloc(Element, @intCast(count));
 }
 
 /// Counts memory before it is asked for.
-pub fn reserve(maker: *Maker, element_count: u64, element_bytes: u64) Error!void {
-    const limit = limits.decodedBytesMax(maker.input.bytes_read);
+pub fn reserve(tessellator: *Tessellator, element_count: u64, element_bytes: u64) Error!void {
+    const limit = limits.decodedBytesMax(tessellator.input.resources.bytes_read);
     const bytes = std.math.mul(u64, element_count, element_bytes) catch limit;
-    maker.bytes_used = std.math.add(u64, maker.bytes_used, bytes) catch limit + 1;
+    tessellator.bytes_used = std.math.add(u64, tessellator.bytes_used, bytes) catch limit + 1;
     // Each array within half of the address space, too.
-    if (maker.bytes_used <= limit and bytes <= std.math.maxInt(usize) / 2) return;
-    return maker.fail("the scene's shapes need much more memory than its files explain", .{});
+    if (tessellator.bytes_used <= limit and bytes <= std.math.maxInt(usize) / 2) return;
+    return tessellator.fail("the scene's shapes need much more memory than its files explain", .{});
 }
 
 /// A number that has to be above 0.
-pub fn positive(maker: *Maker, name: []const u8, default: f32) Error!f64 {
-    const value = maker.parameters.float(name, default);
+pub fn positive(tessellator: *Tessellator, name: []const u8, default: f32) Error!f64 {
+    const value = tessellator.parameters.float(name, default);
     if (value > 0) return value;
-    return maker.fail("{s} is {d}, not above 0", .{ name, value });
+    return tessellator.fail("{s} is {d}, not above 0", .{ name, value });
 }
 
 /// The sweep "phimax" in radians, at most a full turn.
-pub fn sweep(maker: *Maker) Error!f64 {
-    const degrees = try maker.positive("phimax", 360);
+pub fn sweep(tessellator: *Tessellator) Error!f64 {
+    const degrees = try tessellator.positive("phimax", 360);
     return @min(degrees, 360) * (std.math.pi / 180.0);
 }
 
 /// Steps that an arc of `angle` radians is cut into, `least` at the least.
-pub fn steps(maker: *const Maker, angle: f64, least: u32) u32 {
+pub fn steps(tessellator: *const Tessellator, angle: f64, least: u32) u32 {
     assert(angle >= 0 and angle <= 2 * std.math.pi + 1e-9);
-    const full: f64 = @floatFromInt(maker.input.settings.tessellation);
+    const full: f64 = @floatFromInt(tessellator.input.resources.settings.tessellation);
     // A little less, lest rounding adds a step to a whole number of them.
     return @max(least, @as(u32, @intFromFloat(@ceil(full * angle / (2 * std.math.pi) - 1e-6))));
 }
@@ -83,55 +89,47 @@ pub fn steps(maker: *const Maker, angle: f64, least: u32) u32 {
 /// A surface over rows and columns: point and normal of each crossing.
 pub const Sample = struct { point: Vector, normal: Vector };
 
-/// How a grid is joined.
-pub const Grid = struct {
-    columns: u32,
-    rows: u32,
-    /// The last column is the first.
-    closed: bool = false,
-    /// All points of the first or last row are one.
+/// A grid, and whether all points of its first or last row are one.
+pub const Surface = struct {
+    grid: Grid,
     first_row_is_point: bool = false,
     last_row_is_point: bool = false,
 };
 
-/// Triangles of a grid: seen from the front, columns run to the right and rows upwards.
-/// `sampleAt` gives the crossing of a column and a row.
-pub fn grid(
-    maker: *Maker,
-    size: Grid,
+/// Triangles of a surface; `sampleAt` gives the point of a column and a row.
+pub fn tessellate(
+    tessellator: *Tessellator,
+    surface: Surface,
     context: anytype,
     comptime sampleAt: fn (@TypeOf(context), u32, u32) Sample,
 ) Error!Geometry {
-    assert(size.columns >= 1 and size.rows >= 1);
-    const stride: u64 = if (size.closed) size.columns else size.columns + 1;
-    const vertex_count = stride * (size.rows + 1);
-    const points: u32 = @as(u32, @intFromBool(size.first_row_is_point)) +
-        @intFromBool(size.last_row_is_point);
-    const triangle_count = @as(u64, size.columns) * (2 * @as(u64, size.rows) - points);
-    if (vertex_count > std.math.maxInt(u32)) return maker.fail("has too many vertices", .{});
+    const grid = surface.grid;
+    assert(grid.columns >= 1 and grid.rows >= 1);
+    const vertex_count = @as(u64, grid.stride()) * (grid.rows + 1);
+    const points: u32 = @as(u32, @intFromBool(surface.first_row_is_point)) +
+        @intFromBool(surface.last_row_is_point);
+    const triangle_count = @as(u64, grid.columns) * (2 * @as(u64, grid.rows) - points);
+    if (vertex_count > std.math.maxInt(u32)) return tessellator.fail("has too many vertices", .{});
     const result: Geometry = .{
-        .positions = try maker.alloc(Vec3, vertex_count),
-        .normals = try maker.alloc(Vec3, vertex_count),
-        .triangles = try maker.alloc([3]u32, triangle_count),
+        .positions = try tessellator.alloc(Vec3, vertex_count),
+        .normals = try tessellator.alloc(Vec3, vertex_count),
+        .triangles = try tessellator.alloc([3]u32, triangle_count),
     };
-    for (0..size.rows + 1) |row| for (0..@intCast(stride)) |column| {
+    for (0..grid.rows + 1) |row| for (0..grid.stride()) |column| {
         const sample = sampleAt(context, @intCast(column), @intCast(row));
-        const index = row * @as(usize, @intCast(stride)) + column;
-        result.positions[index] = Transform.toVec3(sample.point);
-        result.normals.?[index] = Transform.toVec3(sample.normal);
+        const index = row * grid.stride() + column;
+        result.positions[index] = vec3d.toSingle(sample.point);
+        result.normals.?[index] = vec3d.toSingle(sample.normal);
     };
-    const wide: u32 = @intCast(stride);
     var made: usize = 0;
-    for (0..size.rows) |row| for (0..size.columns) |column| {
-        const first: u32 = @intCast(row * wide);
-        const left: u32 = @intCast(column);
-        const right: u32 = if (size.closed and left + 1 == size.columns) 0 else left + 1;
-        if (row > 0 or !size.first_row_is_point) {
-            result.triangles[made] = .{ first + left, first + right, first + wide + right };
+    for (0..grid.rows) |row| for (0..grid.columns) |column| {
+        const lower, const upper = Grid.cut(grid.corners(row, column));
+        if (row > 0 or !surface.first_row_is_point) {
+            result.triangles[made] = lower;
             made += 1;
         }
-        if (row + 1 < size.rows or !size.last_row_is_point) {
-            result.triangles[made] = .{ first + left, first + wide + right, first + wide + left };
+        if (row + 1 < grid.rows or !surface.last_row_is_point) {
+            result.triangles[made] = upper;
             made += 1;
         }
     };
@@ -156,8 +154,8 @@ pub fn orient(geometry: *const Geometry) void {
 }
 
 /// Normals of a smooth surface: the sum of the faces around each vertex, by area.
-pub fn smooth(maker: *Maker, geometry: *Geometry) Error!void {
-    const normals = try maker.alloc(Vec3, geometry.positions.len);
+pub fn smooth(tessellator: *Tessellator, geometry: *Geometry) Error!void {
+    const normals = try tessellator.alloc(Vec3, geometry.positions.len);
     @memset(normals, .{ 0, 0, 0 });
     for (geometry.triangles) |corners| {
         const a, const b, const c = .{

@@ -1,36 +1,39 @@
 //! The command line of `raylane bench`: arguments -> `Bench`, or one line that says what is wrong.
 
 const std = @import("std");
-const options = @import("../options.zig");
+const arguments_file = @import("arguments.zig");
+const cli = @import("../cli.zig");
+const settings = @import("../settings.zig");
 const variant = @import("../variant.zig");
-const Arguments = @import("arguments.zig").Arguments;
+const Arguments = arguments_file.Arguments;
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
-const Flag = @import("arguments.zig").Flag;
+const Flag = arguments_file.Flag;
+const Range = settings.Range;
+const Section = arguments_file.Section;
+const comptimePrint = std.fmt.comptimePrint;
 
 /// Scenes of one run at most.
-pub const scene_count_max = 32;
-/// Rounds at most.
-pub const round_count_max = 1000;
-/// Longest that may be asked for, in seconds.
-pub const time_s_max = 1_000_000;
+const scene_count_max = 32;
+const rounds: Range = .{ .min = 2, .max = 1000 };
+const time_s: Range = .{ .min = 1, .max = 1_000_000, .default = 240 };
 
 /// What to measure.
 pub const Bench = struct {
     /// As given; empty: the four built-in ones.
     scenes: [scene_count_max][]const u8 = undefined,
     scene_count: usize = 0,
-    resolution: [2]u32 = .{ 1024, 1024 },
+    resolution: [2]u32 = settings.thesis.resolution,
     /// Null: as many as the system has CPUs.
-    thread_count: ?u16 = null,
-    sample_count: u32 = 1,
-    depth: u32 = 3,
-    bvh: options.Bvh = .default,
+    thread_count: ?u32 = null,
+    sample_count: u32 = settings.thesis.sample_count,
+    depth: u32 = settings.thesis.depth,
+    tree_quality: settings.TreeQuality = .default,
     /// Parts of names with commas between them: a variant is measured whose name has one of them.
     /// Null: all.
     variants: ?[]const u8 = null,
     /// Null: until intervals are narrow.
     round_count: ?u32 = null,
-    time_s: u32 = 240,
+    time_s: u32 = time_s.default,
     /// Null: none; "-": standard output, in place of the tables.
     json: ?[]const u8 = null,
     energy: bool = true,
@@ -53,6 +56,7 @@ const Id = enum {
     depth,
     energy_command,
     energy_root,
+    help,
     json,
     no_energy,
     quiet,
@@ -64,25 +68,107 @@ const Id = enum {
     variants,
 };
 
-const flags: []const Flag(Id) = &.{
-    .{ .id = .resolution, .long = "--resolution", .short = 'r' },
-    .{ .id = .threads, .long = "--threads", .short = 't' },
-    .{ .id = .spp, .long = "--spp" },
-    .{ .id = .depth, .long = "--depth" },
-    .{ .id = .bvh, .long = "--bvh" },
-    .{ .id = .variants, .long = "--variants" },
-    .{ .id = .rounds, .long = "--rounds" },
-    .{ .id = .time_limit, .long = "--time-limit" },
-    .{ .id = .json, .long = "--json" },
-    .{ .id = .energy_root, .long = "--energy-root" },
-    .{ .id = .energy_command, .long = "--energy-command" },
-    .{ .id = .no_energy, .long = "--no-energy", .has_value = false },
-    .{ .id = .allow_outside, .long = "--allow-outside", .has_value = false },
-    .{ .id = .quiet, .long = "--quiet", .short = 'q', .has_value = false },
+const sections: []const Section(Id) = &.{
+    .{ .title = "Settings: those of the thesis unless changed", .flags = &.{
+        .{
+            .id = .resolution,
+            .long = "--resolution",
+            .short = 'r',
+            .value = "WxH",
+            .help = comptimePrint("size in pixels (default: {d}x{d})", .{
+                settings.thesis.resolution[0], settings.thesis.resolution[1],
+            }),
+        },
+        .{
+            .id = .spp,
+            .long = "--spp",
+            .value = "N",
+            .help = comptimePrint("samples a pixel (default: {d})", .{
+                settings.thesis.sample_count,
+            }),
+        },
+        .{
+            .id = .depth,
+            .long = "--depth",
+            .value = "N",
+            .help = comptimePrint("reflections and refractions in a row (default: {d})", .{
+                settings.thesis.depth,
+            }),
+        },
+        .{
+            .id = .threads,
+            .long = "--threads",
+            .short = 't',
+            .value = "N",
+            .help = "threads (default: as many as CPUs)",
+        },
+        .{
+            .id = .bvh,
+            .long = "--bvh",
+            .value = "QUALITY",
+            .help = arguments_file.namesOf(settings.TreeQuality),
+        },
+        .{
+            .id = .variants,
+            .long = "--variants",
+            .value = "PARTS",
+            .help = "only variants whose names contain one of these, for\n" ++
+                "example scalar-single,vector-beam (default: all)",
+        },
+    } },
+    .{ .title = "Measurement", .flags = &.{
+        .{
+            .id = .rounds,
+            .long = "--rounds",
+            .value = "N",
+            .help = "so many rounds, no less and no more, unless the time\n" ++
+                "is over; two are the least",
+        },
+        .{
+            .id = .time_limit,
+            .long = "--time-limit",
+            .value = "S",
+            .help = comptimePrint("seconds for all scenes together (default: {d})", .{
+                time_s.default,
+            }),
+        },
+        .{
+            .id = .energy_command,
+            .long = "--energy-command",
+            .value = "CMD",
+            .help = "a shell command that prints, each time it is run, the\n" ++
+                "power of this moment (5.2 W, 5200 mW) or a counter of\n" ++
+                "energy (17.5 J, 17500 mJ)",
+        },
+        .{
+            .id = .energy_root,
+            .long = "--energy-root",
+            .value = "DIR",
+            .help = "look for sensors there in place of /sys",
+        },
+        .{ .id = .no_energy, .long = "--no-energy", .help = "do not measure energy" },
+    } },
+    .{ .title = "Output", .flags = &.{
+        .{
+            .id = .json,
+            .long = "--json",
+            .value = "FILE",
+            .help = "all samples, for bench/report.py; - is stdout",
+        },
+        .{
+            .id = .allow_outside,
+            .long = "--allow-outside",
+            .help = "let scenes name files outside of their own folders",
+        },
+        .{ .id = .quiet, .long = "--quiet", .short = 'q', .help = "no warnings, no progress" },
+        .{ .id = .help, .long = "--help", .short = 'h', .help = "print this" },
+    } },
 };
 
+const flags = arguments_file.flagsOf(Id, sections);
+
 /// What `raylane bench --help` prints.
-pub const help: []const u8 = "raylane " ++ options.version ++
+pub const help: []const u8 = "raylane " ++ cli.version ++
     \\: measures what SIMD and packets buy, in time and in joules
     \\
     \\usage: raylane bench [SCENE...] [options]
@@ -92,30 +178,7 @@ pub const help: []const u8 = "raylane " ++ options.version ++
     \\time is over; prints the tables. No image is written. SCENE is as for rendering;
     \\without one: the built-in scenes cornell, atrium, nave and handles.
     \\
-    \\Settings: those of the thesis unless changed
-    \\  -r, --resolution WxH     size in pixels (default: 1024x1024)
-    \\      --spp N              samples a pixel (default: 1)
-    \\      --depth N            reflections and refractions in a row (default: 3)
-    \\  -t, --threads N          threads (default: as many as CPUs)
-    \\      --bvh QUALITY        fast, default or high
-    \\      --variants PARTS     only variants whose names contain one of these, for
-    \\                           example scalar-single,vector-beam (default: all)
-    \\
-    \\Measurement
-    \\      --rounds N           so many rounds, no less and no more, unless the time
-    \\                           is over; two are the least
-    \\      --time-limit S       seconds for all scenes together (default: 240)
-    \\      --energy-command CMD a shell command that prints, each time it is run, the
-    \\                           power of this moment (5.2 W, 5200 mW) or a counter of
-    \\                           energy (17.5 J, 17500 mJ)
-    \\      --energy-root DIR    look for sensors there in place of /sys
-    \\      --no-energy          do not measure energy
-    \\
-    \\Output
-    \\      --json FILE          all samples, for bench/report.py; - is stdout
-    \\      --allow-outside      let scenes name files outside of their own folders
-    \\  -q, --quiet              no warnings, no progress
-    \\  -h, --help               print this
+++ arguments_file.helpOf(Id, sections) ++
     \\
     \\Exit status: as of raylane, and 4 where a variant renders another image than
     \\the others.
@@ -123,7 +186,7 @@ pub const help: []const u8 = "raylane " ++ options.version ++
 ;
 
 /// Reads the arguments after `bench`.
-pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) options.Error!Bench {
+pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error!Bench {
     var reader: Arguments(Id, flags) = .{
         .arguments = arguments,
         .diagnostic = diagnostic,
@@ -150,42 +213,30 @@ fn set(
     bench: *Bench,
     flag: Flag(Id),
     value: []const u8,
-) options.Error!void {
-    const integer = options.integer;
+) cli.Error!void {
     switch (flag.id) {
-        .resolution => bench.resolution = options.resolutionOf(value) orelse
-            return reader.bad(flag, value, options.expected_resolution),
-        .threads => bench.thread_count = integer(u16, value, 1, options.thread_count_max) orelse
-            return reader.bad(flag, value, "1 to 256"),
-        .spp => bench.sample_count = integer(u32, value, 1, options.sample_count_max) orelse
-            return reader.bad(flag, value, "1 to 4096"),
-        .depth => bench.depth = integer(u32, value, 0, options.depth_max) orelse
-            return reader.bad(flag, value, "0 to 32"),
-        .bvh => bench.bvh = std.meta.stringToEnum(options.Bvh, value) orelse
-            return reader.bad(flag, value, "fast, default or high"),
+        .resolution => bench.resolution = cli.resolutionOf(value) orelse
+            return reader.bad(flag, value, cli.expected_resolution),
+        .threads => {
+            bench.thread_count = try reader.number(flag, value, settings.thread_count);
+        },
+        .spp => bench.sample_count = try reader.number(flag, value, settings.sample_count),
+        .depth => bench.depth = try reader.number(flag, value, settings.depth),
+        .bvh => bench.tree_quality = try reader.choice(flag, value, settings.TreeQuality),
         .variants => {
             if (!isList(value)) return reader.bad(flag, value, "parts of names, with commas");
             bench.variants = value;
         },
-        .rounds => bench.round_count = integer(u32, value, 2, round_count_max) orelse
-            return reader.bad(flag, value, "2 to 1000"),
-        .time_limit => bench.time_s = integer(u32, value, 1, time_s_max) orelse
-            return reader.bad(flag, value, "1 to 1000000 seconds"),
-        .json => bench.json = try notEmpty(reader, flag, value),
-        .energy_root => bench.energy_root = try notEmpty(reader, flag, value),
-        .energy_command => bench.energy_command = try notEmpty(reader, flag, value),
+        .rounds => bench.round_count = try reader.number(flag, value, rounds),
+        .time_limit => bench.time_s = try reader.number(flag, value, time_s),
+        .json => bench.json = try reader.text(flag, value, "a name"),
+        .energy_root => bench.energy_root = try reader.text(flag, value, "a name"),
+        .energy_command => bench.energy_command = try reader.text(flag, value, "a name"),
         .no_energy => bench.energy = false,
         .allow_outside => bench.allow_outside = true,
         .quiet => bench.quiet = true,
+        .help => unreachable, // Asked for before the rest is read.
     }
-}
-
-fn notEmpty(
-    reader: *const Arguments(Id, flags),
-    flag: Flag(Id),
-    value: []const u8,
-) options.Error![]const u8 {
-    return if (value.len > 0) value else reader.bad(flag, value, "a name");
 }
 
 /// Whether all of the parts between commas are something.
@@ -241,8 +292,7 @@ test "mistakes name the option" {
     try expectUsage("empty", &.{""});
 }
 
-test "the help names every option" {
-    inline for (flags) |flag| try testing.expect(std.mem.find(u8, help, flag.long ++ " ") != null);
+test "the help fits a screen" {
     var lines = std.mem.splitScalar(u8, help, '\n');
     while (lines.next()) |line| try testing.expect(line.len <= 80);
 }

@@ -1,0 +1,416 @@
+//! The library's face: one scene on its way to pictures, stage by stage.
+//!
+//! In: what the user may choose (`settings`). `load` reads a scene, `pose` places what is in it,
+//! `view` chooses camera, size and light, `render` traces, `write` encodes. Each may be called
+//! again and keeps what the ones before it made: another view needs no reading, another picture of
+//! the same view no tree. The session owns the threads, the scene and what is made of it; nothing
+//! is global.
+
+const std = @import("std");
+const builtin_scenes = @import("builtin.zig");
+const output = @import("output.zig");
+const parallel = @import("parallel.zig");
+const parse = @import("parse.zig");
+const prepare = @import("prepare.zig");
+const settings = @import("settings.zig");
+const srgb = @import("math.zig").srgb;
+const statistics = @import("statistics.zig");
+const trace = @import("trace.zig");
+const variant = @import("variant.zig");
+const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const film_file = @import("film.zig");
+const Film = film_file.Film;
+const Report = @import("report.zig").Report;
+const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
+const Scene = @import("scene.zig").Scene;
+const World = @import("world.zig").World;
+const Allocator = std.mem.Allocator;
+const Io = std.Io;
+const assert = std.debug.assert;
+
+/// Why there is no scene.
+pub const LoadError = parse.Error;
+
+/// Reads a file, or builds the scene that `builtin:NAME` means. The caller frees it.
+pub fn loadScene(
+    gpa: Allocator,
+    io: Io,
+    name: []const u8,
+    choices: settings.Load,
+    diagnostic: *Diagnostic,
+) LoadError!Scene {
+    const builtin_name = std.mem.cutPrefix(u8, name, settings.builtin_prefix) orelse
+        return parse.parse(gpa, io, name, choices, diagnostic);
+    return builtin_scenes.build(gpa, builtin_name, diagnostic);
+}
+
+/// How the geometry is placed: for now at one time only.
+pub const Pose = struct {
+    /// Width of the tree: the variant's that is to render.
+    lanes: u8,
+    tree_quality: settings.TreeQuality = .default,
+};
+
+/// One scene, its threads, and what has been made so far. Must stay where it is.
+pub const Session = struct {
+    gpa: Allocator,
+    io: Io,
+    /// What the stages have to say: the line of an error, and warnings.
+    diagnostic: *Diagnostic,
+    pool: parallel.Pool,
+    /// Told of every finished tile.
+    progress: std.Progress.Node = .none,
+    /// Of the latest call of each stage.
+    times: statistics.StageTimes = .{},
+    /// When `load` began.
+    start: Io.Timestamp = .{ .nanoseconds = 0 },
+
+    scene: ?Scene = null,
+    ownership: Ownership = .owned,
+    facts: Facts = .{},
+    posed: ?Pose = null,
+    seen: settings.View = .{},
+    world: ?World = null,
+    film: ?Film = null,
+    traced: trace.Statistics = .{},
+
+    pub const Error = LoadError || prepare.Error;
+
+    /// Whether the scene is freed with the session, or only looked at: then it must live on until
+    /// the last `view`.
+    pub const Ownership = enum { owned, borrowed };
+
+    /// What is known of a scene without having it.
+    const Facts = struct {
+        triangle_count: u64 = 0,
+        sample_count: ?u32 = null,
+        depth: ?u32 = null,
+    };
+
+    /// A session with `thread_count` threads, the caller's among them; null: as many as there are
+    /// processors.
+    pub fn init(gpa: Allocator, io: Io, thread_count: ?usize, diagnostic: *Diagnostic) Session {
+        return .{
+            .gpa = gpa,
+            .io = io,
+            .diagnostic = diagnostic,
+            .pool = .init(thread_count orelse processorCount()),
+        };
+    }
+
+    /// Frees everything and ends the threads.
+    pub fn deinit(session: *Session) void {
+        session.dropWorld();
+        session.dropScene();
+        if (session.film) |*film| film.deinit(session.gpa);
+        session.pool.deinit();
+        session.* = undefined;
+    }
+
+    /// Makes the stage under way, and those that follow, end with `error.Canceled`. Any thread may
+    /// call it.
+    pub fn cancel(session: *Session) void {
+        session.pool.cancelled.store(true, .monotonic);
+    }
+
+    /// Reads a scene in place of the one before.
+    pub fn load(session: *Session, name: []const u8, choices: settings.Load) Error!void {
+        session.dropWorld();
+        session.dropScene();
+        const start = Io.Clock.awake.now(session.io);
+        const scene = try loadScene(session.gpa, session.io, name, choices, session.diagnostic);
+        session.adopt(scene, .owned);
+        session.start = start;
+        session.times.parse_ns = session.since(start);
+    }
+
+    /// Takes a scene that is in memory, in place of the one before.
+    pub fn adopt(session: *Session, scene: Scene, ownership: Ownership) void {
+        session.dropWorld();
+        session.dropScene();
+        session.start = Io.Clock.awake.now(session.io);
+        session.scene = scene;
+        session.ownership = ownership;
+        session.facts = .{
+            .triangle_count = scene.triangleCount(),
+            .sample_count = scene.sample_count,
+            .depth = scene.depth,
+        };
+    }
+
+    /// Frees the scene, for which there is no use after the last `view`.
+    pub fn dropScene(session: *Session) void {
+        if (session.ownership == .owned) if (session.scene) |*scene| scene.deinit();
+        session.scene = null;
+    }
+
+    fn dropWorld(session: *Session) void {
+        if (session.world) |*world| world.deinit();
+        session.world = null;
+    }
+
+    /// Places the geometry. Asserts that there is a scene.
+    pub fn pose(session: *Session, chosen: Pose) Error!void {
+        assert(session.scene != null);
+        session.dropWorld();
+        session.posed = chosen;
+    }
+
+    /// Chooses what is seen, from where and by what light. Asserts that there is a pose.
+    pub fn view(session: *Session, choices: settings.View) Error!void {
+        const posed = session.posed.?;
+        session.dropWorld();
+        session.seen = choices;
+        // One piece with the geometry: boxes are grown by a bound that depends on the camera.
+        session.world = try prepare.prepare(session.gpa, session.io, &session.scene.?, .{
+            .lanes = posed.lanes,
+            .pool = &session.pool,
+            .tree_quality = posed.tree_quality,
+            .camera = choices.camera,
+            .resolution = choices.resolution,
+            .ambient = choices.ambient,
+            .background = backgroundOf(choices.background),
+        }, session.diagnostic, &session.times);
+    }
+
+    /// Traces the picture. Asserts that there is a view, and a tree of the variant's width.
+    pub fn render(session: *Session, choices: settings.Render) Error!void {
+        const film = try session.sizedFilm();
+        const start = Io.Clock.awake.now(session.io);
+        session.traced = try trace.trace(
+            session.gpa,
+            choices.variant,
+            &session.world.?.frame(),
+            film,
+            session.traceSettings(choices),
+        );
+        session.times.trace_ns = session.since(start);
+        if (session.traced.non_finite_count > 0) session.diagnostic.warn(
+            "{d} pixels came out as not a number and were made black",
+            .{session.traced.non_finite_count},
+        );
+    }
+
+    /// Traces the same picture again to count intersection tests, without timing.
+    pub fn countTests(session: *Session, choices: settings.Render) Error!statistics.TestCounts {
+        const counted = try trace.traceCounting(
+            session.gpa,
+            choices.variant,
+            &session.world.?.frame(),
+            &session.film.?,
+            session.traceSettings(choices),
+        );
+        session.traced.tests = counted.tests;
+        return counted.tests.?;
+    }
+
+    /// Refuses what a file cannot hold of the view; best asked before `render`.
+    pub fn checkWrite(session: *Session, choices: settings.Write) error{InputOutput}!void {
+        const seen = &session.world.?.view;
+        return output.check(
+            choices.format,
+            session.seen.background == .transparent,
+            seen.width,
+            seen.height,
+            session.diagnostic,
+        );
+    }
+
+    /// Encodes the picture and moves it to its place. Closes the target in any case. Asserts that
+    /// there is a picture.
+    pub fn write(
+        session: *Session,
+        target: *output.Target,
+        choices: settings.Write,
+    ) output.Error!void {
+        const start = Io.Clock.awake.now(session.io);
+        try output.write(session.gpa, &session.film.?.image, .{
+            .format = choices.format,
+            .exposure = choices.exposure,
+            .transparent = session.seen.background == .transparent,
+            .jpeg_quality = @intCast(choices.jpeg_quality),
+            .pool = &session.pool,
+        }, target, session.diagnostic);
+        session.times.output_ns = session.since(start);
+        session.times.total_ns = session.since(session.start);
+    }
+
+    /// What the picture took; what the user called things is the caller's to fill in.
+    pub fn report(session: *const Session, choices: settings.Render) Report {
+        const image = &session.film.?.image;
+        const tree = &session.world.?.facts.tree;
+        return .{
+            .triangle_count = session.facts.triangle_count,
+            .width = image.width,
+            .height = image.height,
+            .sample_count = session.sampleCount(choices),
+            .depth = session.depthOf(choices),
+            .thread_count = session.pool.thread_count,
+            .variant = variant.names[choices.variant],
+            .times = session.times,
+            .rays = session.traced.rays,
+            .tests = session.traced.tests,
+            .bvh = .{
+                .node_count = tree.node_count,
+                .depth = tree.depth,
+                .sah_cost = tree.sah_cost,
+                .bytes = tree.bytes,
+            },
+            .memory_peak_bytes = memoryPeakBytes(),
+            .image_hash = image.hash(),
+        };
+    }
+
+    fn sampleCount(session: *const Session, choices: settings.Render) u32 {
+        return choices.sample_count orelse session.facts.sample_count orelse
+            settings.sample_count.default;
+    }
+
+    fn depthOf(session: *const Session, choices: settings.Render) u32 {
+        return choices.depth orelse session.facts.depth orelse settings.depth.default;
+    }
+
+    fn traceSettings(session: *Session, choices: settings.Render) trace.Settings {
+        return .{
+            .pool = &session.pool,
+            .sample_count = session.sampleCount(choices),
+            .depth_max = session.depthOf(choices),
+            .tile_size = choices.tile_size,
+            .progress = session.progress,
+            .cancel = &session.pool.cancelled,
+        };
+    }
+
+    /// A film of the view's size, with alpha where the background is to be seen through.
+    fn sizedFilm(session: *Session) error{OutOfMemory}!*Film {
+        const view_size = &session.world.?.view;
+        const has_alpha = session.seen.background == .transparent;
+        const layers: film_file.Layers = .init(.{ .color = true, .alpha = has_alpha });
+        if (session.film) |*film| {
+            film.layers = layers;
+            const image = &film.image;
+            if (image.width == view_size.width and image.height == view_size.height) return film;
+            film.deinit(session.gpa);
+            session.film = null;
+        }
+        session.film = try .init(session.gpa, view_size.width, view_size.height, layers);
+        return &session.film.?;
+    }
+
+    fn since(session: *const Session, start: Io.Timestamp) u64 {
+        return @intCast(start.untilNow(session.io, .awake).toNanoseconds());
+    }
+};
+
+/// Threads where nobody says how many.
+pub fn processorCount() usize {
+    return @min(std.Thread.getCpuCount() catch 1, parallel.thread_count_max);
+}
+
+/// The radiance of a background; null: as the lights have it.
+fn backgroundOf(background: settings.Background) ?[3]f32 {
+    return switch (background) {
+        .default => null,
+        .transparent => .{ 0, 0, 0 },
+        .linear => |color| color,
+        .srgb => |codes| .{
+            srgb.decoded[codes[0]], srgb.decoded[codes[1]], srgb.decoded[codes[2]],
+        },
+    };
+}
+
+const testing = std.testing;
+
+/// A session that is ready to trace the built-in scene.
+fn openForTest(session: *Session) !void {
+    try session.load("builtin:cornell", .{});
+    try session.pose(.{ .lanes = variant.compiled[0].lanes });
+}
+
+test "a scene is built in or in a file" {
+    var diagnostic: Diagnostic = .{};
+    var session: Session = .init(testing.allocator, testing.io, 1, &diagnostic);
+    defer session.deinit();
+    try testing.expectError(error.InvalidInput, session.load("builtin:no such", .{}));
+    try testing.expect(diagnostic.message.text().len > 0);
+    try testing.expectError(error.InputOutput, session.load("no such.glb", .{}));
+    try session.load("builtin:cornell", .{});
+    try testing.expectEqual(session.scene.?.triangleCount(), session.facts.triangle_count);
+}
+
+test "a scene that is loaded once gives each view the picture it has alone" {
+    const views = [_]settings.View{
+        .{ .resolution = .{ 24, 16 } },
+        .{ .resolution = .{ 9, 13 }, .camera = .auto, .background = .{ .srgb = .{ 255, 0, 0 } } },
+        .{ .resolution = .{ 24, 16 } },
+    };
+    var diagnostic: Diagnostic = .{};
+    var hashes: [views.len]u64 = undefined;
+    for (views, &hashes) |view, *hash| {
+        var session: Session = .init(testing.allocator, testing.io, 2, &diagnostic);
+        defer session.deinit();
+        try openForTest(&session);
+        try session.view(view);
+        session.dropScene();
+        try session.render(.{});
+        hash.* = session.film.?.image.hash();
+    }
+    try testing.expectEqual(hashes[0], hashes[2]);
+    try testing.expect(hashes[0] != hashes[1]);
+    var session: Session = .init(testing.allocator, testing.io, 2, &diagnostic);
+    defer session.deinit();
+    try openForTest(&session);
+    for (views, hashes) |view, hash| {
+        try session.view(view);
+        // The same picture again needs nothing before it.
+        for (0..2) |_| {
+            try session.render(.{});
+            try testing.expectEqual(hash, session.film.?.image.hash());
+        }
+    }
+    const tests = try session.countTests(.{});
+    try testing.expect(tests.box_issued > 0 and session.film.?.image.hash() == hashes[2]);
+    const made = session.report(.{ .depth = 2 });
+    try testing.expectEqual(2, made.depth);
+    try testing.expectEqual(24 * 16, made.rays.primary);
+    try testing.expectEqual(hashes[2], made.image_hash);
+}
+
+test "every stage ends when it is cancelled, and no file is left" {
+    var folder = testing.tmpDir(.{ .iterate = true });
+    defer folder.cleanup();
+    const io = testing.io;
+    var path_buffer: [std.fs.max_path_bytes]u8 = undefined;
+    const folder_path = path_buffer[0..try folder.dir.realPath(io, &path_buffer)];
+    const path = try std.fs.path.join(testing.allocator, &.{ folder_path, "a.png" });
+    defer testing.allocator.free(path);
+
+    var diagnostic: Diagnostic = .{};
+    var session: Session = .init(testing.allocator, io, 2, &diagnostic);
+    defer session.deinit();
+    var temporaries: output.TemporaryFiles = .{};
+    var target: output.Target = try .openFile(io, &temporaries, path, &diagnostic);
+    defer target.abandon();
+    try openForTest(&session);
+    try session.view(.{ .resolution = .{ 512, 512 } });
+    // As soon as the first tile is there, from another thread.
+    const Canceller = struct {
+        fn run(cancelled: *Session, first: *const volatile f32) void {
+            while (std.math.isNan(first.*)) std.atomic.spinLoopHint();
+            cancelled.cancel();
+        }
+    };
+    const image = &(try session.sizedFilm()).image;
+    @memset(image.pixels, @splat(std.math.nan(f32)));
+    const first: *const volatile f32 = &image.pixels[0][3];
+    const canceller = try std.Thread.spawn(.{}, Canceller.run, .{ &session, first });
+    const result = session.render(.{ .tile_size = 4, .sample_count = 64 });
+    canceller.join();
+    try testing.expectError(error.Canceled, result);
+    // Some tiles were traced, others were not.
+    try testing.expect(std.math.isNan(image.pixels[image.pixels.len - 1][3]));
+    try testing.expectError(error.Canceled, session.write(&target, .{}));
+    try testing.expectError(error.Canceled, session.view(.{ .resolution = .{ 4, 4 } }));
+    var entries = folder.dir.iterate();
+    try testing.expectEqual(null, try entries.next(io));
+}

@@ -1,0 +1,164 @@
+//! What a user may choose: values, limits and defaults, each once.
+//!
+//! A leaf. The command line fills these structs, as any other way to ask for a picture would; the
+//! session hands them to the stages; help, messages and checks take their numbers from here.
+
+const std = @import("std");
+const Identity = @import("identity.zig").Identity;
+
+/// Whole numbers to choose from.
+pub const Range = struct {
+    min: u32,
+    max: u32,
+    /// Where neither the user nor the scene says.
+    default: u32 = 0,
+
+    /// Whether the number is one of them.
+    pub fn holds(range: Range, number: anytype) bool {
+        return number >= range.min and number <= range.max;
+    }
+
+    /// `1 to 256`, for help and messages.
+    pub fn text(comptime range: Range) []const u8 {
+        return std.fmt.comptimePrint("{d} to {d}", .{ range.min, range.max });
+    }
+
+    /// `1 to 256 (default: 3)`.
+    pub fn textWithDefault(comptime range: Range) []const u8 {
+        return std.fmt.comptimePrint("{s} (default: {d})", .{ range.text(), range.default });
+    }
+};
+
+/// Threads; by default as many as there are processors.
+pub const thread_count: Range = .{ .min = 1, .max = 256 };
+/// Samples a pixel.
+pub const sample_count: Range = .{ .min = 1, .max = 4096, .default = 1 };
+/// Bounces after the primary ray: reflections and refractions in a row.
+pub const depth: Range = .{ .min = 0, .max = 32, .default = 6 };
+/// Straight pieces that a full circle becomes.
+pub const tessellation: Range = .{ .min = 4, .max = 1024, .default = 32 };
+/// Sides of tiles, in pixels: multiples of `tile_size_step`.
+pub const tile_size: Range = .{ .min = 4, .max = 512, .default = 32 };
+pub const tile_size_step = 4;
+/// Sides of pictures, in pixels; by default the longer one has so many, unless the scene says.
+pub const side: Range = .{ .min = 1, .max = 65_536, .default = 1024 };
+/// Pixels of a picture.
+pub const pixel_count_max = 1 << 28;
+/// Quality of a JPEG.
+pub const jpeg_quality: Range = .{ .min = 1, .max = 100, .default = 90 };
+/// Largest exposure either way, in stops.
+pub const exposure_ev_max = 64;
+/// Automatic exposure lets so many of the pixels, in percent, be no brighter than this.
+pub const auto_exposure: struct { percentile: u64, brightness: f32 } =
+    .{ .percentile = 95, .brightness = 0.8 };
+/// Radiance from everywhere in scenes without lights.
+pub const ambient_default: f32 = 0.35;
+
+/// Names of scenes that need no file begin with this.
+pub const builtin_prefix = "builtin:";
+
+/// File formats of images, by their extensions.
+pub const Format = enum {
+    png,
+    jpg,
+    tga,
+    bmp,
+    /// Radiance RGBE: linear, 8 bits and a common exponent.
+    hdr,
+    /// Netpbm's binary format: RGB of 8 bits.
+    ppm,
+    /// Its relative for floats, linear: the picture itself, bit for bit, without alpha.
+    pfm,
+};
+
+/// Care taken over the tree of the scene: time to build it against time to trace rays through it.
+/// The picture is the same in any case.
+pub const TreeQuality = enum {
+    /// Cut between the cells of a grid as long as there are several, then along the longest axis.
+    fast,
+    /// Cut at the best of the planes along all three axes.
+    default,
+    /// That, and then each subtree moved to where it costs the least.
+    high,
+};
+
+/// Which camera to look through.
+pub const Camera = union(enum) {
+    /// The file's own, else automatic.
+    default,
+    /// All of the scene in view.
+    auto,
+    index: u32,
+    name: []const u8,
+};
+
+/// What is seen where there is nothing.
+pub const Background = union(enum) {
+    /// As the lights have it.
+    default,
+    transparent,
+    /// Codes of red, green and blue.
+    srgb: [3]u8,
+    /// Radiance of red, green and blue, finite and >= 0.
+    linear: [3]f32,
+};
+
+/// How radiance becomes brightness.
+pub const Exposure = union(enum) {
+    /// Stops: radiance 2^-ev is white. |ev| <= `exposure_ev_max`.
+    ev: f32,
+    /// See `auto_exposure`.
+    auto,
+};
+
+/// The settings of the thesis, which `--thesis` and the benchmark begin with.
+pub const thesis: struct { resolution: [2]u32, sample_count: u32, depth: u32 } = .{
+    .resolution = .{ 1024, 1024 },
+    .sample_count = 1,
+    .depth = 3,
+};
+
+/// How a scene is read.
+pub const Load = struct {
+    /// Whether a scene may name files outside of its own folder.
+    allow_outside: bool = false,
+    /// Within `tessellation`.
+    tessellation: u32 = tessellation.default,
+    /// A file that is about to be replaced: a scene that is read from it is refused.
+    output: ?Identity = null,
+};
+
+/// What is seen of a scene, and by what light.
+pub const View = struct {
+    camera: Camera = .default,
+    /// Width and height in pixels; null: the scene's, or its camera's aspect with `side.default` on
+    /// the long side.
+    resolution: ?[2]u32 = null,
+    /// Radiance from everywhere, finite and >= 0; null: as the lights have it.
+    ambient: ?f32 = null,
+    background: Background = .default,
+};
+
+/// How rays are traced.
+pub const Render = struct {
+    /// Index into `variant.compiled`.
+    variant: usize = 0,
+    /// Null: the scene's, or `sample_count.default`.
+    sample_count: ?u32 = null,
+    /// Null: the scene's, or `depth.default`.
+    depth: ?u32 = null,
+    tile_size: u32 = tile_size.default,
+};
+
+/// How a picture is encoded.
+pub const Write = struct {
+    format: Format = .png,
+    exposure: Exposure = .{ .ev = 0 },
+    /// Within `jpeg_quality`.
+    jpeg_quality: u32 = jpeg_quality.default,
+};
+
+test Range {
+    try std.testing.expect(depth.holds(0) and depth.holds(32) and !depth.holds(33));
+    try std.testing.expectEqualStrings("1 to 256", comptime thread_count.text());
+}

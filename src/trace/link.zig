@@ -1,0 +1,93 @@
+//! How a program and the kernels that it is linked to find each other.
+//!
+//! Kernels are compiled by themselves, and what they share with the program are Zig's structures,
+//! whose layout is the compiler's choice. So the name of a kernel's symbol ends with a hash of all
+//! layouts that its functions lead to: where the two sides do not agree, linking fails.
+
+const std = @import("std");
+const Variant = @import("../variant.zig").Variant;
+
+/// Name of the symbol of a variant's `Face`, through which it is called.
+pub fn symbolOf(
+    comptime Face: type,
+    comptime variant: Variant,
+    comptime counting: bool,
+) [:0]const u8 {
+    return std.fmt.comptimePrint("rl_{s}{s}_{x:0>16}", .{
+        variant.name(), if (counting) "_counting" else "", layoutOf(Face),
+    });
+}
+
+/// Ends the program with a message; exported by the program, for its kernels.
+pub extern fn rl_kernel_panic(message: [*]const u8, byte_count: usize, address: usize) noreturn;
+
+/// `rl_kernel_panic` as programs export it.
+pub fn panicOfKernel(message: [*]const u8, byte_count: usize, _: usize) callconv(.c) noreturn {
+    @panic(message[0..byte_count]);
+}
+
+/// Hash of the sizes, alignments and offsets of everything that can be reached from a type.
+fn layoutOf(comptime T: type) u64 {
+    comptime {
+        @setEvalBranchQuota(1_000_000);
+        var layout: Layout = .{};
+        layout.add(T);
+        return layout.hash;
+    }
+}
+
+const Layout = struct {
+    hash: u64 = 0xcbf29ce484222325,
+    seen: []const type = &.{},
+
+    fn add(comptime layout: *Layout, comptime T: type) void {
+        for (layout.seen) |other| if (other == T) return;
+        layout.seen = layout.seen ++ .{T};
+        const info = @typeInfo(T);
+        layout.mixText(@tagName(info));
+        switch (info) {
+            .@"opaque" => return,
+            .@"fn" => |function| {
+                for (function.param_types) |Parameter| if (Parameter) |Known| layout.add(Known);
+                if (function.return_type) |Result| layout.add(Result);
+                return;
+            },
+            .pointer => |pointer| layout.add(pointer.child),
+            .optional => |optional| layout.add(optional.child),
+            .array => |array| layout.add(array.child),
+            .@"struct" => |fields| for (fields.field_names, fields.field_types) |name, Field| {
+                layout.mixText(name);
+                if (fields.layout != .@"packed") layout.mix(@offsetOf(T, name));
+                layout.add(Field);
+            },
+            .@"union" => |fields| for (fields.field_names, fields.field_types) |name, Field| {
+                layout.mixText(name);
+                layout.add(Field);
+            },
+            .@"enum" => |values| for (values.field_names) |name| layout.mixText(name),
+            else => {},
+        }
+        layout.mix(@sizeOf(T));
+        layout.mix(@alignOf(T));
+    }
+
+    fn mixText(comptime layout: *Layout, comptime text: []const u8) void {
+        for (text) |byte| layout.mix(byte);
+    }
+
+    /// FNV-1a, a number at a time.
+    fn mix(comptime layout: *Layout, comptime number: u64) void {
+        layout.hash = (layout.hash ^ number) *% 0x100000001b3;
+    }
+};
+
+test "the hash sees offsets, order and what pointers lead to" {
+    const A = struct { x: u32, next: ?*const @This() };
+    const B = extern struct { y: u8, a: *const A, list: [*]const u16 };
+    const C = extern struct { a: *const A, y: u8, list: [*]const u16 };
+    const D = extern struct { y: u8, a: *const A, list: [*]const u32 };
+    const E = extern struct { y: u8, a: *const A, list: [*]const u16 };
+    try std.testing.expect(comptime layoutOf(B) != layoutOf(C));
+    try std.testing.expect(comptime layoutOf(B) != layoutOf(D));
+    try std.testing.expect(comptime layoutOf(B) == layoutOf(E));
+}
