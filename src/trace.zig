@@ -46,6 +46,7 @@ pub const Grid = @import("trace/traverse/beam/grid.zig").Grid;
 pub const beam = struct {
     pub const frustum = @import("trace/traverse/beam/frustum.zig");
     pub const members = @import("trace/traverse/beam/members.zig");
+    pub const pixel_window = @import("trace/traverse/beam/pixel_window.zig");
     pub const projected_triangle = @import("trace/traverse/beam/projected_triangle.zig");
     pub const shadow_plane = @import("trace/traverse/beam/shadow_plane.zig");
     pub const shadow_receivers = @import("trace/traverse/beam/shadow_receivers.zig");

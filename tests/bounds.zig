@@ -105,15 +105,7 @@ fn expectBounds(
     at: [2]f32,
     near: struct { base: f32 = 0, by_t: f32 = 0, by_inverse: f32 = 0 },
 ) !void {
-    var corners: [3]Four.Vec3 = undefined;
-    for (&corners, 0..) |*corner, index| {
-        var axes: [3][4]f32 = undefined;
-        for (triangles, 0..) |*each, lane| {
-            for (&axes, each[index]) |*axis, value| axis[lane] = value;
-        }
-        corner.* =
-            .{ .x = .fromArray(axes[0]), .y = .fromArray(axes[1]), .z = .fromArray(axes[2]) };
-    }
+    const corners = inLanes(triangles);
     const shown = projection.project(Four, corners);
     const nearness = projection.nearness(Four, &shown.facet);
     const hit = triangle.intersect(Four, corners, line, &padding);
@@ -145,6 +137,19 @@ fn expectBounds(
     }
 }
 
+fn inLanes(triangles: *const [4][3][3]f32) [3]Four.Vec3 {
+    var corners: [3]Four.Vec3 = undefined;
+    for (&corners, 0..) |*corner, index| {
+        var axes: [3][4]f32 = undefined;
+        for (triangles, 0..) |*each, lane| {
+            for (&axes, each[index]) |*axis, value| axis[lane] = value;
+        }
+        corner.* =
+            .{ .x = .fromArray(axes[0]), .y = .fromArray(axes[1]), .z = .fromArray(axes[2]) };
+    }
+    return corners;
+}
+
 fn valueAt(form: Linear(Four.F32), lane: usize, at: [2]f32) f32 {
     const one: Linear(f32) =
         .{ .u = form.u.lane(lane), .v = form.v.lane(lane), .one = form.one.lane(lane) };
@@ -171,6 +176,7 @@ test "bounds of what the eye sees hold, and are not much too wide" {
     var generator = std.Random.DefaultPrng.init(21);
     const random = generator.random();
     var usage: Usage = .{};
+    var windowed_count: u32 = 0;
     for (0..3000) |round| {
         const origin = randomVector(random, if (round % 5 == 0) 1e4 else 1);
         const forward = randomVector(random, 1);
@@ -200,8 +206,38 @@ test "bounds of what the eye sees hold, and are not much too wide" {
         }
         const line: ray_file.Line(Four) = .init(.splat(origin), .splat(direction));
         try expectBounds(&usage, projection, &triangles, &truth, line, at, .{ .by_inverse = 1 });
+        if (grid.depthNormal() == null) continue;
+        windowed_count += try expectWindows(&grid, projection, &triangles, line, at);
     }
     try usage.expectUsed();
+    // Of the triangles that miss their pixel a window tells of some hundreds.
+    try std.testing.expect(windowed_count > 300);
+}
+
+/// Fails where a pixel whose ray hits a triangle is out of its window. Returns how many windows do
+/// not hold it.
+fn expectWindows(
+    grid: *const Grid,
+    projection: GridProjection,
+    triangles: *const [4][3][3]f32,
+    line: ray_file.Line(Four),
+    at: [2]f32,
+) !u32 {
+    const corners = inLanes(triangles);
+    const facet = projection.project(Four, corners).facet;
+    const window, const seen = beam.pixel_window.Dual.of(grid).windowOf(Four, corners, &facet);
+    const hit = triangle.intersect(Four, corners, line, &padding);
+    var outside_count: u32 = 0;
+    for (0..4) |lane| {
+        const x: i32 = @trunc(at[0]);
+        const y: i32 = @trunc(at[1]);
+        const holds = seen.lane(lane) and
+            window.first_x.lane(lane) <= x and x <= window.last_x.lane(lane) and
+            window.first_y.lane(lane) <= y and y <= window.last_y.lane(lane);
+        if (hit.mask.lane(lane) and hit.t.lane(lane) > 0) try std.testing.expect(holds);
+        outside_count += @intFromBool(!holds);
+    }
+    return outside_count;
 }
 
 test "bounds of what a point light sees hold, and are not much too wide" {

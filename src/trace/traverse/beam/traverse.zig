@@ -134,14 +134,30 @@ inline fn draw(
         .primitive = primitive,
     });
     const first: exact.Slot = @intCast(pack_index * Kernel.width);
-    inline for (.{ true, false }, .{ decided, undecided }) |decisive, lanes| {
-        var rest = lanes;
-        while (rest != 0) : (rest &= rest - 1) {
-            const lane = @ctz(rest);
-            var coverage: Coverage(Set, f32, i32) = undefined;
-            takeEach(&coverage, &table, lane);
-            rasterise.cover(Kernel, decisive, set, &coverage, first + @as(exact.Slot, lane));
-        }
+    while (decided != 0) : (decided &= decided - 1) {
+        const lane = @ctz(decided);
+        var coverage: Coverage(Set, f32, i32) = undefined;
+        takeEach(&coverage, &table, lane);
+        rasterise.cover(Kernel, true, set, &coverage, first + @as(exact.Slot, lane));
+    }
+    if (undecided != 0) coverUndecided(Kernel, set, &table, undecided, first);
+}
+
+/// Out of the way of the others: they are rare.
+noinline fn coverUndecided(
+    comptime Kernel: type,
+    set: anytype,
+    table: *const Coverage(@TypeOf(set.*), [Kernel.width]f32, [Kernel.width]i32),
+    undecided: u32,
+    first: exact.Slot,
+) void {
+    @branchHint(.cold);
+    var rest = undecided;
+    while (rest != 0) : (rest &= rest - 1) {
+        const lane = @ctz(rest);
+        var coverage: Coverage(@TypeOf(set.*), f32, i32) = undefined;
+        takeEach(&coverage, table, lane);
+        rasterise.cover(Kernel, false, set, &coverage, first + @as(exact.Slot, lane));
     }
 }
 
