@@ -704,6 +704,7 @@ test "a small stack is enough for every command" {
         // Mirrors, glass and shadows through it, by the caller's thread and by another.
         &.{ "builtin:cornell", "-r64x64", "-t1", "--bvh=high", "--count-tests" },
         &.{ "builtin:cornell", "-r64x64", "-t2" },
+        &.{ "builtin:atrium", "-r8x8" },
         &.{ "bench", "builtin:cornell", "-r16x16", "-q", "--no-energy", "--rounds=2", variant },
     }) |arguments| {
         const ending = try sandbox.runShell(script, arguments);

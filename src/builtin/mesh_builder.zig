@@ -31,9 +31,18 @@ colors: std.ArrayList([4]f32) = .empty,
 triangles: std.ArrayList([3]u32) = .empty,
 smooth: bool = false,
 tinted: bool = false,
+/// Made when it is first needed.
+scratch: ?*Scratch = null,
 
 /// Most quadrilaterals in one patch.
 pub const patch_quad_max = 2048;
+
+/// What a patch needs while it is added: too much for a small stack.
+const Scratch = struct {
+    points: [patch_quad_max]Point,
+    face_normals: [patch_quad_max]Point,
+    corner_vertices: [patch_quad_max][4]u32,
+};
 
 /// Points in rows. Seen from the visible side, columns run to the right and rows upwards.
 pub const Patch = struct {
@@ -170,7 +179,7 @@ fn turn(
     crease_cos: f64,
 ) Allocator.Error!void {
     assert(columns >= 3);
-    var points: [patch_quad_max]Point = undefined;
+    const points = &(try builder.scratchSpace()).points;
     assert(outline.len * columns <= points.len);
     for (outline, 0..) |outline_point, row| {
         for (0..columns) |column| {
@@ -192,7 +201,7 @@ fn turn(
 
 /// Adds a square prism with the given outline of half widths, sides across x and z.
 pub fn prism(builder: *MeshBuilder, outline: []const OutlinePoint) Allocator.Error!void {
-    var points: [patch_quad_max]Point = undefined;
+    const points = &(try builder.scratchSpace()).points;
     assert(4 * outline.len <= points.len);
     for (outline, 0..) |outline_point, row| {
         const half, const height = outline_point;
@@ -211,6 +220,11 @@ pub fn prism(builder: *MeshBuilder, outline: []const OutlinePoint) Allocator.Err
     });
 }
 
+fn scratchSpace(builder: *MeshBuilder) Allocator.Error!*Scratch {
+    if (builder.scratch == null) builder.scratch = try builder.arena.create(Scratch);
+    return builder.scratch.?;
+}
+
 /// Adds a patch. Where faces meet at more than the crease, vertices are doubled.
 pub fn patch(builder: *MeshBuilder, surface: Patch) Allocator.Error!void {
     const grid = gridOf(surface);
@@ -219,7 +233,9 @@ pub fn patch(builder: *MeshBuilder, surface: Patch) Allocator.Error!void {
         for (surface.points) |point| _ = try builder.vertex(point, null);
         return builder.gridFaces(grid, first);
     }
-    var face_normals: [patch_quad_max]Point = undefined;
+    const scratch = try builder.scratchSpace();
+    const face_normals = &scratch.face_normals;
+    const corner_vertices = &scratch.corner_vertices;
     for (0..grid.rows) |row| {
         for (0..grid.columns) |column| {
             const a, const b, const c, const d = grid.corners(row, column);
@@ -229,9 +245,8 @@ pub fn patch(builder: *MeshBuilder, surface: Patch) Allocator.Error!void {
             );
         }
     }
-    var corner_vertices: [patch_quad_max][4]u32 = undefined;
     for (surface.points, 0..) |_, point_index| {
-        try builder.patchPoint(surface, grid, point_index, &face_normals, &corner_vertices);
+        try builder.patchPoint(surface, grid, point_index, face_normals, corner_vertices);
     }
     for (corner_vertices[0 .. grid.rows * grid.columns]) |corners| {
         for (Grid.cut(corners)) |t| try builder.triangle(t[0], t[1], t[2]);
