@@ -14,9 +14,9 @@ const Golden = struct { scene: []const u8, size: [2]u32, hash: u64 };
 /// Small pictures of scenes that take every path of shading and traversal.
 const goldens = [_]Golden{
     .{ .scene = "builtin:cornell", .size = .{ 61, 47 }, .hash = 0x786fc2c79a965f00 },
-    .{ .scene = "builtin:atrium", .size = .{ 53, 40 }, .hash = 0xc71228fd03d18869 },
-    .{ .scene = "builtin:nave", .size = .{ 53, 40 }, .hash = 0xb3f44d630da93019 },
-    .{ .scene = "builtin:handles", .size = .{ 40, 53 }, .hash = 0xd1f7064ed445c955 },
+    .{ .scene = "builtin:atrium", .size = .{ 53, 40 }, .hash = 0x156bae1624f23fdf },
+    .{ .scene = "builtin:nave", .size = .{ 53, 40 }, .hash = 0x7ac01b4336e4dd98 },
+    .{ .scene = "builtin:handles", .size = .{ 40, 53 }, .hash = 0x01672464671f0e65 },
     .{ .scene = "tests/pictures/solids.gltf", .size = .{ 50, 40 }, .hash = 0xeca7519afeb767a5 },
     .{ .scene = "tests/pictures/shapes.pbrt", .size = .{ 60, 40 }, .hash = 0x41ed4c6a9947061b },
     .{ .scene = "tests/pictures/view.pbrt", .size = .{ 48, 32 }, .hash = 0x3afc7b59342d46f4 },

@@ -2,7 +2,7 @@
 //!
 //! In: glTF's nodes and scenes (glTF 2.0, section 3.5). Out: the scene's nodes, and for each the
 //! glTF node it comes from. Explicit stacks: a chain may be as deep as the file is long. Every node
-//! of the file has to be in a tree, shown or not.
+//! that is shown hangs below a root.
 
 const std = @import("std");
 const json = @import("../json.zig");
@@ -24,12 +24,13 @@ const Pending = struct { origin: u32, parent: u32 };
 pub fn collect(source: *const Source) Error![]const u32 {
     const gpa = source.gpa;
     const node_count = source.data.nodes_count;
-    try checkTrees(source);
+    var in_tree = try findTrees(source);
+    defer in_tree.deinit(gpa);
     var stack: std.ArrayList(Pending) = .empty;
     defer stack.deinit(gpa);
     var listed = try std.DynamicBitSetUnmanaged.initEmpty(gpa, node_count);
     defer listed.deinit(gpa);
-    try pushRoots(source, &stack, &listed);
+    try pushRoots(source, &in_tree, &stack, &listed);
 
     var origins: std.ArrayList(u32) = .empty;
     errdefer origins.deinit(gpa);
@@ -52,6 +53,7 @@ pub fn collect(source: *const Source) Error![]const u32 {
 /// The roots of the shown scene, the first on top.
 fn pushRoots(
     source: *const Source,
+    in_tree: *const std.DynamicBitSetUnmanaged,
     stack: *std.ArrayList(Pending),
     listed: *std.DynamicBitSetUnmanaged,
 ) Error!void {
@@ -74,18 +76,22 @@ fn pushRoots(
             "scene {d}: lists node {d} twice",
             .{ Source.indexOf(data.scenes, shown), index },
         );
+        if (!in_tree.isSet(index)) return source.fail(
+            "node {d}: is its own ancestor, or hangs below a node that is",
+            .{index},
+        );
         listed.set(index);
         try stack.append(gpa, .{ .origin = index, .parent = scene.none });
     }
 }
 
-/// Fails where nodes are their own ancestors. cgltf has refused nodes with two parents, so what no
-/// root reaches lies on a cycle or below one.
-fn checkTrees(source: *const Source) Error!void {
+/// The nodes that hang below a root, the caller's to free; a warning where others do not. cgltf has
+/// refused nodes with two parents, so what no root reaches lies on a cycle or below one.
+fn findTrees(source: *const Source) Error!std.DynamicBitSetUnmanaged {
     const gpa = source.gpa;
     const data = source.data;
     var reached = try std.DynamicBitSetUnmanaged.initEmpty(gpa, data.nodes_count);
-    defer reached.deinit(gpa);
+    errdefer reached.deinit(gpa);
     var stack: std.ArrayList(u32) = .empty;
     defer stack.deinit(gpa);
     for (Source.slice(data.nodes, data.nodes_count), 0..) |*node, index| {
@@ -99,10 +105,11 @@ fn checkTrees(source: *const Source) Error!void {
         }
     }
     var missing = reached.iterator(.{ .kind = .unset });
-    if (missing.next()) |index| return source.fail(
-        "node {d}: is its own ancestor, or hangs below a node that is",
+    if (missing.next()) |index| source.warn(
+        "node {d}: is its own ancestor, or hangs below a node that is; not shown",
         .{index},
     );
+    return reached;
 }
 
 /// A node's map into its parent's space: its matrix, or translation, rotation and scale.
