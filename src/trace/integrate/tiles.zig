@@ -1,9 +1,9 @@
 //! Progressive rendering in square tiles, handed out by one atomic counter.
 //!
 //! In: an integrator's type, the frame, settings. Out: the film, finished. Passes over the samples
-//! come outermost: each visits every tile. Samples of a pixel are added in order all the same: a
-//! thread that comes to a tile whose last pass is under way leaves this one to whoever is at it,
-//! who does both. So nobody waits, and no lock is taken.
+//! come outermost: each visits every tile and doubles its samples, up to 64 more. Those of a pixel
+//! are added in order all the same: a thread that comes to a tile whose last pass is under way
+//! leaves this one to whoever is at it, who does both. So nobody waits, and no lock is taken.
 //!
 //! An integrator is a type I with
 //!
@@ -194,8 +194,7 @@ const Job = struct {
     fn passTile(job: *Job, integrator: *anyopaque, number: u32) void {
         const state = &job.tiles.states[number];
         const tile = job.tiles.rectangleOf(number);
-        const left = job.settings.sample_count - state.samples_done;
-        const sample_count = @min(left, job.tiles.samples_per_pass);
+        const sample_count = passSamples(state.samples_done, job.settings.sample_count);
         job.pass(integrator, &tile, state.samples_done, sample_count, job.film);
         state.samples_done += sample_count;
         if (state.samples_done < job.settings.sample_count) return;
@@ -203,6 +202,12 @@ const Job = struct {
         if (non_finite > 0) _ = job.tiles.non_finite_count.fetchAdd(non_finite, .monotonic);
     }
 };
+
+/// Samples of a tile's next pass: as many as it has, lest each ray finds the cache cold; and few
+/// enough that the work ends soon after it is told to.
+fn passSamples(samples_done: u32, sample_count: u32) u32 {
+    return @min(sample_count - samples_done, @min(@max(samples_done, 1), 64));
+}
 
 /// The picture in tiles, each as often as there are passes.
 const Tiles = struct {
@@ -213,7 +218,6 @@ const Tiles = struct {
     columns: u32,
     count: u32,
     pass_count: u32,
-    samples_per_pass: u32,
     non_finite_count: std.atomic.Value(usize) = .init(0),
     /// By tile.
     states: []State = &.{},
@@ -227,25 +231,28 @@ const Tiles = struct {
 
     /// Passes of all tiles at most. Threads overshoot the counter by one each.
     const count_max = 1 << 31;
+    /// More than 4096 samples take.
+    const passes_max = 128;
 
-    /// Asserts that no size is 0. A side of a tile is raised, and passes take more samples than
-    /// one, where there would be too many to count.
+    /// Asserts that no size is 0. A side of a tile is raised where there would be too many.
     fn init(width: u32, height: u32, settings: *const Settings) Tiles {
         const sample_count = settings.sample_count;
         var size = settings.tile_size;
         assert(width > 0 and height > 0 and size > 0 and sample_count > 0);
-        while (@as(u64, @divCeil(width, size)) * @divCeil(height, size) > count_max) size *= 2;
+        while (@as(u64, @divCeil(width, size)) * @divCeil(height, size) > count_max / passes_max)
+            size *= 2;
         const columns = @divCeil(width, size);
         const count = columns * @divCeil(height, size);
-        const samples_per_pass = @divCeil(sample_count, @min(sample_count, count_max / count));
+        var pass_count: u32 = 0;
+        var done: u32 = 0;
+        while (done < sample_count) : (pass_count += 1) done += passSamples(done, sample_count);
         return .{
             .width = width,
             .height = height,
             .size = size,
             .columns = columns,
             .count = count,
-            .pass_count = @divCeil(sample_count, samples_per_pass),
-            .samples_per_pass = samples_per_pass,
+            .pass_count = pass_count,
         };
     }
 
@@ -298,7 +305,7 @@ test "huge pictures have a countable number of tiles" {
         .sample_count = 4096,
     });
     try std.testing.expect(@as(u64, tiles.count) * tiles.pass_count <= Tiles.count_max);
-    try std.testing.expect(tiles.samples_per_pass * tiles.pass_count >= 4096);
+    try std.testing.expect(tiles.pass_count <= Tiles.passes_max);
 }
 
 /// Counts samples, and holds that each pixel gets its own in order.
