@@ -28,7 +28,7 @@ pub const triangle = @import("trace/traverse/triangle.zig");
 pub const traversal_ray = @import("trace/traverse/traversal_ray.zig");
 /// One ray after the other through the tree.
 pub const single = @import("trace/traverse/single.zig");
-/// Rays that have little in common, as a set.
+/// Incoherent rays as a stream.
 pub const stream = @import("trace/traverse/stream.zig");
 /// The first few hits of rays.
 pub const multi_hit = @import("trace/traverse/multi_hit.zig");

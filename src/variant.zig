@@ -20,7 +20,7 @@ pub const Traversal = enum { single, packet2x2, beam };
 pub const Variant = struct {
     backend: Backend,
     traversal: Traversal,
-    /// Lanes of a SIMD value, 4, 8 or 16; also the width of the BVH's nodes and triangle blocks.
+    /// Lanes of a SIMD value, 4, 8 or 16; also the width of the BVH's nodes and triangle packs.
     lanes: u8,
 
     /// Whether the combination exists: the C intrinsics and the thesis's 2x2 packets are 4 wide.

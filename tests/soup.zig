@@ -314,7 +314,7 @@ fn addQueries(soup: Soup, queries: []Query, corners: []const [3]f32, random: std
             // Some of the others a thousand kilometres away.
             if (index % 16 == 0) x.* = random.floatNorm(f32) * 1e6;
         };
-        // And every other block's rays go much the same way from much the same place.
+        // And every other subtile's rays go much the same way from much the same place.
         const led = index % 32 < 16 and index % 16 > 0;
         if (led) {
             const leader = queries[index - index % 16];

@@ -28,7 +28,7 @@ pub fn Batch(comptime Kernel: type) type {
         const Self = @This();
         const Bundle = raylane.trace.bundle.Bundle(Kernel);
 
-        /// As a bundle of the traversal `packet`.
+        /// As a bundle of the traversal `beam`.
         pub fn bundle(batch: *Self) *Bundle {
             comptime std.debug.assert(@sizeOf(Bundle) == @sizeOf(@FieldType(Self, "groups")));
             return @ptrCast(&batch.groups);

@@ -1,4 +1,4 @@
-//! Instances of meshes -> one list of triangles in world space.
+//! The triangle soup: instances of meshes become one list of triangles in world space.
 //!
 //! In: a scene and the world maps of its nodes. Out: vertices and triangles in the order of the
 //! instances, without those that have no area or no finite place. Fronts stay fronts under
@@ -45,7 +45,7 @@ pub const TriangleSoup = struct {
     triangles: []const world.Triangle,
     /// Box of the triangles' corners, empty without triangles.
     bounds: Box3,
-    /// Box of twice the middles of the triangles' boxes, empty without triangles.
+    /// Box of twice the centroids of the triangles' boxes, empty without triangles.
     centroid_bounds: Box3,
     /// Triangles left out.
     dropped_count: u64,

@@ -1,4 +1,4 @@
-//! A camera for a scene that has none: all of it in the picture, as large as a margin allows.
+//! Automatic framing: a camera with all of the scene in its picture, as large as a margin allows.
 //!
 //! In: the triangles and the picture's aspect. Out: a perspective camera. The direction is a
 //! three-quarter view, unless hardly a front would be seen from there; the position is the nearest

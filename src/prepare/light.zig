@@ -1,4 +1,4 @@
-//! Where the lights are, and what there is where they are not.
+//! Lights and environment: where they are in the world, and what there is without them.
 //!
 //! In: a scene's lights and the world maps of their nodes, or none of them and a camera. Out:
 //! lights in world space, ambient and background. Scale of nodes does not count, as

@@ -1,8 +1,7 @@
-//! Materials as shading wants them.
+//! Metallic-roughness materials (glTF 2.0, appendix B) as shading wants them.
 //!
 //! In: a scene's materials. Out: the world's, one for one, so that indices stay what they are.
-//! Sources: the glTF 2.0 specification, appendix B, and its extensions KHR_materials_ior,
-//! _transmission and _volume.
+//! Further sources: the extensions KHR_materials_ior, _transmission and _volume.
 
 const std = @import("std");
 const math = @import("../math.zig");

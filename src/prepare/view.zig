@@ -1,4 +1,4 @@
-//! Which camera, and how large the picture.
+//! The view: which camera, and how large the picture.
 //!
 //! In: the scene's cameras, the user's wishes, and the triangles to frame where no camera is
 //! wanted or there. Out: the camera of the world and the picture's size. A camera's vertical

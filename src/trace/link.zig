@@ -1,4 +1,4 @@
-//! How a program and the kernels that it is linked to find each other.
+//! Linkage of kernels: how a program and those that it is linked to find each other.
 //!
 //! Kernels are compiled by themselves, and what they share with the program are Zig's structures,
 //! whose layout is the compiler's choice. So the name of a kernel's symbol ends with a hash of all

@@ -1,5 +1,5 @@
-//! By how much boxes and rays are grown, so that culling is exact: no box culls what the triangle
-//! test accepts, and no ray slips through an edge for rounding alone.
+//! Conservative padding: by how much boxes and rays are grown, so that culling is exact: no box
+//! culls what the triangle test accepts, and no ray slips through an edge for rounding alone.
 //!
 //! With u = 2^-24, distances in the maximum norm, C a fixed point in the middle of the geometry:
 //!

@@ -1,4 +1,4 @@
-//! Triangles -> a binary tree over them, by all threads.
+//! Parallel top-down build of a binary BVH by the binned surface area heuristic (Wald 2007).
 //!
 //! In: triangles and how far their boxes are grown. Out: nodes in pairs and references to the
 //! triangles in the order of the leaves. The tree is the same whatever the number of threads:
@@ -82,7 +82,7 @@ pub const Tree = struct {
     /// begin + 1 .. begin + count, so that threads need not agree on who takes which.
     nodes: []Node,
     references: []align(64) Box,
-    /// Pairs made, by one task side by side: parents before children within a stretch.
+    /// Pairs made, by one task side by side: parents before children within a range.
     stretches: []Stretch,
     /// Pairs above all tasks, parents before children.
     top_pairs: []u32,
@@ -516,7 +516,7 @@ fn Builder(comptime pack_size: u32) type {
             bins.add(&binning, references);
             const chosen = bins.choose(pack_size) orelse return null;
             const side: Side = .init(&binning, &chosen);
-            // Leaves have no use for the middles of what is in them.
+            // Leaves have no use for the centroids of what is in them.
             const largest = @max(chosen.left_count, set.count() - chosen.left_count);
             const centers = if (largest > builder.leaf_size)
                 partition(references, &side, chosen.left_count, true)
@@ -528,7 +528,7 @@ fn Builder(comptime pack_size: u32) type {
     };
 }
 
-/// Boxes of what goes left and what goes right, and of the middles of both.
+/// Boxes of what goes left and what goes right, and of the centroids of both.
 const Sides = struct {
     boxes: [2]Box,
     centers: [2]Box,
@@ -548,7 +548,7 @@ const Sides = struct {
     }
 };
 
-/// Moves what goes left to the front and bounds the middles of each side. Lomuto's way, without a
+/// Moves what goes left to the front and bounds the centroids of each side. Lomuto's way, without a
 /// branch on the side: that is as good as random, and a wrong guess costs as much as all the rest
 /// of a round. A reference that goes right is exchanged too, with another one that does.
 fn partition(
@@ -577,7 +577,7 @@ fn partition(
     return centers;
 }
 
-/// Makes a reference for each triangle, and the boxes of all references and of their middles.
+/// Makes a reference for each triangle, and the boxes of all references and of their centroids.
 const ReferenceWork = struct {
     input: *const Input,
     references: []Box,

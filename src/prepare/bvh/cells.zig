@@ -1,7 +1,7 @@
-//! Many triangles -> some thousand cells of a grid.
+//! A grid of cells over many triangles (Ize, Wald and Parker 2007), for the first cuts of a BVH.
 //!
-//! In: triangles and the bounds of their middles. Out: the cells that hold some, each with its box,
-//! then references in whatever order of the cells the caller comes to, cell by cell. A tree over
+//! In: triangles and the bounds of their centroids. Out: the cells that hold some, each with its
+//! box, then references in whatever order of the cells the caller comes to. A tree over
 //! the cells takes the place of the first levels of binned cuts, each of which reads and writes all
 //! of memory; here the triangles are read twice and the references written once. Which cell a
 //! triangle falls in, and its place among those of the same cell, are functions of the triangles
@@ -44,7 +44,7 @@ pub const Item = struct {
     cell: u32,
 };
 
-/// From a middle to a cell.
+/// From a centroid to a cell.
 const Grid = struct {
     offset: Vec4,
     scale: Vec4,
@@ -87,8 +87,8 @@ const Grid = struct {
 
     inline fn cellOf(grid: *const Grid, box: Box) u32 {
         const at = (split.centerTwice(box) - grid.offset) * grid.scale;
-        // Boxes are grown, and rounded by that: their middles may lie beyond the bounds of all. An
-        // integer may not hold how far beyond.
+        // Boxes are grown, and rounded by that: their centroids may lie beyond the bounds of all,
+        // how far, an integer may not hold.
         const last: Vec4 = @floatFromInt(grid.last);
         const within: Indices = @intFromFloat(@min(@max(at, @as(Vec4, @splat(0))), last));
         const moved = within << grid.shifts;
@@ -174,7 +174,7 @@ pub const Cells = struct {
 
 const CountWork = struct {
     cells: *Cells,
-    /// By thread and cell: box and middles.
+    /// By thread and cell: box and centroids.
     boxes: [][2]Box,
     /// Threads that have made their boxes.
     used: [chunk_count_max]bool = @splat(false),

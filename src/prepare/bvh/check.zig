@@ -1,4 +1,4 @@
-//! Whether a world keeps what `world.zig` promises to those who trace it.
+//! Invariants of a world, asserted: what `world.zig` promises to those who trace it.
 //!
 //! In: a world. Out: nothing, or a failed assertion. For tests and debug builds: it visits every
 //! node and triangle.

@@ -1,4 +1,4 @@
-//! What a tree is built on: triangles, and the reference that stands for each of them.
+//! Input of a BVH's build: triangles, and the reference that stands for each of them.
 
 const std = @import("std");
 const math = @import("../../math.zig");
@@ -16,7 +16,7 @@ pub const Error = error{OutOfMemory} || parallel.Error;
 pub const Input = struct {
     positions: []const Vec3,
     triangles: []const world.Triangle,
-    /// Box of twice the middles of the triangles' boxes, give or take rounding.
+    /// Box of twice the centroids of the triangles' boxes, give or take rounding.
     centroid_bounds: Box3,
     padding: world.Padding,
     pool: *parallel.Pool,

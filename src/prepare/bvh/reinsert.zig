@@ -1,4 +1,5 @@
-//! A binary tree -> one of less expected cost: subtrees are taken out and put in elsewhere.
+//! Reinsertion (Bittner et al. 2013, Meister and Bittner 2018): subtrees of a binary BVH are taken
+//! out and put in where they cost less.
 //!
 //! In: a tree whose leaves may be smaller than packs. Out: the same triangles in a tree of the
 //! same form. Each pass asks for every node where its subtree would cost the least, by branch and
@@ -481,7 +482,7 @@ fn Optimizer(comptime pack_size: u32) type {
                 );
             }
 
-            /// A pair for two halves that meet at `middle`, numbered as in `bvh_build`.
+            /// A pair for two halves that meet at `middle`, numbered as in build.zig.
             fn takePair(
                 layout: *Layout,
                 gpa: Allocator,

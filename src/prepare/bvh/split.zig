@@ -1,4 +1,4 @@
-//! Where to cut a set of triangles in two: the binned surface area heuristic.
+//! The binned surface area heuristic (Wald 2007): where to cut a set of triangles in two.
 //!
 //! In: references to triangles. Out: the plane between two bins that makes the expected cost of
 //! both sides least, or null where no plane separates anything. Boxes and counts of bins do not
@@ -72,12 +72,12 @@ inline fn upperHalf(box: Box) Vec4 {
     return @shuffle(f32, box, undefined, @Vector(4, i32){ 4, 5, 6, 7 });
 }
 
-/// Twice the middle.
+/// Twice the centroid.
 pub inline fn centerTwice(box: Box) Vec4 {
     return lowerHalf(box) - upperHalf(box);
 }
 
-/// The box that holds just twice the middle: joined up it bounds where bins are needed.
+/// The box that holds just twice the centroid: joined up it bounds where bins are needed.
 pub inline fn centerBox(box: Box) Box {
     const center = centerTwice(box);
     return std.simd.join(center, -center);
@@ -100,7 +100,7 @@ pub inline fn extent(box: Box) Vec4 {
     return -extentNegated(box);
 }
 
-/// Edges of bounds of middles up to this long have no room for bins.
+/// Edges of bounds of centroids up to this long have no room for bins.
 pub const extent_min = 0x1p-100;
 
 /// Half the surface area, infinite or NaN for the empty box.
@@ -117,11 +117,11 @@ pub inline fn longestAxis(edges: [4]f32) u8 {
     return if (edges[2] > edges[longer]) 2 else longer;
 }
 
-/// From a middle to one of `bin_count` bins: (center - offset) * scale, rounded down.
+/// From a centroid to one of `bin_count` bins: (center - offset) * scale, rounded down.
 pub fn Binning(comptime bin_count: comptime_int) type {
     return struct {
         offset: Vec4,
-        /// 0 on axes where all middles are the same, or too near to tell apart.
+        /// 0 on axes where all centroids are the same, or too near to tell apart.
         scale: Vec4,
         /// The longest axis.
         axis: u8,
@@ -131,7 +131,7 @@ pub fn Binning(comptime bin_count: comptime_int) type {
         /// Bins that span `centers`, the join of `centerBox`es.
         pub fn init(centers: Box) Self {
             const edges = extent(centers);
-            // Just below the count, so that the last middle lands in the last bin after rounding.
+            // Just below the count, so that the last centroid lands in the last bin after rounding.
             const width: Vec4 = @splat(bin_count * (1 - 0x1p-20));
             const least: Vec4 = @splat(extent_min);
             const zero: Vec4 = @splat(0);
@@ -229,7 +229,7 @@ pub fn Bins(comptime bin_count: comptime_int, comptime axis_count: comptime_int)
             }
         }
 
-        /// Puts a cell of references into the bins of its middle.
+        /// Puts a cell of references into the bins of its centroid.
         pub fn addItem(bins: *Self, binning: *const Binning(bin_count), item: anytype) void {
             const indices: [4]i32 = binning.binsOf(middleOf(item.centers));
             inline for (&bins.boxes, &bins.counts, 0..) |*boxes, *counts, row| {

@@ -1,4 +1,4 @@
-//! A binary tree -> the wide tree that rays travel.
+//! Collapse of a binary BVH into the wide one that rays travel (Ylitie, Karras and Laine 2017).
 //!
 //! In: triangles. Out: nodes of `width` children and packs of `width` triangles, exactly as many
 //! as there are, a node's inner children side by side and likewise the packs of its leaves. Which

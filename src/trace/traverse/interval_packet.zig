@@ -29,8 +29,8 @@ const Stream = @import("stream.zig").Stream;
 const Query = walk.Query;
 const Geometry = world_file.Geometry;
 
-/// Fewer rays are no packet. Both as measured (docs/performance.md): a set does so well with rays
-/// that look for any hit that few of them gain by going together.
+/// Fewer rays are no packet. Both as measured (docs/performance.md): a stream does so well with
+/// rays that look for any hit that few of them gain by going together.
 const packet_rays_min = std.EnumArray(Query, u32).initDefault(6, .{ .closest_hit = 4 });
 /// Once so many rays of a subtile are incoherent, the others are not compared any more: most are
 /// incoherent, too, and each comparison goes over the whole subtile.

@@ -1,7 +1,7 @@
 //! The comptime shape of a tracer: which lanes hold rays, which hold boxes, how pixels are bundled.
 //!
 //! In: a variant, and whether tests are counted. Out: a namespace that the other files of this
-//! folder are generic over. A bundle is a block of pixels traced together: `group_count` groups of
+//! folder are generic over. A bundle is a square of pixels traced together: `group_count` groups of
 //! as many rays as a lane value holds.
 
 const std = @import("std");

@@ -2,12 +2,12 @@
 //!
 //! In: rays of a bundle that are in no packet. Out: their hits, in the bundle. Each is tested by
 //! itself against all boxes of a node, one ray right after the other, and those that enter a child
-//! go on to it as a set, of one at last. What a ray by itself waits for, the end of a chain of
+//! go on to it as a stream, of one at last. What a ray by itself waits for, the end of a chain of
 //! arithmetic, a branch on how many children it enters, all share. While a node or a leaf is
 //! visited, the next that waits is on its way from memory.
 //!
-//! J. Tsakok, "Faster Incoherent Rays: Multi-BVH Ray Stream Tracing" (2009), section 3, with sets
-//! as bits, not lists.
+//! J. Tsakok, "Faster Incoherent Rays: Multi-BVH Ray Stream Tracing" (2009), section 3, with
+//! masks, not lists.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -23,10 +23,10 @@ const Query = @import("walk.zig").Query;
 const Geometry = world_file.Geometry;
 const Place = bundle_file.Place;
 
-/// Rays of a set, a bit each.
+/// Active mask: rays of a stream, a bit each.
 const Set = u64;
 const rays_max = @bitSizeOf(Set);
-/// A lane holds a word of a set.
+/// A lane holds a word of a mask.
 const word_bits = 32;
 const word_count = rays_max / word_bits;
 
@@ -158,12 +158,12 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
             return null;
         }
 
-        /// Those of a set that have not yet found what they look for.
+        /// Those of a mask that have not yet found what they look for.
         inline fn looking(stream: *const Self, set: Set) Set {
             return if (query == .closest_hit) set else set & ~stream.found;
         }
 
-        /// A ray of the set after the other against the triangles of a leaf.
+        /// One active ray after the other against the triangles of a leaf.
         inline fn intersect(
             stream: *Self,
             set: Set,
@@ -186,7 +186,7 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
             }
         }
 
-        /// Pushes the children that rays of the set enter, the one that any of them enters first on
+        /// Pushes the children that active rays enter, the one that any of them enters first on
         /// top. Returns the new count.
         inline fn enter(
             stream: *const Self,

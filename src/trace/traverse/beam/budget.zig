@@ -1,4 +1,4 @@
-//! When a beam is given up: once it costs more than its rays would one by one.
+//! Cost budget of a beam, which is given up once it costs more than its rays would one by one.
 //!
 //! In: what the beam meets on its way through the tree. Out: whether to go on. How wide a beam is
 //! for its scene shows early in how many children wait on the stack, before their packs are met.

@@ -1,4 +1,4 @@
-//! The exact test where a beam is in doubt, and for what it has found.
+//! The exact triangle test where a beam is in doubt, and for what it has found.
 //!
 //! In: rays of a bundle, triangles by their slot. Out: whether and where one is hit, by
 //! `triangle.zig` alone, so that beams give the bits that every other traversal gives.

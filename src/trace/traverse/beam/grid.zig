@@ -1,4 +1,4 @@
-//! The directions of a beam's rays, linear in the pixel, and what bounds them.
+//! The ray grid of a beam: directions linear in the pixel, and what bounds them.
 //!
 //! In: what a camera makes of a square of pixels. Out: for the beam, inward normals of
 //! the pyramid around its rays, and the axis along which t counts.

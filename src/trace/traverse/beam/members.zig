@@ -1,4 +1,4 @@
-//! Sets of a bundle's rays, a bit each.
+//! Active masks of a bundle's rays, a bit each.
 //!
 //! In: masks by group. Out: the rays of a beam, taken apart and counted without lanes.
 
@@ -8,7 +8,7 @@ const bundle_file = @import("../bundle.zig");
 /// A bit for each pixel of each subtile.
 pub const Members = [kernel_file.beam_subtiles]u16;
 
-/// How many rays a set has.
+/// How many rays a mask has.
 pub fn count(members: *const Members) u32 {
     return @popCount(@as(@Int(.unsigned, kernel_file.beam_pixels), @bitCast(members.*)));
 }
@@ -28,7 +28,7 @@ pub inline fn setGroup(comptime Kernel: type, members: *Members, group: usize, b
     members[group / Kernel.subtile_groups] |= @as(u16, @truncate(bits)) << shift;
 }
 
-/// A group's part of a set.
+/// A group's part of a mask.
 pub inline fn groupOf(
     comptime Kernel: type,
     members: *const Members,
@@ -39,7 +39,7 @@ pub inline fn groupOf(
     return .fromBits(members[group / Kernel.subtile_groups] >> shift & all);
 }
 
-/// Takes the rays of one set out of another and returns those that were in both.
+/// Takes the rays of one mask out of another and returns those that were in both.
 pub fn split(from: *Members, part: *const Members) Members {
     var both = part.*;
     for (&both, from) |*one, *rest| {

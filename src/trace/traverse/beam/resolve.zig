@@ -1,4 +1,4 @@
-//! What a beam of rays has found, exactly: t of every hit.
+//! Resolution of a beam's hits, exactly: t of what each ray has found.
 //!
 //! In: a triangle's slot for each ray. Out: hits in the bundle, by the expressions of triangle.zig,
 //! bit for bit. Rays of a beam mostly have the same longest axis and the same signs, and neighbours

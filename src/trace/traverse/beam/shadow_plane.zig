@@ -1,4 +1,4 @@
-//! Shadow rays of one light on a plane across its way: which plane, where on it, in which axes.
+//! Projection of one light's shadow rays onto a plane across its way: which, where, in which axes.
 //!
 //! In: a light and a set of a bundle's rays. Out: by pixel the place of each on the plane and how
 //! near to the light it is; bounds of subtiles and of all, in the axes of a parallelogram, since a
