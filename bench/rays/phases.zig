@@ -13,7 +13,7 @@ pub const Phase = enum {
     other,
     /// Primary rays' directions.
     generation,
-    /// Primary rays, with exact t, u and v of the nearest hit.
+    /// Primary rays, with exact t, u and v of the closest hit.
     primary,
     /// Points, normals, brightness and shadow rays of primary hits; the pixels.
     shading,

@@ -25,7 +25,7 @@ pub fn Tracer(comptime Kernel: type) type {
         tests: raylane.statistics.TestCounts = .{},
         const Self = @This();
 
-        /// Nearest hits of rays from the eye, one through each pixel of a tile, all active.
+        /// Closest hits of rays from the eye, one through each pixel of a tile, all active.
         pub fn primary(tracer: *Self, batch: *Batch, grid: *const Grid) void {
             tracer.nearest(batch, grid);
         }
@@ -45,7 +45,7 @@ pub fn Tracer(comptime Kernel: type) type {
             }
         }
 
-        /// Nearest hits of rays of which nothing is known.
+        /// Closest hits of rays of which nothing is known.
         pub fn reflect(tracer: *Self, batch: *Batch) void {
             tracer.nearest(batch, null);
         }
@@ -74,7 +74,7 @@ pub fn Tracer(comptime Kernel: type) type {
             }
         }
 
-        /// Barycentric weights of the nearest hits, by the edge functions that decided them.
+        /// Barycentric weights of the closest hits, by the edge functions that decided them.
         fn weighHits(tracer: *const Self, batch: *Batch) void {
             var hits: [Batch.group_count]Lanes.Mask = undefined;
             for (&hits, &batch.groups) |*hit, *group| {

@@ -74,7 +74,7 @@ const ChunkResult = struct {
     centroid_bounds: Box3 = .empty,
 };
 
-/// Flattens the whole scene. `maps` holds a world map for each node. The surface's arrays come from
+/// Flattens the whole scene. `maps` holds a world map for each node. The soup's arrays come from
 /// `arena`, what is needed meanwhile from `gpa`.
 pub fn flatten(
     gpa: std.mem.Allocator,

@@ -1,6 +1,6 @@
 //! Packet traversal (Wald et al. 2001): a box or a triangle against all rays of a group at once.
 //!
-//! In: a group, such as the thesis's packet of 2x2 pixels. Out: the nearest hit of every ray, or
+//! In: a group, such as the thesis's packet of 2x2 pixels. Out: the closest hit of every ray, or
 //! whether there is any. A child is visited when some ray enters it. Holds also what a bundle is,
 //! and the tests of a group that other traversals share.
 

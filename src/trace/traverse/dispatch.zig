@@ -17,7 +17,7 @@ const Query = @import("walk.zig").Query;
 /// Whether a bundle's rays hit what is near to each other, as those of a beam do.
 pub const Coherence = enum { none, all };
 
-/// Finds the nearest hits of all active rays. With a grid, rays start at its origin along its
+/// Finds the closest hits of all active rays. With a grid, rays start at its origin along its
 /// directions, leave nothing out and have no limit; else nothing is known of them. Returns whether
 /// they went as a beam.
 pub fn closestHit(

@@ -1,7 +1,7 @@
 //! Rays in lanes, and the total order of hits (t, primitive) that decides which one is closest.
 //!
 //! A hit is the pair (t, primitive number), ordered by t and at equal t by the number. A ray
-//! accepts hits strictly between `tnear` and `closest` in this order, so the nearest hit is
+//! accepts hits strictly between `tnear` and `closest` in this order, so the closest hit is
 //! the same in whatever order triangles are tested, and a ray goes on behind a hole or a blended
 //! surface by raising `tnear` to the hit just found, without moving its origin.
 

@@ -1,6 +1,6 @@
 //! A ray made ready for traversal: slab and triangle tests in the lanes of the wide BVH.
 //!
-//! In: a ray of a group. Out: which children it enters; its nearest hit. It is kept as plain
+//! In: a ray of a group. Out: which children it enters; its closest hit. It is kept as plain
 //! numbers: little is copied to make it, and a load puts a number into all lanes where a test wants
 //! it. Which hit wins does not depend on the order of the tests (ray.zig), nor does culling change
 //! it (box.zig; world/padding.zig for the rounding of multiply-adds).
@@ -13,7 +13,7 @@ const bundle_file = @import("bundle.zig");
 const triangle = @import("triangle.zig");
 const walk = @import("walk.zig");
 
-/// A ray and the nearest hit so far.
+/// A ray and the closest hit so far.
 pub fn TraversalRay(comptime Kernel: type) type {
     const Boxes = Kernel.Boxes;
     const F32 = Boxes.F32;
@@ -38,7 +38,7 @@ pub fn TraversalRay(comptime Kernel: type) type {
         tnear_t: f32,
         tnear_primitive: i32,
         skip: i32,
-        /// t of the nearest hit so far, or what is the limit without any.
+        /// t of the closest hit so far, or what is the limit without any.
         limit: f32,
         closest_primitive: i32,
 
@@ -216,7 +216,7 @@ pub fn TraversalRay(comptime Kernel: type) type {
             return hits.mask.any();
         }
 
-        /// Tests the triangles of a pack and keeps the nearest hit. Returns whether there was one.
+        /// Tests the triangles of a pack and keeps the closest hit. Returns whether there was one.
         pub inline fn intersect(
             ray: *Self,
             pack: *const Pack,
