@@ -105,6 +105,7 @@ fn expectBounds(
     at: [2]f32,
     near: struct { base: f32 = 0, by_t: f32 = 0, by_inverse: f32 = 0 },
 ) !void {
+    @setEvalBranchQuota(4000); // For what is inlined here.
     const corners = inLanes(triangles);
     const shown = projection.project(Four, corners);
     const nearness = projection.nearness(Four, &shown.facet);
@@ -223,6 +224,7 @@ fn expectWindows(
     line: ray_file.Line(Four),
     at: [2]f32,
 ) !u32 {
+    @setEvalBranchQuota(4000); // For what is inlined here.
     const corners = inLanes(triangles);
     const facet = projection.project(Four, corners).facet;
     const window, const seen = beam.pixel_window.Dual.of(grid).windowOf(Four, corners, &facet);

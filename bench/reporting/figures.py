@@ -16,8 +16,11 @@ from PIL import Image  # noqa: E402
 
 from . import samples  # noqa: E402
 
-COLOURS = {"single": "#E69F00", "packet2x2": "#56B4E9", "packet": "#0072B2"}
-NAMES = {"single": "single rays", "packet2x2": "2x2 packets", "packet": "beams and companies"}
+COLOURS = {"single": "#E69F00", "packet2x2": "#56B4E9", "beam": "#0072B2"}
+NAMES = {"single": "single rays", "packet2x2": "2x2 packets", "beam": "beams"}
+# Beams in older files.
+COLOURS["packet"] = COLOURS["beam"]
+NAMES["packet"] = NAMES["beam"]
 LINES = ["#D55E00", "#0072B2", "#009E73", "#CC79A7"]
 
 STYLE = {

@@ -192,7 +192,7 @@ def write(runs, figures, folder_name, suffix):
              "</code>. Numbers are means with half the width of their 95 % confidence intervals; "
              "numbers of figures and tables are the thesis's. Its scenes cannot be shipped: "
              "atrium stands for Sponza, nave for Sibenik, handles for YeahRight. Its packets are "
-             "<code>packet2x2</code>; <code>packet</code> is the widest bundle here.</p>"]
+             "<code>packet2x2</code>; <code>beam</code> is the widest bundle here.</p>"]
     for run in runs:
         parts.append(f"<h2>{text(run['machine']['processor'])}</h2>")
         parts += [about(run), summary_beside_thesis(run), beside_thesis(run)]

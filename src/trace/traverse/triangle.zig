@@ -300,6 +300,7 @@ pub inline fn intersect(
     line: ray_file.Line(Lanes),
     padding: *const Padding,
 ) WeightedIntersection(Lanes) {
+    @setEvalBranchQuota(4000); // For what is inlined here.
     const axis: ray_file.LongAxis(Lanes) = .of(line.direction);
     const view: ShearedRay(Lanes) = .init(line, axis, padding);
     const turned: [3]Lanes.Vec3 = .{
