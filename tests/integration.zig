@@ -4,6 +4,7 @@
 //! Pictures are decoded by stb_image, which is not what wrote them.
 
 const std = @import("std");
+const builtin = @import("builtin");
 const testing = std.testing;
 const stb_image = @import("stb_image.zig");
 
@@ -15,9 +16,14 @@ test {
     _ = @import("pbrt.zig");
     _ = @import("samples.zig");
     _ = @import("beams.zig");
-    _ = @import("bounds.zig");
     _ = @import("soup.zig");
     _ = @import("variants.zig");
+}
+
+test "bounds of beams against 128-bit floats" {
+    // LLVM refuses what Zig makes of vectors of them for this processor.
+    if (builtin.cpu.arch == .arm) return error.SkipZigTest;
+    _ = @import("bounds.zig");
 }
 
 test "the decoder of pictures decodes a PNG, and no format that it is not asked for" {
