@@ -9,9 +9,7 @@ const bench = @import("cli/bench.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
 const settings = @import("settings.zig");
-const Arguments = arguments_file.Arguments;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
-const Flag = arguments_file.Flag;
 const Section = arguments_file.Section;
 const comptimePrint = std.fmt.comptimePrint;
 const integer = arguments_file.integer;
@@ -94,59 +92,25 @@ pub fn outputName(
     return gpa.print("{s}.{t}", .{ std.fs.path.stem(path), options.write.format });
 }
 
-const Id = enum {
-    allow_outside,
-    ambient,
-    background,
-    bvh,
-    camera,
-    count_tests,
-    depth,
-    exposure,
-    format,
-    help,
-    jpeg_quality,
-    licenses,
-    list_variants,
-    max_memory,
-    output,
-    quiet,
-    resolution,
-    spp,
-    stats,
-    tessellation,
-    thesis,
-    threads,
-    tile_size,
-    tonemap,
-    variant,
-    verbose,
-    version,
-};
-
-const sections: []const Section(Id) = &.{
+const sections: []const Section = &.{
     .{ .title = "Image", .flags = &.{
         .{
-            .id = .output,
             .long = "--output",
             .short = 'o',
             .value = "FILE",
             .help = "name ending in a format; - is standard output",
         },
         .{
-            .id = .format,
             .long = "--format",
             .value = "FORMAT",
             .help = "png, jpg, tga, bmp or ppm, or linear: hdr or pfm",
         },
         .{
-            .id = .jpeg_quality,
             .long = "--jpeg-quality",
             .value = "N",
             .help = settings.jpeg_quality.textWithDefault(),
         },
         .{
-            .id = .resolution,
             .long = "--resolution",
             .short = 'r',
             .value = "WxH",
@@ -154,7 +118,6 @@ const sections: []const Section(Id) = &.{
                 "the long side, in the camera's aspect)", .{settings.side.default}),
         },
         .{
-            .id = .exposure,
             .long = "--exposure",
             .value = "EV|auto",
             .help = comptimePrint("brighten by EV stops, or so that {d} % of the pixels\n" ++
@@ -163,13 +126,11 @@ const sections: []const Section(Id) = &.{
             }),
         },
         .{
-            .id = .tonemap,
             .long = "--tonemap",
             .value = "linear",
             .help = "clamp, then encode as sRGB: the only way there is",
         },
         .{
-            .id = .background,
             .long = "--background",
             .value = "COLOR",
             .help = "transparent, #rrggbb (sRGB) or R,G,B (linear)",
@@ -177,40 +138,34 @@ const sections: []const Section(Id) = &.{
     } },
     .{ .title = "Scene", .flags = &.{
         .{
-            .id = .camera,
             .long = "--camera",
             .value = "WHICH",
             .help = "name or index of a camera, or auto: all in view",
         },
         .{
-            .id = .ambient,
             .long = "--ambient",
             .value = "L",
             .help = comptimePrint("radiance from all sides (default: {d} for scenes\n" ++
                 "without lights, otherwise 0)", .{settings.ambient_default}),
         },
         .{
-            .id = .tessellation,
             .long = "--tessellation",
             .value = "N",
             .help = "straight pieces of a circle in curved PBRT shapes,\n" ++
                 settings.tessellation.textWithDefault(),
         },
         .{
-            .id = .allow_outside,
             .long = "--allow-outside",
             .help = "let the scene name files outside of its own folder",
         },
     } },
     .{ .title = "Rendering (PBRT scenes bring their own spp and depth)", .flags = &.{
         .{
-            .id = .spp,
             .long = "--spp",
             .value = "N",
             .help = "samples a pixel, " ++ settings.sample_count.textWithDefault(),
         },
         .{
-            .id = .depth,
             .long = "--depth",
             .value = "N",
             .help = comptimePrint("reflections and refractions in a row, {s}\n(default: {d})", .{
@@ -218,7 +173,6 @@ const sections: []const Section(Id) = &.{
             }),
         },
         .{
-            .id = .thesis,
             .long = "--thesis",
             .help = comptimePrint("{d}x{d}, {d} sample, depth {d}, all CPUs; what follows\n" ++
                 "it still counts", .{
@@ -227,14 +181,12 @@ const sections: []const Section(Id) = &.{
             }),
         },
         .{
-            .id = .threads,
             .long = "--threads",
             .short = 't',
             .value = "N",
             .help = settings.thread_count.text() ++ " (default: as many as CPUs)",
         },
         .{
-            .id = .tile_size,
             .long = "--tile-size",
             .value = "N",
             .help = comptimePrint("pixels on the side of a piece of work, {s} in\n" ++
@@ -244,25 +196,21 @@ const sections: []const Section(Id) = &.{
             }),
         },
         .{
-            .id = .bvh,
             .long = "--bvh",
             .value = "QUALITY",
             .help = namesOf(settings.TreeQuality) ++ ": time to build the scene's tree\n" ++
                 "against time to trace; the image is always the same",
         },
         .{
-            .id = .variant,
             .long = "--variant",
             .value = "NAME",
             .help = "how rays are traced; the image is always the same",
         },
         .{
-            .id = .list_variants,
             .long = "--list-variants",
             .help = "print the names of the variants, the default first",
         },
         .{
-            .id = .max_memory,
             .long = "--max-memory",
             .value = "SIZE",
             .help = "512M or 2G, say; an error where more is needed",
@@ -270,7 +218,6 @@ const sections: []const Section(Id) = &.{
     } },
     .{ .title = "Messages", .flags = &.{
         .{
-            .id = .stats,
             .long = "--stats",
             .value = "FORM",
             .help = "report as " ++ namesOf(Stats) ++ " (default: text, or none\n" ++
@@ -278,33 +225,22 @@ const sections: []const Section(Id) = &.{
                 "given, a report that cannot be printed is an error",
         },
         .{
-            .id = .count_tests,
             .long = "--count-tests",
             .help = "count intersection tests, in a second, untimed pass",
         },
         .{
-            .id = .quiet,
             .long = "--quiet",
             .short = 'q',
             .help = "no warnings, no progress, no report but by --stats",
         },
-        .{
-            .id = .verbose,
-            .long = "--verbose",
-            .short = 'v',
-            .help = "say what was chosen by default",
-        },
-        .{ .id = .help, .long = "--help", .short = 'h', .help = "print this" },
-        .{ .id = .version, .long = "--version", .help = "print the version" },
-        .{
-            .id = .licenses,
-            .long = "--licenses",
-            .help = "print the licence, and those of the libraries used",
-        },
+        .{ .long = "--verbose", .short = 'v', .help = "say what was chosen by default" },
+        .{ .long = "--help", .short = 'h', .help = "print this" },
+        .{ .long = "--version", .help = "print the version" },
+        .{ .long = "--licenses", .help = "print the licence, and those of the libraries used" },
     } },
 };
 
-const flags = arguments_file.flagsOf(Id, sections);
+const Reader = arguments_file.Arguments(sections);
 
 /// What `--help` prints.
 pub const help: []const u8 = "raylane " ++ version ++
@@ -318,7 +254,7 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\working directory under the scene's name, as a whole or not at all; a report
     \\goes to standard output.
     \\
-++ arguments_file.helpOf(Id, sections) ++
+++ arguments_file.helpOf(sections) ++
     \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
     \\supported, 128 + N ended by signal N.
@@ -350,8 +286,6 @@ pub fn parse(
     return parser.run();
 }
 
-const Reader = Arguments(Id, flags);
-
 const Parser = struct {
     reader: Reader,
     variant_names: []const []const u8,
@@ -366,7 +300,7 @@ const Parser = struct {
         const reader = &parser.reader;
         var command_seen = false;
         while (try reader.next()) |argument| switch (argument) {
-            .flag => |flag| try parser.set(flag.flag, flag.value),
+            .flag => |flag| try parser.set(flag),
             .word => |word| {
                 const is_command = std.mem.eql(u8, word, "render") and !reader.flags_ended and
                     !command_seen and parser.scene == null;
@@ -389,61 +323,52 @@ const Parser = struct {
         parser.scene = argument;
     }
 
-    fn set(parser: *Parser, flag: Flag(Id), value: []const u8) Error!void {
+    fn set(parser: *Parser, given: Reader.Given) Error!void {
         const options = &parser.options;
         const reader = &parser.reader;
-        switch (flag.id) {
-            .output => options.output = try reader.text(flag, value, "a file name or -"),
-            .format => parser.format = formatOf(value) orelse
-                return reader.bad(flag, value, comptime namesOf(settings.Format)),
+        switch (given.id) {
+            .output => options.output = try reader.text(given, "a file name or -"),
+            .format => parser.format = formatOf(given.value) orelse
+                return reader.bad(given, comptime namesOf(settings.Format)),
             .jpeg_quality => {
-                options.write.jpeg_quality =
-                    try reader.number(flag, value, settings.jpeg_quality);
+                options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
             },
-            .max_memory => options.memory_max = bytesOf(value) orelse
-                return reader.bad(flag, value, "a size such as 512M or 2G"),
-            .resolution => options.view.resolution = resolutionOf(value) orelse
-                return reader.bad(flag, value, expected_resolution),
-            .threads => {
-                options.thread_count = try reader.number(flag, value, settings.thread_count);
-            },
-            .spp => {
-                options.render.sample_count =
-                    try reader.number(flag, value, settings.sample_count);
-            },
-            .depth => options.render.depth = try reader.number(flag, value, settings.depth),
-            .tile_size => options.render.tile_size = tileSizeOf(value) orelse
-                return reader.bad(flag, value, comptimePrint("{s}, a multiple of {d}", .{
+            .max_memory => options.memory_max = bytesOf(given.value) orelse
+                return reader.bad(given, "a size such as 512M or 2G"),
+            .resolution => options.view.resolution = resolutionOf(given.value) orelse
+                return reader.bad(given, expected_resolution),
+            .threads => options.thread_count = try reader.number(given, settings.thread_count),
+            .spp => options.render.sample_count = try reader.number(given, settings.sample_count),
+            .depth => options.render.depth = try reader.number(given, settings.depth),
+            .tile_size => options.render.tile_size = tileSizeOf(given.value) orelse
+                return reader.bad(given, comptimePrint("{s}, a multiple of {d}", .{
                     settings.tile_size.text(), settings.tile_size_step,
                 })),
-            .camera => options.view.camera = cameraOf(value) orelse
-                return reader.bad(flag, value, "a camera's name, its index, or auto"),
-            .background => options.view.background = backgroundOf(value) orelse
-                return reader.bad(flag, value, "transparent, #rrggbb, or R,G,B of 0 or more"),
-            .ambient => options.view.ambient = radiance(value) orelse
-                return reader.bad(flag, value, "a number of 0 or more"),
-            .exposure => options.write.exposure = exposureOf(value) orelse
-                return reader.bad(flag, value, comptimePrint("-{d} to {d}, or auto", .{
+            .camera => options.view.camera = cameraOf(given.value) orelse
+                return reader.bad(given, "a camera's name, its index, or auto"),
+            .background => options.view.background = backgroundOf(given.value) orelse
+                return reader.bad(given, "transparent, #rrggbb, or R,G,B of 0 or more"),
+            .ambient => options.view.ambient = radiance(given.value) orelse
+                return reader.bad(given, "a number of 0 or more"),
+            .exposure => options.write.exposure = exposureOf(given.value) orelse
+                return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
                     settings.exposure_ev_max, settings.exposure_ev_max,
                 })),
-            .tonemap => if (!std.mem.eql(u8, value, "linear")) {
-                return reader.bad(flag, value, "linear");
+            .tonemap => if (!std.mem.eql(u8, given.value, "linear")) {
+                return reader.bad(given, "linear");
             },
-            .stats => options.stats = try reader.choice(flag, value, Stats),
+            .stats => options.stats = try reader.choice(given, Stats),
             .thesis => {
                 options.view.resolution = settings.thesis.resolution;
                 options.render.sample_count = settings.thesis.sample_count;
                 options.render.depth = settings.thesis.depth;
                 options.thread_count = null;
             },
-            .bvh => {
-                options.tree_quality = try reader.choice(flag, value, settings.TreeQuality);
-            },
-            .variant => options.render.variant = try parser.variantOf(value),
+            .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
+            .variant => options.render.variant = try parser.variantOf(given.value),
             .count_tests => options.count_tests = true,
             .tessellation => {
-                options.load.tessellation =
-                    try reader.number(flag, value, settings.tessellation);
+                options.load.tessellation = try reader.number(given, settings.tessellation);
             },
             .allow_outside => options.load.allow_outside = true,
             .quiet => options.quiet = true,
@@ -639,10 +564,10 @@ test "a long option takes its value joined or apart, a short one also attached" 
         const options = try optionsForTest(spelling);
         try std.testing.expectEqual([2]u32{ 3, 4 }, options.view.resolution.?);
     }
-    inline for (flags) |flag| {
+    inline for (Reader.flags) |flag| {
         const argument = flag.long ++ if (flag.value.len > 0) "" else "=1";
         const needle = "'" ++ flag.long ++ if (flag.value.len > 0) "' needs a" else "' takes no";
-        if (flag.id != .help) try expectUsage(needle ++ " value", &.{ "s", argument });
+        if (flag.short != 'h') try expectUsage(needle ++ " value", &.{ "s", argument });
     }
     try expectUsage("'-t' needs a value", &.{ "s", "-t" });
     try expectUsage("'--threads': '' is not 1 to 256", &.{ "s", "--threads=" });

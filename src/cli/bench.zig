@@ -5,9 +5,7 @@ const arguments_file = @import("arguments.zig");
 const cli = @import("../cli.zig");
 const settings = @import("../settings.zig");
 const variant = @import("../variant.zig");
-const Arguments = arguments_file.Arguments;
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
-const Flag = arguments_file.Flag;
 const Range = settings.Range;
 const Section = arguments_file.Section;
 const comptimePrint = std.fmt.comptimePrint;
@@ -50,28 +48,9 @@ pub const Bench = struct {
     }
 };
 
-const Id = enum {
-    allow_outside,
-    bvh,
-    depth,
-    energy_command,
-    energy_root,
-    help,
-    json,
-    no_energy,
-    quiet,
-    resolution,
-    rounds,
-    spp,
-    threads,
-    time_limit,
-    variants,
-};
-
-const sections: []const Section(Id) = &.{
+const sections: []const Section = &.{
     .{ .title = "Settings: those of the thesis unless changed", .flags = &.{
         .{
-            .id = .resolution,
             .long = "--resolution",
             .short = 'r',
             .value = "WxH",
@@ -80,7 +59,6 @@ const sections: []const Section(Id) = &.{
             }),
         },
         .{
-            .id = .spp,
             .long = "--spp",
             .value = "N",
             .help = comptimePrint("samples a pixel (default: {d})", .{
@@ -88,7 +66,6 @@ const sections: []const Section(Id) = &.{
             }),
         },
         .{
-            .id = .depth,
             .long = "--depth",
             .value = "N",
             .help = comptimePrint("reflections and refractions in a row (default: {d})", .{
@@ -96,20 +73,17 @@ const sections: []const Section(Id) = &.{
             }),
         },
         .{
-            .id = .threads,
             .long = "--threads",
             .short = 't',
             .value = "N",
             .help = "threads (default: as many as CPUs)",
         },
         .{
-            .id = .bvh,
             .long = "--bvh",
             .value = "QUALITY",
             .help = arguments_file.namesOf(settings.TreeQuality),
         },
         .{
-            .id = .variants,
             .long = "--variants",
             .value = "PARTS",
             .help = "only variants whose names contain one of these, for\n" ++
@@ -118,14 +92,12 @@ const sections: []const Section(Id) = &.{
     } },
     .{ .title = "Measurement", .flags = &.{
         .{
-            .id = .rounds,
             .long = "--rounds",
             .value = "N",
             .help = "so many rounds, no less and no more, unless the time\n" ++
                 "is over; two are the least",
         },
         .{
-            .id = .time_limit,
             .long = "--time-limit",
             .value = "S",
             .help = comptimePrint("seconds for all scenes together (default: {d})", .{
@@ -133,7 +105,6 @@ const sections: []const Section(Id) = &.{
             }),
         },
         .{
-            .id = .energy_command,
             .long = "--energy-command",
             .value = "CMD",
             .help = "a shell command that prints, each time it is run, the\n" ++
@@ -141,31 +112,28 @@ const sections: []const Section(Id) = &.{
                 "energy (17.5 J, 17500 mJ)",
         },
         .{
-            .id = .energy_root,
             .long = "--energy-root",
             .value = "DIR",
             .help = "look for sensors there in place of /sys",
         },
-        .{ .id = .no_energy, .long = "--no-energy", .help = "do not measure energy" },
+        .{ .long = "--no-energy", .help = "do not measure energy" },
     } },
     .{ .title = "Output", .flags = &.{
         .{
-            .id = .json,
             .long = "--json",
             .value = "FILE",
             .help = "all samples, for bench/report.py; - is stdout",
         },
         .{
-            .id = .allow_outside,
             .long = "--allow-outside",
             .help = "let scenes name files outside of their own folders",
         },
-        .{ .id = .quiet, .long = "--quiet", .short = 'q', .help = "no warnings, no progress" },
-        .{ .id = .help, .long = "--help", .short = 'h', .help = "print this" },
+        .{ .long = "--quiet", .short = 'q', .help = "no warnings, no progress" },
+        .{ .long = "--help", .short = 'h', .help = "print this" },
     } },
 };
 
-const flags = arguments_file.flagsOf(Id, sections);
+const Reader = arguments_file.Arguments(sections);
 
 /// What `raylane bench --help` prints.
 pub const help: []const u8 = "raylane " ++ cli.version ++
@@ -178,7 +146,7 @@ pub const help: []const u8 = "raylane " ++ cli.version ++
     \\time is over; prints the tables. No image is written. SCENE is as for rendering;
     \\without one: the built-in scenes cornell, atrium, nave and handles.
     \\
-++ arguments_file.helpOf(Id, sections) ++
+++ arguments_file.helpOf(sections) ++
     \\
     \\Exit status: as of raylane, and 4 where a variant renders another image than
     \\the others.
@@ -187,7 +155,7 @@ pub const help: []const u8 = "raylane " ++ cli.version ++
 
 /// Reads the arguments after `bench`.
 pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error!Bench {
-    var reader: Arguments(Id, flags) = .{
+    var reader: Reader = .{
         .arguments = arguments,
         .diagnostic = diagnostic,
         .help = "raylane bench --help",
@@ -201,7 +169,7 @@ pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error
             bench.scenes[bench.scene_count] = scene;
             bench.scene_count += 1;
         },
-        .flag => |flag| try set(&reader, &bench, flag.flag, flag.value),
+        .flag => |flag| try set(&reader, &bench, flag),
     };
     if (!bench.energy and bench.energy_command != null)
         return reader.fail("'--no-energy' contradicts '--energy-command'", .{});
@@ -209,29 +177,26 @@ pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error
 }
 
 fn set(
-    reader: *const Arguments(Id, flags),
+    reader: *const Reader,
     bench: *Bench,
-    flag: Flag(Id),
-    value: []const u8,
+    given: Reader.Given,
 ) cli.Error!void {
-    switch (flag.id) {
-        .resolution => bench.resolution = cli.resolutionOf(value) orelse
-            return reader.bad(flag, value, cli.expected_resolution),
-        .threads => {
-            bench.thread_count = try reader.number(flag, value, settings.thread_count);
-        },
-        .spp => bench.sample_count = try reader.number(flag, value, settings.sample_count),
-        .depth => bench.depth = try reader.number(flag, value, settings.depth),
-        .bvh => bench.tree_quality = try reader.choice(flag, value, settings.TreeQuality),
+    switch (given.id) {
+        .resolution => bench.resolution = cli.resolutionOf(given.value) orelse
+            return reader.bad(given, cli.expected_resolution),
+        .threads => bench.thread_count = try reader.number(given, settings.thread_count),
+        .spp => bench.sample_count = try reader.number(given, settings.sample_count),
+        .depth => bench.depth = try reader.number(given, settings.depth),
+        .bvh => bench.tree_quality = try reader.choice(given, settings.TreeQuality),
         .variants => {
-            if (!isList(value)) return reader.bad(flag, value, "parts of names, with commas");
-            bench.variants = value;
+            if (!isList(given.value)) return reader.bad(given, "parts of names, with commas");
+            bench.variants = given.value;
         },
-        .rounds => bench.round_count = try reader.number(flag, value, rounds),
-        .time_limit => bench.time_s = try reader.number(flag, value, time_s),
-        .json => bench.json = try reader.text(flag, value, "a name"),
-        .energy_root => bench.energy_root = try reader.text(flag, value, "a name"),
-        .energy_command => bench.energy_command = try reader.text(flag, value, "a name"),
+        .rounds => bench.round_count = try reader.number(given, rounds),
+        .time_limit => bench.time_s = try reader.number(given, time_s),
+        .json => bench.json = try reader.text(given, "a name"),
+        .energy_root => bench.energy_root = try reader.text(given, "a name"),
+        .energy_command => bench.energy_command = try reader.text(given, "a name"),
         .no_energy => bench.energy = false,
         .allow_outside => bench.allow_outside = true,
         .quiet => bench.quiet = true,
