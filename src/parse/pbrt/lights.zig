@@ -47,14 +47,7 @@ pub const Source = struct {
     position: usize,
 
     fn color(source: *const Source, name: []const u8) Error!Vec3 {
-        const rgb = try source.colors.rgb(source.parameters, name, .{ 1, 1, 1 });
-        const scale = try source.colors.rgb(source.parameters, "scale", .{ 1, 1, 1 });
-        var result: Vec3 = undefined;
-        for (&result, rgb, scale) |*to, a, b| {
-            const product = a * b;
-            to.* = if (product > 0) @min(product, std.math.floatMax(f32)) else 0;
-        }
-        return result;
+        return scaledColor(source.colors, source.parameters, name, std.math.floatMax(f32));
     }
 
     fn point(source: *const Source, name: []const u8, default: Vec3) Vector {
@@ -72,17 +65,26 @@ pub const Source = struct {
     }
 };
 
+/// The colour `name` times the one of "scale", each component from 0 to `largest`.
+pub fn scaledColor(
+    colors: *Colors,
+    parameters: *const Parameters,
+    name: []const u8,
+    largest: f32,
+) Error!Vec3 {
+    const rgb = try colors.rgb(parameters, name, .{ 1, 1, 1 });
+    const scale = try colors.rgb(parameters, "scale", .{ 1, 1, 1 });
+    var result: Vec3 = undefined;
+    for (&result, rgb, scale) |*to, a, b| {
+        const product = a * b;
+        to.* = if (product > 0) @min(product, largest) else 0;
+    }
+    return result;
+}
+
 /// `LightSource "name" ...`.
 pub fn add(source: *const Source, name: []const u8) Error!void {
-    const Kind = enum {
-        point,
-        spot,
-        distant,
-        goniometric,
-        projection,
-        infinite,
-        exinfinite,
-    };
+    const Kind = enum { point, spot, distant, goniometric, projection, infinite, exinfinite };
     const builder = source.builder;
     const kind = std.meta.stringToEnum(Kind, name) orelse
         return source.note(name, "is not supported and left out");

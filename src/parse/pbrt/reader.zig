@@ -47,19 +47,7 @@ const Graphics = struct {
 const AreaLight = struct { radiance: Vec3, two_sided: bool };
 
 const Kept = struct {
-    const Kind = enum {
-        attribute,
-        transform,
-        object,
-
-        fn name(kind: Kind) []const u8 {
-            return switch (kind) {
-                .attribute => "Attribute",
-                .transform => "Transform",
-                .object => "Object",
-            };
-        }
-    };
+    const Kind = enum { Attribute, Transform, Object };
 
     kind: Kind,
     graphics: Graphics,
@@ -250,10 +238,10 @@ fn perform(reader: *Reader, directive: Directive, position: usize) Error!void {
         .ActiveTransform => try reader.activeTransform(),
         .TransformTimes => _ = try reader.numbers(2),
         .ReverseOrientation => graphics.reverse = !graphics.reverse,
-        .AttributeBegin => try reader.begin(.attribute, position),
-        .TransformBegin => try reader.begin(.transform, position),
-        .AttributeEnd => try reader.end(.attribute, position),
-        .TransformEnd => try reader.end(.transform, position),
+        .AttributeBegin => try reader.begin(.Attribute, position),
+        .TransformBegin => try reader.begin(.Transform, position),
+        .AttributeEnd => try reader.end(.Attribute, position),
+        .TransformEnd => try reader.end(.Transform, position),
         .ObjectBegin => try reader.objectBegin(position),
         .ObjectEnd => try reader.objectEnd(position),
         .ObjectInstance => try reader.objectInstance(position),
@@ -431,14 +419,14 @@ fn begin(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
 
 fn end(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
     const kept = reader.stack.getLastOrNull() orelse
-        return reader.input.fail(position, "{s}End without {0s}Begin", .{kind.name()});
+        return reader.input.fail(position, "{t}End without {0t}Begin", .{kind});
     if (kept.kind != kind) return reader.input.fail(
         position,
-        "{s}End, but {s}Begin came last",
-        .{ kind.name(), kept.kind.name() },
+        "{t}End, but {t}Begin came last",
+        .{ kind, kept.kind },
     );
     _ = reader.stack.pop();
-    if (kind == .transform) {
+    if (kind == .Transform) {
         reader.graphics.transform = kept.graphics.transform;
         reader.graphics.at_start = kept.graphics.at_start;
     } else reader.graphics = kept.graphics;
@@ -448,7 +436,7 @@ fn objectBegin(reader: *Reader, position: usize) Error!void {
     const name = try reader.text();
     if (reader.object != null)
         return reader.input.fail(position, "an object within an object", .{});
-    try reader.begin(.object, position);
+    try reader.begin(.Object, position);
     reader.object = .{
         .name = try reader.arena.dupe(u8, name),
         .first = reader.builder.parts.items.len,
@@ -458,7 +446,7 @@ fn objectBegin(reader: *Reader, position: usize) Error!void {
 fn objectEnd(reader: *Reader, position: usize) Error!void {
     const object = reader.object orelse
         return reader.input.fail(position, "no object has begun", .{});
-    try reader.end(.object, position);
+    try reader.end(.Object, position);
     reader.object = null;
     try reader.keep(SceneBuilder.Object, &reader.objects, object.name, .{
         .first = object.first,
@@ -578,15 +566,10 @@ fn namedMaterial(reader: *Reader, position: usize) Error!void {
 
 fn areaLightSource(reader: *Reader) Error!void {
     const parameters = &reader.parameters;
-    const color = try reader.colors.rgb(parameters, "L", .{ 1, 1, 1 });
-    const scale = try reader.colors.rgb(parameters, "scale", .{ 1, 1, 1 });
-    var radiance: Vec3 = undefined;
-    for (&radiance, color, scale) |*to, a, b| {
-        const product = a * b;
-        to.* = if (product > 0) @min(product, 1e30) else 0;
-    }
-    const two_sided = parameters.boolean("twosided", false);
-    reader.graphics.area_light = .{ .radiance = radiance, .two_sided = two_sided };
+    reader.graphics.area_light = .{
+        .radiance = try lights.scaledColor(&reader.colors, parameters, "L", 1e30),
+        .two_sided = parameters.boolean("twosided", false),
+    };
 }
 
 fn materialIndex(reader: *Reader) Allocator.Error!u32 {
