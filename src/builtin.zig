@@ -46,8 +46,7 @@ pub fn build(gpa: Allocator, name: []const u8, diagnostic: *Diagnostic) Error!Sc
         for (names[1..]) |other| list = list ++ ", " ++ other;
         break :blk list;
     };
-    return diagnostic.fail(
-        error.InvalidInput,
+    return diagnostic.invalid(
         "no built-in scene is called {f}; there are: {s}",
         .{ diagnostic_data.quote(name), known },
     );

@@ -136,7 +136,7 @@ pub fn fail(
     arguments: anytype,
 ) error{InvalidInput} {
     input.locate(position);
-    return input.diagnostic.fail(error.InvalidInput, format, arguments);
+    return input.diagnostic.invalid(format, arguments);
 }
 
 /// Makes the diagnostic name `position` of the top text.
