@@ -179,8 +179,7 @@ fn turn(
     crease_cos: f64,
 ) Allocator.Error!void {
     assert(columns >= 3);
-    const points = &(try builder.scratchSpace()).points;
-    assert(outline.len * columns <= points.len);
+    const points = try builder.patchPoints(outline.len, columns);
     for (outline, 0..) |outline_point, row| {
         for (0..columns) |column| {
             const azimuth_rad = 2 * std.math.pi * (ratio(column, columns) + phase_turns);
@@ -192,7 +191,7 @@ fn turn(
         }
     }
     try builder.patch(.{
-        .points = points[0 .. outline.len * columns],
+        .points = points,
         .columns = columns,
         .closed = true,
         .crease_cos = crease_cos,
@@ -201,8 +200,7 @@ fn turn(
 
 /// Adds a square prism with the given outline of half widths, sides across x and z.
 pub fn prism(builder: *MeshBuilder, outline: []const OutlinePoint) Allocator.Error!void {
-    const points = &(try builder.scratchSpace()).points;
-    assert(4 * outline.len <= points.len);
+    const points = try builder.patchPoints(outline.len, 4);
     for (outline, 0..) |outline_point, row| {
         const half, const height = outline_point;
         points[4 * row ..][0..4].* = .{
@@ -212,12 +210,12 @@ pub fn prism(builder: *MeshBuilder, outline: []const OutlinePoint) Allocator.Err
             .{ -half, height, -half },
         };
     }
-    try builder.patch(.{
-        .points = points[0 .. 4 * outline.len],
-        .columns = 4,
-        .closed = true,
-        .crease_cos = 0.9,
-    });
+    try builder.patch(.{ .points = points, .columns = 4, .closed = true, .crease_cos = 0.9 });
+}
+
+/// Memory for the points of one patch, until the next is made.
+pub fn patchPoints(builder: *MeshBuilder, rows: usize, columns: usize) Allocator.Error![]Point {
+    return (try builder.scratchSpace()).points[0 .. rows * columns];
 }
 
 fn scratchSpace(builder: *MeshBuilder) Allocator.Error!*Scratch {
