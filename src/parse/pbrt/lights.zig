@@ -44,7 +44,6 @@ pub const Source = struct {
     builder: *SceneBuilder,
     parameters: *const Parameters,
     place: *const Transform,
-    position: usize,
 
     fn color(source: *const Source, name: []const u8) Error!Vec3 {
         return scaledColor(source.colors, source.parameters, name, std.math.floatMax(f32));
@@ -56,12 +55,7 @@ pub const Source = struct {
     }
 
     fn note(source: *const Source, kind: []const u8, comptime rest: []const u8) Error!void {
-        try source.colors.input.warn(
-            source.position,
-            kind,
-            "LightSource {f}: " ++ rest,
-            .{quote(kind)},
-        );
+        try source.colors.input.warnHere(kind, "LightSource {f}: " ++ rest, .{quote(kind)});
     }
 };
 
@@ -106,7 +100,7 @@ pub fn add(source: *const Source, name: []const u8) Error!void {
             const to = source.point("to", .{ 0, 0, 1 });
             const way = vec3d.sub(to, from);
             if (vec3d.normalize(way) == null)
-                return source.colors.input.fail(source.position, "the light has no direction", .{});
+                return source.colors.input.failHere("the light has no direction", .{});
             try builder.addLight(.{ 0, 0, 0 }, way, .{
                 .kind = .directional,
                 .node = undefined,
@@ -139,7 +133,7 @@ fn addSpot(source: *const Source, name: []const u8, is_projection: bool) Error!v
         source.point("to", .{ 0, 0, 1 });
     const way = vec3d.sub(target, origin);
     if (vec3d.normalize(way) == null)
-        return source.colors.input.fail(source.position, "the light has no direction", .{});
+        return source.colors.input.failHere("the light has no direction", .{});
     var outer_deg = parameters.float("coneangle", 30);
     var inner_deg = outer_deg - parameters.float("conedeltaangle", 5);
     if (is_projection) {

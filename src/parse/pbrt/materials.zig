@@ -47,25 +47,22 @@ const Kind = enum {
     disney,
 };
 
-/// The material `name` with its parameters, which stand at `position`.
+/// The material `name` with its parameters.
 pub fn convert(
     colors: *Colors,
     name: []const u8,
-    position: usize,
     parameters: *const Parameters,
 ) Error!Material {
     if (name.len == 0 or std.mem.eql(u8, name, "none") or std.mem.eql(u8, name, "interface"))
         return .{ .surface = matte_default, .is_boundary = true };
     if (parameters.find("bumpmap") != null or parameters.find("displacement") != null or
-        parameters.find("normalmap") != null) try colors.input.warn(
-        position,
+        parameters.find("normalmap") != null) try colors.input.warnHere(
         "bump map",
         "Material {f}: bumps are not supported, its surfaces are smooth",
         .{quote(name)},
     );
     const kind = std.meta.stringToEnum(Kind, name) orelse {
-        try colors.input.warn(
-            position,
+        try colors.input.warnHere(
             name,
             "Material {f} is not supported: grey matte stands for it",
             .{quote(name)},

@@ -176,24 +176,23 @@ pub fn run(reader: *Reader) Error!void {
             input.pop();
             continue;
         }
-        const position = input.offset();
+        input.directive = input.offset();
         const word = input.word();
-        if (word.len == 0) return input.fail(position, "a directive is expected", .{});
+        if (word.len == 0) return input.failHere("a directive is expected", .{});
         const directive = std.meta.stringToEnum(Directive, word) orelse
-            return input.fail(position, "{f} is no directive", .{quote(word)});
+            return input.failHere("{f} is no directive", .{quote(word)});
         if (reader.phase == .done) {
             if (!reader.is_preparation) {
-                try input.warn(position, "more", "only the first picture is made", .{});
+                try input.warnHere("more", "only the first picture is made", .{});
                 break;
             }
             reader.startAgain();
         }
-        if (!directive.allowedIn(reader.phase)) return input.fail(
-            position,
+        if (!directive.allowedIn(reader.phase)) return input.failHere(
             "{t} may not stand {s} WorldBegin",
             .{ directive, if (reader.phase == .options) "before" else "after" },
         );
-        try reader.perform(directive, position);
+        try reader.perform(directive);
     }
     if (reader.phase == .options)
         return input.fail(input.top().bytes.len, "there is no WorldBegin", .{});
@@ -205,26 +204,24 @@ pub fn run(reader: *Reader) Error!void {
     );
 }
 
-fn perform(reader: *Reader, directive: Directive, position: usize) Error!void {
+fn perform(reader: *Reader, directive: Directive) Error!void {
     const graphics = &reader.graphics;
     switch (directive) {
-        .Identity => try reader.setTransform(position, .identity),
-        .Translate => {
-            try reader.transform(position, .translate(try reader.numbers(3)));
-        },
-        .Scale => try reader.transform(position, .scale(try reader.numbers(3))),
+        .Identity => try reader.setTransform(.identity),
+        .Translate => try reader.transform(.translate(try reader.numbers(3))),
+        .Scale => try reader.transform(.scale(try reader.numbers(3))),
         .Rotate => {
             const n = try reader.numbers(4);
-            try reader.transform(position, transforms.rotation(n[0], n[1..4].*) orelse
-                return reader.input.fail(position, "the axis has no direction", .{}));
+            try reader.transform(transforms.rotation(n[0], n[1..4].*) orelse
+                return reader.input.failHere("the axis has no direction", .{}));
         },
         .LookAt => {
             const n = try reader.numbers(9);
-            try reader.transform(position, transforms.lookAt(n[0..3].*, n[3..6].*, n[6..9].*) orelse
-                return reader.input.fail(position, "the three points leave no direction", .{}));
+            try reader.transform(transforms.lookAt(n[0..3].*, n[3..6].*, n[6..9].*) orelse
+                return reader.input.failHere("the three points leave no direction", .{}));
         },
-        .Transform => try reader.setTransform(position, try reader.matrix(position)),
-        .ConcatTransform => try reader.transform(position, try reader.matrix(position)),
+        .Transform => try reader.setTransform(try reader.matrix()),
+        .ConcatTransform => try reader.transform(try reader.matrix()),
         .CoordinateSystem => {
             const name = try reader.text();
             try reader.keep(Transform, &reader.spaces, name, graphics.transform);
@@ -232,19 +229,19 @@ fn perform(reader: *Reader, directive: Directive, position: usize) Error!void {
         .CoordSysTransform => {
             const name = try reader.text();
             const space = reader.spaces.get(name) orelse
-                return reader.input.fail(position, "no coordinate system {f}", .{quote(name)});
-            try reader.setTransform(position, space);
+                return reader.input.failHere("no coordinate system {f}", .{quote(name)});
+            try reader.setTransform(space);
         },
         .ActiveTransform => try reader.activeTransform(),
         .TransformTimes => _ = try reader.numbers(2),
         .ReverseOrientation => graphics.reverse = !graphics.reverse,
-        .AttributeBegin => try reader.begin(.Attribute, position),
-        .TransformBegin => try reader.begin(.Transform, position),
-        .AttributeEnd => try reader.end(.Attribute, position),
-        .TransformEnd => try reader.end(.Transform, position),
-        .ObjectBegin => try reader.objectBegin(position),
-        .ObjectEnd => try reader.objectEnd(position),
-        .ObjectInstance => try reader.objectInstance(position),
+        .AttributeBegin => try reader.begin(.Attribute),
+        .TransformBegin => try reader.begin(.Transform),
+        .AttributeEnd => try reader.end(.Attribute),
+        .TransformEnd => try reader.end(.Transform),
+        .ObjectBegin => try reader.objectBegin(),
+        .ObjectEnd => try reader.objectEnd(),
+        .ObjectInstance => try reader.objectInstance(),
         .WorldBegin => try reader.worldBegin(),
         .WorldEnd => try reader.worldEnd(),
         .Include, .Import => {
@@ -256,21 +253,21 @@ fn perform(reader: *Reader, directive: Directive, position: usize) Error!void {
         .MediumInterface => {
             _ = try reader.text();
             if (reader.input.peek() == '"') _ = try reader.input.string();
-            try reader.note(directive, position, "participating media are not supported");
+            try reader.note(directive, "participating media are not supported");
         },
-        .NamedMaterial => try reader.namedMaterial(position),
+        .NamedMaterial => try reader.namedMaterial(),
         .Option => try reader.parameters.read(reader.input),
         .Texture => {
             const name = try reader.text();
             _ = try reader.text(); // Its type: all of them are colours here.
             const class = try reader.text();
             try reader.parameters.read(reader.input);
-            try reader.colors.define(name, class, position, &reader.parameters);
+            try reader.colors.define(name, class, &reader.parameters);
         },
         else => {
             const name = try reader.text();
             try reader.parameters.read(reader.input);
-            try reader.performNamed(directive, name, position);
+            try reader.performNamed(directive, name);
         },
     }
 }
@@ -280,32 +277,31 @@ fn performNamed(
     reader: *Reader,
     directive: Directive,
     name: []const u8,
-    position: usize,
 ) Error!void {
     const parameters = &reader.parameters;
     switch (directive) {
         .Camera => {
             const to_camera = &reader.graphics.transform;
-            try reader.view.setCamera(reader.input, name, position, parameters, to_camera);
+            try reader.view.setCamera(reader.input, name, parameters, to_camera);
             try reader.keep(Transform, &reader.spaces, "camera", reader.view.place.?);
         },
-        .Film => try reader.view.setFilm(reader.input, position, parameters),
+        .Film => try reader.view.setFilm(reader.input, parameters),
         .Sampler => try reader.sampler(),
-        .Integrator, .SurfaceIntegrator => try reader.integrator(name, position),
+        .Integrator, .SurfaceIntegrator => try reader.integrator(name),
         .Renderer => {
             // These prepare what another rendering uses.
             reader.is_preparation = std.mem.eql(u8, name, "surfacepoints") or
                 std.mem.eql(u8, name, "createprobes");
         },
         .Material => {
-            const made = try reader.makeMaterial(name, position);
+            const made = try reader.makeMaterial(name);
             reader.graphics.material = made.index;
             reader.graphics.is_boundary = made.is_boundary;
         },
         .MakeNamedMaterial => {
             const type_name = parameters.string("type") orelse
-                return reader.input.fail(position, "the material has no type", .{});
-            const made = try reader.makeMaterial(type_name, position);
+                return reader.input.failHere("the material has no type", .{});
+            const made = try reader.makeMaterial(type_name);
             try reader.keep(NamedMaterial, &reader.named, name, made);
         },
         .LightSource => try lights.add(&.{
@@ -313,14 +309,13 @@ fn performNamed(
             .builder = reader.builder,
             .parameters = parameters,
             .place = &reader.graphics.transform,
-            .position = position,
         }, name),
         .AreaLightSource => try reader.areaLightSource(),
-        .Shape => try reader.shape(name, position),
+        .Shape => try reader.shape(name),
         .Volume, .MakeNamedMedium => {
-            try reader.note(directive, position, "participating media are not supported");
+            try reader.note(directive, "participating media are not supported");
         },
-        .Attribute => try reader.note(directive, position, "defaults of parameters are not read"),
+        .Attribute => try reader.note(directive, "defaults of parameters are not read"),
         else => {}, // What remains changes how PBRT computes the picture.
     }
 }
@@ -329,10 +324,9 @@ fn performNamed(
 fn note(
     reader: *Reader,
     directive: Directive,
-    position: usize,
     comptime rest: []const u8,
 ) Error!void {
-    try reader.input.warn(position, @tagName(directive), "{t}: " ++ rest, .{directive});
+    try reader.input.warnHere(@tagName(directive), "{t}: " ++ rest, .{directive});
 }
 
 /// Numbers, in brackets or not.
@@ -353,10 +347,10 @@ fn numbers(reader: *Reader, comptime count: usize) Error![count]f64 {
     return result;
 }
 
-fn matrix(reader: *Reader, position: usize) Error!Transform {
+fn matrix(reader: *Reader) Error!Transform {
     const sixteen = try reader.numbers(16);
     return transforms.fromMatrix(&sixteen) orelse
-        reader.input.fail(position, "the matrix is not affine", .{});
+        reader.input.failHere("the matrix is not affine", .{});
 }
 
 /// Position of the string that follows.
@@ -384,32 +378,31 @@ fn keep(
     entry.value_ptr.* = value;
 }
 
-fn transform(reader: *Reader, position: usize, inner: Transform) Error!void {
-    try reader.setTransform(position, reader.graphics.transform.compose(inner));
+fn transform(reader: *Reader, inner: Transform) Error!void {
+    try reader.setTransform(reader.graphics.transform.compose(inner));
 }
 
-fn setTransform(reader: *Reader, position: usize, to: Transform) Error!void {
+fn setTransform(reader: *Reader, to: Transform) Error!void {
     if (!reader.graphics.at_start) return;
     if (!transforms.fitsSingle(&to))
-        return reader.input.fail(position, "the transformation is out of range", .{});
+        return reader.input.failHere("the transformation is out of range", .{});
     reader.graphics.transform = to;
 }
 
 /// Things that move are shown as they are when the shutter opens.
 fn activeTransform(reader: *Reader) Error!void {
-    const position = reader.input.offset();
+    const at = reader.input.offset();
     const word = if (reader.input.peek() == '"') try reader.input.string() else reader.input.word();
     const Which = enum { StartTime, EndTime, All };
     const which = std.meta.stringToEnum(Which, word) orelse
-        return reader.input.fail(position, "{f} is no time of transformations", .{quote(word)});
+        return reader.input.fail(at, "{f} is no time of transformations", .{quote(word)});
     reader.graphics.at_start = which != .EndTime;
     if (which != .All)
-        try reader.note(.ActiveTransform, position, "what moves is shown at the start");
+        try reader.note(.ActiveTransform, "what moves is shown at the start");
 }
 
-fn begin(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
-    if (reader.stack.items.len == limits.attribute_depth_max) return reader.input.fail(
-        position,
+fn begin(reader: *Reader, kind: Kept.Kind) Error!void {
+    if (reader.stack.items.len == limits.attribute_depth_max) return reader.input.failHere(
         "over {d} blocks within each other",
         .{limits.attribute_depth_max},
     );
@@ -417,14 +410,11 @@ fn begin(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
     try reader.stack.append(reader.input.gpa, .{ .kind = kind, .graphics = graphics });
 }
 
-fn end(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
+fn end(reader: *Reader, kind: Kept.Kind) Error!void {
     const kept = reader.stack.getLastOrNull() orelse
-        return reader.input.fail(position, "{t}End without {0t}Begin", .{kind});
-    if (kept.kind != kind) return reader.input.fail(
-        position,
-        "{t}End, but {t}Begin came last",
-        .{ kind, kept.kind },
-    );
+        return reader.input.failHere("{t}End without {0t}Begin", .{kind});
+    if (kept.kind != kind)
+        return reader.input.failHere("{t}End, but {t}Begin came last", .{ kind, kept.kind });
     _ = reader.stack.pop();
     if (kind == .Transform) {
         reader.graphics.transform = kept.graphics.transform;
@@ -432,21 +422,21 @@ fn end(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
     } else reader.graphics = kept.graphics;
 }
 
-fn objectBegin(reader: *Reader, position: usize) Error!void {
+fn objectBegin(reader: *Reader) Error!void {
     const name = try reader.text();
     if (reader.object != null)
-        return reader.input.fail(position, "an object within an object", .{});
-    try reader.begin(.Object, position);
+        return reader.input.failHere("an object within an object", .{});
+    try reader.begin(.Object);
     reader.object = .{
         .name = try reader.arena.dupe(u8, name),
         .first = reader.builder.parts.items.len,
     };
 }
 
-fn objectEnd(reader: *Reader, position: usize) Error!void {
+fn objectEnd(reader: *Reader) Error!void {
     const object = reader.object orelse
-        return reader.input.fail(position, "no object has begun", .{});
-    try reader.end(.Object, position);
+        return reader.input.failHere("no object has begun", .{});
+    try reader.end(.Object);
     reader.object = null;
     try reader.keep(SceneBuilder.Object, &reader.objects, object.name, .{
         .first = object.first,
@@ -454,12 +444,12 @@ fn objectEnd(reader: *Reader, position: usize) Error!void {
     });
 }
 
-fn objectInstance(reader: *Reader, position: usize) Error!void {
+fn objectInstance(reader: *Reader) Error!void {
     const name = try reader.text();
     if (reader.object != null)
-        return reader.input.fail(position, "an instance within an object", .{});
+        return reader.input.failHere("an instance within an object", .{});
     const object = reader.objects.get(name) orelse
-        return reader.input.fail(position, "no object {f}", .{quote(name)});
+        return reader.input.failHere("no object {f}", .{quote(name)});
     try reader.builder.instantiateObject(object, &reader.graphics.transform);
 }
 
@@ -509,10 +499,9 @@ fn sampler(reader: *Reader) Error!void {
 
 /// All integrators are Whitted's here; "maxdepth" counts rays in his and in direct lighting,
 /// bounces in the others.
-fn integrator(reader: *Reader, name: []const u8, position: usize) Error!void {
+fn integrator(reader: *Reader, name: []const u8) Error!void {
     if (std.mem.eql(u8, name, "ambientocclusion") or std.mem.eql(u8, name, "ao")) {
-        try reader.input.warn(
-            position,
+        try reader.input.warnHere(
             name,
             "integrator {f} is not supported: the picture shows lights and materials",
             .{quote(name)},
@@ -524,18 +513,18 @@ fn integrator(reader: *Reader, name: []const u8, position: usize) Error!void {
     reader.depth = @intCast(std.math.clamp(bounces, choices.depth.min, choices.depth.max));
 }
 
-fn makeMaterial(reader: *Reader, name: []const u8, position: usize) Error!NamedMaterial {
+fn makeMaterial(reader: *Reader, name: []const u8) Error!NamedMaterial {
     const made: materials.Material = if (std.mem.eql(u8, name, "mix"))
-        .{ .surface = try reader.mixture(position) }
+        .{ .surface = try reader.mixture() }
     else
-        try materials.convert(&reader.colors, name, position, &reader.parameters);
+        try materials.convert(&reader.colors, name, &reader.parameters);
     return .{
         .index = try reader.builder.scene.addMaterial(made.surface),
         .is_boundary = made.is_boundary,
     };
 }
 
-fn mixture(reader: *Reader, position: usize) Error!scene_data.Material {
+fn mixture(reader: *Reader) Error!scene_data.Material {
     const parameters = &reader.parameters;
     var names = [_][]const u8{
         parameters.string("namedmaterial1") orelse "",
@@ -544,22 +533,22 @@ fn mixture(reader: *Reader, position: usize) Error!scene_data.Material {
     var second_share = try reader.colors.float(parameters, "amount", 0.5);
     if (parameters.find("materials")) |parameter| {
         const list = parameters.stringsOf(parameter);
-        if (list.len != 2) return reader.input.fail(position, "two materials are mixed", .{});
+        if (list.len != 2) return reader.input.failHere("two materials are mixed", .{});
         names = list[0..2].*;
     } else second_share = 1 - second_share; // The older dialects tell the first one's share.
     var parts: [2]scene_data.Material = undefined;
     for (names, &parts) |name, *part| {
         const made = reader.named.get(name) orelse
-            return reader.input.fail(position, "no material {f}", .{quote(name)});
+            return reader.input.failHere("no material {f}", .{quote(name)});
         part.* = reader.builder.scene.materials.items[made.index];
     }
     return materials.mix(parts[0], parts[1], second_share);
 }
 
-fn namedMaterial(reader: *Reader, position: usize) Error!void {
+fn namedMaterial(reader: *Reader) Error!void {
     const name = try reader.text();
     const made = reader.named.get(name) orelse
-        return reader.input.fail(position, "no material {f}", .{quote(name)});
+        return reader.input.failHere("no material {f}", .{quote(name)});
     reader.graphics.material = made.index;
     reader.graphics.is_boundary = made.is_boundary;
 }
@@ -579,14 +568,12 @@ fn materialIndex(reader: *Reader) Allocator.Error!u32 {
     return reader.default_material;
 }
 
-fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
+fn shape(reader: *Reader, name: []const u8) Error!void {
     const graphics = &reader.graphics;
     const input = reader.input;
     reader.tessellator.parameters = &reader.parameters;
-    reader.tessellator.position = position;
     reader.tessellator.name = name;
-    const kind = std.meta.stringToEnum(shapes.Kind, name) orelse return input.warn(
-        position,
+    const kind = std.meta.stringToEnum(shapes.Kind, name) orelse return input.warnHere(
         name,
         "Shape {f} is not supported and left out",
         .{quote(name)},
@@ -595,13 +582,13 @@ fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
         const values = reader.parameters.floatsOf(alpha);
         if (values.len > 0 and values[0] == 0) return;
         if (alpha.type == .texture)
-            try input.warn(position, "alpha", "Shape: textures of holes are not supported", .{});
+            try input.warnHere("alpha", "Shape: textures of holes are not supported", .{});
     }
     if (graphics.is_boundary) return;
     const material = try reader.materialIndex();
     if (graphics.area_light) |area_light| {
         if (reader.object == null) return reader.addAreaLight(kind, material, area_light);
-        try input.warn(position, "area light", "Shape: objects do not shine", .{});
+        try input.warnHere("area light", "Shape: objects do not shine", .{});
     }
     const mesh = try reader.meshOf(kind, material);
     if (reader.object == null)
@@ -647,8 +634,7 @@ fn addAreaLight(
         const mesh = try builder.addMesh(back, try builder.scene.addMaterial(plain));
         try builder.instantiate(mesh, place);
     }
-    if (builder.emitters.items.len >= limits.emitter_count_max) return reader.input.warn(
-        reader.tessellator.position,
+    if (builder.emitters.items.len >= limits.emitter_count_max) return reader.input.warnHere(
         "emitters",
         "Shape: over {d} shapes shine, the others are bright but give no light",
         .{limits.emitter_count_max},

@@ -32,8 +32,6 @@ input: *Input,
 arena: std.mem.Allocator,
 /// Of the directive that is being read.
 parameters: *const Parameters = undefined,
-/// Where that directive stands.
-position: usize = 0,
 /// What kind of shape it is, for messages.
 name: []const u8 = "",
 /// Bytes of all geometry so far.
@@ -46,7 +44,7 @@ pub fn fail(
     arguments: anytype,
 ) error{InvalidInput} {
     const name = .{tessellator.name};
-    return tessellator.input.fail(tessellator.position, "{s}: " ++ format, name ++ arguments);
+    return tessellator.input.failHere("{s}: " ++ format, name ++ arguments);
 }
 
 /// Memory that lives as long as the scene.
