@@ -82,10 +82,7 @@ pub fn isStdout(name: []const u8) bool {
 
 /// Where the image goes: as given, else the scene's file name in the working directory with the
 /// format's extension instead of its own. The caller frees it.
-pub fn outputName(
-    gpa: std.mem.Allocator,
-    options: *const Options,
-) error{OutOfMemory}![]u8 {
+pub fn outputName(gpa: std.mem.Allocator, options: *const Options) error{OutOfMemory}![]u8 {
     if (options.output) |output| return gpa.dupe(u8, output);
     const path = std.mem.cutPrefix(u8, options.scene, settings.builtin_prefix) orelse
         options.scene;

@@ -264,12 +264,7 @@ fn addGroundColumn(stone: *MeshBuilder, place: Place) Allocator.Error!void {
 }
 
 /// A ring of eight leaves that stand close to a capital and curl outwards at their tips.
-fn addLeaves(
-    stone: *MeshBuilder,
-    bottom: f64,
-    radius: f64,
-    height: f64,
-) Allocator.Error!void {
+fn addLeaves(stone: *MeshBuilder, bottom: f64, radius: f64, height: f64) Allocator.Error!void {
     // Height and distance from the bell as shares of the leaf's height, half width in turns.
     const shape = [_][3]f64{
         .{ 0, 0.03, 0.05 },

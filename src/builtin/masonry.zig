@@ -208,12 +208,7 @@ pub fn piercedWall(builder: *MeshBuilder, wall: PiercedWall) Allocator.Error!voi
 }
 
 /// Adds an upright rectangle, seen from +z.
-pub fn rectangle(
-    builder: *MeshBuilder,
-    lower: [2]f64,
-    upper: [2]f64,
-    z: f64,
-) Allocator.Error!void {
+pub fn rectangle(builder: *MeshBuilder, lower: [2]f64, upper: [2]f64, z: f64) Allocator.Error!void {
     assert(lower[0] < upper[0] and lower[1] < upper[1]);
     try builder.quad(
         .{ lower[0], lower[1], z },

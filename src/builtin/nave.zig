@@ -577,12 +577,7 @@ fn addApseRib(stone: *MeshBuilder, center: Point, outward: Point) Allocator.Erro
     });
 }
 
-fn addApseWall(
-    parts: *Parts,
-    place: Place,
-    half_width: f64,
-    seed: u32,
-) Allocator.Error!void {
+fn addApseWall(parts: *Parts, place: Place, half_width: f64, seed: u32) Allocator.Error!void {
     const spring = 7.4;
     try addWindow(parts, .{
         .place = place.moved(.{ 0, spring, 0 }),
@@ -607,12 +602,7 @@ fn addApseWall(
 }
 
 /// The web of the apse's vault above one wall, and the rib on its left.
-fn addApseWeb(
-    parts: *Parts,
-    place: Place,
-    half_width: f64,
-    distance: f64,
-) Allocator.Error!void {
+fn addApseWeb(parts: *Parts, place: Place, half_width: f64, distance: f64) Allocator.Error!void {
     const rows = vault.half_segments + 1;
     const columns = 3;
     var line: [2 * masonry.half_segment_max + 1]Point = undefined;

@@ -176,11 +176,7 @@ pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error
     return bench;
 }
 
-fn set(
-    reader: *const Reader,
-    bench: *Bench,
-    given: Reader.Given,
-) cli.Error!void {
+fn set(reader: *const Reader, bench: *Bench, given: Reader.Given) cli.Error!void {
     switch (given.id) {
         .resolution => bench.resolution = cli.resolutionOf(given.value) orelse
             return reader.bad(given, cli.expected_resolution),

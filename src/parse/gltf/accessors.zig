@@ -127,12 +127,7 @@ fn resolveSparse(
     return sparse;
 }
 
-fn checkSparse(
-    source: *Source,
-    index: usize,
-    count: u32,
-    sparse: accessors.Sparse,
-) Error!void {
+fn checkSparse(source: *Source, index: usize, count: u32, sparse: accessors.Sparse) Error!void {
     try source.charge(sparse.indices.len);
     var next: u64 = 0;
     for (0..sparse.count) |position| {

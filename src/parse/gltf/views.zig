@@ -80,11 +80,7 @@ fn magnification(source: *const Source, index: u32, name: []const u8, value: f32
 }
 
 /// The light of a node; null where its type is unknown.
-pub fn readLight(
-    source: *const Source,
-    raw: *const c.cgltf_light,
-    node: u32,
-) ?scene.Light {
+pub fn readLight(source: *const Source, raw: *const c.cgltf_light, node: u32) ?scene.Light {
     const index = Source.indexOf(source.data.lights, raw);
     var light: scene.Light = .{
         .kind = switch (raw.type) {

@@ -152,11 +152,7 @@ pub fn define(
     entry.value_ptr.* = value;
 }
 
-fn mean(
-    colors: *Colors,
-    class: []const u8,
-    parameters: *const Parameters,
-) Error!Vec3 {
+fn mean(colors: *Colors, class: []const u8, parameters: *const Parameters) Error!Vec3 {
     const input = colors.input;
     const white: Vec3 = @splat(1);
     const Class = enum { constant, scale, mix, directionmix, checkerboard, dots, imagemap, bilerp };

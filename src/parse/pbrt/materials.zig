@@ -48,11 +48,7 @@ const Kind = enum {
 };
 
 /// The material `name` with its parameters.
-pub fn convert(
-    colors: *Colors,
-    name: []const u8,
-    parameters: *const Parameters,
-) Error!Material {
+pub fn convert(colors: *Colors, name: []const u8, parameters: *const Parameters) Error!Material {
     if (name.len == 0 or std.mem.eql(u8, name, "none") or std.mem.eql(u8, name, "interface"))
         return .{ .surface = matte_default, .is_boundary = true };
     if (parameters.find("bumpmap") != null or parameters.find("displacement") != null or

@@ -24,7 +24,7 @@ const Transform = math.AffineD;
 const View = @import("view.zig");
 const Allocator = std.mem.Allocator;
 const Error = Input.Error;
-const Vec3 = @import("../../math.zig").Vec3;
+const Vec3 = math.Vec3;
 const assert = std.debug.assert;
 const quote = diagnostic_file.quote;
 
@@ -33,10 +33,8 @@ const Reader = @This();
 /// Everything that AttributeBegin keeps and AttributeEnd brings back.
 const Graphics = struct {
     transform: Transform = .identity,
-    /// Index into `SceneBuilder.materials`, `scene_data.none` for the default one.
-    material: u32 = scene_data.none,
-    /// Surfaces only bound a medium and are not shown.
-    is_boundary: bool = false,
+    /// Null: the default one.
+    material: ?Material = null,
     area_light: ?AreaLight = null,
     reverse: bool = false,
     /// Whether transformations are those of the time when the shutter opens.
@@ -53,7 +51,12 @@ const Kept = struct {
     graphics: Graphics,
 };
 
-const NamedMaterial = struct { index: u32, is_boundary: bool };
+const Material = struct {
+    /// In the scene.
+    index: u32,
+    /// Surfaces only bound a medium and are not shown.
+    is_boundary: bool,
+};
 
 const Phase = enum { options, world, done };
 
@@ -76,7 +79,7 @@ depth: ?u32 = null,
 object: ?struct { name: []const u8, first: usize } = null,
 objects: std.StringHashMapUnmanaged(SceneBuilder.Object) = .empty,
 spaces: std.StringHashMapUnmanaged(Transform) = .empty,
-named: std.StringHashMapUnmanaged(NamedMaterial) = .empty,
+named: std.StringHashMapUnmanaged(Material) = .empty,
 /// Meshes of curved shapes by all that they depend on.
 known_meshes: std.AutoHashMapUnmanaged(u64, u32) = .empty,
 default_material: u32 = scene_data.none,
@@ -196,12 +199,14 @@ pub fn run(reader: *Reader) Error!void {
     }
     if (reader.phase == .options)
         return input.fail(input.top().bytes.len, "there is no WorldBegin", .{});
-    if (reader.stack.items.len > 0) try input.warn(
-        input.top().bytes.len,
-        "end",
-        "{d} blocks are begun and not ended",
-        .{reader.stack.items.len},
-    );
+    try reader.warnOfBlocks(input.top().bytes.len);
+}
+
+fn warnOfBlocks(reader: *Reader, position: usize) Error!void {
+    const count = reader.stack.items.len;
+    if (count == 0) return;
+    try reader.input.warn(position, "end", "{d} blocks are begun and not ended", .{count});
+    reader.stack.clearRetainingCapacity();
 }
 
 fn perform(reader: *Reader, directive: Directive) Error!void {
@@ -273,11 +278,7 @@ fn perform(reader: *Reader, directive: Directive) Error!void {
 }
 
 /// Directives of the form `Directive "name" parameters`.
-fn performNamed(
-    reader: *Reader,
-    directive: Directive,
-    name: []const u8,
-) Error!void {
+fn performNamed(reader: *Reader, directive: Directive, name: []const u8) Error!void {
     const parameters = &reader.parameters;
     switch (directive) {
         .Camera => {
@@ -293,16 +294,12 @@ fn performNamed(
             reader.is_preparation = std.mem.eql(u8, name, "surfacepoints") or
                 std.mem.eql(u8, name, "createprobes");
         },
-        .Material => {
-            const made = try reader.makeMaterial(name);
-            reader.graphics.material = made.index;
-            reader.graphics.is_boundary = made.is_boundary;
-        },
+        .Material => reader.graphics.material = try reader.makeMaterial(name),
         .MakeNamedMaterial => {
             const type_name = parameters.string("type") orelse
                 return reader.input.failHere("the material has no type", .{});
             const made = try reader.makeMaterial(type_name);
-            try reader.keep(NamedMaterial, &reader.named, name, made);
+            try reader.keep(Material, &reader.named, name, made);
         },
         .LightSource => try lights.add(&.{
             .colors = &reader.colors,
@@ -321,11 +318,7 @@ fn performNamed(
 }
 
 /// A warning about a directive, once.
-fn note(
-    reader: *Reader,
-    directive: Directive,
-    comptime rest: []const u8,
-) Error!void {
+fn note(reader: *Reader, directive: Directive, comptime rest: []const u8) Error!void {
     try reader.input.warnHere(@tagName(directive), "{t}: " ++ rest, .{directive});
 }
 
@@ -471,15 +464,7 @@ fn worldBegin(reader: *Reader) Error!void {
 
 /// The state is that of a new text; the view stays, for it is this world's.
 fn worldEnd(reader: *Reader) Error!void {
-    if (reader.stack.items.len > 0) {
-        try reader.input.warn(
-            reader.input.offset(),
-            "end",
-            "{d} blocks are begun and not ended",
-            .{reader.stack.items.len},
-        );
-        reader.stack.clearRetainingCapacity();
-    }
+    try reader.warnOfBlocks(reader.input.offset());
     reader.object = null;
     reader.phase = .done;
     reader.graphics = .{};
@@ -513,7 +498,7 @@ fn integrator(reader: *Reader, name: []const u8) Error!void {
     reader.depth = @intCast(std.math.clamp(bounces, choices.depth.min, choices.depth.max));
 }
 
-fn makeMaterial(reader: *Reader, name: []const u8) Error!NamedMaterial {
+fn makeMaterial(reader: *Reader, name: []const u8) Error!Material {
     const made: materials.Material = if (std.mem.eql(u8, name, "mix"))
         .{ .surface = try reader.mixture() }
     else
@@ -538,19 +523,19 @@ fn mixture(reader: *Reader) Error!scene_data.Material {
     } else second_share = 1 - second_share; // The older dialects tell the first one's share.
     var parts: [2]scene_data.Material = undefined;
     for (names, &parts) |name, *part| {
-        const made = reader.named.get(name) orelse
-            return reader.input.failHere("no material {f}", .{quote(name)});
+        const made = try reader.materialNamed(name);
         part.* = reader.builder.scene.materials.items[made.index];
     }
     return materials.mix(parts[0], parts[1], second_share);
 }
 
 fn namedMaterial(reader: *Reader) Error!void {
-    const name = try reader.text();
-    const made = reader.named.get(name) orelse
-        return reader.input.failHere("no material {f}", .{quote(name)});
-    reader.graphics.material = made.index;
-    reader.graphics.is_boundary = made.is_boundary;
+    reader.graphics.material = try reader.materialNamed(try reader.text());
+}
+
+fn materialNamed(reader: *Reader, name: []const u8) Error!Material {
+    return reader.named.get(name) orelse
+        reader.input.failHere("no material {f}", .{quote(name)});
 }
 
 fn areaLightSource(reader: *Reader) Error!void {
@@ -562,7 +547,7 @@ fn areaLightSource(reader: *Reader) Error!void {
 }
 
 fn materialIndex(reader: *Reader) Allocator.Error!u32 {
-    if (reader.graphics.material != scene_data.none) return reader.graphics.material;
+    if (reader.graphics.material) |material| return material.index;
     if (reader.default_material == scene_data.none)
         reader.default_material = try reader.builder.scene.addMaterial(materials.matte_default);
     return reader.default_material;
@@ -584,7 +569,7 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
         if (alpha.type == .texture)
             try input.warnHere("alpha", "Shape: textures of holes are not supported", .{});
     }
-    if (graphics.is_boundary) return;
+    if (graphics.material) |material| if (material.is_boundary) return;
     const material = try reader.materialIndex();
     if (graphics.area_light) |area_light| {
         if (reader.object == null) return reader.addAreaLight(kind, material, area_light);

@@ -30,11 +30,7 @@ aspect: ?f64 = null,
 place: ?Transform = null,
 
 /// `Film "name" ...`.
-pub fn setFilm(
-    view: *View,
-    input: *Input,
-    parameters: *const Parameters,
-) Error!void {
+pub fn setFilm(view: *View, input: *Input, parameters: *const Parameters) Error!void {
     var size: [2]u32 = .{ 640, 480 };
     for (&size, [_][]const u8{ "xresolution", "yresolution" }) |*side, name| {
         const value = parameters.integer(name) orelse continue;

@@ -4,9 +4,9 @@
 //! directions of growing angle and growing v. The normals are those of the true surface.
 
 const std = @import("std");
-const elementary = @import("../../../math.zig").elementary;
 const Tessellator = @import("tessellator.zig");
 const math = @import("../../../math.zig");
+const elementary = math.elementary;
 const vec3d = math.vec3d;
 const Error = @import("../input.zig").Error;
 const Geometry = Tessellator.Geometry;
