@@ -93,80 +93,59 @@ pub fn deinit(reader: *Reader) void {
 }
 
 const Directive = enum {
+    // Before the world.
     Accelerator,
-    ActiveTransform,
-    AreaLightSource,
-    Attribute,
-    AttributeBegin,
-    AttributeEnd,
     Camera,
-    ColorSpace,
-    ConcatTransform,
-    CoordSysTransform,
-    CoordinateSystem,
     Film,
-    Identity,
-    Import,
-    Include,
     Integrator,
+    PixelFilter,
+    Renderer,
+    Sampler,
+    SurfaceIntegrator,
+    TransformTimes,
+    VolumeIntegrator,
+    WorldBegin,
+    // In it.
+    AreaLightSource,
     LightSource,
-    LookAt,
-    MakeNamedMaterial,
-    MakeNamedMedium,
     Material,
-    MediumInterface,
     NamedMaterial,
     ObjectBegin,
     ObjectEnd,
     ObjectInstance,
+    Shape,
+    Volume,
+    WorldEnd,
+    // Everywhere.
+    ActiveTransform,
+    Attribute,
+    AttributeBegin,
+    AttributeEnd,
+    ColorSpace,
+    ConcatTransform,
+    CoordSysTransform,
+    CoordinateSystem,
+    Identity,
+    Import,
+    Include,
+    LookAt,
+    MakeNamedMaterial,
+    MakeNamedMedium,
+    MediumInterface,
     Option,
-    PixelFilter,
-    Renderer,
     ReverseOrientation,
     Rotate,
-    Sampler,
     Scale,
-    Shape,
-    SurfaceIntegrator,
     Texture,
     Transform,
     TransformBegin,
     TransformEnd,
-    TransformTimes,
     Translate,
-    Volume,
-    VolumeIntegrator,
-    WorldBegin,
-    WorldEnd,
 
-    /// Where it may stand: before the world, in it, or both.
     fn allowedIn(directive: Directive, phase: Phase) bool {
-        return switch (directive) {
-            .Accelerator,
-            .Camera,
-            .Film,
-            .Integrator,
-            .PixelFilter,
-            .Renderer,
-            .Sampler,
-            .SurfaceIntegrator,
-            .TransformTimes,
-            .VolumeIntegrator,
-            .WorldBegin,
-            => phase == .options,
-            .AreaLightSource,
-            .LightSource,
-            .Material,
-            .NamedMaterial,
-            .ObjectBegin,
-            .ObjectEnd,
-            .ObjectInstance,
-            .Shape,
-            .Volume,
-            .WorldEnd,
-            => phase == .world,
-            else => true,
-        };
+        const place = @backingInt(directive);
+        if (place <= @backingInt(Directive.WorldBegin)) return phase == .options;
+        return place > @backingInt(Directive.WorldEnd) or phase == .world;
     }
 };
 
@@ -558,7 +537,7 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
     const input = reader.input;
     reader.tessellator.parameters = &reader.parameters;
     reader.tessellator.name = name;
-    const kind = std.meta.stringToEnum(shapes.Kind, name) orelse return input.warnHere(
+    const kind = shapes.kinds.get(name) orelse return input.warnHere(
         name,
         "Shape {f} is not supported and left out",
         .{quote(name)},
@@ -584,11 +563,11 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
 
 /// The mesh of the shape that the parameters tell; curved ones are made once.
 fn meshOf(reader: *Reader, kind: shapes.Kind, material: u32) Error!u32 {
-    if (!kind.isCurved()) {
+    if (!kind.is_curved) {
         const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
         return reader.builder.addMesh(geometry, material);
     }
-    const key = shapes.hash(kind, reader.graphics.reverse, &reader.parameters) ^
+    const key = shapes.hash(&reader.tessellator, reader.graphics.reverse) ^
         (@as(u64, material) *% 0x9e3779b97f4a7c15);
     if (reader.known_meshes.get(key)) |mesh| return mesh;
     const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
