@@ -90,87 +90,58 @@ pub fn outputName(gpa: std.mem.Allocator, options: *const Options) error{OutOfMe
 }
 
 const sections: []const Section = &.{
-    .{ .title = "Image", .flags = &.{
+    .{ .title = "Image", .options = &.{
+        .{ .usage = "-o, --output FILE", .help = "name ending in a format; - is standard output" },
+        .{ .usage = "--format FORMAT", .help = "png, jpg, tga, bmp or ppm, or linear: hdr or pfm" },
+        .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
         .{
-            .long = "--output",
-            .short = 'o',
-            .value = "FILE",
-            .help = "name ending in a format; - is standard output",
-        },
-        .{
-            .long = "--format",
-            .value = "FORMAT",
-            .help = "png, jpg, tga, bmp or ppm, or linear: hdr or pfm",
-        },
-        .{
-            .long = "--jpeg-quality",
-            .value = "N",
-            .help = settings.jpeg_quality.textWithDefault(),
-        },
-        .{
-            .long = "--resolution",
-            .short = 'r',
-            .value = "WxH",
+            .usage = "-r, --resolution WxH",
             .help = comptimePrint("size in pixels (default: the scene's own, or {d} on\n" ++
                 "the long side, in the camera's aspect)", .{settings.side.default}),
         },
         .{
-            .long = "--exposure",
-            .value = "EV|auto",
+            .usage = "--exposure EV|auto",
             .help = comptimePrint("brighten by EV stops, or so that {d} % of the pixels\n" ++
                 "are no brighter than {d} (default: 0)", .{
                 settings.auto_exposure.percentile, settings.auto_exposure.brightness,
             }),
         },
         .{
-            .long = "--tonemap",
-            .value = "linear",
+            .usage = "--tonemap linear",
             .help = "clamp, then encode as sRGB: the only way there is",
         },
-        .{
-            .long = "--background",
-            .value = "COLOR",
-            .help = "transparent, #rrggbb (sRGB) or R,G,B (linear)",
-        },
+        .{ .usage = "--background COLOR", .help = "transparent, #rrggbb (sRGB) or R,G,B (linear)" },
     } },
-    .{ .title = "Scene", .flags = &.{
+    .{ .title = "Scene", .options = &.{
+        .{ .usage = "--camera WHICH", .help = "name or index of a camera, or auto: all in view" },
         .{
-            .long = "--camera",
-            .value = "WHICH",
-            .help = "name or index of a camera, or auto: all in view",
-        },
-        .{
-            .long = "--ambient",
-            .value = "L",
+            .usage = "--ambient L",
             .help = comptimePrint("radiance from all sides (default: {d} for scenes\n" ++
                 "without lights, otherwise 0)", .{settings.ambient_default}),
         },
         .{
-            .long = "--tessellation",
-            .value = "N",
+            .usage = "--tessellation N",
             .help = "straight pieces of a circle in curved PBRT shapes,\n" ++
                 settings.tessellation.textWithDefault(),
         },
         .{
-            .long = "--allow-outside",
+            .usage = "--allow-outside",
             .help = "let the scene name files outside of its own folder",
         },
     } },
-    .{ .title = "Rendering (PBRT scenes bring their own spp and depth)", .flags = &.{
+    .{ .title = "Rendering (PBRT scenes bring their own spp and depth)", .options = &.{
         .{
-            .long = "--spp",
-            .value = "N",
+            .usage = "--spp N",
             .help = "samples a pixel, " ++ settings.sample_count.textWithDefault(),
         },
         .{
-            .long = "--depth",
-            .value = "N",
+            .usage = "--depth N",
             .help = comptimePrint("reflections and refractions in a row, {s}\n(default: {d})", .{
                 settings.depth.text(), settings.depth.default,
             }),
         },
         .{
-            .long = "--thesis",
+            .usage = "--thesis",
             .help = comptimePrint("{d}x{d}, {d} sample, depth {d}, all CPUs; what follows\n" ++
                 "it still counts", .{
                 settings.thesis.resolution[0], settings.thesis.resolution[1],
@@ -178,14 +149,11 @@ const sections: []const Section = &.{
             }),
         },
         .{
-            .long = "--threads",
-            .short = 't',
-            .value = "N",
+            .usage = "-t, --threads N",
             .help = settings.thread_count.text() ++ " (default: as many as CPUs)",
         },
         .{
-            .long = "--tile-size",
-            .value = "N",
+            .usage = "--tile-size N",
             .help = comptimePrint("pixels on the side of a piece of work, {s} in\n" ++
                 "steps of {d} (default: {d})", .{
                 settings.tile_size.text(),  settings.tile_size_step,
@@ -193,47 +161,33 @@ const sections: []const Section = &.{
             }),
         },
         .{
-            .long = "--bvh",
-            .value = "QUALITY",
+            .usage = "--bvh QUALITY",
             .help = namesOf(settings.TreeQuality) ++ ": time to build the scene's tree\n" ++
                 "against time to trace; the image is always the same",
         },
+        .{ .usage = "--variant NAME", .help = "how rays are traced; the image is always the same" },
         .{
-            .long = "--variant",
-            .value = "NAME",
-            .help = "how rays are traced; the image is always the same",
-        },
-        .{
-            .long = "--list-variants",
+            .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
         },
-        .{
-            .long = "--max-memory",
-            .value = "SIZE",
-            .help = "512M or 2G, say; an error where more is needed",
-        },
+        .{ .usage = "--max-memory SIZE", .help = "512M or 2G, say; an error where more is needed" },
     } },
-    .{ .title = "Messages", .flags = &.{
+    .{ .title = "Messages", .options = &.{
         .{
-            .long = "--stats",
-            .value = "FORM",
+            .usage = "--stats FORM",
             .help = "report as " ++ namesOf(Stats) ++ " (default: text, or none\n" ++
                 "when the image goes to standard output); when it is\n" ++
                 "given, a report that cannot be printed is an error",
         },
         .{
-            .long = "--count-tests",
+            .usage = "--count-tests",
             .help = "count intersection tests, in a second, untimed pass",
         },
-        .{
-            .long = "--quiet",
-            .short = 'q',
-            .help = "no warnings, no progress, no report but by --stats",
-        },
-        .{ .long = "--verbose", .short = 'v', .help = "say what was chosen by default" },
-        .{ .long = "--help", .short = 'h', .help = "print this" },
-        .{ .long = "--version", .help = "print the version" },
-        .{ .long = "--licenses", .help = "print the licence, and those of the libraries used" },
+        .{ .usage = "-q, --quiet", .help = "no warnings, no progress, no report but by --stats" },
+        .{ .usage = "-v, --verbose", .help = "say what was chosen by default" },
+        .{ .usage = "-h, --help", .help = "print this" },
+        .{ .usage = "--version", .help = "print the version" },
+        .{ .usage = "--licenses", .help = "print the licence, and those of the libraries used" },
     } },
 };
 
@@ -562,8 +516,8 @@ test "a long option takes its value joined or apart, a short one also attached" 
         try std.testing.expectEqual([2]u32{ 3, 4 }, options.view.resolution.?);
     }
     inline for (Reader.flags) |flag| {
-        const argument = flag.long ++ if (flag.value.len > 0) "" else "=1";
-        const needle = "'" ++ flag.long ++ if (flag.value.len > 0) "' needs a" else "' takes no";
+        const argument = flag.long ++ if (flag.takes_value) "" else "=1";
+        const needle = "'" ++ flag.long ++ if (flag.takes_value) "' needs a" else "' takes no";
         if (flag.short != 'h') try expectUsage(needle ++ " value", &.{ "s", argument });
     }
     try expectUsage("'-t' needs a value", &.{ "s", "-t" });

@@ -9,20 +9,35 @@ const nearest = @import("nearest.zig").nearest;
 const quote = @import("../diagnostic.zig").quote;
 const Range = @import("../settings.zig").Range;
 
-/// One option of a command.
-pub const Flag = struct {
-    /// With its dashes.
-    long: []const u8,
-    /// 0: none.
-    short: u8 = 0,
-    /// What the help calls its value; empty: it has none.
-    value: []const u8 = "",
+/// One option of a command, in the words of its help.
+pub const Option = struct {
+    /// `-f, --flag VALUE`, perhaps without a letter or a value.
+    usage: []const u8,
     /// What it does: lines of the help's right column.
     help: []const u8,
 };
 
-/// The flags under one heading of the help.
-pub const Section = struct { title: []const u8, flags: []const Flag };
+/// What the usage of an option says.
+const Flag = struct {
+    /// With its dashes.
+    long: []const u8,
+    /// 0: none.
+    short: u8,
+    takes_value: bool,
+
+    fn of(comptime usage: []const u8) Flag {
+        const has_short = usage[1] != '-';
+        var words = std.mem.tokenizeScalar(u8, usage[if (has_short) 4 else 0..], ' ');
+        return .{
+            .long = words.next().?,
+            .short = if (has_short) usage[1] else 0,
+            .takes_value = words.next() != null,
+        };
+    }
+};
+
+/// The options under one heading of the help.
+pub const Section = struct { title: []const u8, options: []const Option };
 
 /// Where the right column of the help begins.
 const help_column = 27;
@@ -34,12 +49,10 @@ pub fn helpOf(comptime sections: []const Section) []const u8 {
         var text: []const u8 = "";
         for (sections) |section| {
             text = text ++ "\n" ++ section.title ++ "\n";
-            for (section.flags) |flag| {
-                const letters: []const u8 = &.{ '-', flag.short, ',', ' ' };
-                const short = if (flag.short == 0) "    " else letters;
-                var left: []const u8 = "  " ++ short ++ flag.long;
-                if (flag.value.len > 0) left = left ++ " " ++ flag.value;
-                var lines = std.mem.splitScalar(u8, flag.help, '\n');
+            for (section.options) |option| {
+                const indent = if (option.usage[1] == '-') "      " else "  ";
+                var left: []const u8 = indent ++ option.usage;
+                var lines = std.mem.splitScalar(u8, option.help, '\n');
                 while (lines.next()) |line| {
                     const gap: [help_column - left.len]u8 = @splat(' ');
                     text = text ++ left ++ gap ++ line ++ "\n";
@@ -78,8 +91,11 @@ pub fn Arguments(comptime sections: []const Section) type {
 
         /// The flags of all sections.
         pub const flags: []const Flag = flags: {
+            @setEvalBranchQuota(1 << 16);
             var all: []const Flag = &.{};
-            for (sections) |section| all = all ++ section.flags;
+            for (sections) |section| {
+                for (section.options) |option| all = all ++ .{Flag.of(option.usage)};
+            }
             break :flags all;
         };
 
@@ -193,7 +209,7 @@ pub fn Arguments(comptime sections: []const Section) type {
             const value = if (equals) |at| argument[at + 1 ..] else null;
             for (flags, 0..) |flag, index| {
                 if (!std.mem.eql(u8, flag.long, name)) continue;
-                if (flag.value.len == 0 and value != null)
+                if (!flag.takes_value and value != null)
                     return reader.fail("option '{s}' takes no value", .{name});
                 return reader.give(index, value, name);
             }
@@ -214,7 +230,7 @@ pub fn Arguments(comptime sections: []const Section) type {
             reader.shorts = "";
             for (flags, 0..) |flag, index| {
                 if (flag.short != letter) continue;
-                if (flag.value.len == 0) reader.shorts = rest;
+                if (!flag.takes_value) reader.shorts = rest;
                 return reader.give(index, if (rest.len > 0) rest else null, &.{ '-', letter });
             }
             return reader.fail("unknown option {f}", .{quote(reader.arguments[reader.index - 1])});
@@ -231,7 +247,7 @@ pub fn Arguments(comptime sections: []const Section) type {
             return .{ .flag = .{
                 .id = @fromBackingInt(@intCast(index)),
                 .long = flag.long,
-                .value = if (flag.value.len == 0) "" else value orelse reader.take() orelse
+                .value = if (!flag.takes_value) "" else value orelse reader.take() orelse
                     return reader.fail("option '{s}' needs a value", .{name}),
             } };
         }

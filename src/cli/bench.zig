@@ -49,87 +49,62 @@ pub const Bench = struct {
 };
 
 const sections: []const Section = &.{
-    .{ .title = "Settings: those of the thesis unless changed", .flags = &.{
+    .{ .title = "Settings: those of the thesis unless changed", .options = &.{
         .{
-            .long = "--resolution",
-            .short = 'r',
-            .value = "WxH",
+            .usage = "-r, --resolution WxH",
             .help = comptimePrint("size in pixels (default: {d}x{d})", .{
                 settings.thesis.resolution[0], settings.thesis.resolution[1],
             }),
         },
         .{
-            .long = "--spp",
-            .value = "N",
+            .usage = "--spp N",
             .help = comptimePrint("samples a pixel (default: {d})", .{
                 settings.thesis.sample_count,
             }),
         },
         .{
-            .long = "--depth",
-            .value = "N",
+            .usage = "--depth N",
             .help = comptimePrint("reflections and refractions in a row (default: {d})", .{
                 settings.thesis.depth,
             }),
         },
+        .{ .usage = "-t, --threads N", .help = "threads (default: as many as CPUs)" },
+        .{ .usage = "--bvh QUALITY", .help = arguments_file.namesOf(settings.TreeQuality) },
         .{
-            .long = "--threads",
-            .short = 't',
-            .value = "N",
-            .help = "threads (default: as many as CPUs)",
-        },
-        .{
-            .long = "--bvh",
-            .value = "QUALITY",
-            .help = arguments_file.namesOf(settings.TreeQuality),
-        },
-        .{
-            .long = "--variants",
-            .value = "PARTS",
+            .usage = "--variants PARTS",
             .help = "only variants whose names contain one of these, for\n" ++
                 "example scalar-single,vector-beam (default: all)",
         },
     } },
-    .{ .title = "Measurement", .flags = &.{
+    .{ .title = "Measurement", .options = &.{
         .{
-            .long = "--rounds",
-            .value = "N",
+            .usage = "--rounds N",
             .help = "so many rounds, no less and no more, unless the time\n" ++
                 "is over; two are the least",
         },
         .{
-            .long = "--time-limit",
-            .value = "S",
+            .usage = "--time-limit S",
             .help = comptimePrint("seconds for all scenes together (default: {d})", .{
                 time_s.default,
             }),
         },
         .{
-            .long = "--energy-command",
-            .value = "CMD",
+            .usage = "--energy-command CMD",
             .help = "a shell command that prints, each time it is run, the\n" ++
                 "power of this moment (5.2 W, 5200 mW) or a counter of\n" ++
                 "energy (17.5 J, 17500 mJ)",
         },
-        .{
-            .long = "--energy-root",
-            .value = "DIR",
-            .help = "look for sensors there in place of /sys",
-        },
-        .{ .long = "--no-energy", .help = "do not measure energy" },
+        .{ .usage = "--energy-root DIR", .help = "look for sensors there in place of /sys" },
+        .{ .usage = "--no-energy", .help = "do not measure energy" },
     } },
-    .{ .title = "Output", .flags = &.{
+    .{ .title = "Output", .options = &.{
+        .{ .usage = "--json FILE", .help = "all samples, for bench/report.py; - is stdout" },
         .{
-            .long = "--json",
-            .value = "FILE",
-            .help = "all samples, for bench/report.py; - is stdout",
-        },
-        .{
-            .long = "--allow-outside",
+            .usage = "--allow-outside",
             .help = "let scenes name files outside of their own folders",
         },
-        .{ .long = "--quiet", .short = 'q', .help = "no warnings, no progress" },
-        .{ .long = "--help", .short = 'h', .help = "print this" },
+        .{ .usage = "-q, --quiet", .help = "no warnings, no progress" },
+        .{ .usage = "-h, --help", .help = "print this" },
     } },
 };
 
