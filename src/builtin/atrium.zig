@@ -193,7 +193,6 @@ fn addArcadeArch(parts: *Parts, storey: Storey) Allocator.Error!void {
             .half_width = bay / 2.0,
             .top = storey.wall_top - storey.spring,
             .z = z,
-            .side = if (z > 0) .front else .back,
         });
     }
     // The keystone: a wedge that stands out at the crown.

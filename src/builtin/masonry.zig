@@ -147,9 +147,8 @@ pub const Spandrel = struct {
     /// Half the width of the wall.
     half_width: f64,
     top: f64,
+    /// Behind 0 it is seen from behind.
     z: f64,
-    /// Which side is seen.
-    side: enum { front, back },
 };
 
 /// Adds the flat wall between an arch, the springing line, and a horizontal line above.
@@ -164,10 +163,7 @@ pub fn spandrel(builder: *MeshBuilder, wall: Spandrel) Allocator.Error!void {
     lower[columns - 1] = .{ wall.half_width, 0, 0 };
     const points = try builder.patchPoints(2, columns);
     for (lower[0..columns], 0..) |point, column| {
-        const at = switch (wall.side) {
-            .front => column,
-            .back => columns - 1 - column,
-        };
+        const at = if (wall.z < 0) columns - 1 - column else column;
         points[at] = .{ point[0], point[1], wall.z };
         points[columns + at] = .{ point[0], wall.top, wall.z };
     }
@@ -195,7 +191,6 @@ pub fn piercedWall(builder: *MeshBuilder, wall: PiercedWall) Allocator.Error!voi
         .half_width = wall.half_width,
         .top = wall.top,
         .z = wall.z,
-        .side = .front,
     });
     const opening = wall.arch.half_span + wall.distance;
     try rectangle(builder, .{ -wall.half_width, wall.sill }, .{ -opening, 0 }, wall.z);

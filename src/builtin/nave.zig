@@ -228,7 +228,6 @@ fn addArcadeBay(parts: *Parts, place: Place) Allocator.Error!void {
         .half_width = bay / 2.0,
         .top = triforium_bottom - arcade_spring,
         .z = wall_half,
-        .side = .front,
     });
     try masonry.spandrel(parts.get(.wall), .{
         .arch = arcade,
@@ -236,17 +235,18 @@ fn addArcadeBay(parts: *Parts, place: Place) Allocator.Error!void {
         .half_width = bay / 2.0,
         .top = aisle_rise + 0.2,
         .z = -wall_half,
-        .side = .back,
     });
 }
 
 /// A row of small blind arches on colonnettes.
 fn addTriforium(parts: *Parts, place: Place) Allocator.Error!void {
+    const wall = parts.get(.wall);
+    const stone = parts.get(.stone);
     parts.setPlace(place);
     const depth = 0.22;
     const back = wall_half - depth;
     try masonry.rectangle(
-        parts.get(.wall),
+        wall,
         .{ -bay / 2.0, triforium_bottom },
         .{ bay / 2.0, triforium_top },
         back,
@@ -261,7 +261,7 @@ fn addTriforium(parts: *Parts, place: Place) Allocator.Error!void {
         const lower = if (side < 0) outer else inner;
         const upper = if (side < 0) inner else outer;
         try masonry.rectangle(
-            parts.get(.wall),
+            wall,
             .{ lower, triforium_bottom },
             .{ upper, triforium_top },
             wall_half,
@@ -271,24 +271,23 @@ fn addTriforium(parts: *Parts, place: Place) Allocator.Error!void {
         const b: Point = .{ inner, triforium_bottom, back };
         const up: Point = .{ 0, triforium_spring - triforium_bottom, 0 };
         if (side < 0) {
-            try parts.get(.wall).quad(a, b, b + up, a + up);
+            try wall.quad(a, b, b + up, a + up);
         } else {
-            try parts.get(.wall).quad(b, a, a + up, b + up);
+            try wall.quad(b, a, a + up, b + up);
         }
     }
     for (0..count) |index| {
         const x = half_width * (2 * @as(f64, @floatFromInt(index)) + 1) - reach;
         parts.setPlace(place.moved(.{ x, triforium_spring, 0 }));
-        try masonry.archBand(parts.get(.stone), .{ .arch = arch, .section = &.{
+        try masonry.archBand(stone, .{ .arch = arch, .section = &.{
             .{ 0, back }, .{ 0, wall_half }, .{ 0.04, wall_half + 0.04 }, .{ 0.1, wall_half },
         } });
-        try masonry.spandrel(parts.get(.wall), .{
+        try masonry.spandrel(wall, .{
             .arch = arch,
             .distance = 0.1,
             .half_width = half_width,
             .top = triforium_top - triforium_spring,
             .z = wall_half,
-            .side = .front,
         });
     }
     var outline: Outline = .from(.{ 0.1, triforium_bottom });
@@ -297,8 +296,8 @@ fn addTriforium(parts: *Parts, place: Place) Allocator.Error!void {
     outline.line(&.{ .{ 0.12, triforium_spring }, .{ 0, triforium_spring } });
     for (0..count + 1) |index| {
         const x = half_width * 2 * @as(f64, @floatFromInt(index)) - reach;
-        parts.get(.stone).place = place.moved(.{ x, 0, wall_half - 0.1 });
-        try parts.get(.stone).revolve(outline.points(), 6);
+        stone.place = place.moved(.{ x, 0, wall_half - 0.1 });
+        try stone.revolve(outline.points(), 6);
     }
 }
 
