@@ -46,8 +46,7 @@ pub fn build(gpa: Allocator, name: []const u8, diagnostic: *Diagnostic) Error!Sc
         for (names[1..]) |other| list = list ++ ", " ++ other;
         break :blk list;
     };
-    return diagnostic.fail(
-        error.InvalidInput,
+    return diagnostic.invalid(
         "no built-in scene is called {f}; there are: {s}",
         .{ diagnostic_data.quote(name), known },
     );
@@ -91,7 +90,8 @@ test "every scene is whole, bounded, and the same on every target" {
         0x06da2e742e1efca3,
         0x22cd95aa30894669,
     };
-    for (names, hashes) |name, hash| {
+    const triangle_counts = [_]usize{ 3_978, 66_862, 81_466, 190_392 };
+    for (names, hashes, triangle_counts) |name, hash, triangle_count| {
         var diagnostic: Diagnostic = .{};
         var scene = try build(std.testing.allocator, name, &diagnostic);
         defer scene.deinit();
@@ -105,6 +105,7 @@ test "every scene is whole, bounded, and the same on every target" {
         }
         for (box.extent()) |extent| try std.testing.expect(extent > 1 and extent < 200);
         try std.testing.expectEqual(hash, meshesHash(&scene));
+        try std.testing.expectEqual(triangle_count, scene.triangleCount());
     }
 }
 

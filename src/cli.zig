@@ -9,9 +9,7 @@ const bench = @import("cli/bench.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
 const settings = @import("settings.zig");
-const Arguments = arguments_file.Arguments;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
-const Flag = arguments_file.Flag;
 const Section = arguments_file.Section;
 const comptimePrint = std.fmt.comptimePrint;
 const integer = arguments_file.integer;
@@ -84,142 +82,66 @@ pub fn isStdout(name: []const u8) bool {
 
 /// Where the image goes: as given, else the scene's file name in the working directory with the
 /// format's extension instead of its own. The caller frees it.
-pub fn outputName(
-    gpa: std.mem.Allocator,
-    options: *const Options,
-) error{OutOfMemory}![]u8 {
+pub fn outputName(gpa: std.mem.Allocator, options: *const Options) error{OutOfMemory}![]u8 {
     if (options.output) |output| return gpa.dupe(u8, output);
     const path = std.mem.cutPrefix(u8, options.scene, settings.builtin_prefix) orelse
         options.scene;
     return gpa.print("{s}.{t}", .{ std.fs.path.stem(path), options.write.format });
 }
 
-const Id = enum {
-    allow_outside,
-    ambient,
-    background,
-    bvh,
-    camera,
-    count_tests,
-    depth,
-    exposure,
-    format,
-    help,
-    jpeg_quality,
-    licenses,
-    list_variants,
-    max_memory,
-    output,
-    quiet,
-    resolution,
-    spp,
-    stats,
-    tessellation,
-    thesis,
-    threads,
-    tile_size,
-    tonemap,
-    variant,
-    verbose,
-    version,
-};
-
-const sections: []const Section(Id) = &.{
-    .{ .title = "Image", .flags = &.{
+const sections: []const Section = &.{
+    .{ .title = "Image", .options = &.{
+        .{ .usage = "-o, --output FILE", .help = "name ending in a format; - is standard output" },
+        .{ .usage = "--format FORMAT", .help = "png, jpg, tga, bmp or ppm, or linear: hdr or pfm" },
+        .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
         .{
-            .id = .output,
-            .long = "--output",
-            .short = 'o',
-            .value = "FILE",
-            .help = "name ending in a format; - is standard output",
-        },
-        .{
-            .id = .format,
-            .long = "--format",
-            .value = "FORMAT",
-            .help = "png, jpg, tga, bmp or ppm, or linear: hdr or pfm",
-        },
-        .{
-            .id = .jpeg_quality,
-            .long = "--jpeg-quality",
-            .value = "N",
-            .help = settings.jpeg_quality.textWithDefault(),
-        },
-        .{
-            .id = .resolution,
-            .long = "--resolution",
-            .short = 'r',
-            .value = "WxH",
+            .usage = "-r, --resolution WxH",
             .help = comptimePrint("size in pixels (default: the scene's own, or {d} on\n" ++
                 "the long side, in the camera's aspect)", .{settings.side.default}),
         },
         .{
-            .id = .exposure,
-            .long = "--exposure",
-            .value = "EV|auto",
+            .usage = "--exposure EV|auto",
             .help = comptimePrint("brighten by EV stops, or so that {d} % of the pixels\n" ++
                 "are no brighter than {d} (default: 0)", .{
                 settings.auto_exposure.percentile, settings.auto_exposure.brightness,
             }),
         },
         .{
-            .id = .tonemap,
-            .long = "--tonemap",
-            .value = "linear",
+            .usage = "--tonemap linear",
             .help = "clamp, then encode as sRGB: the only way there is",
         },
-        .{
-            .id = .background,
-            .long = "--background",
-            .value = "COLOR",
-            .help = "transparent, #rrggbb (sRGB) or R,G,B (linear)",
-        },
+        .{ .usage = "--background COLOR", .help = "transparent, #rrggbb (sRGB) or R,G,B (linear)" },
     } },
-    .{ .title = "Scene", .flags = &.{
+    .{ .title = "Scene", .options = &.{
+        .{ .usage = "--camera WHICH", .help = "name or index of a camera, or auto: all in view" },
         .{
-            .id = .camera,
-            .long = "--camera",
-            .value = "WHICH",
-            .help = "name or index of a camera, or auto: all in view",
-        },
-        .{
-            .id = .ambient,
-            .long = "--ambient",
-            .value = "L",
+            .usage = "--ambient L",
             .help = comptimePrint("radiance from all sides (default: {d} for scenes\n" ++
                 "without lights, otherwise 0)", .{settings.ambient_default}),
         },
         .{
-            .id = .tessellation,
-            .long = "--tessellation",
-            .value = "N",
+            .usage = "--tessellation N",
             .help = "straight pieces of a circle in curved PBRT shapes,\n" ++
                 settings.tessellation.textWithDefault(),
         },
         .{
-            .id = .allow_outside,
-            .long = "--allow-outside",
+            .usage = "--allow-outside",
             .help = "let the scene name files outside of its own folder",
         },
     } },
-    .{ .title = "Rendering (PBRT scenes bring their own spp and depth)", .flags = &.{
+    .{ .title = "Rendering (PBRT scenes bring their own spp and depth)", .options = &.{
         .{
-            .id = .spp,
-            .long = "--spp",
-            .value = "N",
+            .usage = "--spp N",
             .help = "samples a pixel, " ++ settings.sample_count.textWithDefault(),
         },
         .{
-            .id = .depth,
-            .long = "--depth",
-            .value = "N",
+            .usage = "--depth N",
             .help = comptimePrint("reflections and refractions in a row, {s}\n(default: {d})", .{
                 settings.depth.text(), settings.depth.default,
             }),
         },
         .{
-            .id = .thesis,
-            .long = "--thesis",
+            .usage = "--thesis",
             .help = comptimePrint("{d}x{d}, {d} sample, depth {d}, all CPUs; what follows\n" ++
                 "it still counts", .{
                 settings.thesis.resolution[0], settings.thesis.resolution[1],
@@ -227,16 +149,11 @@ const sections: []const Section(Id) = &.{
             }),
         },
         .{
-            .id = .threads,
-            .long = "--threads",
-            .short = 't',
-            .value = "N",
+            .usage = "-t, --threads N",
             .help = settings.thread_count.text() ++ " (default: as many as CPUs)",
         },
         .{
-            .id = .tile_size,
-            .long = "--tile-size",
-            .value = "N",
+            .usage = "--tile-size N",
             .help = comptimePrint("pixels on the side of a piece of work, {s} in\n" ++
                 "steps of {d} (default: {d})", .{
                 settings.tile_size.text(),  settings.tile_size_step,
@@ -244,67 +161,37 @@ const sections: []const Section(Id) = &.{
             }),
         },
         .{
-            .id = .bvh,
-            .long = "--bvh",
-            .value = "QUALITY",
+            .usage = "--bvh QUALITY",
             .help = namesOf(settings.TreeQuality) ++ ": time to build the scene's tree\n" ++
                 "against time to trace; the image is always the same",
         },
+        .{ .usage = "--variant NAME", .help = "how rays are traced; the image is always the same" },
         .{
-            .id = .variant,
-            .long = "--variant",
-            .value = "NAME",
-            .help = "how rays are traced; the image is always the same",
-        },
-        .{
-            .id = .list_variants,
-            .long = "--list-variants",
+            .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
         },
-        .{
-            .id = .max_memory,
-            .long = "--max-memory",
-            .value = "SIZE",
-            .help = "512M or 2G, say; an error where more is needed",
-        },
+        .{ .usage = "--max-memory SIZE", .help = "512M or 2G, say; an error where more is needed" },
     } },
-    .{ .title = "Messages", .flags = &.{
+    .{ .title = "Messages", .options = &.{
         .{
-            .id = .stats,
-            .long = "--stats",
-            .value = "FORM",
+            .usage = "--stats FORM",
             .help = "report as " ++ namesOf(Stats) ++ " (default: text, or none\n" ++
                 "when the image goes to standard output); when it is\n" ++
                 "given, a report that cannot be printed is an error",
         },
         .{
-            .id = .count_tests,
-            .long = "--count-tests",
+            .usage = "--count-tests",
             .help = "count intersection tests, in a second, untimed pass",
         },
-        .{
-            .id = .quiet,
-            .long = "--quiet",
-            .short = 'q',
-            .help = "no warnings, no progress, no report but by --stats",
-        },
-        .{
-            .id = .verbose,
-            .long = "--verbose",
-            .short = 'v',
-            .help = "say what was chosen by default",
-        },
-        .{ .id = .help, .long = "--help", .short = 'h', .help = "print this" },
-        .{ .id = .version, .long = "--version", .help = "print the version" },
-        .{
-            .id = .licenses,
-            .long = "--licenses",
-            .help = "print the licence, and those of the libraries used",
-        },
+        .{ .usage = "-q, --quiet", .help = "no warnings, no progress, no report but by --stats" },
+        .{ .usage = "-v, --verbose", .help = "say what was chosen by default" },
+        .{ .usage = "-h, --help", .help = "print this" },
+        .{ .usage = "--version", .help = "print the version" },
+        .{ .usage = "--licenses", .help = "print the licence, and those of the libraries used" },
     } },
 };
 
-const flags = arguments_file.flagsOf(Id, sections);
+const Reader = arguments_file.Arguments(sections);
 
 /// What `--help` prints.
 pub const help: []const u8 = "raylane " ++ version ++
@@ -318,7 +205,7 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\working directory under the scene's name, as a whole or not at all; a report
     \\goes to standard output.
     \\
-++ arguments_file.helpOf(Id, sections) ++
+++ arguments_file.helpOf(sections) ++
     \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
     \\supported, 128 + N ended by signal N.
@@ -350,8 +237,6 @@ pub fn parse(
     return parser.run();
 }
 
-const Reader = Arguments(Id, flags);
-
 const Parser = struct {
     reader: Reader,
     variant_names: []const []const u8,
@@ -366,7 +251,7 @@ const Parser = struct {
         const reader = &parser.reader;
         var command_seen = false;
         while (try reader.next()) |argument| switch (argument) {
-            .flag => |flag| try parser.set(flag.flag, flag.value),
+            .flag => |flag| try parser.set(flag),
             .word => |word| {
                 const is_command = std.mem.eql(u8, word, "render") and !reader.flags_ended and
                     !command_seen and parser.scene == null;
@@ -389,61 +274,52 @@ const Parser = struct {
         parser.scene = argument;
     }
 
-    fn set(parser: *Parser, flag: Flag(Id), value: []const u8) Error!void {
+    fn set(parser: *Parser, given: Reader.Given) Error!void {
         const options = &parser.options;
         const reader = &parser.reader;
-        switch (flag.id) {
-            .output => options.output = try reader.text(flag, value, "a file name or -"),
-            .format => parser.format = formatOf(value) orelse
-                return reader.bad(flag, value, comptime namesOf(settings.Format)),
+        switch (given.id) {
+            .output => options.output = try reader.text(given, "a file name or -"),
+            .format => parser.format = formatOf(given.value) orelse
+                return reader.bad(given, comptime namesOf(settings.Format)),
             .jpeg_quality => {
-                options.write.jpeg_quality =
-                    try reader.number(flag, value, settings.jpeg_quality);
+                options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
             },
-            .max_memory => options.memory_max = bytesOf(value) orelse
-                return reader.bad(flag, value, "a size such as 512M or 2G"),
-            .resolution => options.view.resolution = resolutionOf(value) orelse
-                return reader.bad(flag, value, expected_resolution),
-            .threads => {
-                options.thread_count = try reader.number(flag, value, settings.thread_count);
-            },
-            .spp => {
-                options.render.sample_count =
-                    try reader.number(flag, value, settings.sample_count);
-            },
-            .depth => options.render.depth = try reader.number(flag, value, settings.depth),
-            .tile_size => options.render.tile_size = tileSizeOf(value) orelse
-                return reader.bad(flag, value, comptimePrint("{s}, a multiple of {d}", .{
+            .max_memory => options.memory_max = bytesOf(given.value) orelse
+                return reader.bad(given, "a size such as 512M or 2G"),
+            .resolution => options.view.resolution = resolutionOf(given.value) orelse
+                return reader.bad(given, expected_resolution),
+            .threads => options.thread_count = try reader.number(given, settings.thread_count),
+            .spp => options.render.sample_count = try reader.number(given, settings.sample_count),
+            .depth => options.render.depth = try reader.number(given, settings.depth),
+            .tile_size => options.render.tile_size = tileSizeOf(given.value) orelse
+                return reader.bad(given, comptimePrint("{s}, a multiple of {d}", .{
                     settings.tile_size.text(), settings.tile_size_step,
                 })),
-            .camera => options.view.camera = cameraOf(value) orelse
-                return reader.bad(flag, value, "a camera's name, its index, or auto"),
-            .background => options.view.background = backgroundOf(value) orelse
-                return reader.bad(flag, value, "transparent, #rrggbb, or R,G,B of 0 or more"),
-            .ambient => options.view.ambient = radiance(value) orelse
-                return reader.bad(flag, value, "a number of 0 or more"),
-            .exposure => options.write.exposure = exposureOf(value) orelse
-                return reader.bad(flag, value, comptimePrint("-{d} to {d}, or auto", .{
+            .camera => options.view.camera = cameraOf(given.value) orelse
+                return reader.bad(given, "a camera's name, its index, or auto"),
+            .background => options.view.background = backgroundOf(given.value) orelse
+                return reader.bad(given, "transparent, #rrggbb, or R,G,B of 0 or more"),
+            .ambient => options.view.ambient = radiance(given.value) orelse
+                return reader.bad(given, "a number of 0 or more"),
+            .exposure => options.write.exposure = exposureOf(given.value) orelse
+                return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
                     settings.exposure_ev_max, settings.exposure_ev_max,
                 })),
-            .tonemap => if (!std.mem.eql(u8, value, "linear")) {
-                return reader.bad(flag, value, "linear");
+            .tonemap => if (!std.mem.eql(u8, given.value, "linear")) {
+                return reader.bad(given, "linear");
             },
-            .stats => options.stats = try reader.choice(flag, value, Stats),
+            .stats => options.stats = try reader.choice(given, Stats),
             .thesis => {
                 options.view.resolution = settings.thesis.resolution;
                 options.render.sample_count = settings.thesis.sample_count;
                 options.render.depth = settings.thesis.depth;
                 options.thread_count = null;
             },
-            .bvh => {
-                options.tree_quality = try reader.choice(flag, value, settings.TreeQuality);
-            },
-            .variant => options.render.variant = try parser.variantOf(value),
+            .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
+            .variant => options.render.variant = try parser.variantOf(given.value),
             .count_tests => options.count_tests = true,
             .tessellation => {
-                options.load.tessellation =
-                    try reader.number(flag, value, settings.tessellation);
+                options.load.tessellation = try reader.number(given, settings.tessellation);
             },
             .allow_outside => options.load.allow_outside = true,
             .quiet => options.quiet = true,
@@ -639,10 +515,10 @@ test "a long option takes its value joined or apart, a short one also attached" 
         const options = try optionsForTest(spelling);
         try std.testing.expectEqual([2]u32{ 3, 4 }, options.view.resolution.?);
     }
-    inline for (flags) |flag| {
-        const argument = flag.long ++ if (flag.value.len > 0) "" else "=1";
-        const needle = "'" ++ flag.long ++ if (flag.value.len > 0) "' needs a" else "' takes no";
-        if (flag.id != .help) try expectUsage(needle ++ " value", &.{ "s", argument });
+    inline for (Reader.flags) |flag| {
+        const argument = flag.long ++ if (flag.takes_value) "" else "=1";
+        const needle = "'" ++ flag.long ++ if (flag.takes_value) "' needs a" else "' takes no";
+        if (flag.short != 'h') try expectUsage(needle ++ " value", &.{ "s", argument });
     }
     try expectUsage("'-t' needs a value", &.{ "s", "-t" });
     try expectUsage("'--threads': '' is not 1 to 256", &.{ "s", "--threads=" });

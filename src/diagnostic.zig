@@ -61,6 +61,15 @@ pub const Diagnostic = struct {
         return err;
     }
 
+    /// Sets the error line of a scene that is invalid.
+    pub fn invalid(
+        diagnostic: *Diagnostic,
+        comptime format: []const u8,
+        arguments: anytype,
+    ) error{InvalidInput} {
+        return diagnostic.fail(error.InvalidInput, format, arguments);
+    }
+
     /// Adds a warning; the same text is kept once.
     pub fn warn(diagnostic: *Diagnostic, comptime format: []const u8, arguments: anytype) void {
         var message: Message = .{};

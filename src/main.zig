@@ -67,11 +67,7 @@ fn run(init: std.process.Init) ExitCode {
 }
 
 /// Measures all variants on some scenes, then prints the tables, or why there are none.
-fn bench(
-    init: std.process.Init,
-    options: *const cli.Bench,
-    diagnostic: *Diagnostic,
-) ExitCode {
+fn bench(init: std.process.Init, options: *const cli.Bench, diagnostic: *Diagnostic) ExitCode {
     const io = init.io;
     var settings = benchSettings(options);
     if (std.mem.findScalar(bool, &settings.wanted, true) == null) {
@@ -112,13 +108,7 @@ fn bench(
     const results = outcome catch |err| {
         const text = if (err == error.OutOfMemory) "out of memory" else diagnostic.message.text();
         say(io, "raylane: {f}: {s}\n", .{ printable(placeOf(diagnostic, run_of.scene)), text });
-        return switch (err) {
-            error.OutOfMemory, error.InputOutput => .failed,
-            error.CameraUnknown => .usage,
-            error.InvalidInput, error.SceneTooLarge => .invalid,
-            error.ImagesDiffer => .differ,
-            error.Canceled => unreachable, // Nobody does.
-        };
+        return exitCodeOf(err);
     };
     return printBench(init.gpa, io, options, &results, &target, diagnostic);
 }
@@ -175,12 +165,18 @@ fn printBench(
     return print(io, text.written());
 }
 
+fn exitCodeOf(err: (Job.Error || raylane.bench.Error)) ExitCode {
+    return switch (err) {
+        error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
+        error.CameraUnknown => .usage,
+        error.InvalidInput, error.SceneTooLarge => .invalid,
+        error.ImagesDiffer => .differ,
+        error.Canceled => unreachable, // Nobody asks for it here.
+    };
+}
+
 /// Where `--json` goes; standard output where it does not go to a file.
-fn openJson(
-    io: Io,
-    path: ?[]const u8,
-    diagnostic: *Diagnostic,
-) raylane.output.TargetError!Target {
+fn openJson(io: Io, path: ?[]const u8, diagnostic: *Diagnostic) raylane.output.TargetError!Target {
     const name = path orelse return .openStdout(io);
     if (cli.isStdout(name)) return .openStdout(io);
     return .openFile(io, &signals.temporary_files, name, diagnostic);
@@ -238,12 +234,7 @@ fn renderAndReport(
         const text = diagnostic.message.text();
         assert(text.len > 0);
         say(io, "raylane: {f}: {s}\n", .{ printable(file), text });
-        return switch (err) {
-            error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
-            error.CameraUnknown => .usage,
-            error.InvalidInput, error.SceneTooLarge => .invalid,
-            error.Canceled => unreachable, // Nobody asks for it here.
-        };
+        return exitCodeOf(err);
     };
     return job.printReport(&report);
 }

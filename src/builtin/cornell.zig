@@ -97,10 +97,9 @@ test "a lack of memory leaks none" {
     try std.testing.checkAllAllocationFailures(std.testing.allocator, buildAndFree, .{});
 }
 
-test "as many triangles as promised, spheres closed and facing outwards" {
+test "spheres are closed" {
     var scene = try build(std.testing.allocator);
     defer scene.deinit();
-    try std.testing.expectEqual(3_978, scene.triangleCount());
     for (scene.meshes[3..]) |mesh| {
         try std.testing.expectEqual(2 * sphere_columns * (sphere_rows - 1), mesh.triangles.len);
         try std.testing.expectEqual(sphere_columns * (sphere_rows - 1) + 2, mesh.positions.len);

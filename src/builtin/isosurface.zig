@@ -107,6 +107,15 @@ fn sample(gpa: Allocator, grid: Grid, field: anytype) Allocator.Error![]f64 {
     return samples;
 }
 
+/// Where a sample of a box lies, in cells from its lower corner.
+pub fn boxOffset(index: usize) Point {
+    return .{
+        @floatFromInt(index % box_samples),
+        @floatFromInt(index / box_samples % box_samples),
+        @floatFromInt(index / box_samples / box_samples),
+    };
+}
+
 /// The edge of a cell along `axis` that begins at `corner`. Bit a of a corner's number tells
 /// whether it lies at the upper end of axis a.
 fn cellEdge(axis: usize, corner: usize) usize {
@@ -387,12 +396,7 @@ const TorusField = struct {
 
     fn values(_: TorusField, lower: Point, cell: f64, out: []f64) void {
         for (out, 0..) |*result, index| {
-            const offset: Point = .{
-                @floatFromInt(index % box_samples),
-                @floatFromInt(index / box_samples % box_samples),
-                @floatFromInt(index / box_samples / box_samples),
-            };
-            result.* = value(lower + geometry.scale(offset, cell));
+            result.* = value(lower + geometry.scale(boxOffset(index), cell));
         }
     }
 

@@ -82,8 +82,7 @@ pub fn archBand(builder: *MeshBuilder, band: Band) Allocator.Error!void {
     const legs: usize = if (band.leg > 0) 1 else 0;
     const count = band.arch.pointCount();
     const columns = count + 2 * legs;
-    var points: [MeshBuilder.patch_quad_max]Point = undefined;
-    assert(band.section.len * columns <= points.len);
+    const points = try builder.patchPoints(band.section.len, columns);
     for (band.section, 0..) |section_point, row| {
         const row_points = points[row * columns ..][0..columns];
         band.arch.curve(section_point[0], row_points[legs..][0..count]);
@@ -93,7 +92,7 @@ pub fn archBand(builder: *MeshBuilder, band: Band) Allocator.Error!void {
         }
         for (row_points) |*point| point[2] = section_point[1];
     }
-    try builder.patch(.{ .points = points[0 .. band.section.len * columns], .columns = columns });
+    try builder.patch(.{ .points = points, .columns = columns });
 }
 
 /// A moulded bar below the arch of a vault's barrel.
@@ -118,8 +117,7 @@ pub fn addRib(builder: *MeshBuilder, rib: Rib) Allocator.Error!void {
         .whole => line.len,
         .left => rib.arch.half_segments + 1,
     };
-    var points: [MeshBuilder.patch_quad_max]Point = undefined;
-    assert(rib.section.len * columns <= points.len);
+    const points = try builder.patchPoints(rib.section.len, columns);
     for (rib.section, 0..) |section_point, row| {
         for (0..columns) |column| {
             const outward = barrelNormal(line, column);
@@ -128,7 +126,7 @@ pub fn addRib(builder: *MeshBuilder, rib: Rib) Allocator.Error!void {
                 line[column] + offset + Point{ 0, 0, section_point[1] };
         }
     }
-    try builder.patch(.{ .points = points[0 .. rib.section.len * columns], .columns = columns });
+    try builder.patch(.{ .points = points, .columns = columns });
 }
 
 fn stretchedLine(arch: Arch, half_across: f64, rise: f64, line: []Point) void {
@@ -149,9 +147,8 @@ pub const Spandrel = struct {
     /// Half the width of the wall.
     half_width: f64,
     top: f64,
+    /// Behind 0 it is seen from behind.
     z: f64,
-    /// Which side is seen.
-    side: enum { front, back },
 };
 
 /// Adds the flat wall between an arch, the springing line, and a horizontal line above.
@@ -164,20 +161,13 @@ pub fn spandrel(builder: *MeshBuilder, wall: Spandrel) Allocator.Error!void {
     wall.arch.curve(wall.distance, lower[1 .. 1 + count]);
     lower[0] = .{ -wall.half_width, 0, 0 };
     lower[columns - 1] = .{ wall.half_width, 0, 0 };
-    var points: [2 * lower.len]Point = undefined;
+    const points = try builder.patchPoints(2, columns);
     for (lower[0..columns], 0..) |point, column| {
-        const at = switch (wall.side) {
-            .front => column,
-            .back => columns - 1 - column,
-        };
+        const at = if (wall.z < 0) columns - 1 - column else column;
         points[at] = .{ point[0], point[1], wall.z };
         points[columns + at] = .{ point[0], wall.top, wall.z };
     }
-    try builder.patch(.{
-        .points = points[0 .. 2 * columns],
-        .columns = columns,
-        .crease_cos = null,
-    });
+    try builder.patch(.{ .points = points, .columns = columns, .crease_cos = null });
 }
 
 /// A wall with an arched opening; y = 0 is where the arch springs.
@@ -201,7 +191,6 @@ pub fn piercedWall(builder: *MeshBuilder, wall: PiercedWall) Allocator.Error!voi
         .half_width = wall.half_width,
         .top = wall.top,
         .z = wall.z,
-        .side = .front,
     });
     const opening = wall.arch.half_span + wall.distance;
     try rectangle(builder, .{ -wall.half_width, wall.sill }, .{ -opening, 0 }, wall.z);
@@ -214,18 +203,24 @@ pub fn piercedWall(builder: *MeshBuilder, wall: PiercedWall) Allocator.Error!voi
 }
 
 /// Adds an upright rectangle, seen from +z.
-pub fn rectangle(
-    builder: *MeshBuilder,
-    lower: [2]f64,
-    upper: [2]f64,
-    z: f64,
-) Allocator.Error!void {
+pub fn rectangle(builder: *MeshBuilder, lower: [2]f64, upper: [2]f64, z: f64) Allocator.Error!void {
     assert(lower[0] < upper[0] and lower[1] < upper[1]);
     try builder.quad(
         .{ lower[0], lower[1], z },
         .{ upper[0], lower[1], z },
         .{ upper[0], upper[1], z },
         .{ lower[0], upper[1], z },
+    );
+}
+
+/// Adds a square slab of a floor, from its corner at the least x and z.
+pub fn slab(builder: *MeshBuilder, corner: Point, size: f64) Allocator.Error!void {
+    const x, const y, const z = .{ corner[0], corner[1], corner[2] };
+    try builder.quad(
+        .{ x, y, z + size },
+        .{ x + size, y, z + size },
+        .{ x + size, y, z },
+        .{ x, y, z },
     );
 }
 
@@ -371,10 +366,7 @@ pub fn blocks(builder: *MeshBuilder, wall: Blocks) Allocator.Error!void {
         const shift = course % 2;
         for (0..columns + shift) |column| {
             const left = (2 * column) -| shift;
-            const right = if (2 * column + 2 - shift < 2 * columns)
-                2 * column + 2 - shift
-            else
-                2 * columns;
+            const right = @min(2 * column + 2 - shift, 2 * columns);
             const x0 = between(wall.lower[0], wall.upper[0], left, 2 * columns);
             const x1 = between(wall.lower[0], wall.upper[0], right, 2 * columns);
             const number: u32 = @intCast(course * 1009 + column);
@@ -393,8 +385,7 @@ pub fn courtMoulding(
     half_x: f64,
     half_z: f64,
 ) Allocator.Error!void {
-    var points: [256]Point = undefined;
-    assert(4 * outline.len <= points.len);
+    const points = try builder.patchPoints(outline.len, 4);
     for (outline, 0..) |outline_point, row| {
         const x = half_x - outline_point[0];
         const y = outline_point[1];
@@ -403,11 +394,7 @@ pub fn courtMoulding(
         const corners = [4]Point{ .{ -x, y, -z }, .{ x, y, -z }, .{ x, y, z }, .{ -x, y, z } };
         points[4 * row ..][0..4].* = corners;
     }
-    try builder.patch(.{
-        .points = points[0 .. 4 * outline.len],
-        .columns = 4,
-        .closed = true,
-    });
+    try builder.patch(.{ .points = points, .columns = 4, .closed = true });
 }
 
 /// Adds a straight moulding from x0 to x1. The outline gives z and y, from below upwards.
@@ -417,13 +404,13 @@ pub fn moulding(
     x0: f64,
     x1: f64,
 ) Allocator.Error!void {
-    var points: [128]Point = undefined;
-    assert(2 * outline.len <= points.len and x0 < x1);
+    assert(x0 < x1);
+    const points = try builder.patchPoints(outline.len, 2);
     for (outline, 0..) |outline_point, row| {
         points[2 * row] = .{ x0, outline_point[1], outline_point[0] };
         points[2 * row + 1] = .{ x1, outline_point[1], outline_point[0] };
     }
-    try builder.patch(.{ .points = points[0 .. 2 * outline.len], .columns = 2 });
+    try builder.patch(.{ .points = points, .columns = 2 });
 }
 
 /// A number in 0..1 that looks random but belongs to `index` (a 32-bit finaliser: multiplications
@@ -472,18 +459,20 @@ test "a vault is seen from below, and its webs meet" {
         try std.testing.expect(normal[1] < 1e-6);
         try std.testing.expect(position[1] >= -1e-6 and position[1] <= 1 + 1e-6);
     }
-    var plan_area: f32 = 0;
-    const math = @import("../math.zig");
+    try std.testing.expectApproxEqRel(@as(f32, 4 * 2), try areaAlong(&builder, 1, -1), 1e-5);
+}
+
+/// Area of the triangles seen along an axis; none may be seen from behind.
+fn areaAlong(builder: *const MeshBuilder, axis: usize, sign: f32) !f32 {
+    const vec3 = @import("../math.zig").vec3;
+    const p = builder.positions.items;
+    var area: f32 = 0;
     for (builder.triangles.items) |t| {
-        const p = builder.positions.items;
-        const normal = math.vec3.cross(
-            math.vec3.sub(p[t[1]], p[t[0]]),
-            math.vec3.sub(p[t[2]], p[t[0]]),
-        );
-        try std.testing.expect(normal[1] < 1e-6);
-        plan_area -= normal[1] / 2;
+        const normal = vec3.cross(vec3.sub(p[t[1]], p[t[0]]), vec3.sub(p[t[2]], p[t[0]]));
+        try std.testing.expect(sign * normal[axis] > -1e-6);
+        area += sign * normal[axis] / 2;
     }
-    try std.testing.expectApproxEqRel(@as(f32, 4 * 2), plan_area, 1e-5);
+    return area;
 }
 
 test "blocks fill their rectangle" {
@@ -499,18 +488,7 @@ test "blocks fill their rectangle" {
         .seed = 1,
     });
     try std.testing.expectEqual(2 * (1 + 3 + 4), builder.triangles.items.len);
-    const math = @import("../math.zig");
-    var area: f32 = 0;
-    for (builder.triangles.items) |t| {
-        const p = builder.positions.items;
-        const normal = math.vec3.cross(
-            math.vec3.sub(p[t[1]], p[t[0]]),
-            math.vec3.sub(p[t[2]], p[t[0]]),
-        );
-        try std.testing.expect(normal[2] > 0);
-        area += normal[2] / 2;
-    }
-    try std.testing.expectApproxEqRel(@as(f32, 2 * 6), area, 1e-5);
+    try std.testing.expectApproxEqRel(@as(f32, 2 * 6), try areaAlong(&builder, 2, 1), 1e-5);
 }
 
 test "outlines pass through their points" {

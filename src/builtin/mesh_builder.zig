@@ -179,8 +179,7 @@ fn turn(
     crease_cos: f64,
 ) Allocator.Error!void {
     assert(columns >= 3);
-    const points = &(try builder.scratchSpace()).points;
-    assert(outline.len * columns <= points.len);
+    const points = try builder.patchPoints(outline.len, columns);
     for (outline, 0..) |outline_point, row| {
         for (0..columns) |column| {
             const azimuth_rad = 2 * std.math.pi * (ratio(column, columns) + phase_turns);
@@ -192,7 +191,7 @@ fn turn(
         }
     }
     try builder.patch(.{
-        .points = points[0 .. outline.len * columns],
+        .points = points,
         .columns = columns,
         .closed = true,
         .crease_cos = crease_cos,
@@ -201,8 +200,7 @@ fn turn(
 
 /// Adds a square prism with the given outline of half widths, sides across x and z.
 pub fn prism(builder: *MeshBuilder, outline: []const OutlinePoint) Allocator.Error!void {
-    const points = &(try builder.scratchSpace()).points;
-    assert(4 * outline.len <= points.len);
+    const points = try builder.patchPoints(outline.len, 4);
     for (outline, 0..) |outline_point, row| {
         const half, const height = outline_point;
         points[4 * row ..][0..4].* = .{
@@ -212,12 +210,12 @@ pub fn prism(builder: *MeshBuilder, outline: []const OutlinePoint) Allocator.Err
             .{ -half, height, -half },
         };
     }
-    try builder.patch(.{
-        .points = points[0 .. 4 * outline.len],
-        .columns = 4,
-        .closed = true,
-        .crease_cos = 0.9,
-    });
+    try builder.patch(.{ .points = points, .columns = 4, .closed = true, .crease_cos = 0.9 });
+}
+
+/// Memory for the points of one patch, until the next is made.
+pub fn patchPoints(builder: *MeshBuilder, rows: usize, columns: usize) Allocator.Error![]Point {
+    return (try builder.scratchSpace()).points[0 .. rows * columns];
 }
 
 fn scratchSpace(builder: *MeshBuilder) Allocator.Error!*Scratch {
@@ -234,21 +232,19 @@ pub fn patch(builder: *MeshBuilder, surface: Patch) Allocator.Error!void {
         return builder.gridFaces(grid, first);
     }
     const scratch = try builder.scratchSpace();
-    const face_normals = &scratch.face_normals;
-    const corner_vertices = &scratch.corner_vertices;
     for (0..grid.rows) |row| {
         for (0..grid.columns) |column| {
             const a, const b, const c, const d = grid.corners(row, column);
-            face_normals[row * grid.columns + column] = geometry.cross(
+            scratch.face_normals[row * grid.columns + column] = geometry.cross(
                 surface.points[c] - surface.points[a],
                 surface.points[d] - surface.points[b],
             );
         }
     }
     for (surface.points, 0..) |_, point_index| {
-        try builder.patchPoint(surface, grid, point_index, face_normals, corner_vertices);
+        try builder.patchPoint(surface, grid, point_index);
     }
-    for (corner_vertices[0 .. grid.rows * grid.columns]) |corners| {
+    for (scratch.corner_vertices[0 .. grid.rows * grid.columns]) |corners| {
         for (Grid.cut(corners)) |t| try builder.triangle(t[0], t[1], t[2]);
     }
 }
@@ -296,9 +292,8 @@ fn patchPoint(
     surface: Patch,
     grid: Grid,
     point_index: usize,
-    face_normals: *const [patch_quad_max]Point,
-    corner_vertices: *[patch_quad_max][4]u32,
 ) Allocator.Error!void {
+    const scratch = try builder.scratchSpace();
     const row = point_index / grid.stride();
     const column = point_index % grid.stride();
     var groups: [4]struct { normal: Point, vertex: u32 } = undefined;
@@ -308,8 +303,8 @@ fn patchPoint(
         var sum: Point = .{ 0, 0, 0 };
         for (0..4) |other_corner| {
             const other = quadAt(grid, row, column, other_corner) orelse continue;
-            const a = face_normals[own];
-            const b = face_normals[other];
+            const a = scratch.face_normals[own];
+            const b = scratch.face_normals[other];
             const lengths = geometry.length(a) * geometry.length(b);
             if (geometry.dot(a, b) > surface.crease_cos.? * lengths) sum += b;
         }
@@ -323,7 +318,7 @@ fn patchPoint(
             group_count += 1;
             break :blk added;
         };
-        corner_vertices[own][corner] = group;
+        scratch.corner_vertices[own][corner] = group;
     }
 }
 

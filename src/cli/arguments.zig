@@ -9,51 +9,50 @@ const nearest = @import("nearest.zig").nearest;
 const quote = @import("../diagnostic.zig").quote;
 const Range = @import("../settings.zig").Range;
 
-/// One option of a command, by the names of the enumeration `Id`.
-pub fn Flag(comptime Id: type) type {
-    return struct {
-        id: Id,
-        /// With its dashes.
-        long: []const u8,
-        /// 0: none.
-        short: u8 = 0,
-        /// What the help calls its value; empty: it has none.
-        value: []const u8 = "",
-        /// What it does: lines of the help's right column.
-        help: []const u8,
-    };
-}
+/// One option of a command, in the words of its help.
+pub const Option = struct {
+    /// `-f, --flag VALUE`, perhaps without a letter or a value.
+    usage: []const u8,
+    /// What it does: lines of the help's right column.
+    help: []const u8,
+};
 
-/// The flags under one heading of the help.
-pub fn Section(comptime Id: type) type {
-    return struct { title: []const u8, flags: []const Flag(Id) };
-}
+/// What the usage of an option says.
+const Flag = struct {
+    /// With its dashes.
+    long: []const u8,
+    /// 0: none.
+    short: u8,
+    takes_value: bool,
 
-/// The flags of all sections.
-pub fn flagsOf(comptime Id: type, comptime sections: []const Section(Id)) []const Flag(Id) {
-    comptime {
-        var flags: []const Flag(Id) = &.{};
-        for (sections) |section| flags = flags ++ section.flags;
-        return flags;
+    fn of(comptime usage: []const u8) Flag {
+        const has_short = usage[1] != '-';
+        var words = std.mem.tokenizeScalar(u8, usage[if (has_short) 4 else 0..], ' ');
+        return .{
+            .long = words.next().?,
+            .short = if (has_short) usage[1] else 0,
+            .takes_value = words.next() != null,
+        };
     }
-}
+};
+
+/// The options under one heading of the help.
+pub const Section = struct { title: []const u8, options: []const Option };
 
 /// Where the right column of the help begins.
 const help_column = 27;
 
 /// The part of the help that describes the flags.
-pub fn helpOf(comptime Id: type, comptime sections: []const Section(Id)) []const u8 {
+pub fn helpOf(comptime sections: []const Section) []const u8 {
     comptime {
         @setEvalBranchQuota(1 << 20);
         var text: []const u8 = "";
         for (sections) |section| {
             text = text ++ "\n" ++ section.title ++ "\n";
-            for (section.flags) |flag| {
-                const letters: []const u8 = &.{ '-', flag.short, ',', ' ' };
-                const short = if (flag.short == 0) "    " else letters;
-                var left: []const u8 = "  " ++ short ++ flag.long;
-                if (flag.value.len > 0) left = left ++ " " ++ flag.value;
-                var lines = std.mem.splitScalar(u8, flag.help, '\n');
+            for (section.options) |option| {
+                const indent = if (option.usage[1] == '-') "      " else "  ";
+                var left: []const u8 = indent ++ option.usage;
+                var lines = std.mem.splitScalar(u8, option.help, '\n');
                 while (lines.next()) |line| {
                     const gap: [help_column - left.len]u8 = @splat(' ');
                     text = text ++ left ++ gap ++ line ++ "\n";
@@ -86,9 +85,43 @@ pub fn integer(text: []const u8, range: Range) ?u32 {
 }
 
 /// Reads arguments by a table of flags.
-pub fn Arguments(comptime Id: type, comptime flags: []const Flag(Id)) type {
+pub fn Arguments(comptime sections: []const Section) type {
     return struct {
         const Self = @This();
+
+        /// The flags of all sections.
+        pub const flags: []const Flag = flags: {
+            @setEvalBranchQuota(1 << 16);
+            var all: []const Flag = &.{};
+            for (sections) |section| {
+                for (section.options) |option| all = all ++ .{Flag.of(option.usage)};
+            }
+            break :flags all;
+        };
+
+        /// The flags by their names, without the first dashes and with underscores for the others.
+        pub const Id = Id: {
+            var names: [flags.len][]const u8 = undefined;
+            var numbers: [flags.len]u8 = undefined;
+            for (flags, &names, &numbers, 0..) |flag, *name, *number_of, index| {
+                var tag = flag.long[2..].*;
+                std.mem.replaceScalar(u8, &tag, '-', '_');
+                const constant = tag;
+                name.* = &constant;
+                number_of.* = index;
+            }
+            break :Id @Enum(u8, .exhaustive, &names, &numbers);
+        };
+
+        /// A flag as it stands among the arguments.
+        pub const Given = struct {
+            id: Id,
+            long: []const u8,
+            /// Empty where the flag has none.
+            value: []const u8,
+        };
+
+        pub const Argument = union(enum) { word: []const u8, flag: Given };
 
         arguments: []const [:0]const u8,
         diagnostic: *Diagnostic,
@@ -99,12 +132,6 @@ pub fn Arguments(comptime Id: type, comptime flags: []const Flag(Id)) type {
         /// What is left of several short flags in one.
         shorts: []const u8 = "",
         flags_ended: bool = false,
-
-        pub const Argument = union(enum) {
-            word: []const u8,
-            /// The value is empty where the flag has none.
-            flag: struct { flag: Flag(Id), value: []const u8 },
-        };
 
         /// The next flag or word; null after the last.
         pub fn next(reader: *Self) error{UsageInvalid}!?Argument {
@@ -134,44 +161,39 @@ pub fn Arguments(comptime Id: type, comptime flags: []const Flag(Id)) type {
         /// The error of a value that is not what it should be.
         pub fn bad(
             reader: *const Self,
-            flag: Flag(Id),
-            value: []const u8,
+            given: Given,
             comptime expected: []const u8,
         ) error{UsageInvalid} {
-            return reader.fail("option '{s}': {f} is not " ++ expected, .{
-                flag.long, quote(value),
-            });
+            const parts = .{ given.long, quote(given.value) };
+            return reader.fail("option '{s}': {f} is not " ++ expected, parts);
         }
 
         /// The value as a number of a range.
         pub fn number(
             reader: *const Self,
-            flag: Flag(Id),
-            value: []const u8,
+            given: Given,
             comptime range: Range,
         ) error{UsageInvalid}!u32 {
-            return integer(value, range) orelse reader.bad(flag, value, comptime range.text());
+            return integer(given.value, range) orelse reader.bad(given, comptime range.text());
         }
 
         /// The value as one of the names of an enumeration.
         pub fn choice(
             reader: *const Self,
-            flag: Flag(Id),
-            value: []const u8,
+            given: Given,
             comptime Enum: type,
         ) error{UsageInvalid}!Enum {
-            return std.meta.stringToEnum(Enum, value) orelse
-                reader.bad(flag, value, comptime namesOf(Enum));
+            return std.meta.stringToEnum(Enum, given.value) orelse
+                reader.bad(given, comptime namesOf(Enum));
         }
 
         /// The value as text that is not empty.
         pub fn text(
             reader: *const Self,
-            flag: Flag(Id),
-            value: []const u8,
+            given: Given,
             comptime expected: []const u8,
         ) error{UsageInvalid}![]const u8 {
-            return if (value.len > 0) value else reader.bad(flag, value, expected);
+            return if (given.value.len > 0) given.value else reader.bad(given, expected);
         }
 
         fn take(reader: *Self) ?[]const u8 {
@@ -184,15 +206,12 @@ pub fn Arguments(comptime Id: type, comptime flags: []const Flag(Id)) type {
         fn long(reader: *Self, argument: []const u8) error{UsageInvalid}!Argument {
             const equals = std.mem.findScalar(u8, argument, '=');
             const name = argument[0 .. equals orelse argument.len];
-            for (flags) |flag| {
+            const value = if (equals) |at| argument[at + 1 ..] else null;
+            for (flags, 0..) |flag, index| {
                 if (!std.mem.eql(u8, flag.long, name)) continue;
-                const value = if (equals) |at| argument[at + 1 ..] else null;
-                if (flag.value.len > 0) return .{ .flag = .{
-                    .flag = flag,
-                    .value = value orelse try reader.valueOf(flag.long),
-                } };
-                if (value == null) return .{ .flag = .{ .flag = flag, .value = "" } };
-                return reader.fail("option '{s}' takes no value", .{flag.long});
+                if (!flag.takes_value and value != null)
+                    return reader.fail("option '{s}' takes no value", .{name});
+                return reader.give(index, value, name);
             }
             var names: [flags.len][]const u8 = undefined;
             for (&names, flags) |*candidate, flag| candidate.* = flag.long;
@@ -209,22 +228,28 @@ pub fn Arguments(comptime Id: type, comptime flags: []const Flag(Id)) type {
             const letter = reader.shorts[0];
             const rest = reader.shorts[1..];
             reader.shorts = "";
-            const flag = for (flags) |flag| {
-                if (flag.short == letter) break flag;
-            } else {
-                const whole = reader.arguments[reader.index - 1];
-                return reader.fail("unknown option {f}", .{quote(whole)});
-            };
-            if (flag.value.len > 0) return .{ .flag = .{
-                .flag = flag,
-                .value = if (rest.len > 0) rest else try reader.valueOf(&.{ '-', letter }),
-            } };
-            reader.shorts = rest;
-            return .{ .flag = .{ .flag = flag, .value = "" } };
+            for (flags, 0..) |flag, index| {
+                if (flag.short != letter) continue;
+                if (!flag.takes_value) reader.shorts = rest;
+                return reader.give(index, if (rest.len > 0) rest else null, &.{ '-', letter });
+            }
+            return reader.fail("unknown option {f}", .{quote(reader.arguments[reader.index - 1])});
         }
 
-        fn valueOf(reader: *Self, name: []const u8) error{UsageInvalid}![]const u8 {
-            return reader.take() orelse reader.fail("option '{s}' needs a value", .{name});
+        /// The flag with that index, called `name`; its value is the next argument if need be.
+        fn give(
+            reader: *Self,
+            index: usize,
+            value: ?[]const u8,
+            name: []const u8,
+        ) error{UsageInvalid}!Argument {
+            const flag = flags[index];
+            return .{ .flag = .{
+                .id = @fromBackingInt(@intCast(index)),
+                .long = flag.long,
+                .value = if (!flag.takes_value) "" else value orelse reader.take() orelse
+                    return reader.fail("option '{s}' needs a value", .{name}),
+            } };
         }
     };
 }

@@ -5,9 +5,7 @@ const arguments_file = @import("arguments.zig");
 const cli = @import("../cli.zig");
 const settings = @import("../settings.zig");
 const variant = @import("../variant.zig");
-const Arguments = arguments_file.Arguments;
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
-const Flag = arguments_file.Flag;
 const Range = settings.Range;
 const Section = arguments_file.Section;
 const comptimePrint = std.fmt.comptimePrint;
@@ -50,122 +48,67 @@ pub const Bench = struct {
     }
 };
 
-const Id = enum {
-    allow_outside,
-    bvh,
-    depth,
-    energy_command,
-    energy_root,
-    help,
-    json,
-    no_energy,
-    quiet,
-    resolution,
-    rounds,
-    spp,
-    threads,
-    time_limit,
-    variants,
-};
-
-const sections: []const Section(Id) = &.{
-    .{ .title = "Settings: those of the thesis unless changed", .flags = &.{
+const sections: []const Section = &.{
+    .{ .title = "Settings: those of the thesis unless changed", .options = &.{
         .{
-            .id = .resolution,
-            .long = "--resolution",
-            .short = 'r',
-            .value = "WxH",
+            .usage = "-r, --resolution WxH",
             .help = comptimePrint("size in pixels (default: {d}x{d})", .{
                 settings.thesis.resolution[0], settings.thesis.resolution[1],
             }),
         },
         .{
-            .id = .spp,
-            .long = "--spp",
-            .value = "N",
+            .usage = "--spp N",
             .help = comptimePrint("samples a pixel (default: {d})", .{
                 settings.thesis.sample_count,
             }),
         },
         .{
-            .id = .depth,
-            .long = "--depth",
-            .value = "N",
+            .usage = "--depth N",
             .help = comptimePrint("reflections and refractions in a row (default: {d})", .{
                 settings.thesis.depth,
             }),
         },
+        .{ .usage = "-t, --threads N", .help = "threads (default: as many as CPUs)" },
+        .{ .usage = "--bvh QUALITY", .help = arguments_file.namesOf(settings.TreeQuality) },
         .{
-            .id = .threads,
-            .long = "--threads",
-            .short = 't',
-            .value = "N",
-            .help = "threads (default: as many as CPUs)",
-        },
-        .{
-            .id = .bvh,
-            .long = "--bvh",
-            .value = "QUALITY",
-            .help = arguments_file.namesOf(settings.TreeQuality),
-        },
-        .{
-            .id = .variants,
-            .long = "--variants",
-            .value = "PARTS",
+            .usage = "--variants PARTS",
             .help = "only variants whose names contain one of these, for\n" ++
                 "example scalar-single,vector-beam (default: all)",
         },
     } },
-    .{ .title = "Measurement", .flags = &.{
+    .{ .title = "Measurement", .options = &.{
         .{
-            .id = .rounds,
-            .long = "--rounds",
-            .value = "N",
+            .usage = "--rounds N",
             .help = "so many rounds, no less and no more, unless the time\n" ++
                 "is over; two are the least",
         },
         .{
-            .id = .time_limit,
-            .long = "--time-limit",
-            .value = "S",
+            .usage = "--time-limit S",
             .help = comptimePrint("seconds for all scenes together (default: {d})", .{
                 time_s.default,
             }),
         },
         .{
-            .id = .energy_command,
-            .long = "--energy-command",
-            .value = "CMD",
+            .usage = "--energy-command CMD",
             .help = "a shell command that prints, each time it is run, the\n" ++
                 "power of this moment (5.2 W, 5200 mW) or a counter of\n" ++
                 "energy (17.5 J, 17500 mJ)",
         },
-        .{
-            .id = .energy_root,
-            .long = "--energy-root",
-            .value = "DIR",
-            .help = "look for sensors there in place of /sys",
-        },
-        .{ .id = .no_energy, .long = "--no-energy", .help = "do not measure energy" },
+        .{ .usage = "--energy-root DIR", .help = "look for sensors there in place of /sys" },
+        .{ .usage = "--no-energy", .help = "do not measure energy" },
     } },
-    .{ .title = "Output", .flags = &.{
+    .{ .title = "Output", .options = &.{
+        .{ .usage = "--json FILE", .help = "all samples, for bench/report.py; - is stdout" },
         .{
-            .id = .json,
-            .long = "--json",
-            .value = "FILE",
-            .help = "all samples, for bench/report.py; - is stdout",
-        },
-        .{
-            .id = .allow_outside,
-            .long = "--allow-outside",
+            .usage = "--allow-outside",
             .help = "let scenes name files outside of their own folders",
         },
-        .{ .id = .quiet, .long = "--quiet", .short = 'q', .help = "no warnings, no progress" },
-        .{ .id = .help, .long = "--help", .short = 'h', .help = "print this" },
+        .{ .usage = "-q, --quiet", .help = "no warnings, no progress" },
+        .{ .usage = "-h, --help", .help = "print this" },
     } },
 };
 
-const flags = arguments_file.flagsOf(Id, sections);
+const Reader = arguments_file.Arguments(sections);
 
 /// What `raylane bench --help` prints.
 pub const help: []const u8 = "raylane " ++ cli.version ++
@@ -178,7 +121,7 @@ pub const help: []const u8 = "raylane " ++ cli.version ++
     \\time is over; prints the tables. No image is written. SCENE is as for rendering;
     \\without one: the built-in scenes cornell, atrium, nave and handles.
     \\
-++ arguments_file.helpOf(Id, sections) ++
+++ arguments_file.helpOf(sections) ++
     \\
     \\Exit status: as of raylane, and 4 where a variant renders another image than
     \\the others.
@@ -187,7 +130,7 @@ pub const help: []const u8 = "raylane " ++ cli.version ++
 
 /// Reads the arguments after `bench`.
 pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error!Bench {
-    var reader: Arguments(Id, flags) = .{
+    var reader: Reader = .{
         .arguments = arguments,
         .diagnostic = diagnostic,
         .help = "raylane bench --help",
@@ -201,37 +144,30 @@ pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error
             bench.scenes[bench.scene_count] = scene;
             bench.scene_count += 1;
         },
-        .flag => |flag| try set(&reader, &bench, flag.flag, flag.value),
+        .flag => |flag| try set(&reader, &bench, flag),
     };
     if (!bench.energy and bench.energy_command != null)
         return reader.fail("'--no-energy' contradicts '--energy-command'", .{});
     return bench;
 }
 
-fn set(
-    reader: *const Arguments(Id, flags),
-    bench: *Bench,
-    flag: Flag(Id),
-    value: []const u8,
-) cli.Error!void {
-    switch (flag.id) {
-        .resolution => bench.resolution = cli.resolutionOf(value) orelse
-            return reader.bad(flag, value, cli.expected_resolution),
-        .threads => {
-            bench.thread_count = try reader.number(flag, value, settings.thread_count);
-        },
-        .spp => bench.sample_count = try reader.number(flag, value, settings.sample_count),
-        .depth => bench.depth = try reader.number(flag, value, settings.depth),
-        .bvh => bench.tree_quality = try reader.choice(flag, value, settings.TreeQuality),
+fn set(reader: *const Reader, bench: *Bench, given: Reader.Given) cli.Error!void {
+    switch (given.id) {
+        .resolution => bench.resolution = cli.resolutionOf(given.value) orelse
+            return reader.bad(given, cli.expected_resolution),
+        .threads => bench.thread_count = try reader.number(given, settings.thread_count),
+        .spp => bench.sample_count = try reader.number(given, settings.sample_count),
+        .depth => bench.depth = try reader.number(given, settings.depth),
+        .bvh => bench.tree_quality = try reader.choice(given, settings.TreeQuality),
         .variants => {
-            if (!isList(value)) return reader.bad(flag, value, "parts of names, with commas");
-            bench.variants = value;
+            if (!isList(given.value)) return reader.bad(given, "parts of names, with commas");
+            bench.variants = given.value;
         },
-        .rounds => bench.round_count = try reader.number(flag, value, rounds),
-        .time_limit => bench.time_s = try reader.number(flag, value, time_s),
-        .json => bench.json = try reader.text(flag, value, "a name"),
-        .energy_root => bench.energy_root = try reader.text(flag, value, "a name"),
-        .energy_command => bench.energy_command = try reader.text(flag, value, "a name"),
+        .rounds => bench.round_count = try reader.number(given, rounds),
+        .time_limit => bench.time_s = try reader.number(given, time_s),
+        .json => bench.json = try reader.text(given, "a name"),
+        .energy_root => bench.energy_root = try reader.text(given, "a name"),
+        .energy_command => bench.energy_command = try reader.text(given, "a name"),
         .no_energy => bench.energy = false,
         .allow_outside => bench.allow_outside = true,
         .quiet => bench.quiet = true,

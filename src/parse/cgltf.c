@@ -72,146 +72,82 @@ _Static_assert(sizeof(cgltf_float) == sizeof(float), "a float is an f32");
 _Static_assert(sizeof(cgltf_type) == sizeof(unsigned int), "an enumeration is a c_uint");
 _Static_assert(sizeof(cgltf_data) < USHRT_MAX, "numbers of the layout are unsigned short");
 
-/* In the order of cgltf.zig, whose test compares: of each structure its size and the offsets of its
- * fields, then the values of the enumerations. */
-#define AT(field) offsetof(TYPE, field)
+/* The offsets of some fields. Each round of ROUNDS expands one more of them. */
+#define NOTHING
+#define ROUNDS(...) ROUNDS4(ROUNDS4(ROUNDS4(__VA_ARGS__)))
+#define ROUNDS4(...) ROUNDS1(ROUNDS1(ROUNDS1(ROUNDS1(__VA_ARGS__))))
+#define ROUNDS1(...) ROUNDS0(ROUNDS0(ROUNDS0(ROUNDS0(__VA_ARGS__))))
+#define ROUNDS0(...) __VA_ARGS__
+#define EACH(type, field, ...) \
+    offsetof(type, field) __VA_OPT__(, AGAIN NOTHING()(type, __VA_ARGS__))
+#define AGAIN() EACH
+#define OFFSETS(...) ROUNDS(EACH(__VA_ARGS__))
+#define STRUCTURE(type, ...) sizeof(type), OFFSETS(type, __VA_ARGS__)
+
+/* In the order of cgltf.zig, whose test compares: of each enumeration its values, of each structure
+ * its size and the offsets of its fields. */
 const unsigned short rl_cgltf_layout[] = {
-#define TYPE cgltf_buffer
-    sizeof(TYPE), AT(name), AT(size), AT(uri), AT(data), AT(extras),
-#undef TYPE
-#define TYPE cgltf_meshopt_compression
-    sizeof(TYPE), AT(buffer), AT(mode),
-#undef TYPE
-#define TYPE cgltf_buffer_view
-    sizeof(TYPE), AT(name), AT(buffer), AT(offset), AT(size), AT(stride), AT(type),
-    AT(has_meshopt_compression), AT(meshopt_compression), AT(extras),
-#undef TYPE
-#define TYPE cgltf_accessor_sparse
-    sizeof(TYPE), AT(count), AT(indices_buffer_view), AT(indices_byte_offset),
-    AT(indices_component_type), AT(values_buffer_view), AT(values_byte_offset),
-#undef TYPE
-#define TYPE cgltf_accessor
-    sizeof(TYPE), AT(name), AT(component_type), AT(normalized), AT(type), AT(offset), AT(count),
-    AT(stride), AT(buffer_view), AT(has_min), AT(is_sparse), AT(sparse), AT(extras),
-#undef TYPE
-#define TYPE cgltf_attribute
-    sizeof(TYPE), AT(name), AT(type), AT(index), AT(data),
-#undef TYPE
-#define TYPE cgltf_texture_view
-    sizeof(TYPE), AT(texture), AT(texcoord),
-#undef TYPE
-#define TYPE cgltf_pbr_metallic_roughness
-    sizeof(TYPE), AT(base_color_texture), AT(metallic_roughness_texture), AT(base_color_factor),
-    AT(metallic_factor), AT(roughness_factor),
-#undef TYPE
-#define TYPE cgltf_pbr_specular_glossiness
-    sizeof(TYPE), AT(diffuse_texture), AT(diffuse_factor), AT(specular_factor),
-    AT(glossiness_factor),
-#undef TYPE
-#define TYPE cgltf_volume
-    sizeof(TYPE), AT(thickness_texture), AT(thickness_factor), AT(attenuation_color),
-    AT(attenuation_distance),
-#undef TYPE
-#define TYPE cgltf_clearcoat
-    sizeof(TYPE), AT(clearcoat_texture), AT(clearcoat_factor),
-#undef TYPE
-#define TYPE cgltf_ior
-    sizeof(TYPE), AT(ior),
-#undef TYPE
-#define TYPE cgltf_specular
-    sizeof(TYPE), AT(specular_texture), AT(specular_color_factor),
-#undef TYPE
-#define TYPE cgltf_sheen
-    sizeof(TYPE), AT(sheen_color_texture), AT(sheen_roughness_texture),
-#undef TYPE
-#define TYPE cgltf_transmission
-    sizeof(TYPE), AT(transmission_texture), AT(transmission_factor),
-#undef TYPE
-#define TYPE cgltf_emissive_strength
-    sizeof(TYPE), AT(emissive_strength),
-#undef TYPE
-#define TYPE cgltf_iridescence
-    sizeof(TYPE), AT(iridescence_factor), AT(iridescence_texture),
-    AT(iridescence_thickness_texture),
-#undef TYPE
-#define TYPE cgltf_diffuse_transmission
-    sizeof(TYPE), AT(diffuse_transmission_texture), AT(diffuse_transmission_factor),
-    AT(diffuse_transmission_color_texture),
-#undef TYPE
-#define TYPE cgltf_anisotropy
-    sizeof(TYPE), AT(anisotropy_strength), AT(anisotropy_texture),
-#undef TYPE
-#define TYPE cgltf_material
-    sizeof(TYPE), AT(name), AT(has_pbr_metallic_roughness), AT(has_pbr_specular_glossiness),
-    AT(has_clearcoat), AT(has_transmission), AT(has_volume), AT(has_ior), AT(has_specular),
-    AT(has_emissive_strength), AT(has_iridescence), AT(pbr_metallic_roughness),
-    AT(pbr_specular_glossiness), AT(clearcoat), AT(ior), AT(specular), AT(sheen),
-    AT(transmission), AT(volume), AT(emissive_strength), AT(iridescence),
-    AT(diffuse_transmission), AT(anisotropy), AT(dispersion), AT(normal_texture),
-    AT(emissive_texture), AT(emissive_factor), AT(alpha_mode), AT(alpha_cutoff), AT(double_sided),
-    AT(unlit), AT(extras),
-#undef TYPE
-#define TYPE cgltf_morph_target
-    sizeof(TYPE), AT(attributes), AT(attributes_count),
-#undef TYPE
-#define TYPE cgltf_primitive
-    sizeof(TYPE), AT(type), AT(indices), AT(material), AT(attributes), AT(attributes_count),
-    AT(targets), AT(targets_count), AT(extras), AT(has_draco_mesh_compression),
-    AT(draco_mesh_compression),
-#undef TYPE
-#define TYPE cgltf_mesh
-    sizeof(TYPE), AT(name), AT(primitives), AT(primitives_count), AT(weights), AT(weights_count),
-    AT(target_names), AT(extras),
-#undef TYPE
-#define TYPE cgltf_skin
-    sizeof(TYPE), AT(name), AT(joints), AT(joints_count), AT(skeleton), AT(inverse_bind_matrices),
-    AT(extras),
-#undef TYPE
-#define TYPE cgltf_camera_perspective
-    sizeof(TYPE), AT(has_aspect_ratio), AT(aspect_ratio), AT(yfov), AT(has_zfar), AT(zfar),
-    AT(znear), AT(extras),
-#undef TYPE
-#define TYPE cgltf_camera_orthographic
-    sizeof(TYPE), AT(xmag), AT(ymag), AT(zfar), AT(extras),
-#undef TYPE
-#define TYPE cgltf_camera
-    sizeof(TYPE), AT(name), AT(type), AT(data), AT(extras),
-#undef TYPE
-#define TYPE cgltf_light
-    sizeof(TYPE), AT(name), AT(color), AT(intensity), AT(type), AT(range),
-    AT(spot_inner_cone_angle), AT(spot_outer_cone_angle), AT(extras),
-#undef TYPE
-#define TYPE cgltf_node
-    sizeof(TYPE), AT(name), AT(parent), AT(children), AT(children_count), AT(skin), AT(mesh),
-    AT(camera), AT(light), AT(weights), AT(weights_count), AT(has_translation), AT(has_rotation),
-    AT(has_scale), AT(has_matrix), AT(translation), AT(rotation), AT(scale), AT(matrix),
-    AT(extras), AT(has_mesh_gpu_instancing), AT(mesh_gpu_instancing),
-#undef TYPE
-#define TYPE cgltf_scene
-    sizeof(TYPE), AT(name), AT(nodes), AT(nodes_count), AT(extras),
-#undef TYPE
-#define TYPE cgltf_asset
-    sizeof(TYPE), AT(copyright), AT(version), AT(min_version), AT(extras),
-#undef TYPE
-#define TYPE cgltf_data
-    AT(file_type), AT(asset), AT(meshes), AT(meshes_count), AT(materials), AT(materials_count),
-    AT(accessors), AT(accessors_count), AT(buffer_views), AT(buffer_views_count), AT(buffers),
-    AT(buffers_count), AT(images), AT(textures_count), AT(samplers), AT(skins), AT(skins_count),
-    AT(cameras), AT(cameras_count), AT(lights), AT(lights_count), AT(nodes), AT(nodes_count),
-    AT(scenes), AT(scenes_count), AT(scene), AT(animations), AT(animations_count), AT(variants),
-    AT(extensions_used), AT(extensions_used_count), AT(extensions_required),
-    AT(extensions_required_count),
-#undef TYPE
-    cgltf_result_success, cgltf_result_legacy_gltf, cgltf_attribute_type_invalid,
-    cgltf_attribute_type_position, cgltf_attribute_type_normal, cgltf_attribute_type_tangent,
-    cgltf_attribute_type_texcoord, cgltf_attribute_type_color, cgltf_attribute_type_joints,
-    cgltf_attribute_type_weights, cgltf_component_type_r_8, cgltf_component_type_r_8u,
+    cgltf_result_success, cgltf_result_legacy_gltf,
+    cgltf_attribute_type_invalid, cgltf_attribute_type_position, cgltf_attribute_type_normal,
+    cgltf_attribute_type_tangent, cgltf_attribute_type_texcoord, cgltf_attribute_type_color,
+    cgltf_attribute_type_joints, cgltf_attribute_type_weights,
+    cgltf_component_type_invalid, cgltf_component_type_r_8, cgltf_component_type_r_8u,
     cgltf_component_type_r_16, cgltf_component_type_r_16u, cgltf_component_type_r_32u,
-    cgltf_component_type_r_32f, cgltf_type_scalar, cgltf_type_vec2, cgltf_type_vec3,
-    cgltf_type_vec4, cgltf_type_mat2, cgltf_type_mat3, cgltf_type_mat4,
+    cgltf_component_type_r_32f,
+    cgltf_type_invalid, cgltf_type_scalar, cgltf_type_vec2, cgltf_type_vec3, cgltf_type_vec4,
+    cgltf_type_mat2, cgltf_type_mat3, cgltf_type_mat4,
     cgltf_primitive_type_invalid, cgltf_primitive_type_triangles,
-    cgltf_primitive_type_triangle_strip, cgltf_primitive_type_triangle_fan, cgltf_alpha_mode_mask,
-    cgltf_alpha_mode_blend, cgltf_camera_type_perspective, cgltf_camera_type_orthographic,
-    cgltf_light_type_directional, cgltf_light_type_point, cgltf_light_type_spot,
+    cgltf_primitive_type_triangle_strip, cgltf_primitive_type_triangle_fan,
+    cgltf_alpha_mode_opaque, cgltf_alpha_mode_mask, cgltf_alpha_mode_blend,
+    cgltf_camera_type_invalid, cgltf_camera_type_perspective, cgltf_camera_type_orthographic,
+    cgltf_light_type_invalid, cgltf_light_type_directional, cgltf_light_type_point,
+    cgltf_light_type_spot,
+    STRUCTURE(cgltf_buffer, name, size, uri, data, extras),
+    STRUCTURE(cgltf_buffer_view, name, buffer, offset, size, stride, type,
+              has_meshopt_compression, meshopt_compression, extras),
+    STRUCTURE(cgltf_accessor_sparse, count, indices_buffer_view, indices_byte_offset,
+              indices_component_type, values_buffer_view, values_byte_offset),
+    STRUCTURE(cgltf_accessor, name, component_type, normalized, type, offset, count, stride,
+              buffer_view, has_min, is_sparse, sparse, extras),
+    STRUCTURE(cgltf_attribute, name, type, index, data),
+    STRUCTURE(cgltf_texture_view, texture, texcoord),
+    STRUCTURE(cgltf_pbr_metallic_roughness, base_color_texture, metallic_roughness_texture,
+              base_color_factor, metallic_factor, roughness_factor),
+    STRUCTURE(cgltf_pbr_specular_glossiness, diffuse_texture, diffuse_factor, specular_factor,
+              glossiness_factor),
+    STRUCTURE(cgltf_volume, thickness_texture, thickness_factor, attenuation_color,
+              attenuation_distance),
+    STRUCTURE(cgltf_transmission, transmission_texture, transmission_factor),
+    STRUCTURE(cgltf_material, name, has_pbr_metallic_roughness, has_pbr_specular_glossiness,
+              has_clearcoat, has_transmission, has_volume, has_ior, has_specular,
+              has_emissive_strength, has_iridescence, pbr_metallic_roughness,
+              pbr_specular_glossiness, clearcoat, ior, specular, sheen, transmission, volume,
+              emissive_strength, iridescence, diffuse_transmission, anisotropy, dispersion,
+              normal_texture, emissive_texture, emissive_factor, alpha_mode, alpha_cutoff,
+              double_sided, unlit, extras),
+    STRUCTURE(cgltf_morph_target, attributes, attributes_count),
+    STRUCTURE(cgltf_primitive, type, indices, material, attributes, attributes_count, targets,
+              targets_count, extras, has_draco_mesh_compression, draco_mesh_compression),
+    STRUCTURE(cgltf_mesh, name, primitives, primitives_count, weights, weights_count,
+              target_names, extras),
+    STRUCTURE(cgltf_skin, name, joints, joints_count, skeleton, inverse_bind_matrices, extras),
+    STRUCTURE(cgltf_camera_perspective, has_aspect_ratio, aspect_ratio, yfov, has_zfar, zfar,
+              znear, extras),
+    STRUCTURE(cgltf_camera_orthographic, xmag, ymag, zfar, extras),
+    STRUCTURE(cgltf_camera, name, type, data, extras),
+    STRUCTURE(cgltf_light, name, color, intensity, type, range, spot_inner_cone_angle,
+              spot_outer_cone_angle, extras),
+    STRUCTURE(cgltf_node, name, parent, children, children_count, skin, mesh, camera, light,
+              weights, weights_count, has_translation, has_rotation, has_scale, has_matrix,
+              translation, rotation, scale, matrix, extras, has_mesh_gpu_instancing,
+              mesh_gpu_instancing),
+    STRUCTURE(cgltf_scene, name, nodes, nodes_count, extras),
+    STRUCTURE(cgltf_asset, copyright, version, min_version, extras),
+    OFFSETS(cgltf_data, file_type, asset, meshes, meshes_count, materials, materials_count,
+            accessors, accessors_count, buffer_views, buffer_views_count, buffers,
+            buffers_count, images, textures_count, samplers, skins, skins_count, cameras,
+            cameras_count, lights, lights_count, nodes, nodes_count, scenes, scenes_count,
+            scene, animations, animations_count, variants, extensions_used,
+            extensions_used_count, extensions_required, extensions_required_count),
 };
 const size_t rl_cgltf_layout_count = sizeof(rl_cgltf_layout) / sizeof(*rl_cgltf_layout);

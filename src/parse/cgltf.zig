@@ -27,55 +27,30 @@ pub extern fn rl_cgltf_parse(
     data: *[*c]cgltf_data,
 ) cgltf_result;
 
-pub const cgltf_result = c_uint;
-pub const cgltf_result_success = 0;
-pub const cgltf_result_legacy_gltf = 9;
-
-pub const cgltf_attribute_type = c_uint;
-pub const cgltf_attribute_type_invalid = 0;
-pub const cgltf_attribute_type_position = 1;
-pub const cgltf_attribute_type_normal = 2;
-pub const cgltf_attribute_type_tangent = 3;
-pub const cgltf_attribute_type_texcoord = 4;
-pub const cgltf_attribute_type_color = 5;
-pub const cgltf_attribute_type_joints = 6;
-pub const cgltf_attribute_type_weights = 7;
-
-pub const cgltf_component_type = c_uint;
-pub const cgltf_component_type_r_8 = 1;
-pub const cgltf_component_type_r_8u = 2;
-pub const cgltf_component_type_r_16 = 3;
-pub const cgltf_component_type_r_16u = 4;
-pub const cgltf_component_type_r_32u = 5;
-pub const cgltf_component_type_r_32f = 6;
-
-pub const cgltf_type = c_uint;
-pub const cgltf_type_scalar = 1;
-pub const cgltf_type_vec2 = 2;
-pub const cgltf_type_vec3 = 3;
-pub const cgltf_type_vec4 = 4;
-pub const cgltf_type_mat2 = 5;
-pub const cgltf_type_mat3 = 6;
-pub const cgltf_type_mat4 = 7;
-
-pub const cgltf_primitive_type = c_uint;
-pub const cgltf_primitive_type_invalid = 0;
-pub const cgltf_primitive_type_triangles = 5;
-pub const cgltf_primitive_type_triangle_strip = 6;
-pub const cgltf_primitive_type_triangle_fan = 7;
-
-pub const cgltf_alpha_mode = c_uint;
-pub const cgltf_alpha_mode_mask = 1;
-pub const cgltf_alpha_mode_blend = 2;
-
-pub const cgltf_camera_type = c_uint;
-pub const cgltf_camera_type_perspective = 1;
-pub const cgltf_camera_type_orthographic = 2;
-
-pub const cgltf_light_type = c_uint;
-pub const cgltf_light_type_directional = 1;
-pub const cgltf_light_type_point = 2;
-pub const cgltf_light_type_spot = 3;
+pub const cgltf_result = enum(c_uint) { success = 0, legacy_gltf = 9, _ };
+pub const cgltf_attribute_type = enum(c_uint) {
+    invalid,
+    position,
+    normal,
+    tangent,
+    texcoord,
+    color,
+    joints,
+    weights,
+    _,
+};
+pub const cgltf_component_type = enum(c_uint) { invalid, r_8, r_8u, r_16, r_16u, r_32u, r_32f, _ };
+pub const cgltf_type = enum(c_uint) { invalid, scalar, vec2, vec3, vec4, mat2, mat3, mat4, _ };
+pub const cgltf_primitive_type = enum(c_uint) {
+    invalid = 0,
+    triangles = 5,
+    triangle_strip = 6,
+    triangle_fan = 7,
+    _,
+};
+pub const cgltf_alpha_mode = enum(c_uint) { @"opaque", mask, blend, _ };
+pub const cgltf_camera_type = enum(c_uint) { invalid, perspective, orthographic, _ };
+pub const cgltf_light_type = enum(c_uint) { invalid, directional, point, spot, _ };
 
 const String = [*c]u8;
 const cgltf_bool = c_int;
@@ -92,8 +67,6 @@ pub const cgltf_buffer = extern struct {
     extras: Tail,
 };
 
-const cgltf_meshopt_compression = extern struct { buffer: [5]usize, mode: [3]c_uint };
-
 pub const cgltf_buffer_view = extern struct {
     name: String,
     buffer: [*c]cgltf_buffer,
@@ -102,11 +75,11 @@ pub const cgltf_buffer_view = extern struct {
     stride: usize,
     type: [2]usize,
     has_meshopt_compression: cgltf_bool,
-    meshopt_compression: cgltf_meshopt_compression,
+    meshopt_compression: extern struct { buffer: [5]usize, mode: [3]c_uint },
     extras: Tail,
 };
 
-const cgltf_accessor_sparse = extern struct {
+pub const cgltf_accessor_sparse = extern struct {
     count: usize,
     indices_buffer_view: [*c]cgltf_buffer_view,
     indices_byte_offset: usize,
@@ -137,7 +110,7 @@ pub const cgltf_attribute = extern struct {
     data: [*c]cgltf_accessor,
 };
 
-const cgltf_texture_view = extern struct { texture: ?*anyopaque, texcoord: [10]u32 };
+pub const cgltf_texture_view = extern struct { texture: ?*anyopaque, texcoord: [10]u32 };
 
 pub const cgltf_pbr_metallic_roughness = extern struct {
     base_color_texture: cgltf_texture_view,
@@ -147,7 +120,7 @@ pub const cgltf_pbr_metallic_roughness = extern struct {
     roughness_factor: f32,
 };
 
-const cgltf_pbr_specular_glossiness = extern struct {
+pub const cgltf_pbr_specular_glossiness = extern struct {
     diffuse_texture: [2]cgltf_texture_view,
     diffuse_factor: [4]f32,
     specular_factor: [3]f32,
@@ -161,39 +134,15 @@ pub const cgltf_volume = extern struct {
     attenuation_distance: f32,
 };
 
-const cgltf_clearcoat = extern struct {
-    clearcoat_texture: [3]cgltf_texture_view,
-    clearcoat_factor: [2]f32,
-};
-const cgltf_ior = extern struct { ior: f32 };
-const cgltf_specular = extern struct {
-    specular_texture: [2]cgltf_texture_view,
-    specular_color_factor: [4]f32,
-};
-const Painted = extern struct { texture: cgltf_texture_view, factors: [3]f32 };
-const cgltf_sheen = extern struct {
-    sheen_color_texture: Painted,
-    sheen_roughness_texture: cgltf_transmission,
-};
-const cgltf_transmission = extern struct {
+pub const cgltf_transmission = extern struct {
     transmission_texture: cgltf_texture_view,
     transmission_factor: f32,
 };
-const cgltf_emissive_strength = extern struct { emissive_strength: f32 };
-const cgltf_iridescence = extern struct {
-    iridescence_factor: f32,
-    iridescence_texture: Painted,
-    iridescence_thickness_texture: cgltf_texture_view,
-};
-const cgltf_diffuse_transmission = extern struct {
-    diffuse_transmission_texture: cgltf_texture_view,
-    diffuse_transmission_factor: [4]f32,
-    diffuse_transmission_color_texture: cgltf_texture_view,
-};
-const cgltf_anisotropy = extern struct {
-    anisotropy_strength: [2]f32,
-    anisotropy_texture: cgltf_texture_view,
-};
+
+/// What is not read of materials consists of textures and numbers.
+fn Textured(comptime texture_count: usize, comptime float_count: usize) type {
+    return extern struct { textures: [texture_count]cgltf_texture_view, floats: [float_count]f32 };
+}
 
 pub const cgltf_material = extern struct {
     name: String,
@@ -208,16 +157,16 @@ pub const cgltf_material = extern struct {
     has_iridescence: [4]cgltf_bool,
     pbr_metallic_roughness: cgltf_pbr_metallic_roughness,
     pbr_specular_glossiness: cgltf_pbr_specular_glossiness,
-    clearcoat: cgltf_clearcoat,
-    ior: cgltf_ior,
-    specular: cgltf_specular,
-    sheen: cgltf_sheen,
+    clearcoat: Textured(3, 2),
+    ior: f32,
+    specular: Textured(2, 4),
+    sheen: extern struct { color: Textured(1, 3), roughness: Textured(1, 1) },
     transmission: cgltf_transmission,
     volume: cgltf_volume,
-    emissive_strength: cgltf_emissive_strength,
-    iridescence: cgltf_iridescence,
-    diffuse_transmission: cgltf_diffuse_transmission,
-    anisotropy: cgltf_anisotropy,
+    emissive_strength: f32,
+    iridescence: extern struct { factor: f32, film: Textured(1, 3), thickness: Textured(1, 0) },
+    diffuse_transmission: extern struct { factors: Textured(1, 4), color: Textured(1, 0) },
+    anisotropy: extern struct { strength: [2]f32, texture: Textured(1, 0) },
     dispersion: f32,
     normal_texture: [2]cgltf_texture_view,
     emissive_texture: cgltf_texture_view,
@@ -229,7 +178,7 @@ pub const cgltf_material = extern struct {
     extras: Tail,
 };
 
-const cgltf_morph_target = extern struct {
+pub const cgltf_morph_target = extern struct {
     attributes: [*c]cgltf_attribute,
     attributes_count: usize,
 };
@@ -247,7 +196,7 @@ pub const cgltf_primitive = extern struct {
     draco_mesh_compression: [7]usize,
 };
 
-const cgltf_mesh = extern struct {
+pub const cgltf_mesh = extern struct {
     name: String,
     primitives: [*c]cgltf_primitive,
     primitives_count: usize,
@@ -257,7 +206,7 @@ const cgltf_mesh = extern struct {
     extras: Tail,
 };
 
-const cgltf_skin = extern struct {
+pub const cgltf_skin = extern struct {
     name: String,
     joints: [*c][*c]cgltf_node,
     joints_count: usize,
@@ -266,7 +215,7 @@ const cgltf_skin = extern struct {
     extras: Tail,
 };
 
-const cgltf_camera_perspective = extern struct {
+pub const cgltf_camera_perspective = extern struct {
     has_aspect_ratio: cgltf_bool,
     aspect_ratio: f32,
     yfov: f32,
@@ -276,7 +225,7 @@ const cgltf_camera_perspective = extern struct {
     extras: Extras,
 };
 
-const cgltf_camera_orthographic = extern struct {
+pub const cgltf_camera_orthographic = extern struct {
     xmag: f32,
     ymag: f32,
     zfar: [2]f32,
@@ -328,14 +277,14 @@ pub const cgltf_node = extern struct {
     mesh_gpu_instancing: [4]usize,
 };
 
-const cgltf_scene = extern struct {
+pub const cgltf_scene = extern struct {
     name: String,
     nodes: [*c][*c]cgltf_node,
     nodes_count: usize,
     extras: Tail,
 };
 
-const cgltf_asset = extern struct {
+pub const cgltf_asset = extern struct {
     copyright: [2]usize,
     version: String,
     min_version: String,
@@ -379,37 +328,19 @@ pub const cgltf_data = extern struct {
     extensions_required_count: usize,
 };
 
-const mirrored = .{
-    cgltf_buffer,                  cgltf_meshopt_compression,
-    cgltf_buffer_view,             cgltf_accessor_sparse,
-    cgltf_accessor,                cgltf_attribute,
-    cgltf_texture_view,            cgltf_pbr_metallic_roughness,
-    cgltf_pbr_specular_glossiness, cgltf_volume,
-    cgltf_clearcoat,               cgltf_ior,
-    cgltf_specular,                cgltf_sheen,
-    cgltf_transmission,            cgltf_emissive_strength,
-    cgltf_iridescence,             cgltf_diffuse_transmission,
-    cgltf_anisotropy,              cgltf_material,
-    cgltf_morph_target,            cgltf_primitive,
-    cgltf_mesh,                    cgltf_skin,
-    cgltf_camera_perspective,      cgltf_camera_orthographic,
-    cgltf_camera,                  cgltf_light,
-    cgltf_node,                    cgltf_scene,
-    cgltf_asset,
-};
-
-/// Of each structure its size, then the offsets of its fields; of the document the offsets alone;
-/// then the values of the enumerations.
+/// In the order above: of each enumeration its values, of each structure its size and the offsets
+/// of its fields, of the document the offsets alone.
 const layout = numbers: {
     @setEvalBranchQuota(10_000);
     var numbers: []const usize = &.{};
-    for (mirrored ++ .{cgltf_data}) |Struct| {
-        if (Struct != cgltf_data) numbers = numbers ++ .{@sizeOf(Struct)};
-        for (std.meta.fieldNames(Struct)) |name| numbers = numbers ++ .{@offsetOf(Struct, name)};
-    }
     for (@typeInfo(@This()).@"struct".decl_names) |name| {
-        const value = @field(@This(), name);
-        if (@TypeOf(value) == comptime_int) numbers = numbers ++ .{value};
+        const Mirror = @field(@This(), name);
+        if (!std.mem.startsWith(u8, name, "cgltf_")) continue;
+        const is_structure = @typeInfo(Mirror) == .@"struct";
+        if (is_structure and Mirror != cgltf_data) numbers = numbers ++ .{@sizeOf(Mirror)};
+        for (std.meta.fieldNames(Mirror)) |field| numbers = numbers ++ .{
+            if (is_structure) @offsetOf(Mirror, field) else @backingInt(@field(Mirror, field)),
+        };
     }
     break :numbers numbers;
 };

@@ -75,21 +75,15 @@ fn parseDocument(
 ) Error!Document {
     return Document.parse(gpa, text) catch |err| switch (err) {
         error.OutOfMemory => error.OutOfMemory,
-        error.TooLarge => diagnostic.fail(
-            error.InvalidInput,
+        error.TooLarge => diagnostic.invalid(
             "the document would need much more memory than its size explains",
             .{},
         ),
-        error.Legacy => diagnostic.fail(
-            error.InvalidInput,
-            "glTF 1.0 is not supported, only 2.0",
-            .{},
-        ),
+        error.Legacy => diagnostic.invalid("glTF 1.0 is not supported, only 2.0", .{}),
         error.Refused => {
             // cgltf does not say why, so look for the reasons that the table leaves.
             try json.checkReferences(gpa, text, &schema.document, lengths, "node", diagnostic);
-            return diagnostic.fail(
-                error.InvalidInput,
+            return diagnostic.invalid(
                 "is not valid glTF: an animation or an extension refers to what is not there",
                 .{},
             );

@@ -104,11 +104,8 @@ pub fn check(
     rule: *const Rule,
     diagnostic: *Diagnostic,
 ) error{InvalidInput}!Checked {
-    if (!std.unicode.utf8ValidateSlice(text)) return diagnostic.fail(
-        error.InvalidInput,
-        "the JSON text is not UTF-8",
-        .{},
-    );
+    if (!std.unicode.utf8ValidateSlice(text))
+        return diagnostic.invalid("the JSON text is not UTF-8", .{});
     var scanner: Scanner = .{ .text = text, .diagnostic = diagnostic };
     try scanner.run(rule);
     return .{ .lengths = scanner.lengths, .double_count = scanner.double_count };
@@ -142,11 +139,8 @@ pub fn checkReferences(
         return err;
     };
     roots.setIntersection(children);
-    if (roots.findFirstSet()) |index| return diagnostic.fail(
-        error.InvalidInput,
-        "{s} {d} is a root and a child at once",
-        .{ noun, index },
-    );
+    if (roots.findFirstSet()) |index|
+        return diagnostic.invalid("{s} {d} is a root and a child at once", .{ noun, index });
 }
 
 /// The doubles of a document that `check` has passed, in their order; the caller frees them.
@@ -305,8 +299,7 @@ const Scanner = struct {
     }
 
     fn push(scanner: *Scanner, frame: Frame) error{InvalidInput}!void {
-        if (scanner.depth == depth_max) return scanner.diagnostic.fail(
-            error.InvalidInput,
+        if (scanner.depth == depth_max) return scanner.diagnostic.invalid(
             "the JSON text is nested over {d} deep",
             .{depth_max},
         );
@@ -493,7 +486,7 @@ const Scanner = struct {
     fn syntax(scanner: *const Scanner, comptime what: []const u8) error{InvalidInput} {
         const before = scanner.text[0..scanner.offset];
         const line_start = if (std.mem.findScalarLast(u8, before, '\n')) |index| index + 1 else 0;
-        return scanner.diagnostic.fail(error.InvalidInput, "JSON line {d}, byte {d}: " ++ what, .{
+        return scanner.diagnostic.invalid("JSON line {d}, byte {d}: " ++ what, .{
             std.mem.countScalar(u8, before, '\n') + 1, scanner.offset - line_start + 1,
         });
     }
@@ -505,7 +498,7 @@ const Scanner = struct {
         arguments: anytype,
     ) error{InvalidInput} {
         const path: Path = .{ .scanner = scanner };
-        return scanner.diagnostic.fail(error.InvalidInput, "{f}: " ++ what, .{path} ++ arguments);
+        return scanner.diagnostic.invalid("{f}: " ++ what, .{path} ++ arguments);
     }
 
     fn unexpected(scanner: *const Scanner, rule: *const Rule) error{InvalidInput} {

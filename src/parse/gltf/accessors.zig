@@ -93,9 +93,9 @@ fn resolveSparse(
         .{ index, raw.count, accessor.count },
     );
     const index_component = switch (raw.indices_component_type) {
-        c.cgltf_component_type_r_8u => Component.u8,
-        c.cgltf_component_type_r_16u => Component.u16,
-        c.cgltf_component_type_r_32u => Component.u32,
+        .r_8u => Component.u8,
+        .r_16u => Component.u16,
+        .r_32u => Component.u32,
         else => return source.fail("accessor {d}: bad componentType of sparse indices", .{index}),
     };
     const count: u64 = raw.count;
@@ -127,12 +127,7 @@ fn resolveSparse(
     return sparse;
 }
 
-fn checkSparse(
-    source: *Source,
-    index: usize,
-    count: u32,
-    sparse: accessors.Sparse,
-) Error!void {
+fn checkSparse(source: *Source, index: usize, count: u32, sparse: accessors.Sparse) Error!void {
     try source.charge(sparse.indices.len);
     var next: u64 = 0;
     for (0..sparse.count) |position| {
@@ -216,25 +211,25 @@ fn bufferIndex(source: *const Source, view: *const c.cgltf_buffer_view) u32 {
 
 fn componentOf(raw: c.cgltf_component_type) ?Component {
     return switch (raw) {
-        c.cgltf_component_type_r_8 => .i8,
-        c.cgltf_component_type_r_8u => .u8,
-        c.cgltf_component_type_r_16 => .i16,
-        c.cgltf_component_type_r_16u => .u16,
-        c.cgltf_component_type_r_32u => .u32,
-        c.cgltf_component_type_r_32f => .f32,
+        .r_8 => .i8,
+        .r_8u => .u8,
+        .r_16 => .i16,
+        .r_16u => .u16,
+        .r_32u => .u32,
+        .r_32f => .f32,
         else => null,
     };
 }
 
 fn componentCount(raw: c.cgltf_type) ?u8 {
     return switch (raw) {
-        c.cgltf_type_scalar => 1,
-        c.cgltf_type_vec2 => 2,
-        c.cgltf_type_vec3 => 3,
-        c.cgltf_type_vec4 => 4,
-        c.cgltf_type_mat2 => 4,
-        c.cgltf_type_mat3 => 9,
-        c.cgltf_type_mat4 => 16,
+        .scalar => 1,
+        .vec2 => 2,
+        .vec3 => 3,
+        .vec4 => 4,
+        .mat2 => 4,
+        .mat3 => 9,
+        .mat4 => 16,
         else => null,
     };
 }
@@ -242,8 +237,8 @@ fn componentCount(raw: c.cgltf_type) ?u8 {
 /// Bytes of an element; columns of matrices start at multiples of 4 bytes.
 fn paddedBytes(raw: c.cgltf_type, component: Component, component_count: u8) u32 {
     const column_count: u32 = switch (raw) {
-        c.cgltf_type_mat2 => 2,
-        c.cgltf_type_mat3 => 3,
+        .mat2 => 2,
+        .mat3 => 3,
         else => return @as(u32, component.bytes()) * component_count,
     };
     return column_count * std.mem.alignForward(u32, component.bytes() * column_count, 4);

@@ -28,7 +28,7 @@ pub const Used = struct {
 pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) Error!Used {
     const list = Source.slice(primitive.attributes, primitive.attributes_count);
     const position = for (list) |*attribute| {
-        if (attribute.type != c.cgltf_attribute_type_position or attribute.index != 0) continue;
+        if (attribute.type != .position or attribute.index != 0) continue;
         break accessorIndex(source, attribute);
     } else return .{};
     const positions = try required(source, position);
@@ -46,9 +46,9 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
         try checkAttribute(source, attribute, index, positions.count, place);
         if (attribute.index != 0) continue;
         const slot: *?u32 = switch (attribute.type) {
-            c.cgltf_attribute_type_position => &used.position,
-            c.cgltf_attribute_type_normal => &used.normal,
-            c.cgltf_attribute_type_color => &used.color,
+            .position => &used.position,
+            .normal => &used.normal,
+            .color => &used.color,
             else => continue,
         };
         if (slot.* != null) {
@@ -115,7 +115,7 @@ fn checkAttribute(
     if (!fits) return source.fail("{f}: accessor {d} has no type for {f}", .{
         place, index, quote(attribute),
     });
-    if (attribute.type == c.cgltf_attribute_type_texcoord) {
+    if (attribute.type == .texcoord) {
         try gltf_accessors.checkFinite(source, index, accessor);
     }
 }
@@ -130,9 +130,9 @@ fn checkTarget(
     const accessor = try gltf_accessors.resolve(source, index) orelse return;
     try checkCount(source, accessor, index, vertex_count, place);
     const vector = switch (attribute.type) {
-        c.cgltf_attribute_type_position,
-        c.cgltf_attribute_type_normal,
-        c.cgltf_attribute_type_tangent,
+        .position,
+        .normal,
+        .tangent,
         => true,
         else => false,
     };
@@ -165,27 +165,27 @@ fn kindOf(accessor: Accessor, attribute: c.cgltf_attribute_type) Kind {
     const small_unsigned = component == .u8 or component == .u16;
     const small = small_signed or small_unsigned;
     const count_fits = switch (attribute) {
-        c.cgltf_attribute_type_position, c.cgltf_attribute_type_normal => count == 3,
-        c.cgltf_attribute_type_texcoord => count == 2,
-        c.cgltf_attribute_type_color => count == 3 or count == 4,
-        c.cgltf_attribute_type_tangent,
-        c.cgltf_attribute_type_joints,
-        c.cgltf_attribute_type_weights,
+        .position, .normal => count == 3,
+        .texcoord => count == 2,
+        .color => count == 3 or count == 4,
+        .tangent,
+        .joints,
+        .weights,
         => count == 4,
         else => return .core,
     };
     if (!count_fits) return .wrong;
     switch (attribute) {
-        c.cgltf_attribute_type_joints => return if (small_unsigned) .core else .wrong,
+        .joints => return if (small_unsigned) .core else .wrong,
         else => if (component == .f32) return .core,
     }
     return switch (attribute) {
-        c.cgltf_attribute_type_position => if (small) .quantized else .wrong,
+        .position => if (small) .quantized else .wrong,
         // A direction is the same whether its numbers are normalised or not.
-        c.cgltf_attribute_type_normal,
-        c.cgltf_attribute_type_tangent,
+        .normal,
+        .tangent,
         => if (small_signed) .quantized else .wrong,
-        c.cgltf_attribute_type_texcoord => if (small_unsigned and accessor.normalized)
+        .texcoord => if (small_unsigned and accessor.normalized)
             .core
         else if (small)
             .quantized

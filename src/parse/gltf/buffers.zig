@@ -44,118 +44,96 @@ pub fn load(
     var buffers: Buffers = .{ .gpa = gpa, .list = list };
     errdefer buffers.deinit();
     var total: u64 = 0;
-    for (list, Source.slice(data.buffers, data.buffers_count), 0..) |*bytes, *buffer, index| {
-        total +|= buffer.size;
-        if (total > limits.buffer_bytes_max) return diagnostic.fail(
-            error.InvalidInput,
-            "buffer {d}: {d} bytes of buffers are over the limit of {d}",
-            .{ index, total, limits.buffer_bytes_max },
+    for (list, Source.slice(data.buffers, data.buffers_count), 0..) |*bytes, *raw, index| {
+        const reader: Reader = .{
+            .buffers = &buffers,
+            .resources = resources,
+            .diagnostic = diagnostic,
+            .raw = raw,
+            .index = index,
+        };
+        total +|= raw.size;
+        if (total > limits.buffer_bytes_max) return reader.fail(
+            "{d} bytes of buffers are over the limit of {d}",
+            .{ total, limits.buffer_bytes_max },
         );
-        if (buffer.size == 0) return diagnostic.fail(
-            error.InvalidInput,
-            "buffer {d}: byteLength is 0",
-            .{index},
-        );
-        bytes.* = if (buffer.uri != null)
-            try buffers.loadUri(buffer, index, resources, diagnostic)
+        if (raw.size == 0) return reader.fail("byteLength is 0", .{});
+        bytes.* = if (raw.uri != null)
+            try reader.whole(try reader.fromUri())
         else if (index == 0 and binary != null)
             // A buffer without URI is the GLB's if it is the first, else an extension's.
-            try whole(binary.?, buffer.size, index, diagnostic)
+            try reader.whole(binary.?)
         else
             null;
     }
     return buffers;
 }
 
-fn loadUri(
+/// Reads one buffer.
+const Reader = struct {
     buffers: *Buffers,
-    buffer: *const c.cgltf_buffer,
-    index: usize,
     resources: *Resources,
     diagnostic: *Diagnostic,
-) Error![]const u8 {
-    const gpa = buffers.gpa;
-    const text = std.mem.span(@as([*:0]const u8, buffer.uri));
-    switch (uri.classify(text)) {
-        .base64 => |digits| {
-            // Before anything of that size is allocated.
-            if (buffer.size > digits.len / 4 * 3 + 3) return diagnostic.fail(
-                error.InvalidInput,
-                "buffer {d}: byteLength {d} is more than its data URI holds",
-                .{ index, buffer.size },
-            );
-            const bytes = uri.decodeBase64(gpa, digits) catch |err| return switch (err) {
-                error.OutOfMemory => error.OutOfMemory,
-                error.NotBase64 => diagnostic.fail(
-                    error.InvalidInput,
-                    "buffer {d}: its data URI is not valid base64",
-                    .{index},
-                ),
-            };
-            try buffers.own(bytes);
-            return try whole(bytes, buffer.size, index, diagnostic);
-        },
-        .data_not_base64 => return diagnostic.fail(
-            error.InvalidInput,
-            "buffer {d}: its data URI is not base64",
-            .{index},
-        ),
-        .scheme => |scheme| return diagnostic.fail(
-            error.InvalidInput,
-            "buffer {d}: URIs of the scheme {f} are not read, only files and data",
-            .{ index, quote(scheme) },
-        ),
-        .path => |encoded| {
-            const bytes = try buffers.loadFile(encoded, index, resources, diagnostic);
-            return try whole(bytes, buffer.size, index, diagnostic);
-        },
+    raw: *const c.cgltf_buffer,
+    index: usize,
+
+    fn fail(reader: Reader, comptime format: []const u8, arguments: anytype) error{InvalidInput} {
+        return reader.diagnostic.invalid("buffer {d}: " ++ format, .{reader.index} ++ arguments);
     }
-}
 
-/// Takes over `bytes`, which are freed even when this fails.
-fn own(buffers: *Buffers, bytes: [:0]const u8) error{OutOfMemory}!void {
-    errdefer buffers.gpa.free(bytes);
-    try buffers.owned.append(buffers.gpa, bytes);
-}
+    fn fromUri(reader: Reader) Error![]const u8 {
+        const text = std.mem.span(@as([*:0]const u8, reader.raw.uri));
+        switch (uri.classify(text)) {
+            .base64 => |digits| {
+                // Before anything of that size is allocated.
+                if (reader.raw.size > digits.len / 4 * 3 + 3) return reader.fail(
+                    "byteLength {d} is more than its data URI holds",
+                    .{reader.raw.size},
+                );
+                const gpa = reader.buffers.gpa;
+                return reader.own(uri.decodeBase64(gpa, digits) catch |err| return switch (err) {
+                    error.OutOfMemory => error.OutOfMemory,
+                    error.NotBase64 => reader.fail("its data URI is not valid base64", .{}),
+                });
+            },
+            .data_not_base64 => return reader.fail("its data URI is not base64", .{}),
+            .scheme => |scheme| return reader.fail(
+                "URIs of the scheme {f} are not read, only files and data",
+                .{quote(scheme)},
+            ),
+            .path => |encoded| return reader.fromFile(encoded),
+        }
+    }
 
-fn loadFile(
-    buffers: *Buffers,
-    encoded: []const u8,
-    index: usize,
-    resources: *Resources,
-    diagnostic: *Diagnostic,
-) Error![]const u8 {
-    const gpa = buffers.gpa;
-    const text = try escapes.decodeString(gpa, encoded);
-    defer gpa.free(text);
-    const path = uri.decodePath(gpa, text) catch |err| return switch (err) {
-        error.OutOfMemory => error.OutOfMemory,
-        error.BadEscape => diagnostic.fail(
-            error.InvalidInput,
-            "buffer {d}: {f} is not a valid path",
-            .{ index, quote(text) },
-        ),
-    };
-    defer gpa.free(path);
-    var reason: diagnostic_data.Message = .{};
-    const file = resources.read(path, &reason) catch |err| return if (err == error.OutOfMemory)
-        err
-    else
-        diagnostic.fail(err, "buffer {d}: {f} {s}", .{ index, quote(text), reason.text() });
-    try buffers.own(file.bytes);
-    return file.bytes;
-}
+    /// Takes over `bytes`, which are freed even when this fails.
+    fn own(reader: Reader, bytes: [:0]const u8) error{OutOfMemory}![]const u8 {
+        errdefer reader.buffers.gpa.free(bytes);
+        try reader.buffers.owned.append(reader.buffers.gpa, bytes);
+        return bytes;
+    }
 
-fn whole(
-    bytes: []const u8,
-    byte_length: u64,
-    index: usize,
-    diagnostic: *Diagnostic,
-) error{InvalidInput}![]const u8 {
-    if (bytes.len >= byte_length) return bytes[0..@intCast(byte_length)];
-    return diagnostic.fail(
-        error.InvalidInput,
-        "buffer {d}: has {d} bytes, its byteLength is {d}",
-        .{ index, bytes.len, byte_length },
-    );
-}
+    fn fromFile(reader: Reader, encoded: []const u8) Error![]const u8 {
+        const gpa = reader.buffers.gpa;
+        const text = try escapes.decodeString(gpa, encoded);
+        defer gpa.free(text);
+        const path = uri.decodePath(gpa, text) catch |err| return switch (err) {
+            error.OutOfMemory => error.OutOfMemory,
+            error.BadEscape => reader.fail("{f} is not a valid path", .{quote(text)}),
+        };
+        defer gpa.free(path);
+        var reason: diagnostic_data.Message = .{};
+        const file = reader.resources.read(path, &reason) catch |err| {
+            if (err == error.OutOfMemory) return err;
+            const parts = .{ reader.index, quote(text), reason.text() };
+            return reader.diagnostic.fail(err, "buffer {d}: {f} {s}", parts);
+        };
+        return reader.own(file.bytes);
+    }
+
+    /// As many of the bytes as byteLength says.
+    fn whole(reader: Reader, bytes: []const u8) error{InvalidInput}![]const u8 {
+        const byte_length: u64 = reader.raw.size;
+        if (bytes.len >= byte_length) return bytes[0..@intCast(byte_length)];
+        return reader.fail("has {d} bytes, its byteLength is {d}", .{ bytes.len, byte_length });
+    }
+};

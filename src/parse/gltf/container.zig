@@ -22,14 +22,13 @@ const binary_type = 0x004E4942;
 
 /// Finds the parts of a glTF file.
 pub fn open(bytes: []const u8, diagnostic: *Diagnostic) error{InvalidInput}!Container {
-    if (bytes.len == 0) return diagnostic.fail(error.InvalidInput, "the file is empty", .{});
+    if (bytes.len == 0) return diagnostic.invalid("the file is empty", .{});
     const container: Container = if (std.mem.startsWith(u8, bytes, magic))
         try openBinary(bytes, diagnostic)
     else
         .{ .json = bytes, .binary = null };
     const json = skipMark(container.json, diagnostic);
-    if (json.len > limits.json_bytes_max) return diagnostic.fail(
-        error.InvalidInput,
+    if (json.len > limits.json_bytes_max) return diagnostic.invalid(
         "{d} bytes of JSON are over the limit of {d}",
         .{ json.len, limits.json_bytes_max },
     );
@@ -37,23 +36,14 @@ pub fn open(bytes: []const u8, diagnostic: *Diagnostic) error{InvalidInput}!Cont
 }
 
 fn openBinary(bytes: []const u8, diagnostic: *Diagnostic) error{InvalidInput}!Container {
-    if (bytes.len < header_bytes + chunk_header_bytes) return diagnostic.fail(
-        error.InvalidInput,
-        "GLB of {d} bytes is cut short",
-        .{bytes.len},
-    );
+    if (bytes.len < header_bytes + chunk_header_bytes)
+        return diagnostic.invalid("GLB of {d} bytes is cut short", .{bytes.len});
     const version = readU32(bytes, 4);
-    if (version != 2) return diagnostic.fail(
-        error.InvalidInput,
-        "GLB version {d} is not supported, only 2",
-        .{version},
-    );
+    if (version != 2)
+        return diagnostic.invalid("GLB version {d} is not supported, only 2", .{version});
     const length = readU32(bytes, 8);
-    if (length > bytes.len) return diagnostic.fail(
-        error.InvalidInput,
-        "GLB is cut short: {d} bytes of {d}",
-        .{ bytes.len, length },
-    );
+    if (length > bytes.len)
+        return diagnostic.invalid("GLB is cut short: {d} bytes of {d}", .{ bytes.len, length });
     if (length < bytes.len) diagnostic.warn(
         "{d} bytes behind the end of the GLB are ignored",
         .{bytes.len - length},
@@ -68,21 +58,18 @@ fn readChunks(bytes: []const u8, diagnostic: *Diagnostic) error{InvalidInput}!Co
     var index: usize = 0;
     while (offset < bytes.len) : (index += 1) {
         const left = bytes.len - offset;
-        if (left < chunk_header_bytes) return diagnostic.fail(
-            error.InvalidInput,
+        if (left < chunk_header_bytes) return diagnostic.invalid(
             "GLB chunk {d}: {d} bytes are no chunk header",
             .{ index, left },
         );
         const length = readU32(bytes, offset);
         const kind = readU32(bytes, offset + 4);
         offset += chunk_header_bytes;
-        if (length > bytes.len - offset) return diagnostic.fail(
-            error.InvalidInput,
+        if (length > bytes.len - offset) return diagnostic.invalid(
             "GLB chunk {d}: {d} bytes past the end",
             .{ index, length - (bytes.len - offset) },
         );
-        if (length % 4 != 0) return diagnostic.fail(
-            error.InvalidInput,
+        if (length % 4 != 0) return diagnostic.invalid(
             "GLB chunk {d}: length {d} is no multiple of 4",
             .{ index, length },
         );
@@ -94,11 +81,7 @@ fn readChunks(bytes: []const u8, diagnostic: *Diagnostic) error{InvalidInput}!Co
         if (kind == binary_type and binary == null) binary = content;
     }
     return .{
-        .json = json orelse return diagnostic.fail(
-            error.InvalidInput,
-            "GLB does not begin with a JSON chunk",
-            .{},
-        ),
+        .json = json orelse return diagnostic.invalid("GLB does not begin with a JSON chunk", .{}),
         .binary = binary,
     };
 }

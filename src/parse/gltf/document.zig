@@ -39,8 +39,8 @@ fn parseWithin(gpa: Allocator, text: []const u8, bytes_max: u64) Error!Document 
     const result = c.rl_cgltf_parse(&hooks, text.ptr, text.len, &data);
     if (heap.out_of_memory) return error.OutOfMemory;
     if (heap.over_budget) return error.TooLarge;
-    if (result == c.cgltf_result_legacy_gltf) return error.Legacy;
-    if (result != c.cgltf_result_success) return error.Refused;
+    if (result == .legacy_gltf) return error.Legacy;
+    if (result != .success) return error.Refused;
     return .{ .data = data, .heap = heap };
 }
 
@@ -138,8 +138,8 @@ test "any budget is enough or an error, and nothing leaks" {
     const material = &document.data.materials[0];
     try std.testing.expectEqual(0.1, material.pbr_metallic_roughness.roughness_factor);
     const attributes = document.data.meshes[0].primitives[0].attributes;
-    try std.testing.expect(attributes[0].type == c.cgltf_attribute_type_position);
-    try std.testing.expect(attributes[1].type == c.cgltf_attribute_type_invalid);
+    try std.testing.expect(attributes[0].type == .position);
+    try std.testing.expect(attributes[1].type == .invalid);
 }
 
 test "what cgltf refuses is an error" {

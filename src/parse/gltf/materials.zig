@@ -36,8 +36,8 @@ const Reader = struct {
         const source = reader.source;
         var material: scene.Material = .{
             .alpha_mode = switch (raw.alpha_mode) {
-                c.cgltf_alpha_mode_mask => .mask,
-                c.cgltf_alpha_mode_blend => .blend,
+                .mask => .mask,
+                .blend => .blend,
                 else => .@"opaque",
             },
             .alpha_cutoff = reader.clamp("alphaCutoff", raw.alpha_cutoff, 0, float_max),
@@ -54,7 +54,7 @@ const Reader = struct {
             material.roughness = 1 - reader.unit("glossinessFactor", gloss.glossiness_factor);
         }
         material.emissive = reader.readEmissive(raw);
-        if (raw.has_ior != 0) material.ior = reader.readIor(raw.ior.ior);
+        if (raw.has_ior != 0) material.ior = reader.readIor(raw.ior);
         if (raw.has_transmission != 0) {
             const factor = raw.transmission.transmission_factor;
             material.transmission = reader.unit("transmissionFactor", factor);
@@ -81,7 +81,7 @@ const Reader = struct {
         if (raw.has_emissive_strength == 0) return factor;
         const strength = reader.clamp(
             "emissiveStrength",
-            raw.emissive_strength.emissive_strength,
+            raw.emissive_strength,
             0,
             float_max,
         );

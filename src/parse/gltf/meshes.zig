@@ -83,10 +83,10 @@ pub const Place = struct {
 fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Error!?scene.Mesh {
     const source = meshes.source;
     const mode: Mode = switch (primitive.type) {
-        c.cgltf_primitive_type_triangles => .triangles,
-        c.cgltf_primitive_type_triangle_strip => .strip,
-        c.cgltf_primitive_type_triangle_fan => .fan,
-        c.cgltf_primitive_type_invalid => return source.fail("{f}: unknown mode", .{place}),
+        .triangles => .triangles,
+        .triangle_strip => .strip,
+        .triangle_fan => .fan,
+        .invalid => return source.fail("{f}: unknown mode", .{place}),
         else => {
             source.warn("points and lines are not drawn", .{});
             return null;

@@ -144,12 +144,18 @@ fn localTransform(source: *const Source, index: u32) Error!AffineD {
     return local;
 }
 
-/// A node's numbers in double precision, as the file has them.
-const Numbers = struct {
+/// A node's numbers in double precision, as the file has them, each at its slot.
+const Numbers = extern struct {
     matrix: [16]f64,
     translation: Vec3d,
     rotation: [4]f64,
     scale: Vec3d,
+
+    comptime {
+        assert(@offsetOf(Numbers, "translation") == 8 * schema.translation_slot);
+        assert(@offsetOf(Numbers, "rotation") == 8 * schema.rotation_slot);
+        assert(@offsetOf(Numbers, "scale") == 8 * schema.scale_slot);
+    }
 
     /// cgltf's in single precision, but for those that are not exact there.
     fn of(source: *const Source, index: u32) Numbers {
@@ -158,19 +164,11 @@ const Numbers = struct {
         inline for (.{ "matrix", "translation", "rotation", "scale" }) |name| {
             for (&@field(numbers, name), @field(node, name)) |*to, from| to.* = from;
         }
+        const slots: *[@sizeOf(Numbers) / 8]f64 = @ptrCast(&numbers);
         const doubles = source.doubles;
         var at = std.sort.lowerBound(json.Double, doubles, index, orderByElement);
         while (at < doubles.len and doubles[at].element == index) : (at += 1) {
-            const slot = doubles[at].slot;
-            const to = if (slot < schema.translation_slot)
-                &numbers.matrix[slot]
-            else if (slot < schema.rotation_slot)
-                &numbers.translation[slot - schema.translation_slot]
-            else if (slot < schema.scale_slot)
-                &numbers.rotation[slot - schema.rotation_slot]
-            else
-                &numbers.scale[slot - schema.scale_slot];
-            to.* = doubles[at].value;
+            slots[doubles[at].slot] = doubles[at].value;
         }
         return numbers;
     }

@@ -87,7 +87,7 @@ fn get(skins: *Skins, mesh_index: u32) Error!Facts {
             .{ mesh_index, facts.target_count, primitive.targets_count },
         );
         for (Source.slice(primitive.attributes, primitive.attributes_count)) |*attribute| {
-            if (attribute.type != c.cgltf_attribute_type_joints) continue;
+            if (attribute.type != .joints) continue;
             const accessor_index = Source.indexOf(source.data.accessors, attribute.data);
             facts.joint_max = @max(facts.joint_max, try skins.largestJoint(accessor_index));
         }

@@ -44,7 +44,7 @@ pub fn fail(
     comptime format: []const u8,
     arguments: anytype,
 ) error{InvalidInput} {
-    return source.diagnostic.fail(error.InvalidInput, format, arguments);
+    return source.diagnostic.invalid(format, arguments);
 }
 
 /// Adds a warning.

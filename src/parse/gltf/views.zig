@@ -26,7 +26,7 @@ pub fn readCamera(
 ) Error!scene.Camera {
     const index = Source.indexOf(source.data.cameras, raw);
     const projection: scene.Camera.Projection = switch (raw.type) {
-        c.cgltf_camera_type_perspective => projection: {
+        .perspective => projection: {
             const perspective = &raw.data.perspective;
             const y_fov_rad = perspective.yfov;
             const y_fov_fits = y_fov_rad >= std.math.floatMin(f32) and y_fov_rad < y_fov_max;
@@ -50,7 +50,7 @@ pub fn readCamera(
                 .aspect = if (has_aspect) aspect else null,
             } };
         },
-        c.cgltf_camera_type_orthographic => .{ .orthographic = .{
+        .orthographic => .{ .orthographic = .{
             .half_width = try magnification(source, index, "xmag", raw.data.orthographic.xmag),
             .half_height = try magnification(source, index, "ymag", raw.data.orthographic.ymag),
         } },
@@ -80,17 +80,13 @@ fn magnification(source: *const Source, index: u32, name: []const u8, value: f32
 }
 
 /// The light of a node; null where its type is unknown.
-pub fn readLight(
-    source: *const Source,
-    raw: *const c.cgltf_light,
-    node: u32,
-) ?scene.Light {
+pub fn readLight(source: *const Source, raw: *const c.cgltf_light, node: u32) ?scene.Light {
     const index = Source.indexOf(source.data.lights, raw);
     var light: scene.Light = .{
         .kind = switch (raw.type) {
-            c.cgltf_light_type_point => .point,
-            c.cgltf_light_type_spot => .spot,
-            c.cgltf_light_type_directional => .directional,
+            .point => .point,
+            .spot => .spot,
+            .directional => .directional,
             else => {
                 source.warn("light {d}: unknown type, left out", .{index});
                 return null;

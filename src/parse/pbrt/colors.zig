@@ -144,27 +144,20 @@ pub fn define(
     colors: *Colors,
     name: []const u8,
     class: []const u8,
-    position: usize,
     parameters: *const Parameters,
 ) Error!void {
-    const value = try colors.mean(class, position, parameters);
+    const value = try colors.mean(class, parameters);
     const entry = try colors.textures.getOrPut(colors.arena, name);
     if (!entry.found_existing) entry.key_ptr.* = try colors.arena.dupe(u8, name);
     entry.value_ptr.* = value;
 }
 
-fn mean(
-    colors: *Colors,
-    class: []const u8,
-    position: usize,
-    parameters: *const Parameters,
-) Error!Vec3 {
+fn mean(colors: *Colors, class: []const u8, parameters: *const Parameters) Error!Vec3 {
     const input = colors.input;
     const white: Vec3 = @splat(1);
     const Class = enum { constant, scale, mix, directionmix, checkerboard, dots, imagemap, bilerp };
     const known = std.meta.stringToEnum(Class, class) orelse {
-        try input.warn(
-            position,
+        try input.warnHere(
             class,
             "Texture {f} is not supported: its mean is taken as {d}",
             .{ quote(class), image_mean },
@@ -173,18 +166,12 @@ fn mean(
     };
     switch (known) {
         .constant, .scale, .mix => {},
-        .imagemap => try input.warn(
-            position,
+        .imagemap => try input.warnHere(
             class,
             "Texture {f}: images are not read, their mean is taken as {d}",
             .{ quote(class), image_mean },
         ),
-        else => try input.warn(
-            position,
-            class,
-            "Texture {f} is shown as its mean",
-            .{quote(class)},
-        ),
+        else => try input.warnHere(class, "Texture {f} is shown as its mean", .{quote(class)}),
     }
     switch (known) {
         .constant => return colors.rgb(parameters, "value", white),

@@ -38,6 +38,8 @@ folder_name: []const u8,
 diagnostic: *Diagnostic,
 texts: std.ArrayList(Text) = .empty,
 included_count: u32 = 0,
+/// Where the directive that is read stands in the top text.
+directive: usize = 0,
 /// Hashes of the kinds of warnings that have been given.
 warned: std.AutoHashMapUnmanaged(u64, void) = .empty,
 
@@ -136,7 +138,26 @@ pub fn fail(
     arguments: anytype,
 ) error{InvalidInput} {
     input.locate(position);
-    return input.diagnostic.fail(error.InvalidInput, format, arguments);
+    return input.diagnostic.invalid(format, arguments);
+}
+
+/// Fails at the directive.
+pub fn failHere(
+    input: *Input,
+    comptime format: []const u8,
+    arguments: anytype,
+) error{InvalidInput} {
+    return input.fail(input.directive, format, arguments);
+}
+
+/// Says a warning about the directive, once for each `kind`.
+pub fn warnHere(
+    input: *Input,
+    kind: []const u8,
+    comptime format: []const u8,
+    arguments: anytype,
+) Allocator.Error!void {
+    return input.warn(input.directive, kind, format, arguments);
 }
 
 /// Makes the diagnostic name `position` of the top text.

@@ -44,17 +44,9 @@ pub const Source = struct {
     builder: *SceneBuilder,
     parameters: *const Parameters,
     place: *const Transform,
-    position: usize,
 
     fn color(source: *const Source, name: []const u8) Error!Vec3 {
-        const rgb = try source.colors.rgb(source.parameters, name, .{ 1, 1, 1 });
-        const scale = try source.colors.rgb(source.parameters, "scale", .{ 1, 1, 1 });
-        var result: Vec3 = undefined;
-        for (&result, rgb, scale) |*to, a, b| {
-            const product = a * b;
-            to.* = if (product > 0) @min(product, std.math.floatMax(f32)) else 0;
-        }
-        return result;
+        return scaledColor(source.colors, source.parameters, name, std.math.floatMax(f32));
     }
 
     fn point(source: *const Source, name: []const u8, default: Vec3) Vector {
@@ -63,26 +55,30 @@ pub const Source = struct {
     }
 
     fn note(source: *const Source, kind: []const u8, comptime rest: []const u8) Error!void {
-        try source.colors.input.warn(
-            source.position,
-            kind,
-            "LightSource {f}: " ++ rest,
-            .{quote(kind)},
-        );
+        try source.colors.input.warnHere(kind, "LightSource {f}: " ++ rest, .{quote(kind)});
     }
 };
 
+/// The colour `name` times the one of "scale", each component from 0 to `largest`.
+pub fn scaledColor(
+    colors: *Colors,
+    parameters: *const Parameters,
+    name: []const u8,
+    largest: f32,
+) Error!Vec3 {
+    const rgb = try colors.rgb(parameters, name, .{ 1, 1, 1 });
+    const scale = try colors.rgb(parameters, "scale", .{ 1, 1, 1 });
+    var result: Vec3 = undefined;
+    for (&result, rgb, scale) |*to, a, b| {
+        const product = a * b;
+        to.* = if (product > 0) @min(product, largest) else 0;
+    }
+    return result;
+}
+
 /// `LightSource "name" ...`.
 pub fn add(source: *const Source, name: []const u8) Error!void {
-    const Kind = enum {
-        point,
-        spot,
-        distant,
-        goniometric,
-        projection,
-        infinite,
-        exinfinite,
-    };
+    const Kind = enum { point, spot, distant, goniometric, projection, infinite, exinfinite };
     const builder = source.builder;
     const kind = std.meta.stringToEnum(Kind, name) orelse
         return source.note(name, "is not supported and left out");
@@ -104,7 +100,7 @@ pub fn add(source: *const Source, name: []const u8) Error!void {
             const to = source.point("to", .{ 0, 0, 1 });
             const way = vec3d.sub(to, from);
             if (vec3d.normalize(way) == null)
-                return source.colors.input.fail(source.position, "the light has no direction", .{});
+                return source.colors.input.failHere("the light has no direction", .{});
             try builder.addLight(.{ 0, 0, 0 }, way, .{
                 .kind = .directional,
                 .node = undefined,
@@ -137,7 +133,7 @@ fn addSpot(source: *const Source, name: []const u8, is_projection: bool) Error!v
         source.point("to", .{ 0, 0, 1 });
     const way = vec3d.sub(target, origin);
     if (vec3d.normalize(way) == null)
-        return source.colors.input.fail(source.position, "the light has no direction", .{});
+        return source.colors.input.failHere("the light has no direction", .{});
     var outer_deg = parameters.float("coneangle", 30);
     var inner_deg = outer_deg - parameters.float("conedeltaangle", 5);
     if (is_projection) {

@@ -47,25 +47,18 @@ const Kind = enum {
     disney,
 };
 
-/// The material `name` with its parameters, which stand at `position`.
-pub fn convert(
-    colors: *Colors,
-    name: []const u8,
-    position: usize,
-    parameters: *const Parameters,
-) Error!Material {
+/// The material `name` with its parameters.
+pub fn convert(colors: *Colors, name: []const u8, parameters: *const Parameters) Error!Material {
     if (name.len == 0 or std.mem.eql(u8, name, "none") or std.mem.eql(u8, name, "interface"))
         return .{ .surface = matte_default, .is_boundary = true };
     if (parameters.find("bumpmap") != null or parameters.find("displacement") != null or
-        parameters.find("normalmap") != null) try colors.input.warn(
-        position,
+        parameters.find("normalmap") != null) try colors.input.warnHere(
         "bump map",
         "Material {f}: bumps are not supported, its surfaces are smooth",
         .{quote(name)},
     );
     const kind = std.meta.stringToEnum(Kind, name) orelse {
-        try colors.input.warn(
-            position,
+        try colors.input.warnHere(
             name,
             "Material {f} is not supported: grey matte stands for it",
             .{quote(name)},
@@ -90,7 +83,7 @@ const Reader = struct {
                 0.04 * try reader.bright("Ks", 0.25),
             ),
             .substrate => reader.coated(try reader.rgb("Kd", 0.5), try reader.bright("Ks", 0.5)),
-            .coateddiffuse => reader.coatedDiffuse(),
+            .coateddiffuse => reader.polished(try reader.rgb("reflectance", 0.5), 1.5),
             .mirror => metal(try reader.rgb("Kr", 0.9), 0),
             .shinymetal => metal(try reader.rgb("Kr", 1), 0),
             .metal, .conductor, .coatedconductor => reader.conductor(kind),
@@ -105,7 +98,11 @@ const Reader = struct {
     }
 
     fn rgb(reader: Reader, name: []const u8, default: f32) Error!Vec3 {
-        return reader.colors.rgb(reader.parameters, name, @splat(default));
+        return reader.spectrum(name, @splat(default));
+    }
+
+    fn spectrum(reader: Reader, name: []const u8, default: Vec3) Error!Vec3 {
+        return reader.colors.rgb(reader.parameters, name, default);
     }
 
     fn float(reader: Reader, name: []const u8, default: f32) Error!f32 {
@@ -150,13 +147,7 @@ const Reader = struct {
         return result;
     }
 
-    fn coatedDiffuse(reader: Reader) Error!scene.Material {
-        var result = matte(try reader.rgb("reflectance", 0.5));
-        result.ior = try reader.index(1.5);
-        result.roughness = try reader.rough(0);
-        return result;
-    }
-
+    /// A diffuse body under a coat of its own refraction.
     fn polished(reader: Reader, base: Vec3, ior_default: f32) Error!scene.Material {
         var result = matte(base);
         result.ior = try reader.index(ior_default);
@@ -171,16 +162,8 @@ const Reader = struct {
         const roughness = try reader.rough(if (kind == .metal) 0.01 else 0);
         if (reader.has("reflectance")) return metal(try reader.rgb("reflectance", 1), roughness);
         // Copper, as in PBRT.
-        const eta = try reader.colors.rgb(
-            reader.parameters,
-            eta_name,
-            spectra.fromName("metal-Cu-eta").?,
-        );
-        const k = try reader.colors.rgb(
-            reader.parameters,
-            k_name,
-            spectra.fromName("metal-Cu-k").?,
-        );
+        const eta = try reader.spectrum(eta_name, spectra.fromName("metal-Cu-eta").?);
+        const k = try reader.spectrum(k_name, spectra.fromName("metal-Cu-k").?);
         var color: Vec3 = undefined;
         for (&color, eta, k) |*to, n, absorbed| {
             const squared = absorbed * absorbed;
@@ -255,16 +238,8 @@ const Reader = struct {
             1.33,
         );
         const scattered_name = if (reader.has("sigma_prime_s")) "sigma_prime_s" else "sigma_s";
-        const absorbed = try reader.colors.rgb(
-            reader.parameters,
-            "sigma_a",
-            .{ 0.0011, 0.0024, 0.014 },
-        );
-        const scattered = try reader.colors.rgb(
-            reader.parameters,
-            scattered_name,
-            .{ 2.55, 3.21, 3.77 },
-        );
+        const absorbed = try reader.spectrum("sigma_a", .{ 0.0011, 0.0024, 0.014 });
+        const scattered = try reader.spectrum(scattered_name, .{ 2.55, 3.21, 3.77 });
         const ior = @max(try reader.index(1.3), 1);
         const inside = -1.440 / (ior * ior) + 0.710 / ior + 0.668 + 0.0636 * ior;
         const boundary = (1 + inside) / (1 - inside);

@@ -74,7 +74,10 @@ pub inline fn float(text: [:0]const u8, start: *usize) Error!f32 {
 /// Anything that the quick way leaves: exponents, many digits, and what is no number at all.
 noinline fn slow(text: [:0]const u8, start: *usize) Error!f32 {
     const word = text[start.*..endOf(text, start.*)];
-    if (!isDecimal(word)) return error.NotANumber;
+    for (word) |byte| switch (byte) {
+        '0'...'9', '+', '-', '.', 'e', 'E' => {},
+        else => return error.NotANumber, // The library knows "nan", "inf", "0x" and "_" besides.
+    };
     const value = std.fmt.parseFloat(f32, word) catch return error.NotANumber;
     if (!std.math.isFinite(value)) return error.OutOfRange;
     start.* += word.len;
@@ -86,29 +89,6 @@ pub fn endOf(text: [:0]const u8, start: usize) usize {
     var index = start;
     while (!ends(text[index])) index += 1;
     return index;
-}
-
-/// Whether it is a decimal number: the standard library reads more than that, such as `nan`.
-fn isDecimal(word: []const u8) bool {
-    var index: usize = 0;
-    if (index < word.len and (word[0] == '-' or word[0] == '+')) index += 1;
-    var digit_count: usize = 0;
-    var has_point = false;
-    while (index < word.len) : (index += 1) {
-        if (digit(word[index]) < 10) {
-            digit_count += 1;
-        } else if (word[index] == '.' and !has_point) {
-            has_point = true;
-        } else break;
-    }
-    if (digit_count == 0) return false;
-    if (index == word.len) return true;
-    if (word[index] | 0x20 != 'e') return false;
-    index += 1;
-    if (index < word.len and (word[index] == '-' or word[index] == '+')) index += 1;
-    if (index == word.len) return false;
-    for (word[index..]) |byte| if (digit(byte) >= 10) return false;
-    return true;
 }
 
 /// Reads the whole number at `start` and moves `start` behind it.

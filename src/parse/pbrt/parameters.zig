@@ -128,12 +128,12 @@ fn readOne(parameters: *Parameters, input: *Input) Error!void {
             if (type_ == .bool)
                 try parameters.readBools(input, bracketed)
             else
-                try parameters.readIntegers(input, bracketed);
+                try readNumbers(i32, &parameters.integers, input, bracketed);
             parameter.count = parameters.integers.items.len - parameter.first;
         },
         else => {
             parameter.first = parameters.floats.items.len;
-            try parameters.readFloats(input, bracketed);
+            try readNumbers(f32, &parameters.floats, input, bracketed);
             parameter.count = parameters.floats.items.len - parameter.first;
             if (parameter.count % type_.components() != 0) return input.fail(
                 offset,
@@ -150,33 +150,23 @@ fn readOne(parameters: *Parameters, input: *Input) Error!void {
 }
 
 /// Numbers up to the bracket, or one. The inner loop of large scenes.
-fn readFloats(parameters: *Parameters, input: *Input, bracketed: bool) Error!void {
+fn readNumbers(
+    comptime Number: type,
+    list: *std.ArrayList(Number),
+    input: *Input,
+    bracketed: bool,
+) Error!void {
     const text = input.top();
     const bytes = text.bytes;
     var cursor = text.cursor;
-    const list = &parameters.floats;
     while (true) {
         if (bytes[cursor] <= ' ' or bytes[cursor] == '#') cursor = Input.skip(bytes, cursor);
         if (bytes[cursor] == ']' and bracketed) break;
-        const value = number.float(bytes, &cursor) catch |err|
-            return failNumber(input, cursor, err, "number");
-        if (list.items.len == list.capacity) try list.ensureUnusedCapacity(input.gpa, 1);
-        list.appendAssumeCapacity(value);
-        if (!bracketed) break;
-    }
-    text.cursor = cursor;
-}
-
-fn readIntegers(parameters: *Parameters, input: *Input, bracketed: bool) Error!void {
-    const text = input.top();
-    const bytes = text.bytes;
-    var cursor = text.cursor;
-    const list = &parameters.integers;
-    while (true) {
-        if (bytes[cursor] <= ' ' or bytes[cursor] == '#') cursor = Input.skip(bytes, cursor);
-        if (bytes[cursor] == ']' and bracketed) break;
-        const value = number.integer(bytes, &cursor) catch |err|
-            return failNumber(input, cursor, err, "whole number");
+        const value = (if (Number == f32)
+            number.float(bytes, &cursor)
+        else
+            number.integer(bytes, &cursor)) catch |err|
+            return failNumber(input, cursor, err, if (Number == f32) "number" else "whole number");
         if (list.items.len == list.capacity) try list.ensureUnusedCapacity(input.gpa, 1);
         list.appendAssumeCapacity(value);
         if (!bracketed) break;

@@ -24,7 +24,7 @@ const Transform = math.AffineD;
 const View = @import("view.zig");
 const Allocator = std.mem.Allocator;
 const Error = Input.Error;
-const Vec3 = @import("../../math.zig").Vec3;
+const Vec3 = math.Vec3;
 const assert = std.debug.assert;
 const quote = diagnostic_file.quote;
 
@@ -33,10 +33,8 @@ const Reader = @This();
 /// Everything that AttributeBegin keeps and AttributeEnd brings back.
 const Graphics = struct {
     transform: Transform = .identity,
-    /// Index into `SceneBuilder.materials`, `scene_data.none` for the default one.
-    material: u32 = scene_data.none,
-    /// Surfaces only bound a medium and are not shown.
-    is_boundary: bool = false,
+    /// Null: the default one.
+    material: ?Material = null,
     area_light: ?AreaLight = null,
     reverse: bool = false,
     /// Whether transformations are those of the time when the shutter opens.
@@ -47,25 +45,18 @@ const Graphics = struct {
 const AreaLight = struct { radiance: Vec3, two_sided: bool };
 
 const Kept = struct {
-    const Kind = enum {
-        attribute,
-        transform,
-        object,
-
-        fn name(kind: Kind) []const u8 {
-            return switch (kind) {
-                .attribute => "Attribute",
-                .transform => "Transform",
-                .object => "Object",
-            };
-        }
-    };
+    const Kind = enum { Attribute, Transform, Object };
 
     kind: Kind,
     graphics: Graphics,
 };
 
-const NamedMaterial = struct { index: u32, is_boundary: bool };
+const Material = struct {
+    /// In the scene.
+    index: u32,
+    /// Surfaces only bound a medium and are not shown.
+    is_boundary: bool,
+};
 
 const Phase = enum { options, world, done };
 
@@ -88,7 +79,7 @@ depth: ?u32 = null,
 object: ?struct { name: []const u8, first: usize } = null,
 objects: std.StringHashMapUnmanaged(SceneBuilder.Object) = .empty,
 spaces: std.StringHashMapUnmanaged(Transform) = .empty,
-named: std.StringHashMapUnmanaged(NamedMaterial) = .empty,
+named: std.StringHashMapUnmanaged(Material) = .empty,
 /// Meshes of curved shapes by all that they depend on.
 known_meshes: std.AutoHashMapUnmanaged(u64, u32) = .empty,
 default_material: u32 = scene_data.none,
@@ -102,80 +93,59 @@ pub fn deinit(reader: *Reader) void {
 }
 
 const Directive = enum {
+    // Before the world.
     Accelerator,
-    ActiveTransform,
-    AreaLightSource,
-    Attribute,
-    AttributeBegin,
-    AttributeEnd,
     Camera,
-    ColorSpace,
-    ConcatTransform,
-    CoordSysTransform,
-    CoordinateSystem,
     Film,
-    Identity,
-    Import,
-    Include,
     Integrator,
+    PixelFilter,
+    Renderer,
+    Sampler,
+    SurfaceIntegrator,
+    TransformTimes,
+    VolumeIntegrator,
+    WorldBegin,
+    // In it.
+    AreaLightSource,
     LightSource,
-    LookAt,
-    MakeNamedMaterial,
-    MakeNamedMedium,
     Material,
-    MediumInterface,
     NamedMaterial,
     ObjectBegin,
     ObjectEnd,
     ObjectInstance,
+    Shape,
+    Volume,
+    WorldEnd,
+    // Everywhere.
+    ActiveTransform,
+    Attribute,
+    AttributeBegin,
+    AttributeEnd,
+    ColorSpace,
+    ConcatTransform,
+    CoordSysTransform,
+    CoordinateSystem,
+    Identity,
+    Import,
+    Include,
+    LookAt,
+    MakeNamedMaterial,
+    MakeNamedMedium,
+    MediumInterface,
     Option,
-    PixelFilter,
-    Renderer,
     ReverseOrientation,
     Rotate,
-    Sampler,
     Scale,
-    Shape,
-    SurfaceIntegrator,
     Texture,
     Transform,
     TransformBegin,
     TransformEnd,
-    TransformTimes,
     Translate,
-    Volume,
-    VolumeIntegrator,
-    WorldBegin,
-    WorldEnd,
 
-    /// Where it may stand: before the world, in it, or both.
     fn allowedIn(directive: Directive, phase: Phase) bool {
-        return switch (directive) {
-            .Accelerator,
-            .Camera,
-            .Film,
-            .Integrator,
-            .PixelFilter,
-            .Renderer,
-            .Sampler,
-            .SurfaceIntegrator,
-            .TransformTimes,
-            .VolumeIntegrator,
-            .WorldBegin,
-            => phase == .options,
-            .AreaLightSource,
-            .LightSource,
-            .Material,
-            .NamedMaterial,
-            .ObjectBegin,
-            .ObjectEnd,
-            .ObjectInstance,
-            .Shape,
-            .Volume,
-            .WorldEnd,
-            => phase == .world,
-            else => true,
-        };
+        const place = @backingInt(directive);
+        if (place <= @backingInt(Directive.WorldBegin)) return phase == .options;
+        return place > @backingInt(Directive.WorldEnd) or phase == .world;
     }
 };
 
@@ -188,55 +158,54 @@ pub fn run(reader: *Reader) Error!void {
             input.pop();
             continue;
         }
-        const position = input.offset();
+        input.directive = input.offset();
         const word = input.word();
-        if (word.len == 0) return input.fail(position, "a directive is expected", .{});
+        if (word.len == 0) return input.failHere("a directive is expected", .{});
         const directive = std.meta.stringToEnum(Directive, word) orelse
-            return input.fail(position, "{f} is no directive", .{quote(word)});
+            return input.failHere("{f} is no directive", .{quote(word)});
         if (reader.phase == .done) {
             if (!reader.is_preparation) {
-                try input.warn(position, "more", "only the first picture is made", .{});
+                try input.warnHere("more", "only the first picture is made", .{});
                 break;
             }
             reader.startAgain();
         }
-        if (!directive.allowedIn(reader.phase)) return input.fail(
-            position,
+        if (!directive.allowedIn(reader.phase)) return input.failHere(
             "{t} may not stand {s} WorldBegin",
             .{ directive, if (reader.phase == .options) "before" else "after" },
         );
-        try reader.perform(directive, position);
+        try reader.perform(directive);
     }
     if (reader.phase == .options)
         return input.fail(input.top().bytes.len, "there is no WorldBegin", .{});
-    if (reader.stack.items.len > 0) try input.warn(
-        input.top().bytes.len,
-        "end",
-        "{d} blocks are begun and not ended",
-        .{reader.stack.items.len},
-    );
+    try reader.warnOfBlocks(input.top().bytes.len);
 }
 
-fn perform(reader: *Reader, directive: Directive, position: usize) Error!void {
+fn warnOfBlocks(reader: *Reader, position: usize) Error!void {
+    const count = reader.stack.items.len;
+    if (count == 0) return;
+    try reader.input.warn(position, "end", "{d} blocks are begun and not ended", .{count});
+    reader.stack.clearRetainingCapacity();
+}
+
+fn perform(reader: *Reader, directive: Directive) Error!void {
     const graphics = &reader.graphics;
     switch (directive) {
-        .Identity => try reader.setTransform(position, .identity),
-        .Translate => {
-            try reader.transform(position, .translate(try reader.numbers(3)));
-        },
-        .Scale => try reader.transform(position, .scale(try reader.numbers(3))),
+        .Identity => try reader.setTransform(.identity),
+        .Translate => try reader.transform(.translate(try reader.numbers(3))),
+        .Scale => try reader.transform(.scale(try reader.numbers(3))),
         .Rotate => {
             const n = try reader.numbers(4);
-            try reader.transform(position, transforms.rotation(n[0], n[1..4].*) orelse
-                return reader.input.fail(position, "the axis has no direction", .{}));
+            try reader.transform(transforms.rotation(n[0], n[1..4].*) orelse
+                return reader.input.failHere("the axis has no direction", .{}));
         },
         .LookAt => {
             const n = try reader.numbers(9);
-            try reader.transform(position, transforms.lookAt(n[0..3].*, n[3..6].*, n[6..9].*) orelse
-                return reader.input.fail(position, "the three points leave no direction", .{}));
+            try reader.transform(transforms.lookAt(n[0..3].*, n[3..6].*, n[6..9].*) orelse
+                return reader.input.failHere("the three points leave no direction", .{}));
         },
-        .Transform => try reader.setTransform(position, try reader.matrix(position)),
-        .ConcatTransform => try reader.transform(position, try reader.matrix(position)),
+        .Transform => try reader.setTransform(try reader.matrix()),
+        .ConcatTransform => try reader.transform(try reader.matrix()),
         .CoordinateSystem => {
             const name = try reader.text();
             try reader.keep(Transform, &reader.spaces, name, graphics.transform);
@@ -244,19 +213,19 @@ fn perform(reader: *Reader, directive: Directive, position: usize) Error!void {
         .CoordSysTransform => {
             const name = try reader.text();
             const space = reader.spaces.get(name) orelse
-                return reader.input.fail(position, "no coordinate system {f}", .{quote(name)});
-            try reader.setTransform(position, space);
+                return reader.input.failHere("no coordinate system {f}", .{quote(name)});
+            try reader.setTransform(space);
         },
         .ActiveTransform => try reader.activeTransform(),
         .TransformTimes => _ = try reader.numbers(2),
         .ReverseOrientation => graphics.reverse = !graphics.reverse,
-        .AttributeBegin => try reader.begin(.attribute, position),
-        .TransformBegin => try reader.begin(.transform, position),
-        .AttributeEnd => try reader.end(.attribute, position),
-        .TransformEnd => try reader.end(.transform, position),
-        .ObjectBegin => try reader.objectBegin(position),
-        .ObjectEnd => try reader.objectEnd(position),
-        .ObjectInstance => try reader.objectInstance(position),
+        .AttributeBegin => try reader.begin(.Attribute),
+        .TransformBegin => try reader.begin(.Transform),
+        .AttributeEnd => try reader.end(.Attribute),
+        .TransformEnd => try reader.end(.Transform),
+        .ObjectBegin => try reader.objectBegin(),
+        .ObjectEnd => try reader.objectEnd(),
+        .ObjectInstance => try reader.objectInstance(),
         .WorldBegin => try reader.worldBegin(),
         .WorldEnd => try reader.worldEnd(),
         .Include, .Import => {
@@ -268,83 +237,68 @@ fn perform(reader: *Reader, directive: Directive, position: usize) Error!void {
         .MediumInterface => {
             _ = try reader.text();
             if (reader.input.peek() == '"') _ = try reader.input.string();
-            try reader.note(directive, position, "participating media are not supported");
+            try reader.note(directive, "participating media are not supported");
         },
-        .NamedMaterial => try reader.namedMaterial(position),
+        .NamedMaterial => try reader.namedMaterial(),
         .Option => try reader.parameters.read(reader.input),
         .Texture => {
             const name = try reader.text();
             _ = try reader.text(); // Its type: all of them are colours here.
             const class = try reader.text();
             try reader.parameters.read(reader.input);
-            try reader.colors.define(name, class, position, &reader.parameters);
+            try reader.colors.define(name, class, &reader.parameters);
         },
         else => {
             const name = try reader.text();
             try reader.parameters.read(reader.input);
-            try reader.performNamed(directive, name, position);
+            try reader.performNamed(directive, name);
         },
     }
 }
 
 /// Directives of the form `Directive "name" parameters`.
-fn performNamed(
-    reader: *Reader,
-    directive: Directive,
-    name: []const u8,
-    position: usize,
-) Error!void {
+fn performNamed(reader: *Reader, directive: Directive, name: []const u8) Error!void {
     const parameters = &reader.parameters;
     switch (directive) {
         .Camera => {
             const to_camera = &reader.graphics.transform;
-            try reader.view.setCamera(reader.input, name, position, parameters, to_camera);
+            try reader.view.setCamera(reader.input, name, parameters, to_camera);
             try reader.keep(Transform, &reader.spaces, "camera", reader.view.place.?);
         },
-        .Film => try reader.view.setFilm(reader.input, position, parameters),
+        .Film => try reader.view.setFilm(reader.input, parameters),
         .Sampler => try reader.sampler(),
-        .Integrator, .SurfaceIntegrator => try reader.integrator(name, position),
+        .Integrator, .SurfaceIntegrator => try reader.integrator(name),
         .Renderer => {
             // These prepare what another rendering uses.
             reader.is_preparation = std.mem.eql(u8, name, "surfacepoints") or
                 std.mem.eql(u8, name, "createprobes");
         },
-        .Material => {
-            const made = try reader.makeMaterial(name, position);
-            reader.graphics.material = made.index;
-            reader.graphics.is_boundary = made.is_boundary;
-        },
+        .Material => reader.graphics.material = try reader.makeMaterial(name),
         .MakeNamedMaterial => {
             const type_name = parameters.string("type") orelse
-                return reader.input.fail(position, "the material has no type", .{});
-            const made = try reader.makeMaterial(type_name, position);
-            try reader.keep(NamedMaterial, &reader.named, name, made);
+                return reader.input.failHere("the material has no type", .{});
+            const made = try reader.makeMaterial(type_name);
+            try reader.keep(Material, &reader.named, name, made);
         },
         .LightSource => try lights.add(&.{
             .colors = &reader.colors,
             .builder = reader.builder,
             .parameters = parameters,
             .place = &reader.graphics.transform,
-            .position = position,
         }, name),
         .AreaLightSource => try reader.areaLightSource(),
-        .Shape => try reader.shape(name, position),
+        .Shape => try reader.shape(name),
         .Volume, .MakeNamedMedium => {
-            try reader.note(directive, position, "participating media are not supported");
+            try reader.note(directive, "participating media are not supported");
         },
-        .Attribute => try reader.note(directive, position, "defaults of parameters are not read"),
+        .Attribute => try reader.note(directive, "defaults of parameters are not read"),
         else => {}, // What remains changes how PBRT computes the picture.
     }
 }
 
 /// A warning about a directive, once.
-fn note(
-    reader: *Reader,
-    directive: Directive,
-    position: usize,
-    comptime rest: []const u8,
-) Error!void {
-    try reader.input.warn(position, @tagName(directive), "{t}: " ++ rest, .{directive});
+fn note(reader: *Reader, directive: Directive, comptime rest: []const u8) Error!void {
+    try reader.input.warnHere(@tagName(directive), "{t}: " ++ rest, .{directive});
 }
 
 /// Numbers, in brackets or not.
@@ -365,10 +319,10 @@ fn numbers(reader: *Reader, comptime count: usize) Error![count]f64 {
     return result;
 }
 
-fn matrix(reader: *Reader, position: usize) Error!Transform {
+fn matrix(reader: *Reader) Error!Transform {
     const sixteen = try reader.numbers(16);
     return transforms.fromMatrix(&sixteen) orelse
-        reader.input.fail(position, "the matrix is not affine", .{});
+        reader.input.failHere("the matrix is not affine", .{});
 }
 
 /// Position of the string that follows.
@@ -396,32 +350,31 @@ fn keep(
     entry.value_ptr.* = value;
 }
 
-fn transform(reader: *Reader, position: usize, inner: Transform) Error!void {
-    try reader.setTransform(position, reader.graphics.transform.compose(inner));
+fn transform(reader: *Reader, inner: Transform) Error!void {
+    try reader.setTransform(reader.graphics.transform.compose(inner));
 }
 
-fn setTransform(reader: *Reader, position: usize, to: Transform) Error!void {
+fn setTransform(reader: *Reader, to: Transform) Error!void {
     if (!reader.graphics.at_start) return;
     if (!transforms.fitsSingle(&to))
-        return reader.input.fail(position, "the transformation is out of range", .{});
+        return reader.input.failHere("the transformation is out of range", .{});
     reader.graphics.transform = to;
 }
 
 /// Things that move are shown as they are when the shutter opens.
 fn activeTransform(reader: *Reader) Error!void {
-    const position = reader.input.offset();
+    const at = reader.input.offset();
     const word = if (reader.input.peek() == '"') try reader.input.string() else reader.input.word();
     const Which = enum { StartTime, EndTime, All };
     const which = std.meta.stringToEnum(Which, word) orelse
-        return reader.input.fail(position, "{f} is no time of transformations", .{quote(word)});
+        return reader.input.fail(at, "{f} is no time of transformations", .{quote(word)});
     reader.graphics.at_start = which != .EndTime;
     if (which != .All)
-        try reader.note(.ActiveTransform, position, "what moves is shown at the start");
+        try reader.note(.ActiveTransform, "what moves is shown at the start");
 }
 
-fn begin(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
-    if (reader.stack.items.len == limits.attribute_depth_max) return reader.input.fail(
-        position,
+fn begin(reader: *Reader, kind: Kept.Kind) Error!void {
+    if (reader.stack.items.len == limits.attribute_depth_max) return reader.input.failHere(
         "over {d} blocks within each other",
         .{limits.attribute_depth_max},
     );
@@ -429,36 +382,33 @@ fn begin(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
     try reader.stack.append(reader.input.gpa, .{ .kind = kind, .graphics = graphics });
 }
 
-fn end(reader: *Reader, kind: Kept.Kind, position: usize) Error!void {
+fn end(reader: *Reader, kind: Kept.Kind) Error!void {
     const kept = reader.stack.getLastOrNull() orelse
-        return reader.input.fail(position, "{s}End without {0s}Begin", .{kind.name()});
-    if (kept.kind != kind) return reader.input.fail(
-        position,
-        "{s}End, but {s}Begin came last",
-        .{ kind.name(), kept.kind.name() },
-    );
+        return reader.input.failHere("{t}End without {0t}Begin", .{kind});
+    if (kept.kind != kind)
+        return reader.input.failHere("{t}End, but {t}Begin came last", .{ kind, kept.kind });
     _ = reader.stack.pop();
-    if (kind == .transform) {
+    if (kind == .Transform) {
         reader.graphics.transform = kept.graphics.transform;
         reader.graphics.at_start = kept.graphics.at_start;
     } else reader.graphics = kept.graphics;
 }
 
-fn objectBegin(reader: *Reader, position: usize) Error!void {
+fn objectBegin(reader: *Reader) Error!void {
     const name = try reader.text();
     if (reader.object != null)
-        return reader.input.fail(position, "an object within an object", .{});
-    try reader.begin(.object, position);
+        return reader.input.failHere("an object within an object", .{});
+    try reader.begin(.Object);
     reader.object = .{
         .name = try reader.arena.dupe(u8, name),
         .first = reader.builder.parts.items.len,
     };
 }
 
-fn objectEnd(reader: *Reader, position: usize) Error!void {
+fn objectEnd(reader: *Reader) Error!void {
     const object = reader.object orelse
-        return reader.input.fail(position, "no object has begun", .{});
-    try reader.end(.object, position);
+        return reader.input.failHere("no object has begun", .{});
+    try reader.end(.Object);
     reader.object = null;
     try reader.keep(SceneBuilder.Object, &reader.objects, object.name, .{
         .first = object.first,
@@ -466,12 +416,12 @@ fn objectEnd(reader: *Reader, position: usize) Error!void {
     });
 }
 
-fn objectInstance(reader: *Reader, position: usize) Error!void {
+fn objectInstance(reader: *Reader) Error!void {
     const name = try reader.text();
     if (reader.object != null)
-        return reader.input.fail(position, "an instance within an object", .{});
+        return reader.input.failHere("an instance within an object", .{});
     const object = reader.objects.get(name) orelse
-        return reader.input.fail(position, "no object {f}", .{quote(name)});
+        return reader.input.failHere("no object {f}", .{quote(name)});
     try reader.builder.instantiateObject(object, &reader.graphics.transform);
 }
 
@@ -493,15 +443,7 @@ fn worldBegin(reader: *Reader) Error!void {
 
 /// The state is that of a new text; the view stays, for it is this world's.
 fn worldEnd(reader: *Reader) Error!void {
-    if (reader.stack.items.len > 0) {
-        try reader.input.warn(
-            reader.input.offset(),
-            "end",
-            "{d} blocks are begun and not ended",
-            .{reader.stack.items.len},
-        );
-        reader.stack.clearRetainingCapacity();
-    }
+    try reader.warnOfBlocks(reader.input.offset());
     reader.object = null;
     reader.phase = .done;
     reader.graphics = .{};
@@ -521,10 +463,9 @@ fn sampler(reader: *Reader) Error!void {
 
 /// All integrators are Whitted's here; "maxdepth" counts rays in his and in direct lighting,
 /// bounces in the others.
-fn integrator(reader: *Reader, name: []const u8, position: usize) Error!void {
+fn integrator(reader: *Reader, name: []const u8) Error!void {
     if (std.mem.eql(u8, name, "ambientocclusion") or std.mem.eql(u8, name, "ao")) {
-        try reader.input.warn(
-            position,
+        try reader.input.warnHere(
             name,
             "integrator {f} is not supported: the picture shows lights and materials",
             .{quote(name)},
@@ -536,18 +477,18 @@ fn integrator(reader: *Reader, name: []const u8, position: usize) Error!void {
     reader.depth = @intCast(std.math.clamp(bounces, choices.depth.min, choices.depth.max));
 }
 
-fn makeMaterial(reader: *Reader, name: []const u8, position: usize) Error!NamedMaterial {
+fn makeMaterial(reader: *Reader, name: []const u8) Error!Material {
     const made: materials.Material = if (std.mem.eql(u8, name, "mix"))
-        .{ .surface = try reader.mixture(position) }
+        .{ .surface = try reader.mixture() }
     else
-        try materials.convert(&reader.colors, name, position, &reader.parameters);
+        try materials.convert(&reader.colors, name, &reader.parameters);
     return .{
         .index = try reader.builder.scene.addMaterial(made.surface),
         .is_boundary = made.is_boundary,
     };
 }
 
-fn mixture(reader: *Reader, position: usize) Error!scene_data.Material {
+fn mixture(reader: *Reader) Error!scene_data.Material {
     const parameters = &reader.parameters;
     var names = [_][]const u8{
         parameters.string("namedmaterial1") orelse "",
@@ -556,54 +497,47 @@ fn mixture(reader: *Reader, position: usize) Error!scene_data.Material {
     var second_share = try reader.colors.float(parameters, "amount", 0.5);
     if (parameters.find("materials")) |parameter| {
         const list = parameters.stringsOf(parameter);
-        if (list.len != 2) return reader.input.fail(position, "two materials are mixed", .{});
+        if (list.len != 2) return reader.input.failHere("two materials are mixed", .{});
         names = list[0..2].*;
     } else second_share = 1 - second_share; // The older dialects tell the first one's share.
     var parts: [2]scene_data.Material = undefined;
     for (names, &parts) |name, *part| {
-        const made = reader.named.get(name) orelse
-            return reader.input.fail(position, "no material {f}", .{quote(name)});
+        const made = try reader.materialNamed(name);
         part.* = reader.builder.scene.materials.items[made.index];
     }
     return materials.mix(parts[0], parts[1], second_share);
 }
 
-fn namedMaterial(reader: *Reader, position: usize) Error!void {
-    const name = try reader.text();
-    const made = reader.named.get(name) orelse
-        return reader.input.fail(position, "no material {f}", .{quote(name)});
-    reader.graphics.material = made.index;
-    reader.graphics.is_boundary = made.is_boundary;
+fn namedMaterial(reader: *Reader) Error!void {
+    reader.graphics.material = try reader.materialNamed(try reader.text());
+}
+
+fn materialNamed(reader: *Reader, name: []const u8) Error!Material {
+    return reader.named.get(name) orelse
+        reader.input.failHere("no material {f}", .{quote(name)});
 }
 
 fn areaLightSource(reader: *Reader) Error!void {
     const parameters = &reader.parameters;
-    const color = try reader.colors.rgb(parameters, "L", .{ 1, 1, 1 });
-    const scale = try reader.colors.rgb(parameters, "scale", .{ 1, 1, 1 });
-    var radiance: Vec3 = undefined;
-    for (&radiance, color, scale) |*to, a, b| {
-        const product = a * b;
-        to.* = if (product > 0) @min(product, 1e30) else 0;
-    }
-    const two_sided = parameters.boolean("twosided", false);
-    reader.graphics.area_light = .{ .radiance = radiance, .two_sided = two_sided };
+    reader.graphics.area_light = .{
+        .radiance = try lights.scaledColor(&reader.colors, parameters, "L", 1e30),
+        .two_sided = parameters.boolean("twosided", false),
+    };
 }
 
 fn materialIndex(reader: *Reader) Allocator.Error!u32 {
-    if (reader.graphics.material != scene_data.none) return reader.graphics.material;
+    if (reader.graphics.material) |material| return material.index;
     if (reader.default_material == scene_data.none)
         reader.default_material = try reader.builder.scene.addMaterial(materials.matte_default);
     return reader.default_material;
 }
 
-fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
+fn shape(reader: *Reader, name: []const u8) Error!void {
     const graphics = &reader.graphics;
     const input = reader.input;
     reader.tessellator.parameters = &reader.parameters;
-    reader.tessellator.position = position;
     reader.tessellator.name = name;
-    const kind = std.meta.stringToEnum(shapes.Kind, name) orelse return input.warn(
-        position,
+    const kind = shapes.kinds.get(name) orelse return input.warnHere(
         name,
         "Shape {f} is not supported and left out",
         .{quote(name)},
@@ -612,13 +546,13 @@ fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
         const values = reader.parameters.floatsOf(alpha);
         if (values.len > 0 and values[0] == 0) return;
         if (alpha.type == .texture)
-            try input.warn(position, "alpha", "Shape: textures of holes are not supported", .{});
+            try input.warnHere("alpha", "Shape: textures of holes are not supported", .{});
     }
-    if (graphics.is_boundary) return;
+    if (graphics.material) |material| if (material.is_boundary) return;
     const material = try reader.materialIndex();
     if (graphics.area_light) |area_light| {
         if (reader.object == null) return reader.addAreaLight(kind, material, area_light);
-        try input.warn(position, "area light", "Shape: objects do not shine", .{});
+        try input.warnHere("area light", "Shape: objects do not shine", .{});
     }
     const mesh = try reader.meshOf(kind, material);
     if (reader.object == null)
@@ -629,11 +563,11 @@ fn shape(reader: *Reader, name: []const u8, position: usize) Error!void {
 
 /// The mesh of the shape that the parameters tell; curved ones are made once.
 fn meshOf(reader: *Reader, kind: shapes.Kind, material: u32) Error!u32 {
-    if (!kind.isCurved()) {
+    if (!kind.is_curved) {
         const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
         return reader.builder.addMesh(geometry, material);
     }
-    const key = shapes.hash(kind, reader.graphics.reverse, &reader.parameters) ^
+    const key = shapes.hash(&reader.tessellator, reader.graphics.reverse) ^
         (@as(u64, material) *% 0x9e3779b97f4a7c15);
     if (reader.known_meshes.get(key)) |mesh| return mesh;
     const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
@@ -664,8 +598,7 @@ fn addAreaLight(
         const mesh = try builder.addMesh(back, try builder.scene.addMaterial(plain));
         try builder.instantiate(mesh, place);
     }
-    if (builder.emitters.items.len >= limits.emitter_count_max) return reader.input.warn(
-        reader.tessellator.position,
+    if (builder.emitters.items.len >= limits.emitter_count_max) return reader.input.warnHere(
         "emitters",
         "Shape: over {d} shapes shine, the others are bright but give no light",
         .{limits.emitter_count_max},

@@ -10,51 +10,36 @@ const ply = @import("shapes/ply.zig");
 const quadrics = @import("shapes/quadrics.zig");
 const subdivision = @import("shapes/subdivision.zig");
 const Tessellator = @import("shapes/tessellator.zig");
-const Parameters = @import("parameters.zig");
 const Error = @import("input.zig").Error;
 const Geometry = Tessellator.Geometry;
 const Vec3 = @import("../../math.zig").Vec3;
 
-/// Names as they stand in the text.
-pub const Kind = enum {
-    bilinearmesh,
-    cone,
-    cylinder,
-    disk,
-    heightfield,
-    hyperboloid,
-    loopsubdiv,
-    nurbs,
-    paraboloid,
-    plymesh,
-    sphere,
-    trianglemesh,
-
+/// A kind of shapes.
+pub const Kind = struct {
+    make: *const fn (tessellator: *Tessellator) Error!Geometry,
     /// Few parameters make many triangles, and often the same ones again.
-    pub fn isCurved(kind: Kind) bool {
-        return switch (kind) {
-            .cone, .cylinder, .disk, .hyperboloid, .paraboloid, .sphere => true,
-            else => false,
-        };
-    }
+    is_curved: bool = false,
 };
+
+/// By their names as they stand in the text.
+pub const kinds: std.StaticStringMap(Kind) = .initComptime(.{
+    .{ "bilinearmesh", Kind{ .make = meshes.bilinear } },
+    .{ "cone", Kind{ .make = quadrics.cone, .is_curved = true } },
+    .{ "cylinder", Kind{ .make = quadrics.cylinder, .is_curved = true } },
+    .{ "disk", Kind{ .make = quadrics.disk, .is_curved = true } },
+    .{ "heightfield", Kind{ .make = meshes.heightfield } },
+    .{ "hyperboloid", Kind{ .make = quadrics.hyperboloid, .is_curved = true } },
+    .{ "loopsubdiv", Kind{ .make = subdivision.loop } },
+    .{ "nurbs", Kind{ .make = nurbs.nurbs } },
+    .{ "paraboloid", Kind{ .make = quadrics.paraboloid, .is_curved = true } },
+    .{ "plymesh", Kind{ .make = ply.mesh } },
+    .{ "sphere", Kind{ .make = quadrics.sphere, .is_curved = true } },
+    .{ "trianglemesh", Kind{ .make = meshes.triangles } },
+});
 
 /// Makes the shape that the tessellator's parameters tell.
 pub fn make(tessellator: *Tessellator, kind: Kind, reverse: bool) Error!Geometry {
-    const geometry = try switch (kind) {
-        .bilinearmesh => meshes.bilinear(tessellator),
-        .cone => quadrics.cone(tessellator),
-        .cylinder => quadrics.cylinder(tessellator),
-        .disk => quadrics.disk(tessellator),
-        .heightfield => meshes.heightfield(tessellator),
-        .hyperboloid => quadrics.hyperboloid(tessellator),
-        .loopsubdiv => subdivision.loop(tessellator),
-        .nurbs => nurbs.nurbs(tessellator),
-        .paraboloid => quadrics.paraboloid(tessellator),
-        .plymesh => ply.mesh(tessellator),
-        .sphere => quadrics.sphere(tessellator),
-        .trianglemesh => meshes.triangles(tessellator),
-    };
+    const geometry = try kind.make(tessellator);
     if (!reverse) return geometry;
     for (geometry.triangles) |*corners| std.mem.swap(u32, &corners[1], &corners[2]);
     if (geometry.normals) |normals| {
@@ -71,9 +56,10 @@ pub fn turned(tessellator: *Tessellator, geometry: *const Geometry) Error!Geomet
 }
 
 /// A number for all that a curved shape depends on.
-pub fn hash(kind: Kind, reverse: bool, parameters: *const Parameters) u64 {
-    var state: std.hash.Wyhash = .init(@backingInt(kind));
-    state.update(&.{@intFromBool(reverse)});
+pub fn hash(tessellator: *const Tessellator, reverse: bool) u64 {
+    const parameters = tessellator.parameters;
+    var state: std.hash.Wyhash = .init(@intFromBool(reverse));
+    state.update(tessellator.name);
     for (parameters.items.items) |*parameter| {
         state.update(parameter.name);
         state.update(&.{@backingInt(parameter.type)});

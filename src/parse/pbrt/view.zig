@@ -30,29 +30,18 @@ aspect: ?f64 = null,
 place: ?Transform = null,
 
 /// `Film "name" ...`.
-pub fn setFilm(
-    view: *View,
-    input: *Input,
-    position: usize,
-    parameters: *const Parameters,
-) Error!void {
+pub fn setFilm(view: *View, input: *Input, parameters: *const Parameters) Error!void {
     var size: [2]u32 = .{ 640, 480 };
     for (&size, [_][]const u8{ "xresolution", "yresolution" }) |*side, name| {
         const value = parameters.integer(name) orelse continue;
-        if (!settings.side.holds(value)) return input.fail(
-            position,
-            "{s} is {d}, not " ++ settings.side.text(),
-            .{ name, value },
-        );
+        if (!settings.side.holds(value))
+            return input.failHere("{s} is {d}, not " ++ settings.side.text(), .{ name, value });
         side.* = @intCast(value);
     }
-    if (@as(u64, size[0]) * size[1] > settings.pixel_count_max) return input.fail(
-        position,
-        "the film has over {d} pixels",
-        .{settings.pixel_count_max},
-    );
+    if (@as(u64, size[0]) * size[1] > settings.pixel_count_max)
+        return input.failHere("the film has over {d} pixels", .{settings.pixel_count_max});
     if (parameters.find("cropwindow") != null or parameters.find("pixelbounds") != null)
-        try input.warn(position, "cropwindow", "Film: crop windows are not supported", .{});
+        try input.warnHere("cropwindow", "Film: crop windows are not supported", .{});
     view.size = size;
 }
 
@@ -61,20 +50,18 @@ pub fn setCamera(
     view: *View,
     input: *Input,
     name: []const u8,
-    position: usize,
     parameters: *const Parameters,
     to_camera: *const Transform,
 ) Error!void {
     const place = to_camera.inverse() orelse
-        return input.fail(position, "the camera's transformation has no inverse", .{});
+        return input.failHere("the camera's transformation has no inverse", .{});
     if (!transforms.fitsSingle(&place))
-        return input.fail(position, "the camera is too far away", .{});
+        return input.failHere("the camera is too far away", .{});
     var result: View = .{ .size = view.size, .place = place };
     if (std.mem.eql(u8, name, "orthographic")) {
         result.kind = .orthographic;
     } else if (!std.mem.eql(u8, name, "perspective")) {
-        try input.warn(
-            position,
+        try input.warnHere(
             name,
             "Camera {f} is not supported: a perspective one with fov 90 stands for it",
             .{quote(name)},
@@ -83,28 +70,21 @@ pub fn setCamera(
     const fov_name = if (parameters.find("halffov") != null) "halffov" else "fov";
     const factor: f64 = if (parameters.find("halffov") != null) 2 else 1;
     result.fov_deg = factor * parameters.float(fov_name, @floatCast(90 / factor));
-    if (!(result.fov_deg > 0 and result.fov_deg < 180)) return input.fail(
-        position,
-        "the camera's fov is {d}, not between 0 and 180",
-        .{result.fov_deg},
-    );
+    if (!(result.fov_deg > 0 and result.fov_deg < 180))
+        return input.failHere("the camera's fov is {d}, not between 0 and 180", .{result.fov_deg});
     if (parameters.find("frameaspectratio") != null) {
         const aspect = parameters.float("frameaspectratio", 1);
         if (!(aspect > 1e-4 and aspect < 1e4))
-            return input.fail(position, "the frame's aspect ratio is {d}", .{aspect});
+            return input.failHere("the frame's aspect ratio is {d}", .{aspect});
         result.aspect = aspect;
     }
     if (parameters.floatsNamed("screenwindow")) |window| {
         if (window.len != 4 or !(window[1] > window[0] and window[3] > window[2]))
-            return input.fail(position, "the screen window is not [left right bottom top]", .{});
+            return input.failHere("the screen window is not [left right bottom top]", .{});
         result.window = .{ window[0], window[1], window[2], window[3] };
     }
-    if (parameters.float("lensradius", 0) > 0) try input.warn(
-        position,
-        "lensradius",
-        "Camera: lenses are not supported, all is in focus",
-        .{},
-    );
+    if (parameters.float("lensradius", 0) > 0)
+        try input.warnHere("lensradius", "Camera: lenses are not supported, all is in focus", .{});
     view.* = result;
 }
 

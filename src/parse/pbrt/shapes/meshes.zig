@@ -18,25 +18,49 @@ pub fn points(floats: []const f32) []const Vec3 {
 
 /// `P`, `indices` and perhaps `N`. One triangle needs no indices.
 pub fn triangles(tessellator: *Tessellator) Error!Geometry {
+    return faces(tessellator, 3, "triangles");
+}
+
+/// Patches of four points each, cut into two triangles. One needs no indices.
+pub fn bilinear(tessellator: *Tessellator) Error!Geometry {
+    return faces(tessellator, 4, "patches");
+}
+
+fn faces(
+    tessellator: *Tessellator,
+    comptime corner_count: u32,
+    comptime what: []const u8,
+) Error!Geometry {
     const parameters = tessellator.parameters;
     const from = points(parameters.floatsNamed("P") orelse
         return tessellator.fail("has no points P", .{}));
-    const one = [_]i32{ 0, 1, 2 };
+    const one = [_]i32{ 0, 1, 2, 3 };
     const indices: []const i32 = if (parameters.find("indices")) |parameter|
         parameters.integersOf(parameter)
-    else if (from.len == 3) &one else return tessellator.fail("has no indices", .{});
-    if (indices.len % 3 != 0)
-        return tessellator.fail("{d} indices make no whole triangles", .{indices.len});
+    else if (from.len == corner_count)
+        one[0..corner_count]
+    else
+        return tessellator.fail("has no indices", .{});
+    if (indices.len % corner_count != 0)
+        return tessellator.fail("{d} indices make no whole " ++ what, .{indices.len});
+    const face_count = indices.len / corner_count;
     const result: Geometry = .{
         .positions = try tessellator.alloc(Vec3, from.len),
         .normals = try normals(tessellator, from.len),
-        .triangles = try tessellator.alloc([3]u32, indices.len / 3),
+        .triangles = try tessellator.alloc([3]u32, face_count * (corner_count - 2)),
     };
     @memcpy(result.positions, from);
-    for (result.triangles, 0..) |*triangle, index| {
-        for (triangle, indices[3 * index ..][0..3]) |*corner, vertex| {
+    for (0..face_count) |face| {
+        var corners: [corner_count]u32 = undefined;
+        for (&corners, indices[corner_count * face ..][0..corner_count]) |*corner, vertex| {
             corner.* = try checked(tessellator, vertex, from.len);
         }
+        // Corners of patches stand in the order (0, 0), (1, 0), (0, 1), (1, 1).
+        const cut = if (corner_count == 3)
+            [1][3]u32{corners}
+        else
+            Grid.cut(.{ corners[0], corners[1], corners[3], corners[2] });
+        result.triangles[cut.len * face ..][0..cut.len].* = cut;
     }
     Tessellator.orient(&result);
     return result;
@@ -56,36 +80,6 @@ inline fn checked(tessellator: *Tessellator, vertex: i32, vertex_count: usize) E
     // Negative ones are beyond the range as well.
     if (@as(u32, @bitCast(vertex)) < vertex_count) return @intCast(vertex);
     return tessellator.fail("index {d} of {d} vertices", .{ vertex, vertex_count });
-}
-
-/// Patches of four points each, cut into two triangles.
-pub fn bilinear(tessellator: *Tessellator) Error!Geometry {
-    const parameters = tessellator.parameters;
-    const from = points(parameters.floatsNamed("P") orelse
-        return tessellator.fail("has no points P", .{}));
-    const one = [_]i32{ 0, 1, 2, 3 };
-    const indices: []const i32 = if (parameters.find("indices")) |parameter|
-        parameters.integersOf(parameter)
-    else if (from.len == 4) &one else return tessellator.fail("has no indices", .{});
-    if (indices.len % 4 != 0)
-        return tessellator.fail("{d} indices make no whole patches", .{indices.len});
-    const result: Geometry = .{
-        .positions = try tessellator.alloc(Vec3, from.len),
-        .normals = try normals(tessellator, from.len),
-        .triangles = try tessellator.alloc([3]u32, indices.len / 2),
-    };
-    @memcpy(result.positions, from);
-    for (0..indices.len / 4) |patch| {
-        var corner: [4]u32 = undefined;
-        for (&corner, indices[4 * patch ..][0..4]) |*to, vertex| {
-            to.* = try checked(tessellator, vertex, from.len);
-        }
-        // In the order (0, 0), (1, 0), (0, 1), (1, 1).
-        const quad = [4]u32{ corner[0], corner[1], corner[3], corner[2] };
-        result.triangles[2 * patch ..][0..2].* = Grid.cut(quad);
-    }
-    Tessellator.orient(&result);
-    return result;
 }
 
 /// `nu` by `nv` heights `Pz` over the unit square.

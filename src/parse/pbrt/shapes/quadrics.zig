@@ -4,9 +4,9 @@
 //! directions of growing angle and growing v. The normals are those of the true surface.
 
 const std = @import("std");
-const elementary = @import("../../../math.zig").elementary;
 const Tessellator = @import("tessellator.zig");
 const math = @import("../../../math.zig");
+const elementary = math.elementary;
 const vec3d = math.vec3d;
 const Error = @import("../input.zig").Error;
 const Geometry = Tessellator.Geometry;
@@ -116,16 +116,18 @@ fn angleOf(cosine: f64) f64 {
     return std.math.acos(std.math.clamp(cosine, -1, 1));
 }
 
-const CylinderCurve = struct {
-    radius: f64,
-    z: [2]f64,
+/// A straight outline between two radii and two heights; the normal goes out and up.
+const Line = struct {
+    radii: [2]f64,
+    heights: [2]f64,
+    normal: [2]f64,
 
-    fn at(curve: CylinderCurve, v: f64) Outline {
+    fn at(line: Line, v: f64) Outline {
         return .{
-            .radius = curve.radius,
-            .height = (1 - v) * curve.z[0] + v * curve.z[1],
-            .normal_out = 1,
-            .normal_up = 0,
+            .radius = (1 - v) * line.radii[0] + v * line.radii[1],
+            .height = (1 - v) * line.heights[0] + v * line.heights[1],
+            .normal_out = line.normal[0],
+            .normal_up = line.normal[1],
         };
     }
 };
@@ -133,55 +135,38 @@ const CylinderCurve = struct {
 /// `radius` from `zmin` to `zmax`, without lids.
 pub fn cylinder(tessellator: *Tessellator) Error!Geometry {
     const radius = try tessellator.positive("radius", 1);
-    const curve: CylinderCurve = .{ .radius = radius, .z = heights(tessellator, -1, 1) };
-    return revolve(tessellator, curve, 1, .{ false, false });
+    const line: Line = .{
+        .radii = @splat(radius),
+        .heights = heights(tessellator, -1, 1),
+        .normal = .{ 1, 0 },
+    };
+    return revolve(tessellator, line, 1, .{ false, false });
 }
-
-const DiskCurve = struct {
-    outer: f64,
-    inner: f64,
-    height: f64,
-
-    fn at(curve: DiskCurve, v: f64) Outline {
-        return .{
-            .radius = (1 - v) * curve.outer + v * curve.inner,
-            .height = curve.height,
-            .normal_out = 0,
-            .normal_up = 1,
-        };
-    }
-};
 
 /// At `height`, from `innerradius` to `radius`, looking up.
 pub fn disk(tessellator: *Tessellator) Error!Geometry {
     const radius = try tessellator.positive("radius", 1);
     const inner: f64 = std.math.clamp(tessellator.parameters.float("innerradius", 0), 0, radius);
     const height = tessellator.parameters.float("height", 0);
-    const curve: DiskCurve = .{ .outer = radius, .inner = inner, .height = height };
-    return revolve(tessellator, curve, 1, .{ false, inner == 0 });
+    const line: Line = .{
+        .radii = .{ radius, inner },
+        .heights = @splat(height),
+        .normal = .{ 0, 1 },
+    };
+    return revolve(tessellator, line, 1, .{ false, inner == 0 });
 }
-
-const ConeCurve = struct {
-    radius: f64,
-    height: f64,
-
-    fn at(curve: ConeCurve, v: f64) Outline {
-        const slant = @sqrt(curve.radius * curve.radius + curve.height * curve.height);
-        return .{
-            .radius = curve.radius * (1 - v),
-            .height = curve.height * v,
-            .normal_out = curve.height / slant,
-            .normal_up = curve.radius / slant,
-        };
-    }
-};
 
 /// `radius` at z = 0, a point at `height`.
 pub fn cone(tessellator: *Tessellator) Error!Geometry {
     const radius = try tessellator.positive("radius", 1);
     const height = try tessellator.positive("height", 1);
-    const curve: ConeCurve = .{ .radius = radius, .height = height };
-    return revolve(tessellator, curve, 1, .{ false, true });
+    const slant = @sqrt(radius * radius + height * height);
+    const line: Line = .{
+        .radii = .{ radius, 0 },
+        .heights = .{ 0, height },
+        .normal = .{ height / slant, radius / slant },
+    };
+    return revolve(tessellator, line, 1, .{ false, true });
 }
 
 const ParaboloidCurve = struct {

@@ -32,8 +32,6 @@ input: *Input,
 arena: std.mem.Allocator,
 /// Of the directive that is being read.
 parameters: *const Parameters = undefined,
-/// Where that directive stands.
-position: usize = 0,
 /// What kind of shape it is, for messages.
 name: []const u8 = "",
 /// Bytes of all geometry so far.
@@ -46,7 +44,7 @@ pub fn fail(
     arguments: anytype,
 ) error{InvalidInput} {
     const name = .{tessellator.name};
-    return tessellator.input.fail(tessellator.position, "{s}: " ++ format, name ++ arguments);
+    return tessellator.input.failHere("{s}: " ++ format, name ++ arguments);
 }
 
 /// Memory that lives as long as the scene.
@@ -137,16 +135,18 @@ pub fn tessellate(
     return result;
 }
 
+/// The normal of a face, as long as twice its area.
+fn faceNormal(geometry: *const Geometry, corners: [3]u32) Vec3 {
+    const a = geometry.positions[corners[0]];
+    const ab = math.vec3.sub(geometry.positions[corners[1]], a);
+    return math.vec3.cross(ab, math.vec3.sub(geometry.positions[corners[2]], a));
+}
+
 /// Turns the faces around that look against their vertices' normals.
 pub fn orient(geometry: *const Geometry) void {
     const normals = geometry.normals orelse return;
     for (geometry.triangles) |*corners| {
-        const a, const b, const c = .{
-            geometry.positions[corners[0]],
-            geometry.positions[corners[1]],
-            geometry.positions[corners[2]],
-        };
-        const face = math.vec3.cross(math.vec3.sub(b, a), math.vec3.sub(c, a));
+        const face = faceNormal(geometry, corners.*);
         var agreement: f32 = 0;
         for (corners) |corner| agreement += math.vec3.dot(face, normals[corner]);
         if (agreement < 0) std.mem.swap(u32, &corners[1], &corners[2]);
@@ -158,12 +158,7 @@ pub fn smooth(tessellator: *Tessellator, geometry: *Geometry) Error!void {
     const normals = try tessellator.alloc(Vec3, geometry.positions.len);
     @memset(normals, .{ 0, 0, 0 });
     for (geometry.triangles) |corners| {
-        const a, const b, const c = .{
-            geometry.positions[corners[0]],
-            geometry.positions[corners[1]],
-            geometry.positions[corners[2]],
-        };
-        const face = math.vec3.cross(math.vec3.sub(b, a), math.vec3.sub(c, a));
+        const face = faceNormal(geometry, corners);
         for (corners) |corner| normals[corner] = math.vec3.add(normals[corner], face);
     }
     for (normals) |*normal| normal.* = math.vec3.normalize(normal.*) orelse .{ 0, 0, 0 };
