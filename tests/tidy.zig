@@ -123,8 +123,8 @@ const long_generics = [_]LongGeneric{
     .{
         .path = "src/trace/integrate/whitted.zig",
         .name = "Whitted",
-        .lines = 550,
-        .why = "sampler, visibility and film are still in it",
+        .lines = 290,
+        .why = "one algorithm over one state",
     },
     .{
         .path = "src/trace/traverse/beam/shadow_receivers.zig",

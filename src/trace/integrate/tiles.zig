@@ -199,7 +199,8 @@ const Job = struct {
         state.samples_done += sample_count;
         if (state.samples_done < job.settings.sample_count) return;
         const non_finite = job.film.finish(tile, job.settings.sample_count);
-        if (non_finite > 0) _ = job.tiles.non_finite_count.fetchAdd(@intCast(non_finite), .monotonic);
+        if (non_finite == 0) return;
+        _ = job.tiles.non_finite_count.fetchAdd(@intCast(non_finite), .monotonic);
     }
 };
 
