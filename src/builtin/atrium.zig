@@ -160,11 +160,14 @@ fn addSide(parts: *Parts, place: Place, bays: usize) Allocator.Error!void {
     // The corner of the gallery has a vault of its own.
     const corner: Point = .{ -gallery_middle, ground.spring, -gallery_middle };
     parts.get(.wall).place = place.moved(corner);
-    try masonry.groinVault(parts.get(.wall), vault_arch, 1.5, 1.5, vault_rise);
+    try masonry.groinVault(parts.get(.wall), vaultOver(1.5));
 }
 
-const vault_arch: Arch = .{ .half_span = 1, .half_segments = 4 };
-const vault_rise = 1.5;
+/// The vault of a bay over a gallery that is twice `half_depth` deep.
+fn vaultOver(half_depth: f64) masonry.Vault {
+    const arch: Arch = .{ .half_span = 1, .half_segments = 4 };
+    return .{ .arch = arch, .half_x = bay / 2.0, .half_z = half_depth, .rise = 1.5 };
+}
 
 /// What stands between two columns; x = 0 is the middle of the bay.
 fn addBay(parts: *Parts, place: Place) Allocator.Error!void {
@@ -173,8 +176,7 @@ fn addBay(parts: *Parts, place: Place) Allocator.Error!void {
         try addArcadeArch(parts, storey);
     }
     parts.get(.wall).place = place.moved(.{ 0, ground.spring, -gallery_middle });
-    const vault_half_z = gallery_middle - wall_half;
-    try masonry.groinVault(parts.get(.wall), vault_arch, bay / 2.0, vault_half_z, vault_rise);
+    try masonry.groinVault(parts.get(.wall), vaultOver(gallery_middle - wall_half));
     try addBalustrade(parts.get(.stone), place.moved(.{ 0, floor_upper, 0 }));
     try addBeams(parts.get(.wood), place);
 }

@@ -224,40 +224,36 @@ pub fn slab(builder: *MeshBuilder, corner: Point, size: f64) Allocator.Error!voi
     );
 }
 
-/// Adds the underside of a groin vault over the rectangle of the given half widths in x and z:
-/// the crossing of two barrels whose lines are those of `arch`, stretched to the two spans and
-/// brought to the height `rise`. Each of its four webs ends in a whole arch.
-pub fn groinVault(
-    builder: *MeshBuilder,
+/// A groin vault over a rectangle: the crossing of two barrels whose lines are those of `arch`,
+/// stretched to the two spans and brought to the height `rise`.
+pub const Vault = struct {
     arch: Arch,
     half_x: f64,
     half_z: f64,
     rise: f64,
-) Allocator.Error!void {
+};
+
+/// Adds the underside of a vault. Each of its four webs ends in a whole arch.
+pub fn groinVault(builder: *MeshBuilder, vault: Vault) Allocator.Error!void {
     const place = builder.place;
     defer builder.place = place;
     for (0..4) |web| {
         builder.place = place.turned(@intCast(web));
-        const across = if (web % 2 == 0) half_x else half_z;
-        const along = if (web % 2 == 0) half_z else half_x;
-        try vaultWeb(builder, arch, across, along, rise);
+        var turned = vault;
+        if (web % 2 == 1) std.mem.swap(f64, &turned.half_x, &turned.half_z);
+        try vaultWeb(builder, turned);
     }
 }
 
 /// The web at -z: part of a barrel along z, between the two groins that meet above the middle.
-fn vaultWeb(
-    builder: *MeshBuilder,
-    arch: Arch,
-    half_across: f64,
-    half_along: f64,
-    rise: f64,
-) Allocator.Error!void {
+fn vaultWeb(builder: *MeshBuilder, vault: Vault) Allocator.Error!void {
+    const arch = vault.arch;
     const count = arch.pointCount();
     const half = arch.half_segments;
     var buffer: [2 * half_segment_max + 1]Point = undefined;
     const line = buffer[0..count];
-    stretchedLine(arch, half_across, rise, line);
-    for (line) |*point| point[2] = -@abs(point[0]) / half_across * half_along;
+    stretchedLine(arch, vault.half_x, vault.rise, line);
+    for (line) |*point| point[2] = -@abs(point[0]) / vault.half_x * vault.half_z;
     // Row r holds the points of the barrel's line from r to count - 1 - r at the z of point r.
     var vertices: [2][2 * half_segment_max + 1]u32 = undefined;
     for (0..half + 1) |row| {
@@ -452,8 +448,12 @@ test "a vault is seen from below, and its webs meet" {
     var arena: std.heap.ArenaAllocator = .init(std.testing.allocator);
     defer arena.deinit();
     var builder: MeshBuilder = .init(arena.allocator());
-    const arch: Arch = .{ .half_span = 1, .half_segments = 4 };
-    try groinVault(&builder, arch, 2, 1, 1);
+    try groinVault(&builder, .{
+        .arch = .{ .half_span = 1, .half_segments = 4 },
+        .half_x = 2,
+        .half_z = 1,
+        .rise = 1,
+    });
     try std.testing.expectEqual(4 * 2 * 16, builder.triangles.items.len);
     for (builder.positions.items, builder.normals.items) |position, normal| {
         try std.testing.expect(normal[1] < 1e-6);

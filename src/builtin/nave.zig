@@ -434,9 +434,12 @@ const aisle_vault: Arch = .{ .half_span = 1, .offset = 0.4, .half_segments = 4 }
 /// Vault, outer wall and window of one bay of an aisle.
 fn addAisleBay(parts: *Parts, place: Place, seed: u32) Allocator.Error!void {
     const vault_place = place.moved(.{ 0, arcade_spring, -aisle_middle });
-    parts.get(.wall).place = vault_place;
-    try masonry.groinVault(parts.get(.wall), aisle_vault, bay / 2.0, aisle_half, aisle_rise);
-    try addDiagonalRibs(parts.get(.stone), vault_place, aisle_vault, aisle_half, aisle_rise);
+    try addVault(parts, vault_place, .{
+        .arch = aisle_vault,
+        .half_x = bay / 2.0,
+        .half_z = aisle_half,
+        .rise = aisle_rise,
+    });
 
     const spring = 4.0;
     try addWindow(parts, .{
@@ -466,15 +469,13 @@ fn addAisleBay(parts: *Parts, place: Place, seed: u32) Allocator.Error!void {
     }, -bay / 2.0, bay / 2.0);
 }
 
-/// The two ribs below the groins of a vault.
-fn addDiagonalRibs(
-    stone: *MeshBuilder,
-    place: Place,
-    arch: Arch,
-    half_z: f64,
-    rise: f64,
-) Allocator.Error!void {
-    const half_x = bay / 2.0;
+/// A vault and the two ribs below its groins.
+fn addVault(parts: *Parts, place: Place, shape: masonry.Vault) Allocator.Error!void {
+    parts.get(.wall).place = place;
+    try masonry.groinVault(parts.get(.wall), shape);
+    const stone = parts.get(.stone);
+    const half_x = shape.half_x;
+    const half_z = shape.half_z;
     const half_diagonal = @sqrt(half_x * half_x + half_z * half_z);
     for ([_]f64{ -1, 1 }) |side| {
         const cosine = half_x / half_diagonal;
@@ -486,9 +487,9 @@ fn addDiagonalRibs(
             .translation = place.translation,
         };
         try masonry.addRib(stone, .{
-            .arch = arch,
+            .arch = shape.arch,
             .half_across = half_diagonal,
-            .rise = rise,
+            .rise = shape.rise,
             .section = &diagonal_section,
         });
     }
@@ -507,9 +508,12 @@ fn addVaults(parts: *Parts) Allocator.Error!void {
         });
         if (index == bay_count) break;
         const middle: Place = .translate(.{ x + bay / 2.0, vault_spring, 0 });
-        parts.get(.wall).place = middle;
-        try masonry.groinVault(parts.get(.wall), vault, bay / 2.0, nave_half, vault_rise);
-        try addDiagonalRibs(parts.get(.stone), middle, vault, nave_half, vault_rise);
+        try addVault(parts, middle, .{
+            .arch = vault,
+            .half_x = bay / 2.0,
+            .half_z = nave_half,
+            .rise = vault_rise,
+        });
         try addBoss(parts.get(.stone), middle);
     }
 }

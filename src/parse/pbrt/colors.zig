@@ -139,20 +139,8 @@ fn parsePairs(colors: *Colors, bytes: [:0]const u8) Error!?Vec3 {
     }
 }
 
-/// `Texture "name" "type" "class" ...`: keeps its mean under its name.
-pub fn define(
-    colors: *Colors,
-    name: []const u8,
-    class: []const u8,
-    parameters: *const Parameters,
-) Error!void {
-    const value = try colors.mean(class, parameters);
-    const entry = try colors.textures.getOrPut(colors.arena, name);
-    if (!entry.found_existing) entry.key_ptr.* = try colors.arena.dupe(u8, name);
-    entry.value_ptr.* = value;
-}
-
-fn mean(colors: *Colors, class: []const u8, parameters: *const Parameters) Error!Vec3 {
+/// The mean of a texture: `Texture "name" "type" "class" ...`.
+pub fn mean(colors: *Colors, class: []const u8, parameters: *const Parameters) Error!Vec3 {
     const input = colors.input;
     const white: Vec3 = @splat(1);
     const Class = enum { constant, scale, mix, directionmix, checkerboard, dots, imagemap, bilerp };

@@ -246,7 +246,8 @@ fn perform(reader: *Reader, directive: Directive) Error!void {
             _ = try reader.text(); // Its type: all of them are colours here.
             const class = try reader.text();
             try reader.parameters.read(reader.input);
-            try reader.colors.define(name, class, &reader.parameters);
+            const mean = try reader.colors.mean(class, &reader.parameters);
+            try reader.keep(Vec3, &reader.colors.textures, name, mean);
         },
         else => {
             const name = try reader.text();
