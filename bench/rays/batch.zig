@@ -21,7 +21,7 @@ pub fn Batch(comptime Kernel: type) type {
         groups: [group_count]ray_file.Ray(Lanes),
         /// Barycentric weights of the second and the third corner of what was hit; not of shadow
         /// rays.
-        shares: [group_count][2]Lanes.F32,
+        barycentrics: [group_count][2]Lanes.F32,
 
         pub const Lanes = Kernel.Boxes;
         pub const group_count = ray_count / Lanes.count;

@@ -13,13 +13,13 @@ pub const Phase = enum {
     other,
     /// Primary rays' directions.
     generation,
-    /// Primary rays, with exact t, u and v of the closest hit.
+    /// Primary rays, with exact t of the closest hit.
     primary,
-    /// Points, normals, brightness and shadow rays of primary hits; the pixels.
+    /// Barycentrics, points, normals, brightness and shadow rays of primary hits; the pixels.
     shading,
     /// Shadow rays of primary hits.
     shadow,
-    /// Reflection rays, with exact t, u and v.
+    /// Reflection rays, with exact t.
     bounce,
     /// Shadow rays of their hits.
     bounce_shadow,

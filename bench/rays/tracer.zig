@@ -57,7 +57,6 @@ pub fn Tracer(comptime Kernel: type) type {
                 .beam => _ = dispatch.closestHit(Kernel, geometry, batch.bundle(), grid, tests),
                 .packet2x2, .single => tracer.traceEach(.closest_hit, batch),
             }
-            tracer.weighHits(batch);
         }
 
         /// Group by group, each by itself.
@@ -75,13 +74,13 @@ pub fn Tracer(comptime Kernel: type) type {
         }
 
         /// Barycentric weights of the closest hits, by the edge functions that decided them.
-        fn weighHits(tracer: *const Self, batch: *Batch) void {
+        pub fn weighHits(tracer: *const Self, batch: *Batch) void {
             var hits: [Batch.group_count]Lanes.Mask = undefined;
             for (&hits, &batch.groups) |*hit, *group| {
                 hit.* = group.active.andNot(group.closest.primitive.lt(.zero()));
                 if (hit.any()) tracer.prefetchCorners(group.closest.primitive, hit.bits());
             }
-            for (&batch.groups, &batch.shares, hits) |*group, *all, hit| {
+            for (&batch.groups, &batch.barycentrics, hits) |*group, *all, hit| {
                 if (hit.none()) continue;
                 const primitive: Lanes.I32 = .select(hit, group.closest.primitive, .zero());
                 const weights = edgeFunctions(tracer.cornersOf(primitive, hit), group.line, hit);

@@ -183,6 +183,7 @@ pub fn Workload(comptime Kernel: type) type {
                 var depth: u32 = 0;
                 while (true) : (depth += 1) {
                     const last = depth == worker.shared.settings.depth_max;
+                    worker.tracer.weighHits(&worker.rays);
                     if (!worker.shade(depth, last)) break;
                     worker.marks.to(if (depth == 0) .shadow else .bounce_shadow);
                     worker.tracer.occluded(&worker.shadows, depth > 0);
