@@ -65,38 +65,54 @@ inline fn coverSubtile(
     slot: exact.Slot,
     subtile: u32,
 ) void {
-    const Mask = Kernel.Rays.Mask;
     var rows = set.rowsOf(coverage, subtile);
     var changed = false;
-    while (true) {
-        const value = rows.values();
-        const known = set.lower(rows.group);
-        const least = value[0].minOrNegative(value[1]).minOrNegative(value[2]);
-        var possible = if (decisive)
-            value[3].gt(known).andNot(least.isNegative())
-        else
-            mayTouch(Kernel.Rays, value, coverage.slack)
-                .bitAnd(known.lt(.splat(std.math.inf(f32))));
-        if (possible.any()) {
-            possible = set.withoutOwn(possible, rows.group, coverage);
-            const lower = value[3].mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
-            const before: Mask = if (decisive)
-                possible.bitAnd(lower.gt(set.upper(rows.group)))
-            else
-                .splat(false);
-            const certain = before.bitAnd(least.gt(.splat(coverage.slack)));
-            var met: Met(Kernel.Rays) = .{ .mask = certain, .lower = lower, .upper = value[3] };
-            const doubtful = possible.andNot(certain);
-            if (doubtful.any()) met = decide(Kernel, set, slot, rows.group, doubtful, before, met);
-            // From the eye it mostly does, and a branch would be one more to foresee.
-            if (@TypeOf(set.*).query == .closest_hit or met.mask.any()) {
-                set.accept(rows.group, met.mask, slot, met.lower, met.upper);
-                changed = true;
-            }
+    if (@TypeOf(set.*).query == .any_hit) {
+        // Of a light all rows of a subtile are met, in code of their own each.
+        inline for (0..Kernel.subtile_groups) |row| {
+            if (coverRow(Kernel, decisive, set, coverage, slot, &rows)) changed = true;
+            if (row + 1 < Kernel.subtile_groups) _ = rows.next();
         }
+    } else while (true) {
+        if (coverRow(Kernel, decisive, set, coverage, slot, &rows)) changed = true;
         if (!rows.next()) break;
     }
     if (changed) set.boundSubtile(subtile);
+}
+
+/// Tests a triangle against a group of rays. Returns whether any may have met it.
+inline fn coverRow(
+    comptime Kernel: type,
+    comptime decisive: bool,
+    set: anytype,
+    coverage: *const Coverage(@TypeOf(set.*), f32, i32),
+    slot: exact.Slot,
+    rows: anytype,
+) bool {
+    const Mask = Kernel.Rays.Mask;
+    const value = rows.values();
+    const known = set.lower(rows.group);
+    const least = value[0].minOrNegative(value[1]).minOrNegative(value[2]);
+    var possible = if (decisive)
+        value[3].gt(known).andNot(least.isNegative())
+    else
+        mayTouch(Kernel.Rays, value, coverage.slack)
+            .bitAnd(known.lt(.splat(std.math.inf(f32))));
+    if (possible.none()) return false;
+    possible = set.withoutOwn(possible, rows.group, coverage);
+    const lower = value[3].mulAdd(.splat(coverage.shrink), .splat(-coverage.drop));
+    const before: Mask = if (decisive)
+        possible.bitAnd(lower.gt(set.upper(rows.group)))
+    else
+        .splat(false);
+    const certain = before.bitAnd(least.gt(.splat(coverage.slack)));
+    var met: Met(Kernel.Rays) = .{ .mask = certain, .lower = lower, .upper = value[3] };
+    const doubtful = possible.andNot(certain);
+    if (doubtful.any()) met = decide(Kernel, set, slot, rows.group, doubtful, before, met);
+    // From the eye it mostly does, and a branch would be one more to foresee.
+    if (@TypeOf(set.*).query != .closest_hit and met.mask.none()) return false;
+    set.accept(rows.group, met.mask, slot, met.lower, met.upper);
+    return true;
 }
 
 /// Rays that a triangle of unknown orientation may touch: unless some edge function is surely
