@@ -44,7 +44,7 @@ pub fn loadScene(
     return builtin_scenes.build(gpa, builtin_name, diagnostic);
 }
 
-/// How the geometry is placed: for now at one time only.
+/// How the tree over the placed geometry is built.
 pub const Pose = struct {
     /// Width of the tree: the variant's that is to render.
     lanes: u8,

@@ -46,7 +46,7 @@ fn aim(origin: [3]f32, target: [3]f32, step: f32, random: std.Random) Grid {
         .corner = corner,
         .right = right,
         .down = down,
-        .deviation_roundings = 40 * size,
+        .deviation_ulps = 40 * size,
     };
 }
 

@@ -188,9 +188,9 @@ test "bounds of what the eye sees hold, and are not much too wide" {
             .corner = forward,
             .right = randomVector(random, step),
             .down = randomVector(random, step),
-            .deviation_roundings = undefined,
+            .deviation_ulps = undefined,
         };
-        grid.deviation_roundings = 4 * (vec3.length1(grid.corner) + grid.spread());
+        grid.deviation_ulps = 4 * (vec3.length1(grid.corner) + grid.spread());
         const projection: GridProjection = .init(&grid);
         const at = [2]f32{
             @floatFromInt(random.uintLessThan(u32, 16)),
@@ -515,7 +515,7 @@ fn expectEnclosed(
         const at: Kernel.Boxes.Vec3 = .splat(corner);
         try std.testing.expect(set.frustum.mayMeet(.{ at, at, at }).all());
     }
-    // Not wider than what is there by more than some hundred roundings of the largest number.
+    // Not wider than what is there by more than some hundred ulps of the largest number.
     for (ends, [2][2]f32{ set.bounds.u, set.bounds.v }) |end, bounds| {
         const size = @max(1, @abs(end[0]), @abs(end[1]), projection.reach);
         const margin = 0x1p-14 * size * set.basis.norm();

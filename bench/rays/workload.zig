@@ -230,7 +230,7 @@ pub fn Workload(comptime Kernel: type) type {
                     .right = setup.across,
                     .down = setup.down,
                     // Two products and two sums; steps are up to 15 long.
-                    .deviation_roundings = 4 * size,
+                    .deviation_ulps = 4 * size,
                 };
             }
 

@@ -106,6 +106,6 @@ pub fn grid(view: *const world_file.View, rectangle: Rectangle, offset: Offset) 
         .down = down,
         // `generate` rounds x and y 3 times, their products and two sums once; `start` as well,
         // and steps of up to a tile are as many again.
-        .deviation_roundings = 12 * extent,
+        .deviation_ulps = 12 * extent,
     };
 }

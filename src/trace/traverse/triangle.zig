@@ -131,8 +131,8 @@ pub inline fn resolveTies(
     agreeing: Lanes.Mask,
 ) Lanes.Mask {
     const zero: Lanes.F32 = .zero();
-    const unsettled = weights.a.eq(zero).bitOr(weights.b.eq(zero)).bitOr(weights.c.eq(zero));
-    const rare = agreeing.bitAnd(unsettled).bits();
+    const tied = weights.a.eq(zero).bitOr(weights.b.eq(zero)).bitOr(weights.c.eq(zero));
+    const rare = agreeing.bitAnd(tied).bits();
     if (rare == 0) return agreeing;
     // Copies, so that nothing is put into memory unless it comes to this.
     const seen_copy = seen;
@@ -150,7 +150,7 @@ fn resolveRareTies(
     rare: u32,
 ) Lanes.Mask {
     @branchHint(.cold);
-    var settled: [3][Lanes.F32.count]f32 = .{
+    var resolved: [3][Lanes.F32.count]f32 = .{
         weights.a.toArray(), weights.b.toArray(), weights.c.toArray(),
     };
     var inside = agreeing.bits();
@@ -166,13 +166,13 @@ fn resolveRareTies(
         const sides = [3]Side{ edges[0].side(), edges[1].side(), edges[2].side() };
         const same = sides[0] == sides[1] and sides[1] == sides[2] and sides[0] != .none;
         if (!same) inside &= ~(@as(u32, 1) << @intCast(lane));
-        const rounded = [3]f32{ settled[0][lane], settled[1][lane], settled[2][lane] };
-        for (&settled, resolveLane(rounded, edges)) |*weight, value| weight[lane] = value;
+        const rounded = [3]f32{ resolved[0][lane], resolved[1][lane], resolved[2][lane] };
+        for (&resolved, resolveLane(rounded, edges)) |*weight, value| weight[lane] = value;
     }
     weights.* = .{
-        .a = .fromArray(settled[0]),
-        .b = .fromArray(settled[1]),
-        .c = .fromArray(settled[2]),
+        .a = .fromArray(resolved[0]),
+        .b = .fromArray(resolved[1]),
+        .c = .fromArray(resolved[2]),
     };
     return .fromBits(inside);
 }

@@ -33,13 +33,13 @@ const std = @import("std");
 pub const unit_roundoff: f32 = 0x1p-24;
 
 /// Bounds in the units above.
-pub const edge_roundings = 76.0;
+pub const edge_ulps = 76.0;
 /// Of an edge function stepped over directions that differ by T.
-pub const step_roundings = 60.0;
+pub const step_ulps = 60.0;
 /// Twice what is derived above: the relative part is taken of the rounded value.
-pub const inverse_roundings = 18.0;
-const inverse_relative_roundings = 36.0;
-const weight_roundings = 11.0;
+pub const inverse_ulps = 18.0;
+const inverse_relative_ulps = 36.0;
+const weight_ulps = 11.0;
 
 /// 1/t whose relative error may reach this is left to the exact test.
 pub const relative_error_max = 0.125;
@@ -47,7 +47,7 @@ pub const relative_error_max = 0.125;
 /// See above: |det| over u R^2 L that keeps a triangle from being turned over by rounding. Then the
 /// sign of the rounded det is right, too: it is off by less than 8 u R S, S is at most 3 L^2, L at
 /// most 2 R.
-pub const turning_roundings = 64.0;
+pub const turning_ulps = 64.0;
 
 /// Outside of this range of L^2 and R, in metres, products may leave the range of floats.
 pub const length_squared_min = 0x1p-80;
@@ -61,7 +61,7 @@ pub fn Edges(comptime Lanes: type) type {
     return struct {
         /// Edge function i of a ray with direction D is `normal[i]` . D.
         normal: [3]Vec3,
-        /// Bound of the error of an edge function over u |D|, without its factor of roundings.
+        /// Bound of the error of an edge function over u |D|, without its factor of ulps.
         slack: F32,
         facet: Facet(Lanes),
 
@@ -157,7 +157,7 @@ pub fn Inverse(comptime Lanes: type) type {
         vector: Lanes.Vec3,
         /// Bound of its relative error.
         relative: Lanes.F32,
-        /// Bound of the rest of its error over u |D|, without its factor of roundings.
+        /// Bound of the rest of its error over u |D|, without its factor of ulps.
         absolute: Lanes.F32,
         /// Lanes whose bounds hold and are worth anything; others are up to the exact test.
         decisive: Lanes.Mask,
@@ -173,7 +173,7 @@ pub inline fn isTurned(
     length_squared: Lanes.F32,
     length: Lanes.F32,
 ) Lanes.Mask {
-    const least = scale.mul(length).mul(.splat(turning_roundings * unit_roundoff));
+    const least = scale.mul(length).mul(.splat(turning_ulps * unit_roundoff));
     return det.abs().gt(least).bitAnd(length_squared.gt(.splat(length_squared_min)));
 }
 
@@ -183,8 +183,8 @@ pub inline fn weighed(
     steepness: Lanes.F32,
     thinness: Lanes.F32,
 ) Lanes.F32 {
-    const constant: Lanes.F32 = .splat(inverse_relative_roundings * unit_roundoff);
-    const share = thinness.mulAdd(.splat(weight_roundings * unit_roundoff), constant);
+    const constant: Lanes.F32 = .splat(inverse_relative_ulps * unit_roundoff);
+    const share = thinness.mulAdd(.splat(weight_ulps * unit_roundoff), constant);
     return steepness.mulAdd(share, constant);
 }
 

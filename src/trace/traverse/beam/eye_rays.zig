@@ -84,7 +84,7 @@ fn EyeRays(comptime Kernel: type) type {
             set.frustum = .init(grid.origin, sides, along, .{
                 .apart = frustum_file.apartOf(&geometry.padding, grid.origin),
                 .by_depth = frustum_file.by_distance * grid.longest() +
-                    edges_file.unit_roundoff * grid.deviation_roundings,
+                    edges_file.unit_roundoff * grid.deviation_ulps,
             });
             set.dual = .of(grid);
             set.buffer.clear(bundle);

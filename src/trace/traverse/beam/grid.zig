@@ -17,7 +17,7 @@ pub const Grid = struct {
     right: [3]f32,
     down: [3]f32,
     /// Bound of what every ray's direction differs from that, in units of 2^-24.
-    deviation_roundings: f32,
+    deviation_ulps: f32,
 
     /// A bound of how much directions differ.
     pub fn spread(grid: *const Grid) f32 {
@@ -71,7 +71,7 @@ test "the pyramid holds its pixels and leaves out the others, turned either way"
             .corner = .{ 0.3 * turn, -1, 0.2 },
             .right = .{ 0.01 * turn, 0, 0.002 },
             .down = .{ 0, 0.003, 0.01 },
-            .deviation_roundings = 0,
+            .deviation_ulps = 0,
         };
         const sides = grid.sides().?;
         const along = grid.depthNormal().?;
@@ -94,7 +94,7 @@ test "directions too far apart, or along the picture, have no pyramid" {
         .corner = .{ 0, 0, 1 },
         .right = .{ 0.1, 0, 0 },
         .down = .{ 0, 0.1, 0 },
-        .deviation_roundings = 0,
+        .deviation_ulps = 0,
     };
     try std.testing.expectEqual(null, grid.sides());
     grid.right = .{ 0.001, 0, 0 };

@@ -76,11 +76,11 @@ pub const GridProjection = struct {
     /// 2 R L d, 1/t by L^2 / |det| d.
     pub fn init(grid: *const Grid) GridProjection {
         const longest = grid.longest();
-        const off = 2 * grid.deviation_roundings;
+        const off = 2 * grid.deviation_ulps;
         return .{ .grid = grid.*, .scale = .{
-            .edge = unit * (edges_file.edge_roundings * longest +
-                edges_file.step_roundings * grid.spread() + off),
-            .nearness = unit * (edges_file.inverse_roundings * longest + off),
+            .edge = unit * (edges_file.edge_ulps * longest +
+                edges_file.step_ulps * grid.spread() + off),
+            .nearness = unit * (edges_file.inverse_ulps * longest + off),
         } };
     }
 
@@ -154,9 +154,9 @@ pub const LightProjection = struct {
         const parallel = projection.slope != null;
         projection.stretch = stretch;
         projection.scale = .{
-            .edge = unit * stretch * edges_file.edge_roundings * if (parallel) stretch else 1,
+            .edge = unit * stretch * edges_file.edge_ulps * if (parallel) stretch else 1,
             .nearness = unit * stretch *
-                if (parallel) @as(f32, 1) else edges_file.inverse_roundings,
+                if (parallel) @as(f32, 1) else edges_file.inverse_ulps,
         };
     }
 

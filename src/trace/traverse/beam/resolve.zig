@@ -48,7 +48,7 @@ const Course = struct {
     fn of(grid: *const Grid) Course {
         const last: f32 = kernel_file.beam_side - 1;
         var course: Course = .{ .axis = null, .negative = @splat(false) };
-        const margin = 2 * edges_file.unit_roundoff * grid.deviation_roundings + 1e-20;
+        const margin = 2 * edges_file.unit_roundoff * grid.deviation_ulps + 1e-20;
         for (0..4) |index| {
             var direction: [3]f32 = undefined;
             var longest: u2 = 0;

@@ -54,8 +54,8 @@ pub fn place(
         steepest.reduceMax();
     set.projection.bound(slope_max);
     set.basis = if (hasCorners(Kernel, members)) chooseBasis(Kernel, set) else .{};
-    const roundings = 64 * edges_file.unit_roundoff * (1 + 2 * slope_max);
-    const margin = roundings * set.basis.norm() *
+    const relative_error = 64 * edges_file.unit_roundoff * (1 + 2 * slope_max);
+    const margin = relative_error * set.basis.norm() *
         (if (set.projection.slope == null) 1 else set.projection.reach);
     if (all and unfit.none())
         bound(Kernel, true, set, members, margin)
