@@ -102,6 +102,7 @@ pub fn pose(
         .geometry = geometry,
         .node_maps = place.maps,
         .materials = materials,
+        .textures = &.empty,
         .facts = .{ .tree = tree_facts, .degenerate_count = soup.dropped_count },
     };
     if (builtin.mode == .debug) try check.check(gpa, &result);

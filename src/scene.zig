@@ -27,6 +27,45 @@ pub const Node = struct {
     local: AffineD,
 };
 
+/// A picture in a file: as it came, not decoded.
+pub const Image = struct {
+    /// What messages call it.
+    name: []const u8,
+    bytes: []const u8,
+};
+
+/// What a texture has beyond its image.
+pub const Wrap = enum { repeat, mirrored_repeat, clamp_to_edge };
+
+/// How a texture is looked up between its texels.
+pub const Filter = enum { nearest, linear };
+
+/// And between the levels of its pyramid; `none`: there is but the finest.
+pub const MipFilter = enum { none, nearest, linear };
+
+/// An image and how it is looked up (glTF 2.0, sections 3.8.3 and 3.8.4).
+pub const Texture = struct {
+    image: u32,
+    wrap: [2]Wrap = .{ .repeat, .repeat },
+    magnify: Filter = .linear,
+    minify: Filter = .linear,
+    mip: MipFilter = .linear,
+};
+
+/// Sets of texture coordinates of a mesh at most.
+pub const texcoord_set_count = 4;
+
+/// A texture as a material uses it.
+pub const TextureView = struct {
+    /// Index into `Scene.textures`.
+    texture: u32,
+    /// Below `texcoord_set_count`.
+    texcoord_set: u32 = 0,
+    /// Rows of the affine map of texture coordinates (KHR_texture_transform):
+    /// u' = row[0] u + row[1] v + row[2].
+    transform: [2][3]f32 = .{ .{ 1, 0, 0 }, .{ 0, 1, 0 } },
+};
+
 /// Triangles with one material, in the space of the node that shows them.
 pub const Mesh = struct {
     positions: []const Vec3,
@@ -34,6 +73,11 @@ pub const Mesh = struct {
     normals: ?[]const Vec3 = null,
     /// Linear RGBA a vertex, multiplied with the material's base colour; null: white.
     colors: ?[]const [4]f32 = null,
+    /// One a vertex in each set; null: none, which counts as 0 everywhere.
+    texcoords: [texcoord_set_count]?[]const [2]f32 = @splat(null),
+    /// One a vertex: a direction and, fourth, 1 or -1 for the sign of the bitangent; null: where a
+    /// normal texture needs them they are made.
+    tangents: ?[]const [4]f32 = null,
     /// Vertex indices, counter-clockwise seen from the front.
     triangles: []const [3]u32,
     /// Index into `Scene.materials`.
@@ -74,6 +118,36 @@ pub const Material = struct {
     attenuation_color: Vec3 = .{ 1, 1, 1 },
     /// In metres of the scene's space; infinity: no attenuation.
     attenuation_distance: f32 = std.math.inf(f32),
+    /// Red, green, blue (sRGB) and alpha, multiplied with `base_color`.
+    base_color_texture: ?TextureView = null,
+    /// Green: roughness, blue: metallic, each multiplied with its factor.
+    metallic_roughness_texture: ?TextureView = null,
+    /// Tangent-space normals.
+    normal_texture: ?TextureView = null,
+    /// Multiplies x and y of the normal.
+    normal_scale: f32 = 1,
+    /// Red: share of the light from all sides that arrives.
+    occlusion_texture: ?TextureView = null,
+    /// How much of the occlusion counts, 0..1.
+    occlusion_strength: f32 = 1,
+    /// Red, green, blue (sRGB), multiplied with `emissive`.
+    emissive_texture: ?TextureView = null,
+};
+
+/// The textures of a material.
+pub const texture_fields = [_][]const u8{
+    "base_color_texture", "metallic_roughness_texture", "normal_texture", "occlusion_texture",
+    "emissive_texture",
+};
+
+/// Light from all around, as an image by direction.
+pub const EnvironmentMap = struct {
+    /// Index into `Scene.images`; equirectangular, see docs/environment.md.
+    image: u32,
+    /// Multiplies the image's radiance.
+    scale: Vec3 = .{ 1, 1, 1 },
+    /// From the world's directions to those of the image.
+    rotation: AffineD = .identity,
 };
 
 /// A light source (KHR_lights_punctual); it shines from its node's origin along its node's -z.
@@ -125,6 +199,9 @@ pub const Scene = struct {
     materials: []const Material = &.{},
     lights: []const Light = &.{},
     cameras: []const Camera = &.{},
+    images: []const Image = &.{},
+    textures: []const Texture = &.{},
+    environment: ?EnvironmentMap = null,
     /// Index of the camera that the file itself would use, `none` without cameras.
     camera_default: u32 = none,
     /// Ambient radiance that the source of the scene asks for; null: by the rules of shading.
@@ -166,6 +243,8 @@ pub const Scene = struct {
             assert(mesh.material < scene.materials.len);
             if (mesh.normals) |normals| assert(normals.len == mesh.positions.len);
             if (mesh.colors) |colors| assert(colors.len == mesh.positions.len);
+            if (mesh.tangents) |tangents| assert(tangents.len == mesh.positions.len);
+            for (mesh.texcoords) |set| if (set) |all| assert(all.len == mesh.positions.len);
             for (mesh.positions) |position| assert(math.vec3.isFinite(position));
             for (mesh.triangles) |triangle| {
                 for (triangle) |vertex| assert(vertex < mesh.positions.len);
@@ -175,6 +254,14 @@ pub const Scene = struct {
             assert(instance.mesh < scene.meshes.len);
             assert(instance.node < scene.nodes.len);
         }
+        for (scene.textures) |texture| assert(texture.image < scene.images.len);
+        for (scene.materials) |*material| inline for (texture_fields) |field| {
+            if (@field(material, field)) |view| {
+                assert(view.texture < scene.textures.len);
+                assert(view.texcoord_set < texcoord_set_count);
+            }
+        };
+        if (scene.environment) |map| assert(map.image < scene.images.len);
         for (scene.lights) |light| assert(light.node < scene.nodes.len);
         for (scene.cameras) |camera| assert(camera.node < scene.nodes.len);
         assert(scene.camera_default == none or scene.camera_default < scene.cameras.len);

@@ -8,6 +8,7 @@ const std = @import("std");
 const math = @import("math.zig");
 const geometry_file = @import("world/geometry.zig");
 const materials_file = @import("world/materials.zig");
+const textures_file = @import("world/textures.zig");
 const view_file = @import("world/view.zig");
 
 pub const AnyTree = geometry_file.AnyTree;
@@ -15,16 +16,22 @@ pub const Camera = view_file.Camera;
 pub const Child = geometry_file.Child;
 pub const Environment = @import("world/environment.zig").Environment;
 pub const Geometry = geometry_file.Geometry;
+pub const Lookup = textures_file.Lookup;
 pub const Light = @import("world/light.zig").Light;
 pub const Material = materials_file.Material;
 pub const Materials = materials_file.Materials;
 pub const Node = geometry_file.Node;
 pub const Padding = @import("world/padding.zig").Padding;
+pub const Slot = textures_file.Slot;
+pub const Texture = textures_file.Texture;
+pub const TextureLevel = textures_file.Level;
+pub const Textures = textures_file.Textures;
 pub const Tree = geometry_file.Tree;
 pub const TreeStatistics = geometry_file.TreeStatistics;
 pub const Triangle = geometry_file.Triangle;
 pub const TrianglePack = geometry_file.TrianglePack;
 pub const View = view_file.View;
+pub const Wrap = textures_file.Wrap;
 pub const cache_line_bytes = geometry_file.cache_line_bytes;
 pub const none = geometry_file.none;
 pub const tree_depth_max = geometry_file.tree_depth_max;
@@ -33,6 +40,7 @@ pub const tree_depth_max = geometry_file.tree_depth_max;
 pub const Frame = struct {
     geometry: *const Geometry,
     materials: *const Materials,
+    textures: *const Textures,
     lights: []const Light,
     environment: *const Environment,
     view: *const View,
@@ -58,6 +66,8 @@ pub const World = struct {
     /// Where the nodes of the scene are: for cameras and lights, which are placed by the view.
     node_maps: []const math.AffineD,
     materials: Materials,
+    /// Made once a scene, by `prepare.load`; not owned.
+    textures: *const Textures,
     lights: []const Light = &.{},
     environment: Environment = .{ .ambient = 0, .background = @splat(0) },
     view: View = .nowhere,
@@ -68,6 +78,7 @@ pub const World = struct {
         return .{
             .geometry = &world.geometry,
             .materials = &world.materials,
+            .textures = world.textures,
             .lights = world.lights,
             .environment = &world.environment,
             .view = &world.view,

@@ -22,9 +22,12 @@ instances: std.ArrayList(scene_data.Instance) = .empty,
 materials: std.ArrayList(scene_data.Material) = .empty,
 lights: std.ArrayList(scene_data.Light) = .empty,
 cameras: std.ArrayList(scene_data.Camera) = .empty,
+images: std.ArrayList(scene_data.Image) = .empty,
+textures: std.ArrayList(scene_data.Texture) = .empty,
 
 const list_names = [_][]const u8{
-    "nodes", "meshes", "instances", "materials", "lights", "cameras",
+    "nodes",    "meshes", "instances", "materials", "lights", "cameras", "images",
+    "textures",
 };
 
 /// A scene with nothing in it. `deinit` it, unless `finish` took it over.
@@ -97,6 +100,17 @@ pub fn addLight(builder: *Builder, light: scene_data.Light) Error!void {
 pub fn addCamera(builder: *Builder, camera: scene_data.Camera) Error!void {
     assert(camera.node < builder.nodes.items.len);
     _ = try builder.add("cameras", camera);
+}
+
+/// Adds an image, whose bytes must live as long as the scene, and returns its index.
+pub fn addImage(builder: *Builder, image: scene_data.Image) Error!u32 {
+    return builder.add("images", image);
+}
+
+/// Adds a texture of an image that exists and returns its index.
+pub fn addTexture(builder: *Builder, texture: scene_data.Texture) Error!u32 {
+    assert(texture.image < builder.images.items.len);
+    return builder.add("textures", texture);
 }
 
 /// The scene, whose first camera is the default. The builder is empty afterwards and needs no

@@ -159,6 +159,9 @@ pub const TreeStatistics = struct {
     bytes: u64,
 };
 
+/// Sets of texture coordinates at most.
+pub const texcoord_set_count = 4;
+
 /// What there is to hit: a function of the scene's meshes and their pose.
 pub const Geometry = struct {
     tree: AnyTree,
@@ -168,6 +171,11 @@ pub const Geometry = struct {
     normals: []const Vec3,
     /// By vertex, linear RGBA; empty where no mesh has colours.
     colors: []const [4]f32,
+    /// By set and vertex; a set that no material looks up is empty.
+    texcoords: [texcoord_set_count][]const [2]f32 = @splat(&.{}),
+    /// By vertex: a tangent in world space, not normalised, zero where there is none, and the sign
+    /// of the bitangent cross(normal, tangent); empty where no material has a normal texture.
+    tangents: []const [4]f32 = &.{},
     triangles: []const Triangle,
     /// Box of the triangles' corners, empty without any.
     bounds: Box3,

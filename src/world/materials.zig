@@ -2,6 +2,7 @@
 
 const math = @import("../math.zig");
 const Vec3 = math.Vec3;
+const Lookup = @import("textures.zig").Lookup;
 
 /// The metallic-roughness model of glTF 2.0 with transmission and volume.
 pub const Material = struct {
@@ -26,6 +27,13 @@ pub const Material = struct {
     unlit: f32,
     /// 1: bounds a volume, rays bend; 0: thin, they go straight on.
     volume: f32,
+    /// Multiplies x and y of normals from a texture.
+    normal_scale: f32 = 1,
+    /// How much of the occlusion texture counts.
+    occlusion_strength: f32 = 1,
+    /// Its textures: `Materials.lookups[first_lookup..][0..lookup_count]`.
+    first_lookup: u32 = 0,
+    lookup_count: u32 = 0,
 
     /// Whether no light passes, wherever a surface of it is hit.
     pub fn stopsLight(material: *const Material) bool {
@@ -38,6 +46,8 @@ pub const Material = struct {
 pub const Materials = struct {
     /// `Triangle.material` counts these.
     all: []const Material,
+    /// Of all materials, one after the other.
+    lookups: []const Lookup = &.{},
     /// Some drawn material lets shadow rays through in part (blend or transmission).
     has_transparency: bool,
     /// Some drawn material has holes (mask).
