@@ -31,8 +31,8 @@ pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
 /// Largest file that is read, in bytes.
 pub const file_bytes_max: u64 = 2 << 30;
 
-/// What a file holds, and which one it is. The bytes are the caller's, from `gpa` where nothing else
-/// is said.
+/// What a file holds, and which one it is. The bytes are the caller's, from `gpa` unless another
+/// allocator is asked for.
 pub const File = struct { bytes: [:0]const u8, identity: ?Identity };
 
 gpa: Allocator,

@@ -1,7 +1,7 @@
 //! Version and extensions of a document: whether this reader may read it at all.
 //!
-//! In: `asset`, `extensionsRequired` and `extensionsUsed` (glTF 2.0, sections 3.2 and 3.12). Out: an
-//! error that names what is required and not supported, and one warning that names whatever else
+//! In: `asset`, `extensionsRequired` and `extensionsUsed` (glTF 2.0, sections 3.2 and 3.12). Out:
+//! an error that names what is required and not supported, and one warning that names whatever else
 //! the picture will lack.
 
 const std = @import("std");

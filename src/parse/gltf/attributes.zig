@@ -1,8 +1,9 @@
 //! Vertex attributes: the accessors that a primitive draws from, each of the right kind.
 //!
 //! In: a primitive's attributes, indices and morph targets. Out: the accessors of its positions,
-//! normals, colours, texture coordinates and tangents. The kinds are those of glTF 2.0, section 3.7.2.1, and of
-//! KHR_mesh_quantization; an attribute that is not drawn has to be of its kind as well.
+//! normals, colours, texture coordinates and tangents. The kinds are those of glTF 2.0, section
+//! 3.7.2.1, and of KHR_mesh_quantization; an attribute that is not drawn has to be of its kind as
+//! well.
 
 const std = @import("std");
 const c = @import("../cgltf.zig");

@@ -1,9 +1,9 @@
 //! glTF's materials: metallic-roughness factors and those of the extensions that are traced.
 //!
 //! In: materials (glTF 2.0, section 3.9; KHR_materials_ior, _transmission, _volume,
-//! _emissive_strength, _unlit, _pbrSpecularGlossiness). Out: the scene's materials with every factor
-//! in its range, in the order of the file, and behind them those that the file does not have. The
-//! textures of a material are read once something is drawn with it.
+//! _emissive_strength, _unlit, _pbrSpecularGlossiness). Out: the scene's materials with every
+//! factor in its range, in the order of the file, and behind them those that the file does not
+//! have. The textures of a material are read once something is drawn with it.
 
 const std = @import("std");
 const c = @import("../cgltf.zig");

@@ -164,7 +164,8 @@ fn readSampler(textures: *const Textures, raw: *const c.cgltf_texture) scene.Tex
         _ => |filter| warnOfSampler(source, raw, "minFilter", @backingInt(filter)),
     }
     const modes = [2]c.cgltf_wrap_mode{ sampler.wrap_s, sampler.wrap_t };
-    for (&texture.wrap, modes, [_][]const u8{ "wrapS", "wrapT" }) |*wrap, mode, name| switch (mode) {
+    const names = [2][]const u8{ "wrapS", "wrapT" };
+    for (&texture.wrap, modes, names) |*wrap, mode, name| switch (mode) {
         .repeat => wrap.* = .repeat,
         .clamp_to_edge => wrap.* = .clamp_to_edge,
         .mirrored_repeat => wrap.* = .mirrored_repeat,
@@ -185,7 +186,8 @@ fn warnOfSampler(
     value: c_uint,
 ) void {
     const index = Source.indexOf(source.data.textures, raw);
-    source.warn("texture {d}: its sampler's {s} {d} is not known, ignored", .{ index, name, value });
+    const parts = .{ index, name, value };
+    source.warn("texture {d}: its sampler's {s} {d} is not known, ignored", parts);
 }
 
 /// The scene's image for the file's with this index.

@@ -13,8 +13,8 @@ const quote = diagnostic.quote;
 /// What a URI stands for; free what is in it.
 pub const Target = union(enum) { bytes: [:0]u8, path: []u8 };
 
-/// Resolves a URI as it stands in a JSON text. On an error but that of memory, `reason` says what is
-/// wrong. Bytes come from `allocator`, a path from `gpa`.
+/// Resolves a URI as it stands in a JSON text. On an error but that of memory, `reason` says what
+/// is wrong. Bytes come from `allocator`, a path from `gpa`.
 pub fn resolve(
     gpa: Allocator,
     allocator: Allocator,
