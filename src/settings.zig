@@ -92,6 +92,17 @@ pub const Camera = union(enum) {
     name: []const u8,
 };
 
+/// Which of a file's scenes to read.
+pub const SceneChoice = union(enum) {
+    /// The one that the file shows.
+    default,
+    index: u32,
+    name: []const u8,
+};
+
+/// The axis of a scene that points up.
+pub const UpAxis = enum { y, z };
+
 /// What is seen where there is nothing.
 pub const Background = union(enum) {
     /// As the lights have it.
@@ -124,6 +135,9 @@ pub const Load = struct {
     allow_outside: bool = false,
     /// Within `tessellation`.
     tessellation: u32 = tessellation.default,
+    scene: SceneChoice = .default,
+    /// Where it is not y, the scene is turned about x until it is.
+    up_axis: UpAxis = .y,
     /// A file that is about to be replaced: a scene that is read from it is refused.
     output: ?Identity = null,
 };
