@@ -12,6 +12,8 @@ pub const flushDenormal = @import("math/vec3.zig").flushDenormal;
 pub const box3 = @import("math/box3.zig");
 /// Sine, cosine, tangent, exponential, logarithm, power.
 pub const elementary = @import("math/elementary.zig");
+/// Directions on a square.
+pub const equal_area = @import("math/equal_area.zig");
 /// The sRGB transfer function.
 pub const srgb = @import("math/srgb.zig");
 
@@ -31,5 +33,6 @@ test {
     _ = @import("math/affine.zig");
     _ = box3;
     _ = elementary;
+    _ = equal_area;
     _ = srgb;
 }
