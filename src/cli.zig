@@ -125,6 +125,11 @@ const sections: []const Section = &.{
                 settings.tessellation.textWithDefault(),
         },
         .{
+            .usage = "--max-texture-size N",
+            .help = comptimePrint("halve larger images on loading until no side is\n" ++
+                "longer, {s}", .{settings.texture_side.text()}),
+        },
+        .{
             .usage = "--allow-outside",
             .help = "let the scene name files outside of its own folder",
         },
@@ -320,6 +325,9 @@ const Parser = struct {
             .count_tests => options.count_tests = true,
             .tessellation => {
                 options.load.tessellation = try reader.number(given, settings.tessellation);
+            },
+            .max_texture_size => {
+                options.load.texture_side_max = try reader.number(given, settings.texture_side);
             },
             .allow_outside => options.load.allow_outside = true,
             .quiet => options.quiet = true,

@@ -37,6 +37,8 @@ pub const sample_count: Range = .{ .min = 1, .max = 4096, .default = 1 };
 pub const depth: Range = .{ .min = 0, .max = 32, .default = 6 };
 /// Straight pieces that a full circle becomes.
 pub const tessellation: Range = .{ .min = 4, .max = 1024, .default = 32 };
+/// Longest side of a texture, in texels; larger images are halved until they fit.
+pub const texture_side: Range = .{ .min = 1, .max = 32_768, .default = 32_768 };
 /// Sides of tiles, in pixels: multiples of `tile_size_step`.
 pub const tile_size: Range = .{ .min = 4, .max = 512, .default = 32 };
 pub const tile_size_step = 4;
@@ -124,6 +126,8 @@ pub const Load = struct {
     allow_outside: bool = false,
     /// Within `tessellation`.
     tessellation: u32 = tessellation.default,
+    /// Within `texture_side`.
+    texture_side_max: u32 = texture_side.default,
     /// A file that is about to be replaced: a scene that is read from it is refused.
     output: ?Identity = null,
 };
