@@ -793,6 +793,7 @@ test {
     _ = @import("prepare/pyramid.zig");
     _ = view_file;
     _ = @import("prepare/framing.zig");
+    _ = @import("prepare/mikktspace.zig");
     _ = @import("prepare/bvh/split.zig");
     _ = bvh_input;
     _ = @import("prepare/bvh/build.zig");
