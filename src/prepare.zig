@@ -605,6 +605,7 @@ test {
     _ = place_file;
     _ = view_file;
     _ = @import("prepare/framing.zig");
+    _ = @import("prepare/mikktspace.zig");
     _ = @import("prepare/bvh/split.zig");
     _ = bvh_input;
     _ = @import("prepare/bvh/build.zig");
