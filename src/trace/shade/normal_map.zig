@@ -53,7 +53,8 @@ pub inline fn apply(
     return bentBack(Lanes, point, .select(opposite, front.neg(), front));
 }
 
-/// Half way from the view to the mirror direction, after that was lifted off the surface.
+/// Half way from the view to the mirror direction, after that was turned up to where it just leaves
+/// the surface.
 inline fn bentBack(
     comptime Lanes: type,
     point: *const interaction_file.Interaction(Lanes),
@@ -65,7 +66,12 @@ inline fn bentBack(
     const height = mirrored.dot(up);
     const least = point.view.dot(up).mul(.splat(mirror_cosine_share))
         .min(.splat(mirror_cosine_min));
-    const lifted = mirrored.add(up.scale(least.sub(height))).normalize();
-    const bent = lifted.add(point.view).normalize();
+    const across = mirrored.sub(up.scale(height));
+    const is_upright = across.dot(across).lt(.splat(1e-8));
+    const level = Lanes.Vec3
+        .select(is_upright, normal.sub(up.scale(normal.dot(up))), across).normalize();
+    const share = Lanes.F32.splat(1).sub(least.mul(least)).sqrt();
+    const turned = level.scale(share).add(up.scale(least));
+    const bent = turned.add(point.view).normalize();
     return .select(height.lt(least), bent, normal);
 }

@@ -319,3 +319,208 @@ inline fn mix(a: Texel, b: Texel, share: f32) Texel {
 inline fn larger(a: f32, b: f32) f32 {
     return if (a > b) a else b;
 }
+
+/// A pyramid of one channel whose level l is all of value 10 (l + 1), but for the finest.
+const TestPyramid = struct {
+    texels: [3][64]u8,
+    levels: [4]world_file.TextureLevel,
+
+    fn init(pyramid: *TestPyramid, finest: *const [64]u8) Texture {
+        pyramid.levels[0] = .{ .width = 8, .height = 8, .texels = finest };
+        for (&pyramid.texels, pyramid.levels[1..], 1..) |*texels, *level, number| {
+            const side = @as(u32, 8) >> @intCast(number);
+            texels.* = @splat(@intCast(10 * (number + 1)));
+            level.* = .{ .width = side, .height = side, .texels = texels[0 .. side * side] };
+        }
+        return .{ .levels = &pyramid.levels, .channel_count = 1, .is_srgb = false };
+    }
+};
+
+const test_lookup: Lookup = .{
+    .slot = .base_color,
+    .texture = 0,
+    .wrap = @splat(.repeat),
+    .magnify_linear = true,
+    .minify_linear = true,
+    .has_mips = true,
+    .mip_linear = true,
+    .texcoord_set = 0,
+    .transform = .{ .{ 1, 0, 0 }, .{ 0, 1, 0 } },
+    .channels = @splat(0),
+};
+
+/// The first channel of a lookup, in bytes.
+fn testSample(texture: *const Texture, lookup: *const Lookup, footprint: Footprint) f32 {
+    var texels: [textures_max]Texel = undefined;
+    sample(&.{texture}, lookup, &footprint, &texels);
+    return texels[0][0] * 255;
+}
+
+/// A row of texels 0, 1, 2 and 3 looked up without a footprint.
+fn testRow(wrap: Wrap, is_linear: bool, u: f32) f32 {
+    const texels = [4]u8{ 0, 1, 2, 3 };
+    const texture: Texture = .{
+        .levels = &.{.{ .width = 4, .height = 1, .texels = &texels }},
+        .channel_count = 1,
+        .is_srgb = false,
+    };
+    var lookup = test_lookup;
+    lookup.wrap = .{ wrap, .repeat };
+    lookup.magnify_linear = is_linear;
+    return testSample(&texture, &lookup, .{ .place = .{ u, 0.5 }, .axes = @splat(.{ 0, 0 }) });
+}
+
+test "texel centres, edges and what lies beyond them, by every wrap mode" {
+    const Case = struct { Wrap, f32, f32, f32 };
+    for ([_]Case{
+        // Coordinate, linear, nearest.
+        .{ .repeat, 0.125, 0, 0 },           .{ .repeat, 0.5, 1.5, 2 },
+        .{ .repeat, 0, 1.5, 0 },             .{ .repeat, 1, 1.5, 0 },
+        .{ .repeat, -0.125, 3, 3 },          .{ .repeat, 5.375, 1, 1 },
+        .{ .repeat, -7.625, 1, 1 },          .{ .repeat, 0.9375, 2.25, 3 },
+        .{ .repeat, 4096.625, 2, 2 },        .{ .repeat, 1e30, 1.5, 0 },
+        .{ .mirrored_repeat, 0, 0, 0 },      .{ .mirrored_repeat, 1, 3, 3 },
+        .{ .mirrored_repeat, 1.125, 3, 3 },  .{ .mirrored_repeat, 1.625, 1, 1 },
+        .{ .mirrored_repeat, 2.125, 0, 0 },  .{ .mirrored_repeat, -0.375, 1, 1 },
+        .{ .mirrored_repeat, 0.0625, 0, 0 }, .{ .mirrored_repeat, -1.25, 2.5, 3 },
+        .{ .clamp_to_edge, -3, 0, 0 },       .{ .clamp_to_edge, 0.0625, 0, 0 },
+        .{ .clamp_to_edge, 0.75, 2.5, 3 },   .{ .clamp_to_edge, 1e38, 3, 3 },
+    }) |case| {
+        errdefer std.debug.print("{t} {d}\n", .{ case[0], case[1] });
+        try std.testing.expectApproxEqAbs(case[2], testRow(case[0], true, case[1]), 1e-5);
+        try std.testing.expectApproxEqAbs(case[3], testRow(case[0], false, case[1]), 1e-5);
+    }
+}
+
+test "no number is looked up as 0, infinities somewhere in the image" {
+    const inf = std.math.inf(f32);
+    const nan = std.math.nan(f32);
+    for (std.enums.values(Wrap)) |wrap| for ([_]bool{ false, true }) |is_linear| {
+        try std.testing.expectEqual(testRow(wrap, is_linear, 0), testRow(wrap, is_linear, nan));
+        for ([_]f32{ inf, -inf, std.math.floatMax(f32), -0x1p23, -1e-30 }) |u| {
+            const value = testRow(wrap, is_linear, u);
+            try std.testing.expect(value >= 0 and value <= 3);
+        }
+    };
+    const finest: [64]u8 = @splat(10);
+    var pyramid: TestPyramid = undefined;
+    const texture = pyramid.init(&finest);
+    for ([_]f32{ nan, inf, 1e30, 1e38 }) |size| {
+        const footprint: Footprint = .{ .place = .{ nan, inf }, .axes = @splat(.{ size, 0 }) };
+        try std.testing.expectApproxEqAbs(40, testSample(&texture, &test_lookup, footprint), 1e-5);
+    }
+}
+
+test "the level is that whose texels are as wide as the footprint" {
+    const finest: [64]u8 = @splat(10);
+    var pyramid: TestPyramid = undefined;
+    const texture = pyramid.init(&finest);
+    var nearest_level = test_lookup;
+    nearest_level.mip_linear = false;
+    var no_levels = test_lookup;
+    no_levels.has_mips = false;
+    const Case = struct { f32, f32, f32 };
+    for ([_]Case{
+        // Texels, mixed levels, nearest level.
+        .{ 0, 10, 10 },   .{ 0.5, 10, 10 }, .{ 1, 10, 10 },       .{ 1.4, 14, 10 },
+        .{ 1.5, 15, 20 }, .{ 2, 20, 20 },   .{ 2.75, 23.75, 20 }, .{ 3, 25, 30 },
+        .{ 4, 30, 30 },   .{ 6, 35, 40 },   .{ 8, 40, 40 },       .{ 1000, 40, 40 },
+    }) |case| {
+        const size = case[0] / 8;
+        const footprint: Footprint = .{
+            .place = .{ 0.3, 0.7 },
+            .axes = .{ .{ 0, size }, .{ -size, 0 } },
+        };
+        const expectClose = std.testing.expectApproxEqAbs;
+        try expectClose(case[1], testSample(&texture, &test_lookup, footprint), 1e-4);
+        try expectClose(case[2], testSample(&texture, &nearest_level, footprint), 1e-4);
+        try expectClose(10, testSample(&texture, &no_levels, footprint), 1e-4);
+    }
+}
+
+test "filters for what is larger and smaller than texels differ where a sampler says so" {
+    var finest: [64]u8 = undefined;
+    for (&finest, 0..) |*texel, index| texel.* = if (index % 8 == 0) 0 else 100;
+    var pyramid: TestPyramid = undefined;
+    const texture = pyramid.init(&finest);
+    var lookup = test_lookup;
+    lookup.has_mips = false;
+    const place = [2]f32{ 1.0 / 8.0, 0.5 }; // Between the first column and the second.
+    const Case = struct { bool, bool, f32, f32 };
+    for ([_]Case{ .{ true, false, 50, 100 }, .{ false, true, 100, 50 } }) |case| {
+        lookup.magnify_linear = case[0];
+        lookup.minify_linear = case[1];
+        const small: Footprint = .{ .place = place, .axes = .{ .{ 0.1, 0 }, .{ 0, 0.1 } } };
+        const large: Footprint = .{ .place = place, .axes = .{ .{ 0.2, 0 }, .{ 0, 0.2 } } };
+        try std.testing.expectApproxEqAbs(case[2], testSample(&texture, &lookup, small), 1e-4);
+        try std.testing.expectApproxEqAbs(case[3], testSample(&texture, &lookup, large), 1e-4);
+    }
+}
+
+test "a long footprint is as fine as it is narrow, and as long as it is" {
+    // Columns that alternate, and columns in two halves.
+    var stripes: [64]u8 = undefined;
+    var halves: [64]u8 = undefined;
+    for (&stripes, &halves, 0..) |*stripe, *half, index| {
+        stripe.* = if (index % 2 == 0) 0 else 200;
+        half.* = if (index % 8 < 4) 0 else 200;
+    }
+    var pyramid: TestPyramid = undefined;
+    var lookup = test_lookup;
+    lookup.wrap = @splat(.clamp_to_edge);
+    const texture = pyramid.init(&stripes);
+    const texel = 1.0 / 8.0;
+    // Narrow across the stripes: level 0 wherever along them, one texel of each colour across.
+    const along: Footprint = .{
+        .place = .{ 2.5 * texel, 0.5 },
+        .axes = .{ .{ 0, 1 }, .{ 0.5 * texel, 0 } },
+    };
+    try std.testing.expectApproxEqAbs(0, testSample(&texture, &lookup, along), 1e-4);
+    const across: Footprint = .{
+        .place = .{ 0.5, 0.5 },
+        .axes = .{ .{ 0.5 * texel, 0.1 * texel }, .{ 1, 0 } },
+    };
+    try std.testing.expectApproxEqAbs(100, testSample(&texture, &lookup, across), 20);
+    // It reaches from one half to the other by an eighth of its length.
+    const split = pyramid.init(&halves);
+    var reaching = across;
+    reaching.place[0] = 0.5 - 0.375 * 0.5;
+    reaching.axes[1] = .{ 0.5, 0 };
+    try std.testing.expectApproxEqAbs(25, testSample(&split, &lookup, reaching), 15);
+    reaching.axes[1] = .{ 0, 0.5 };
+    try std.testing.expectApproxEqAbs(0, testSample(&split, &lookup, reaching), 1e-4);
+}
+
+test "colours are decoded before they are mixed, alpha is linear" {
+    const texels = [2][4]u8{ .{ 0, 255, 188, 0 }, .{ 255, 255, 188, 255 } };
+    const texture: Texture = .{
+        .levels = &.{.{ .width = 2, .height = 1, .texels = std.mem.asBytes(&texels) }},
+        .channel_count = 4,
+        .is_srgb = true,
+    };
+    var found: [textures_max]Texel = undefined;
+    const footprint: Footprint = .{ .place = .{ 0.5, 0.5 }, .axes = @splat(.{ 0, 0 }) };
+    sample(&.{ &texture, &texture }, &test_lookup, &footprint, &found);
+    const expected: Texel = .{ 0.5, 1, math.srgb.decoded[188], 0.5 };
+    try std.testing.expectEqual(expected, found[0]);
+    try std.testing.expectEqual(expected, found[1]);
+}
+
+test "what is the same everywhere stays exactly that" {
+    const finest: [64]u8 = @splat(255);
+    var pyramid: TestPyramid = undefined;
+    var texture = pyramid.init(&finest);
+    for (&pyramid.texels) |*texels| texels.* = @splat(255);
+    var random = std.Random.DefaultPrng.init(5);
+    for (0..500) |_| {
+        var footprint: Footprint = undefined;
+        for (&footprint.place) |*coordinate| coordinate.* = random.random().float(f32) * 9 - 4;
+        for (&footprint.axes) |*axis| for (axis) |*length| {
+            length.* = random.random().float(f32) - 0.5;
+        };
+        for ([_]bool{ false, true }) |is_srgb| {
+            texture.is_srgb = is_srgb;
+            try std.testing.expectEqual(255, testSample(&texture, &test_lookup, footprint));
+        }
+    }
+}

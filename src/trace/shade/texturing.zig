@@ -5,6 +5,8 @@
 //! material at a time, one lane after the other, at places that differ from lane to lane; frames
 //! without textures never come here.
 
+const std = @import("std");
+const simd = @import("../../simd.zig");
 const world_file = @import("../../world.zig");
 const interaction_file = @import("interaction.zig");
 const lookups_file = @import("lookups.zig");
@@ -187,4 +189,271 @@ pub noinline fn apply(
         .bitangent_sign = .fromArray(texels.tangents[3]),
     }, texels.vector(.normal), materials.float("normal_scale"));
     point.normal = .select(bumpy, mapped, point.normal);
+}
+
+const Single = simd.Lanes(.scalar, 1);
+const Lookup = world_file.Lookup;
+const Texture = world_file.Texture;
+
+const test_factors: world_file.Material = .{
+    .base_color = .{ 0.5, 1, 1, 1 },
+    .emissive = .{ 2, 2, 2 },
+    .metallic = 0.5,
+    .roughness = 0.8,
+    .dielectric_f0 = 0.04,
+    .ior = 1.5,
+    .transmission = 0,
+    .sigma_a = .{ 0, 0, 0 },
+    .alpha_cutoff = -1,
+    .blend = 0,
+    .double_sided = 1,
+    .unlit = 0,
+    .volume = 0,
+    .occlusion_strength = 0.5,
+};
+
+fn testLookup(slot: Slot, texture: u32) Lookup {
+    return .{
+        .slot = slot,
+        .texture = texture,
+        .wrap = @splat(.clamp_to_edge),
+        .magnify_linear = false,
+        .minify_linear = false,
+        .has_mips = true,
+        .mip_linear = false,
+        .texcoord_set = 0,
+        .transform = .{ .{ 1, 0, 0 }, .{ 0, 1, 0 } },
+        .channels = .{ 0, 1, 2, 255 },
+    };
+}
+
+/// A triangle in the plane y = 0, seen at a quarter of both its edges, (4, 0, 0) and (0, 0, -4).
+const TestPoint = struct {
+    material: world_file.Material = test_factors,
+    textures: []const Texture,
+    lookups: []const Lookup,
+    texcoords: [3][2]f32 = .{ .{ 0, 1 }, .{ 1, 1 }, .{ 0, 0 } },
+    tangents: [3][4]f32 = @splat(.{ 1, 0, 0, 1 }),
+    normals: [3][3]f32 = @splat(.{ 0, 1, 0 }),
+    /// The ray comes from there, as seen from the point.
+    from: [3]f32 = .{ 0, 1, 0 },
+    cone: [2]f32 = .{ 0, 0 },
+
+    fn find(at: *const TestPoint) interaction_file.Interaction(Single) {
+        var geometry: world_file.Geometry = .empty;
+        const positions = [3][3]f32{ .{ 0, 0, 0 }, .{ 4, 0, 0 }, .{ 0, 0, -4 } };
+        geometry.positions = &positions;
+        geometry.normals = &at.normals;
+        geometry.texcoords[0] = &at.texcoords;
+        geometry.tangents = &at.tangents;
+        geometry.triangles = &.{.{ .corner = .{ 0, 1, 2 }, .material = 0 }};
+        var material = at.material;
+        material.lookup_count = @intCast(at.lookups.len);
+        const frame: Frame = .{
+            .geometry = &geometry,
+            .materials = &.{
+                .all = &.{material},
+                .lookups = at.lookups,
+                .has_transparency = false,
+                .has_holes = false,
+                .occluders = &.{},
+            },
+            .textures = &.{ .all = at.textures },
+            .lights = &.{},
+            .environment = undefined,
+            .view = undefined,
+        };
+        const corners: interaction_file.Corners(Single) =
+            .of(&geometry, .splat(0), .splat(true));
+        const direction = Single.Vec3.splat(at.from).neg();
+        const hit: interaction_file.Hit(Single) = .{
+            .mask = .splat(true),
+            .origin = Single.Vec3.splat(.{ 1, 0, -1 }).sub(direction),
+            .direction = direction,
+            .t = .splat(1),
+            .barycentrics = .{ .splat(0.5), .splat(0.25), .splat(0.25) },
+        };
+        var point = interaction_file.resolve(Single, &frame, &corners, &hit);
+        const cone = [2]Single.F32{ .splat(at.cone[0]), .splat(at.cone[1]) };
+        apply(Single, &frame, &corners, &hit, .splat(0), cone, &point);
+        return point;
+    }
+};
+
+fn expectVector(expected: [3]f32, found: Single.Vec3, tolerance: f32) !void {
+    for (expected, found.lane(0)) |a, b| try std.testing.expectApproxEqAbs(a, b, tolerance);
+}
+
+/// A texture of one texel.
+fn Texel(comptime bytes: anytype) type {
+    return struct {
+        const texels: [bytes.len]u8 = bytes;
+        const texture: Texture = .{
+            .levels = &.{.{ .width = 1, .height = 1, .texels = &texels }},
+            .channel_count = bytes.len,
+            .is_srgb = false,
+        };
+    };
+}
+
+test "every slot multiplies its factor, its channels where the lookup says" {
+    var metallic_roughness = testLookup(.metallic_roughness, 1);
+    metallic_roughness.channels = .{ 1, 0, 255, 255 };
+    var alpha = testLookup(.base_color, 0);
+    alpha.channels = .{ 0, 1, 2, 3 };
+    var at: TestPoint = .{
+        .textures = &.{
+            Texel(.{ 255, 51, 0, 102 }).texture,
+            Texel(.{ 51, 204 }).texture,
+            Texel(.{51}).texture,
+        },
+        .lookups = &.{
+            alpha,                    metallic_roughness,
+            testLookup(.emissive, 0), testLookup(.occlusion, 2),
+        },
+    };
+    at.material.blend = 1;
+    const point = at.find();
+    const material = &point.material;
+    try expectVector(.{ 0.5, 0.2, 0 }, material.base_color, 1e-6);
+    try expectVector(.{ 2, 0.4, 0 }, material.emissive, 1e-6);
+    try std.testing.expectApproxEqRel(@as(f32, 0.8 * 0.8), material.roughness.lane(0), 1e-6);
+    try std.testing.expectApproxEqRel(@as(f32, 0.5 * 0.2), material.metallic.lane(0), 1e-6);
+    try std.testing.expectApproxEqRel(@as(f32, 0.6), material.occlusion.lane(0), 1e-6);
+    try std.testing.expectApproxEqRel(@as(f32, 0.4), point.opacity.lane(0), 1e-6);
+    try expectVector(.{ 0, 1, 0 }, point.normal, 0);
+    at.material.blend = 0;
+    try std.testing.expectEqual(1, at.find().opacity.lane(0));
+    for ([_]f32{ 0.39, 0.41 }, [_]f32{ 1, 0 }) |cutoff, opacity| {
+        at.material.alpha_cutoff = cutoff;
+        try std.testing.expectEqual(opacity, at.find().opacity.lane(0));
+    }
+}
+
+test "coordinates lie between those of the corners, transformed, and no number does no harm" {
+    // Sixteen texels, each of its own number; the point is in column 1, row 3 - 1.
+    const texels: [16]u8 = std.simd.iota(u8, 16);
+    var lookup = testLookup(.emissive, 0);
+    var at: TestPoint = .{
+        .textures = &.{.{
+            .levels = &.{.{ .width = 4, .height = 4, .texels = &texels }},
+            .channel_count = 1,
+            .is_srgb = false,
+        }},
+        .lookups = (&lookup)[0..1],
+        .texcoords = .{ .{ 0.1, 0.9 }, .{ 1.1, 0.9 }, .{ 0.1, -0.1 } },
+    };
+    at.material.emissive = .{ 255, 0, 0 };
+    const Case = struct { [2][3]f32, f32 };
+    for ([_]Case{
+        .{ .{ .{ 1, 0, 0 }, .{ 0, 1, 0 } }, 9 },
+        .{ .{ .{ 0, 1, 0 }, .{ 1, 0, 0 } }, 6 },
+        .{ .{ .{ 2, 0, 0.2 }, .{ 0, 0.1, 0 } }, 3 },
+    }) |case| {
+        lookup.transform = case[0];
+        try std.testing.expectApproxEqRel(case[1], at.find().material.emissive.x.lane(0), 1e-6);
+    }
+    // A set that no mesh has: the place is the transform's.
+    lookup.texcoord_set = 2;
+    lookup.transform = .{ .{ 1, 0, 0.6 }, .{ 0, 1, 0.3 } };
+    try std.testing.expectApproxEqRel(@as(f32, 6), at.find().material.emissive.x.lane(0), 1e-6);
+    lookup.texcoord_set = 0;
+    const inf = std.math.inf(f32);
+    const nan = std.math.nan(f32);
+    for ([_][3][2]f32{
+        @splat(.{ 0.5, 0.5 }),
+        .{ .{ nan, 0 }, .{ 1, 0 }, .{ 0, inf } },
+        .{ .{ 1e38, 0 }, .{ -1e38, 0 }, .{ 1e38, -1e38 } },
+    }) |texcoords| {
+        at.texcoords = texcoords;
+        at.cone = .{ 0.1, 0.1 };
+        const red = at.find().material.emissive.x.lane(0);
+        try std.testing.expect(red >= 0 and red <= 15);
+    }
+}
+
+test "the level follows from the width of the cone, its spread, the distance and the angle" {
+    var levels: [6]world_file.TextureLevel = undefined;
+    const numbers = struct {
+        const texels: [6][1024]u8 = .{ @splat(0), @splat(1), @splat(2), @splat(3), @splat(4), @splat(5) };
+    };
+    for (&levels, &numbers.texels, 0..) |*level, *texels, number| {
+        const side = @as(u32, 32) >> @intCast(number);
+        level.* = .{ .width = side, .height = side, .texels = texels };
+    }
+    var lookup = testLookup(.emissive, 0);
+    lookup.mip_linear = true;
+    var at: TestPoint = .{
+        .textures = &.{.{ .levels = &levels, .channel_count = 1, .is_srgb = false }},
+        .lookups = (&lookup)[0..1],
+    };
+    at.material.emissive = .{ 255, 0, 0 };
+    // Texels are 4 / 32 metres wide.
+    const Case = struct { [2]f32, [3]f32, f32 };
+    for ([_]Case{
+        .{ .{ 0.125, 0 }, .{ 0, 2, 0 }, 0 },
+        .{ .{ 0.25, 0 }, .{ 0, 2, 0 }, 1 },
+        .{ .{ -0.5, 0 }, .{ 0, 2, 0 }, 2 },
+        .{ .{ 0.1, 0.2 }, .{ 0, 2, 0 }, 2 },
+        .{ .{ 0, 0.5 }, .{ 0, -1, 0 }, 2 },
+        .{ .{ 100, 0 }, .{ 0, 1, 0 }, 5 },
+        // At 60 degrees it is twice as long: a circle of the same area, 2.83 texels.
+        .{ .{ 0.25, 0 }, .{ 1.7320508, 1, 0 }, 1.4142135 },
+    }) |case| {
+        at.cone = case[0];
+        at.from = case[1];
+        const point = at.find();
+        try std.testing.expectApproxEqAbs(case[2], point.material.emissive.x.lane(0), 1e-4);
+    }
+}
+
+test "a normal texture turns normals in the frame of tangents, on either side" {
+    var at: TestPoint = .{
+        .textures = &.{ Texel(.{ 204, 128, 230 }).texture, Texel(.{ 128, 204, 230 }).texture },
+        .lookups = &.{testLookup(.normal, 0)},
+    };
+    try expectVector(.{ 0.6, 0.8, 0 }, at.find().normal, 6e-3);
+    at.lookups = &.{testLookup(.normal, 1)};
+    try expectVector(.{ 0, 0.8, -0.6 }, at.find().normal, 6e-3);
+    for (&at.tangents) |*tangent| tangent[3] = -1;
+    try expectVector(.{ 0, 0.8, 0.6 }, at.find().normal, 6e-3);
+    at.from = .{ 0, -1, 0 };
+    try expectVector(.{ 0, -0.8, -0.6 }, at.find().normal, 6e-3);
+    at.material.normal_scale = 0;
+    try expectVector(.{ 0, -1, 0 }, at.find().normal, 1e-6);
+    at.material.normal_scale = 1;
+    at.tangents = @splat(.{ 0, 0, 0, 1 });
+    try expectVector(.{ 0, -1, 0 }, at.find().normal, 0);
+}
+
+test "a flat normal texture changes nothing; one of two channels is of unit length" {
+    var at: TestPoint = .{
+        .textures = &.{ Texel(.{ 128, 128, 255 }).texture, Texel(.{ 204, 128 }).texture },
+        .lookups = &.{testLookup(.normal, 0)},
+        .normals = .{ .{ 0, 2, 0 }, .{ 0.3, 1, 0 }, .{ 0, 1, 0.3 } },
+    };
+    const bumpy = at.find().normal.lane(0);
+    at.lookups = &.{testLookup(.emissive, 0)};
+    try expectVector(bumpy, at.find().normal, 6e-3);
+    var two = testLookup(.normal, 1);
+    two.channels[2] = 255;
+    at.lookups = (&two)[0..1];
+    at.normals = @splat(.{ 0, 1, 0 });
+    try expectVector(.{ 0.6, 0.8, 0 }, at.find().normal, 6e-3);
+}
+
+test "a normal that would be seen from behind is bent back to where it mirrors the horizon" {
+    var at: TestPoint = .{
+        .textures = &.{Texel(.{ 0, 128, 128 }).texture},
+        .lookups = &.{testLookup(.normal, 0)},
+    };
+    for ([_][3]f32{ .{ 1, 0.5, 0 }, .{ 1, 0.01, 0 }, .{ 1, 1e-4, 1 }, .{ 0, 1, 0 } }) |from| {
+        at.from = from;
+        const point = at.find();
+        const cosine = point.normal.dot(point.view);
+        try std.testing.expect(cosine.lane(0) > 0);
+        try std.testing.expectApproxEqAbs(1, point.normal.length().lane(0), 1e-6);
+        const mirrored = point.normal.scale(cosine.add(cosine)).sub(point.view);
+        try std.testing.expect(mirrored.y.lane(0) > 0 and mirrored.y.lane(0) <= 0.0101);
+    }
 }
