@@ -61,8 +61,11 @@ pub const PoseSettings = struct {
 /// What is seen of it, and in what light.
 pub const ViewSettings = struct {
     camera: choices.Camera = .default,
+    viewpoint: choices.Viewpoint = .{},
     /// Width and height in pixels, at least 1 each.
     resolution: ?[2]u32 = null,
+    /// Where there is no resolution, pixels of the longer side.
+    long_side: ?u32 = null,
     /// Radiance from everywhere, at least 0.
     ambient: ?f32 = null,
     /// Linear RGB.
@@ -230,8 +233,12 @@ noinline fn chooseView(
         from,
         seen.node_maps,
         &seen.geometry,
-        settings.camera,
-        settings.resolution,
+        &.{
+            .camera = settings.camera,
+            .viewpoint = settings.viewpoint,
+            .resolution = settings.resolution,
+            .long_side = settings.long_side,
+        },
         diagnostic,
     );
     seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };

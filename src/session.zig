@@ -183,7 +183,9 @@ pub const Session = struct {
         session.seen = choices;
         try prepare.view(&session.world.?, session.io, &session.scene.?, .{
             .camera = choices.camera,
+            .viewpoint = choices.viewpoint,
             .resolution = choices.resolution,
+            .long_side = choices.long_side,
             .ambient = choices.ambient,
             .background = backgroundOf(choices.background),
         }, session.diagnostic, &session.times);

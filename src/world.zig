@@ -44,6 +44,11 @@ pub const Frame = struct {
     lights: []const Light,
     environment: *const Environment,
     view: *const View,
+
+    /// Whether what is seen depends on how wide rays are: they have cones then.
+    pub inline fn needsFootprints(frame: *const Frame) bool {
+        return frame.materials.lookups.len > 0;
+    }
 };
 
 /// What was found on the way, for messages and the report; tracing does not read it.
