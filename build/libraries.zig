@@ -16,6 +16,8 @@ pub const Library = struct {
     files: []const []const u8 = &.{},
     /// C files of ours: the implementation of what is a header only, and the call that we make.
     shims: []const []const u8 = &.{},
+    /// A folder below that one, from where its own files include each other.
+    include: ?[]const u8 = null,
     /// Definitions, and what else a library needs the compiler to be told.
     flags: []const []const u8 = &.{},
 
@@ -26,6 +28,7 @@ pub const Library = struct {
             &.{ "-std=c11", "-ffp-contract=off", "-fno-sanitize=undefined" }, library.flags,
         }) catch @panic("OOM");
         module.addIncludePath(headers);
+        if (library.include) |folder| module.addIncludePath(headers.path(b, folder));
         module.addCSourceFiles(.{
             .root = headers,
             .files = library.files,
@@ -49,6 +52,49 @@ pub const libdeflate: Library = .{ .name = "libdeflate", .files = &.{
     "libdeflate/lib/zlib_compress.c",
     "libdeflate/lib/zlib_decompress.c",
 } };
+
+/// The decoder in plain C. Threads are ours, but its tables are set up under locks. Its one place
+/// of allocations is given names of ours.
+pub const libwebp: Library = .{
+    .name = "libwebp",
+    .files = &.{
+        "libwebp/src/dec/alpha_dec.c",
+        "libwebp/src/dec/buffer_dec.c",
+        "libwebp/src/dec/frame_dec.c",
+        "libwebp/src/dec/io_dec.c",
+        "libwebp/src/dec/quant_dec.c",
+        "libwebp/src/dec/tree_dec.c",
+        "libwebp/src/dec/vp8_dec.c",
+        "libwebp/src/dec/vp8l_dec.c",
+        "libwebp/src/dec/webp_dec.c",
+        "libwebp/src/dsp/alpha_processing.c",
+        "libwebp/src/dsp/cpu.c",
+        "libwebp/src/dsp/dec.c",
+        "libwebp/src/dsp/dec_clip_tables.c",
+        "libwebp/src/dsp/filters.c",
+        "libwebp/src/dsp/lossless.c",
+        "libwebp/src/dsp/rescaler.c",
+        "libwebp/src/dsp/upsampling.c",
+        "libwebp/src/dsp/yuv.c",
+        "libwebp/src/utils/bit_reader_utils.c",
+        "libwebp/src/utils/color_cache_utils.c",
+        "libwebp/src/utils/filters_utils.c",
+        "libwebp/src/utils/huffman_utils.c",
+        "libwebp/src/utils/palette.c",
+        "libwebp/src/utils/quant_levels_dec_utils.c",
+        "libwebp/src/utils/random_utils.c",
+        "libwebp/src/utils/rescaler_utils.c",
+        "libwebp/src/utils/thread_utils.c",
+        "libwebp/src/utils/utils.c",
+    },
+    .shims = &.{"src/decode/webp.c"},
+    .include = "libwebp",
+    .flags = &.{
+        "-DWEBP_USE_THREAD",       "-U__SSE2__",              "-U__SSE4_1__",
+        "-U__AVX2__",              "-U__ARM_NEON__",          "-U__aarch64__",
+        "-Dmalloc=rl_webp_malloc", "-Dcalloc=rl_webp_calloc", "-Dfree=rl_webp_free",
+    },
+};
 
 pub const mikktspace: Library = .{
     .name = "mikktspace",
@@ -81,7 +127,10 @@ pub const stb_image_write: Library = .{
 };
 
 /// What the program holds.
-pub const program = [_]Library{ cgltf, libdeflate, mikktspace, stb_image, stb_image_write };
+pub const program = [_]Library{
+    cgltf,      libdeflate, libwebp,
+    mikktspace, stb_image,  stb_image_write,
+};
 
 /// A module with `text`: the project's licence, and the notices of what a program is made of.
 pub fn licenses(b: *std.Build, headers: LazyPath, is_musl: bool) *Module {

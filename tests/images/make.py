@@ -3,8 +3,8 @@
 
     tests/images/make.py
 
-PNG and HDR are written here, byte by byte; JPEG needs Pillow. All show the same picture of 29 by 17
-pixels, of integers alone.
+PNG and HDR are written here, byte by byte; JPEG and WebP need Pillow. All show the same picture of
+29 by 17 pixels, of integers alone.
 """
 import pathlib
 import struct
@@ -101,7 +101,22 @@ def jpegs():
     rgb.save(FOLDER / "rgb-restart.jpg", quality=95, restart_marker_blocks=1)
 
 
+def webps():
+    from PIL import Image
+    rgb = Image.new("RGB", (WIDTH, HEIGHT))
+    rgb.putdata([tuple(value(x, y, c) for c in range(3))
+                 for y in range(HEIGHT) for x in range(WIDTH)])
+    rgba = Image.new("RGBA", (WIDTH, HEIGHT))
+    rgba.putdata([tuple(value(x, y, c) for c in range(4))
+                  for y in range(HEIGHT) for x in range(WIDTH)])
+    rgb.save(FOLDER / "rgb-lossless.webp", lossless=True)
+    rgba.save(FOLDER / "rgba-lossless.webp", lossless=True, exact=True)
+    rgb.save(FOLDER / "rgb.webp", quality=95)
+    rgba.save(FOLDER / "rgba.webp", quality=95, exact=True)
+
+
 pngs()
+webps()
 jpegs()
 hdr("rle.hdr", WIDTH, True)
 hdr("flat.hdr", WIDTH, False)
