@@ -8,6 +8,7 @@
 const std = @import("std");
 const Allocator = std.mem.Allocator;
 const jpeg = @import("decode/jpeg.zig");
+const ktx2 = @import("decode/ktx2.zig");
 const png = @import("decode/png.zig");
 const stb_image = @import("decode/stb_image.zig");
 const texels = @import("decode/texels.zig");
@@ -24,6 +25,7 @@ pub fn formatOf(file: []const u8) ?Format {
     if (std.mem.startsWith(u8, file, png.signature)) return .png;
     if (std.mem.startsWith(u8, file, jpeg.signature)) return .jpeg;
     if (webp.isWebp(file)) return .webp;
+    if (std.mem.startsWith(u8, file, ktx2.signature)) return .ktx2;
     for (stb_image.hdr_signatures) |signature| {
         if (std.mem.startsWith(u8, file, signature)) return .hdr;
     }
@@ -36,6 +38,7 @@ pub fn info(file: []const u8, reason: *Reason) error{InvalidImage}!Info {
         .png => stb_image.info(.png, file, reason),
         .jpeg => stb_image.info(.jpeg, file, reason),
         .webp => webp.info(file, reason),
+        .ktx2 => ktx2.info(file, reason),
         .hdr => stb_image.info(.hdr, file, reason),
     };
 }
@@ -46,6 +49,7 @@ pub fn decode(gpa: Allocator, file: []const u8, reason: *Reason) Error!Texels {
         .png => stb_image.decode(gpa, .png, file, reason),
         .jpeg => stb_image.decode(gpa, .jpeg, file, reason),
         .webp => webp.decode(gpa, file, reason),
+        .ktx2 => ktx2.decode(gpa, file, reason),
         .hdr => stb_image.decode(gpa, .hdr, file, reason),
     };
 }
@@ -61,6 +65,7 @@ fn formatWithin(file: []const u8, reason: *Reason) error{InvalidImage}!Format {
 
 test {
     _ = jpeg;
+    _ = ktx2;
     _ = png;
     _ = stb_image;
     _ = texels;

@@ -107,6 +107,11 @@ const cases = [_]Case{
     .{ .name = "rgba-lossless.webp", .channel_count = 4, .hash = 0x31ad9ef0ab1d105e },
     .{ .name = "rgb.webp", .channel_count = 3, .tolerance = 12, .hash = 0xb6b775057d00f942 },
     .{ .name = "rgba.webp", .channel_count = 4, .tolerance = 12, .hash = 0xf1b4da5b3a717064 },
+    .{ .name = "etc1s-rgb.ktx2", .channel_count = 3, .tolerance = 60, .hash = 0x8becb1709dd20155 },
+    .{ .name = "etc1s-rgba.ktx2", .channel_count = 4, .tolerance = 60, .hash = 0xdce9258b242c8117 },
+    .{ .name = "uastc-rgb.ktx2", .channel_count = 3, .tolerance = 16, .hash = 0x9da1f0f5e633f562 },
+    .{ .name = "uastc-rgba.ktx2", .channel_count = 4, .tolerance = 16, .hash = 0x6c7edda434a49513 },
+    .{ .name = "uastc-mips.ktx2", .channel_count = 3, .tolerance = 16, .hash = 0x9da1f0f5e633f562 },
 };
 
 /// A file of tests/images; the caller frees it.

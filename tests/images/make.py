@@ -3,11 +3,12 @@
 
     tests/images/make.py
 
-PNG and HDR are written here, byte by byte; JPEG and WebP need Pillow. All show the same picture of
-29 by 17 pixels, of integers alone.
+PNG and HDR are written here, byte by byte; JPEG and WebP need Pillow, KTX 2 the encoder
+`basisu` beside it. All show the same picture of 29 by 17 pixels, of integers alone.
 """
 import pathlib
 import struct
+import subprocess
 import zlib
 
 FOLDER = pathlib.Path(__file__).parent
@@ -115,9 +116,22 @@ def webps():
     rgba.save(FOLDER / "rgba.webp", quality=95, exact=True)
 
 
+def ktx2s():
+    for name, source, options in [
+            ("etc1s-rgb", "rgb", "-q 255 -comp_level 4"),
+            ("etc1s-rgba", "rgba", "-q 255 -comp_level 4"),
+            ("uastc-rgb", "rgb", "-uastc"),
+            ("uastc-rgba", "rgba", "-uastc"),
+            ("uastc-mips", "rgb", "-uastc -ktx2_no_zstandard -mipmap")]:
+        subprocess.run(["basisu", "-ktx2", "-linear", *options.split(),
+                        "-file", FOLDER / f"{source}.png",
+                        "-output_file", FOLDER / f"{name}.ktx2"], check=True)
+
+
 pngs()
 webps()
 jpegs()
+ktx2s()
 hdr("rle.hdr", WIDTH, True)
 hdr("flat.hdr", WIDTH, False)
 hdr("narrow.hdr", 5, False)
