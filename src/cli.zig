@@ -118,6 +118,8 @@ const sections: []const Section = &.{
     } },
     .{ .title = "Scene", .options = &.{
         .{ .usage = "--camera WHICH", .help = "name or index of a camera, or auto: all in view" },
+        .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
+        .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
         .{
             .usage = "--eye X,Y,Z",
             .help = "where the camera stands, in place of the file's",
@@ -328,6 +330,9 @@ const Parser = struct {
             .camera => options.view.camera = cameraOf(given.value) orelse
                 return reader.bad(given, "a camera's name, its index, or auto"),
             .eye, .target, .up, .orbit, .fov, .ortho => try parser.setViewpoint(given),
+            .scene => options.load.scene = sceneOf(given.value) orelse
+                return reader.bad(given, "a scene's name or its index"),
+            .up_axis => options.load.up_axis = try reader.choice(given, settings.UpAxis),
             .background => options.view.background = backgroundOf(given.value) orelse
                 return reader.bad(given, "transparent, #rrggbb, or R,G,B of 0 or more"),
             .ambient => options.view.ambient = radiance(given.value) orelse
@@ -534,10 +539,17 @@ fn tileSizeOf(text: []const u8) ?u32 {
 fn cameraOf(text: []const u8) ?settings.Camera {
     if (text.len == 0) return null;
     if (std.mem.eql(u8, text, "auto")) return .auto;
-    const any: settings.Range = .{ .min = 0, .max = std.math.maxInt(u32) };
-    const index = integer(text, any) orelse return .{ .name = text };
+    const index = integer(text, any_index) orelse return .{ .name = text };
     return .{ .index = index };
 }
+
+fn sceneOf(text: []const u8) ?settings.SceneChoice {
+    if (text.len == 0) return null;
+    const index = integer(text, any_index) orelse return .{ .name = text };
+    return .{ .index = index };
+}
+
+const any_index: settings.Range = .{ .min = 0, .max = std.math.maxInt(u32) };
 
 fn backgroundOf(text: []const u8) ?settings.Background {
     if (std.mem.eql(u8, text, "transparent")) return .transparent;
@@ -719,6 +731,8 @@ test "numbers keep to their ranges" {
             .good = &.{ "45", "0.01", "179" },
             .bad = &.{ "0", "180", "-45", "nan", "inf", "", "45deg" },
         },
+        .{ .flag = "--scene", .good = &.{ "0", "4294967296", "b c", "auto" }, .bad = &.{""} },
+        .{ .flag = "--up-axis", .good = &.{ "y", "z" }, .bad = &.{ "", "x", "Z", "-y" } },
         .{ .flag = "--output", .good = &.{ "-", "a.png", "b/A.PPM" }, .bad = &.{ "", "png" } },
     };
     for (cases) |case| {
@@ -743,6 +757,10 @@ test "values arrive as they were meant" {
     try std.testing.expectEqual(.auto, (try optionsForTest(&.{"--camera=auto"})).view.camera);
     const named = (try optionsForTest(&.{"--camera=7a"})).view.camera;
     try std.testing.expectEqualStrings("7a", named.name);
+    try std.testing.expectEqual(7, (try optionsForTest(&.{"--scene=7"})).load.scene.index);
+    const named_scene = (try optionsForTest(&.{"--scene=auto"})).load.scene;
+    try std.testing.expectEqualStrings("auto", named_scene.name);
+    try std.testing.expectEqual(.z, (try optionsForTest(&.{"--up-axis=z"})).load.up_axis);
     const background = (try optionsForTest(&.{"--background=#FF8001"})).view.background;
     try std.testing.expectEqual([3]u8{ 255, 128, 1 }, background.srgb);
     const linear = (try optionsForTest(&.{"--background=0,0.5,2"})).view.background;

@@ -8,12 +8,13 @@
 
 const std = @import("std");
 const builtin_scenes = @import("builtin.zig");
+const math = @import("math.zig");
 const output = @import("output.zig");
 const parallel = @import("parallel.zig");
 const parse = @import("parse.zig");
 const prepare = @import("prepare.zig");
 const settings = @import("settings.zig");
-const srgb = @import("math.zig").srgb;
+const srgb = math.srgb;
 const statistics = @import("statistics.zig");
 const trace = @import("trace.zig");
 const variant = @import("variant.zig");
@@ -39,10 +40,22 @@ pub fn loadScene(
     choices: settings.Load,
     diagnostic: *Diagnostic,
 ) LoadError!Scene {
-    const builtin_name = std.mem.cutPrefix(u8, name, settings.builtin_prefix) orelse
-        return parse.parse(gpa, io, name, choices, diagnostic);
-    return builtin_scenes.build(gpa, builtin_name, diagnostic);
+    var scene = if (std.mem.cutPrefix(u8, name, settings.builtin_prefix)) |builtin_name| builtin: {
+        try parse.checkOnly(choices, diagnostic);
+        break :builtin try builtin_scenes.build(gpa, builtin_name, diagnostic);
+    } else try parse.parse(gpa, io, name, choices, diagnostic);
+    errdefer scene.deinit();
+    if (choices.up_axis == .z) try scene.turn(z_to_y);
+    return scene;
 }
+
+/// A quarter turn about x.
+const z_to_y: math.AffineD = .{
+    .x = .{ 1, 0, 0 },
+    .y = .{ 0, 0, -1 },
+    .z = .{ 0, 1, 0 },
+    .translation = .{ 0, 0, 0 },
+};
 
 /// How the tree over the placed geometry is built.
 pub const Pose = struct {

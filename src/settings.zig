@@ -136,6 +136,16 @@ pub const Viewpoint = struct {
             viewpoint.orbit != null or viewpoint.orthographic;
     }
 };
+/// Which of a file's scenes to read.
+pub const SceneChoice = union(enum) {
+    /// The one that the file shows.
+    default,
+    index: u32,
+    name: []const u8,
+};
+
+/// The axis of a scene that points up.
+pub const UpAxis = enum { y, z };
 
 /// What is seen where there is nothing.
 pub const Background = union(enum) {
@@ -171,6 +181,9 @@ pub const Load = struct {
     tessellation: u32 = tessellation.default,
     /// Within `texture_side`.
     texture_side_max: u32 = texture_side.default,
+    scene: SceneChoice = .default,
+    /// Where it is not y, the scene is turned about x until it is.
+    up_axis: UpAxis = .y,
     /// A file that is about to be replaced: a scene that is read from it is refused.
     output: ?Identity = null,
 };
