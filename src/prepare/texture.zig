@@ -68,6 +68,12 @@ pub const TextureSet = struct {
     materials: []const MaterialUse,
     byte_count: u64,
 
+    /// Those of one material of the scene.
+    pub fn lookupsOf(set: *const TextureSet, material: u32) []const world.Lookup {
+        const use = &set.materials[material];
+        return set.lookups[use.first_lookup..][0..use.lookup_count];
+    }
+
     /// Frees everything.
     pub fn deinit(set: *TextureSet) void {
         for (set.pyramids) |*pyramid| pyramid.deinit(set.arena.child_allocator);
