@@ -85,8 +85,8 @@ pub const ViewError = error{ OutOfMemory, CameraUnknown };
 
 pub const Error = LoadError || PoseError || ViewError;
 
-/// Makes what does not depend on where things are: textures, and tangents for them. The memory is the result's and comes
-/// from `gpa`. Fills `texture_ns` of `times`.
+/// Makes what does not depend on where things are: textures, and tangents for them. The memory is
+/// the result's and comes from `gpa`. Fills `texture_ns` of `times`.
 pub fn load(
     gpa: Allocator,
     io: std.Io,

@@ -3,8 +3,8 @@
 //!
 //! In: a mesh, and how its normal texture is looked up. Out: the mesh with tangents by MikkTSpace.
 //! They belong to corners: a vertex whose corners differ in them becomes several, all at the very
-//! same place, so that surfaces stay closed. What the lookup's transform does to texture coordinates
-//! it does to tangents too. Meshes are done by all threads, each on its own.
+//! same place, so that surfaces stay closed. The lookup's transform turns tangents as it turns
+//! texture coordinates. Meshes are done by all threads, each on its own.
 
 const std = @import("std");
 const math = @import("../math.zig");

@@ -215,7 +215,7 @@ const Work = struct {
             const matters = from.materials[mesh.material].alpha_mode != .@"opaque";
             if (matters) if (mesh.colors) |colors| {
                 range = .{ .least = std.math.inf(f32), .largest = 0 };
-                for (colors) |color| range = join(range, .{ .least = color[3], .largest = color[3] });
+                for (colors) |color| range = join(range, exactly(color[3]));
             };
             const all = &work.vertex_alpha[mesh.material];
             all.* = if (work.is_drawn[mesh.material]) join(all.*, range) else range;
@@ -223,7 +223,11 @@ const Work = struct {
         }
     }
 
-    fn want(work: *Work, material: *const scene.Material, slot: world.Slot) error{OutOfMemory}!void {
+    fn want(
+        work: *Work,
+        material: *const scene.Material,
+        slot: world.Slot,
+    ) error{OutOfMemory}!void {
         const view = viewOf(material, slot) orelse return;
         const image = work.from.textures[view.texture].image;
         const is_srgb = isLight(slot);
@@ -374,6 +378,10 @@ const Work = struct {
         };
     }
 };
+
+fn exactly(alpha: f32) AlphaRange {
+    return .{ .least = alpha, .largest = alpha };
+}
 
 fn join(a: AlphaRange, b: AlphaRange) AlphaRange {
     return .{
@@ -531,7 +539,9 @@ fn store(
     image.texels = image.memory;
     switch (from.data) {
         .bytes => |all| pick(u8, from.channel_count, all, &stored, image.texels),
-        .floats => |all| pickFloats(from.channel_count, all, &stored, request.is_srgb, image.texels),
+        .floats => |all| {
+            pickFloats(from.channel_count, all, &stored, request.is_srgb, image.texels);
+        },
     }
     return image;
 }
@@ -594,7 +604,7 @@ fn alphaRange(texels: *const Texels) AlphaRange {
         },
         .floats => |all| while (at < all.len) : (at += texels.channel_count) {
             const value = if (all[at] < 1) all[at] else 1;
-            range = join(range, .{ .least = value, .largest = value });
+            range = join(range, exactly(value));
         },
     }
     return range;
