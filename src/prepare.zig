@@ -703,6 +703,39 @@ test "texture coordinates and tangents are placed where a texture asks for them"
     try std.testing.expectEqual(0, result.materials.all[1].lookup_count);
 }
 
+test "loading that runs out of memory is an error that leaks nothing" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    const arena = from.arena.allocator();
+    from.images = &.{.{
+        .name = "flat",
+        .bytes = try texture.TestImage.png(arena, 1, 1, 3, &.{ 128, 128, 255 }),
+    }};
+    from.textures = &.{.{ .image = 0 }};
+    from.materials = &.{.{ .normal_texture = .{ .texture = 0 } }};
+    var meshes: [1]scene.Mesh = .{from.meshes[0]};
+    meshes[0].texcoords[0] = &.{ .{ 0, 0 }, .{ 1, 0 }, .{ 0, 1 } };
+    from.meshes = &meshes;
+    const one = struct {
+        fn one(failing: std.mem.Allocator, scene_from: *const Scene) !void {
+            var pool: parallel.Pool = .init(1);
+            defer pool.deinit();
+            var diagnostic: Diagnostic = .{};
+            var times: StageTimes = .{};
+            const io = std.testing.io;
+            var loaded =
+                try load(failing, io, scene_from, .{ .pool = &pool }, &diagnostic, &times);
+            defer loaded.deinit();
+            // Made, since the mesh has none: v grows downwards in textures, upwards here.
+            for (loaded.meshes[0].tangents.?) |tangent| {
+                try std.testing.expectEqual([4]f32{ 1, 0, 0, -1 }, tangent);
+            }
+        }
+    }.one;
+    try std.testing.checkAllAllocationFailures(gpa, one, .{&from});
+}
+
 test "what can be seen nowhere is not drawn" {
     const gpa = std.testing.allocator;
     var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});

@@ -16,7 +16,7 @@ const pyramid_file = @import("pyramid.zig");
 const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
-const quote = @import("../diagnostic.zig").quote;
+const printable = @import("../diagnostic.zig").printable;
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Pyramid = pyramid_file.Pyramid;
@@ -308,8 +308,8 @@ const Work = struct {
     /// In the order of the images.
     fn warn(work: *const Work, diagnostic: *Diagnostic) void {
         for (work.reasons, work.from.images) |*failure, *image| {
-            if (failure.*) |*reason| diagnostic.warn("image {f} is left out: {s}", .{
-                quote(image.name), reason.text(),
+            if (failure.*) |*reason| diagnostic.warn("{f}: {s}, left out", .{
+                printable(image.name), reason.text(),
             });
         }
     }
@@ -856,9 +856,10 @@ test "a broken image costs a warning, the others are there" {
     try testing.expectEqual(2, diagnostic.warning_count);
     for (diagnostic.warnings[0..2], 0..) |*warning, index| {
         var start: [32]u8 = undefined;
-        const expected = try std.fmt.bufPrint(&start, "image 'image {d}' is left out: ", .{index});
+        const expected = try std.fmt.bufPrint(&start, "image {d}: ", .{index});
         try testing.expect(std.mem.startsWith(u8, warning.text(), expected));
-        try testing.expect(warning.text().len > expected.len);
+        try testing.expectStringEndsWith(warning.text(), ", left out");
+        try testing.expect(warning.text().len > expected.len + ", left out".len);
     }
     try testing.expectEqual(1, set.lookups.len);
     try testing.expectEqual(.occlusion, set.lookups[0].slot);
