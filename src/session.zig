@@ -177,10 +177,12 @@ pub const Session = struct {
     pub fn pose(session: *Session, chosen: Pose) Error!void {
         session.dropWorld();
         const scene = &session.scene.?;
-        if (session.loaded == null) session.loaded = try prepare.load(session.gpa, session.io, scene, .{
-            .pool = &session.pool,
-            .side_max = session.texture_side_max,
-        }, session.diagnostic, &session.times);
+        if (session.loaded == null) {
+            session.loaded = try prepare.load(session.gpa, session.io, scene, .{
+                .pool = &session.pool,
+                .side_max = session.texture_side_max,
+            }, session.diagnostic, &session.times);
+        }
         const loaded = &session.loaded.?;
         session.world = try prepare.pose(session.gpa, session.io, scene, loaded, .{
             .lanes = chosen.lanes,
@@ -270,6 +272,7 @@ pub const Session = struct {
     pub fn report(session: *const Session, choices: settings.Render) Report {
         const image = &session.film.?.image;
         const tree = &session.world.?.facts.tree;
+        const textures = &session.loaded.?.textures;
         return .{
             .triangle_count = session.facts.triangle_count,
             .width = image.width,
@@ -281,6 +284,10 @@ pub const Session = struct {
             .times = session.times,
             .rays = session.traced.rays,
             .tests = session.traced.tests,
+            .textures = .{
+                .count = textures.textures.all.len,
+                .bytes = textures.byte_count,
+            },
             .bvh = .{
                 .node_count = tree.node_count,
                 .depth = tree.depth,
