@@ -19,6 +19,7 @@ test {
     _ = @import("samples.zig");
     _ = @import("beams.zig");
     _ = @import("soup.zig");
+    _ = @import("textures.zig");
     _ = @import("variants.zig");
 }
 

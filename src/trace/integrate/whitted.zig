@@ -234,8 +234,7 @@ pub fn Whitted(comptime Kernel: type) type {
             const rest = whitted.stack.push(path.depth, path.transparency_depth + 1);
             rest.bundle = path.bundle;
             rest.sigma_a = path.sigma_a;
-            rest.cone_width = path.cone_width;
-            rest.cone_spread = path.cone_spread;
+            rest.keepCones(path);
             for (&rest.bundle.groups, masks, &whitted.vertices, 0..) |*ray, mask, *vertex, group| {
                 ray.active = mask;
                 if (mask.none()) continue;
