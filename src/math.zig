@@ -10,7 +10,7 @@ pub const AffineMap = @import("math/affine.zig").Affine;
 pub const flushDenormal = @import("math/vec3.zig").flushDenormal;
 /// Axis-aligned boxes.
 pub const box3 = @import("math/box3.zig");
-/// Sine, cosine, tangent, exponential, logarithm, power.
+/// Sine, cosine, tangent, arc cosine, exponential, logarithm, power.
 pub const elementary = @import("math/elementary.zig");
 /// Directions on a square.
 pub const equal_area = @import("math/equal_area.zig");

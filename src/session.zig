@@ -81,6 +81,9 @@ pub const Session = struct {
     scene: ?Scene = null,
     ownership: Ownership = .owned,
     facts: Facts = .{},
+    texture_side_max: u32 = settings.texture_side.default,
+    /// Made by the first `pose` of a scene.
+    loaded: ?prepare.Loaded = null,
     seen: settings.View = .{},
     world: ?World = null,
     film: ?Film = null,
@@ -113,6 +116,7 @@ pub const Session = struct {
     /// Frees everything and ends the threads.
     pub fn deinit(session: *Session) void {
         session.dropWorld();
+        session.dropLoaded();
         session.dropScene();
         if (session.film) |*film| film.deinit(session.gpa);
         session.pool.deinit();
@@ -132,6 +136,7 @@ pub const Session = struct {
         const start = Io.Clock.awake.now(session.io);
         const scene = try loadScene(session.gpa, session.io, name, choices, session.diagnostic);
         session.adopt(scene, .owned);
+        session.texture_side_max = choices.texture_side_max;
         session.start = start;
         session.times.parse_ns = session.since(start);
     }
@@ -139,6 +144,7 @@ pub const Session = struct {
     /// Takes a scene that is in memory, in place of the one before.
     pub fn adopt(session: *Session, scene: Scene, ownership: Ownership) void {
         session.dropWorld();
+        session.dropLoaded();
         session.dropScene();
         session.start = Io.Clock.awake.now(session.io);
         session.scene = scene;
@@ -161,10 +167,24 @@ pub const Session = struct {
         session.world = null;
     }
 
-    /// Places the geometry and builds the tree over it. Asserts that there is a scene.
+    fn dropLoaded(session: *Session) void {
+        if (session.loaded) |*loaded| loaded.deinit();
+        session.loaded = null;
+    }
+
+    /// Places the geometry and builds the tree over it; the first time, decodes the textures.
+    /// Asserts that there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
         session.dropWorld();
-        session.world = try prepare.pose(session.gpa, session.io, &session.scene.?, .{
+        const scene = &session.scene.?;
+        if (session.loaded == null) {
+            session.loaded = try prepare.load(session.gpa, session.io, scene, .{
+                .pool = &session.pool,
+                .side_max = session.texture_side_max,
+            }, session.diagnostic, &session.times);
+        }
+        const loaded = &session.loaded.?;
+        session.world = try prepare.pose(session.gpa, session.io, scene, loaded, .{
             .lanes = chosen.lanes,
             .pool = &session.pool,
             .tree_quality = chosen.tree_quality,
@@ -178,7 +198,9 @@ pub const Session = struct {
         session.seen = choices;
         try prepare.view(&session.world.?, session.io, &session.scene.?, .{
             .camera = choices.camera,
+            .viewpoint = choices.viewpoint,
             .resolution = choices.resolution,
+            .long_side = choices.long_side,
             .ambient = choices.ambient,
             .background = backgroundOf(choices.background),
         }, session.diagnostic, &session.times);
@@ -250,6 +272,7 @@ pub const Session = struct {
     pub fn report(session: *const Session, choices: settings.Render) Report {
         const image = &session.film.?.image;
         const tree = &session.world.?.facts.tree;
+        const textures = &session.loaded.?.textures;
         return .{
             .triangle_count = session.facts.triangle_count,
             .width = image.width,
@@ -261,6 +284,10 @@ pub const Session = struct {
             .times = session.times,
             .rays = session.traced.rays,
             .tests = session.traced.tests,
+            .textures = .{
+                .count = textures.textures.all.len,
+                .bytes = textures.byte_count,
+            },
             .bvh = .{
                 .node_count = tree.node_count,
                 .depth = tree.depth,
