@@ -1,6 +1,6 @@
-//! The equal-area octahedral map between directions and a square (Clarberg, "Fast equal-area mapping
-//! of the (hemi)sphere using SIMD", 2008), with z the axis: the square's centre is +z, its corners
-//! are -z. Maps of PBRT's version 4 are laid out so.
+//! The equal-area octahedral map between directions and a square (Clarberg, "Fast equal-area
+//! mapping of the (hemi)sphere using SIMD", 2008), with z the axis: the square's centre is +z, its
+//! corners are -z. Maps of PBRT's version 4 are laid out so.
 
 const std = @import("std");
 const elementary = @import("elementary.zig");

@@ -1,9 +1,10 @@
 //! Light sources, and shapes that shine as a number of points.
 //!
 //! In: the parameters of a LightSource; emitting shapes with their places. Out: point, spot and
-//! directional lights, the radiance of the sky, or a map of it. An emitting shape becomes `points_per_shape`
-//! spots on its surface, in even shares of its area, the same ones each time: by the R2 sequence
-//! of Roberts ("The unreasonable effectiveness of quasirandom sequences", 2018) within triangles.
+//! directional lights, the radiance of the sky, or a map of it. An emitting shape becomes
+//! `points_per_shape` spots on its surface, in even shares of its area, the same ones each time: by
+//! the R2 sequence of Roberts ("The unreasonable effectiveness of quasirandom sequences", 2018)
+//! within triangles.
 //! Each shines as much as its share of the area. A Lambertian source falls off with the cosine;
 //! our spots fall off with the square of a ramp, here from cosine 0 to 0.75, which has the same
 //! flux: (1 - 0.75) + 0.75 / 3 = 1 / 2.

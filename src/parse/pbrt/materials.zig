@@ -51,7 +51,9 @@ const Kind = enum {
 pub fn convert(colors: *Colors, name: []const u8, parameters: *const Parameters) Error!Material {
     if (name.len == 0 or std.mem.eql(u8, name, "none") or std.mem.eql(u8, name, "interface"))
         return .{ .surface = matte_default, .is_boundary = true };
-    if (parameters.find("bumpmap") != null or parameters.find("displacement") != null) try colors.input.warnHere(
+    const has_bumps = parameters.find("bumpmap") != null or
+        parameters.find("displacement") != null;
+    if (has_bumps) try colors.input.warnHere(
         "bump map",
         "Material {f}: bumps are not supported, its surfaces are smooth",
         .{quote(name)},
@@ -86,7 +88,10 @@ const Reader = struct {
                 try reader.baseColor("Kd", 0.25),
                 0.04 * try reader.bright("Ks", 0.25),
             ),
-            .substrate => reader.coated(try reader.baseColor("Kd", 0.5), try reader.bright("Ks", 0.5)),
+            .substrate => reader.coated(
+                try reader.baseColor("Kd", 0.5),
+                try reader.bright("Ks", 0.5),
+            ),
             .coateddiffuse => reader.polished(try reader.baseColor("reflectance", 0.5), 1.5),
             .mirror => metal(try reader.baseColor("Kr", 0.9), 0),
             .shinymetal => metal(try reader.baseColor("Kr", 1), 0),
@@ -180,7 +185,8 @@ const Reader = struct {
         const eta_name = if (coated_prefix) "conductor.eta" else "eta";
         const k_name = if (coated_prefix) "conductor.k" else "k";
         const roughness = try reader.rough(if (kind == .metal) 0.01 else 0);
-        if (reader.has("reflectance")) return metal(try reader.baseColor("reflectance", 1), roughness);
+        if (reader.has("reflectance"))
+            return metal(try reader.baseColor("reflectance", 1), roughness);
         // Copper, as in PBRT.
         const eta = try reader.spectrum(eta_name, spectra.fromName("metal-Cu-eta").?);
         const k = try reader.spectrum(k_name, spectra.fromName("metal-Cu-k").?);

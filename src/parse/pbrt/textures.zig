@@ -1,9 +1,9 @@
 //! PBRT's textures: a constant, or a picture times a constant, whatever they are made of.
 //!
-//! In: the class of a Texture and its parameters. Out: its mean, and a picture where it is one, from
-//! which a material makes a texture of the scene when it first needs it. Products with constants are
-//! exact. What no picture can show, checkers and noise and sums, is its mean with a warning, once a
-//! kind. docs/pbrt.md has the table.
+//! In: the class of a Texture and its parameters. Out: its mean, and a picture where it is one,
+//! from which a material makes a texture of the scene when it first needs it. Products with
+//! constants are exact. What no picture can show, checkers and noise and sums, is its mean with a
+//! warning, once a kind. docs/pbrt.md has the table.
 
 const std = @import("std");
 const diagnostic = @import("../../diagnostic.zig");
@@ -278,8 +278,8 @@ fn multiply(a: Vec3, b: Vec3) Vec3 {
     return .{ a[0] * b[0], a[1] * b[1], a[2] * b[2] };
 }
 
-/// From coordinates of meshes, (u, 1 - v), to those of pictures, (s, 1 - t), where s = su u + du and
-/// t = sv v + dv; null where it is out of range.
+/// From coordinates of meshes, (u, 1 - v), to those of pictures, (s, 1 - t), where s = su u + du
+/// and t = sv v + dv; null where it is out of range.
 fn transformOf(parameters: *const Parameters) ?[2][3]f32 {
     const su = either(parameters, "uscale", "su", 1);
     const sv = either(parameters, "vscale", "sv", 1);

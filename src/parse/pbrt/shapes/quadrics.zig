@@ -15,7 +15,14 @@ const Sample = Tessellator.Sample;
 const Vector = math.Vec3d;
 
 /// Where the turning curve is, and the normal there: distance from the axis and height each.
-const Outline = struct { radius: f64, height: f64, normal_out: f64, normal_up: f64, v: ?f64 = null };
+const Outline = struct {
+    radius: f64,
+    height: f64,
+    normal_out: f64,
+    normal_up: f64,
+    /// See `Sample`.
+    v: ?f64 = null,
+};
 
 /// A curve and its turn.
 fn Revolution(comptime Curve: type) type {

@@ -23,7 +23,8 @@ pub const Geometry = struct {
     positions: []Vec3,
     /// Null: flat faces.
     normals: ?[]Vec3 = null,
-    /// The shape's u, and 1 less its v, which grows downwards in a picture; null: nobody needs them.
+    /// The shape's u, and 1 less its v, so that it grows downwards as in pictures; null: nobody
+    /// needs them.
     texcoords: ?[][2]f32 = null,
     /// Counter-clockwise seen from the side that PBRT's normal points to.
     triangles: [][3]u32,
@@ -179,7 +180,10 @@ pub fn unshare(
     const vertex_count = 3 * @as(u64, geometry.triangles.len);
     if (vertex_count > std.math.maxInt(u32)) return tessellator.fail("has too many vertices", .{});
     const positions = try tessellator.alloc(Vec3, vertex_count);
-    const normals = if (geometry.normals == null) null else try tessellator.alloc(Vec3, vertex_count);
+    const normals = if (geometry.normals != null)
+        try tessellator.alloc(Vec3, vertex_count)
+    else
+        null;
     const texcoords = try tessellator.alloc([2]f32, vertex_count);
     for (geometry.triangles, 0..) |*triangle, index| for (triangle, 0..) |*vertex, corner| {
         const to = 3 * index + corner;
