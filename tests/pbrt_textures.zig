@@ -14,7 +14,8 @@ const testing = std.testing;
 const gpa = testing.allocator;
 const io = testing.io;
 
-const triangle = "Shape \"trianglemesh\" \"point P\" [0 0 0  1 0 0  0 1 0] \"integer indices\" [0 1 2]";
+const triangle = "Shape \"trianglemesh\" \"point P\" [0 0 0  1 0 0  0 1 0] " ++
+    "\"integer indices\" [0 1 2]";
 const with_uv = triangle ++ " \"float uv\" [0 0  1 0  0.25 0.75]";
 const picture = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.png\"";
 const matte = " Material \"matte\" \"texture Kd\" \"t\" ";
@@ -194,7 +195,7 @@ test "coordinates of shapes" {
             .{ 0, 1 }, .{ 1, 1 }, .{ 1, 0 },
         } },
         // By height, while rows go by the radius.
-        .{ "Shape \"paraboloid\" \"float zmax\" 4", &.{ 0, 8 * 33 }, &.{ .{ 0, 1 }, .{ 0, 0.75 } } },
+        .{ "Shape \"paraboloid\" \"float zmax\" 4", &.{ 0, 264 }, &.{ .{ 0, 1 }, .{ 0, 0.75 } } },
         .{ "Shape \"heightfield\" \"integer nu\" 2 \"integer nv\" 2 \"float Pz\" [0 0 0 0]", &.{
             0, 1, 2,
         }, &.{ .{ 0, 1 }, .{ 1, 1 }, .{ 0, 0 } } },
