@@ -18,6 +18,7 @@ const bvh_input = @import("prepare/bvh/input.zig");
 const bvh_wide = @import("prepare/bvh/wide.zig");
 const check = @import("prepare/bvh/check.zig");
 const flatten = @import("prepare/flatten.zig");
+const environment = @import("prepare/environment.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
 const place_file = @import("prepare/pose.zig");
@@ -47,6 +48,7 @@ pub const ViewSettings = struct {
     ambient: ?f32 = null,
     /// Linear RGB.
     background: ?math.Vec3 = null,
+    environment: light.EnvironmentSettings = .{},
 };
 
 /// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
@@ -56,6 +58,15 @@ pub const PoseError = error{ OutOfMemory, SceneTooLarge } || parallel.Error;
 pub const ViewError = error{ OutOfMemory, CameraUnknown };
 
 pub const Error = PoseError || ViewError;
+
+/// Makes environment maps.
+pub const makeEnvironment = environment.make;
+/// See `makeEnvironment`.
+pub const EnvironmentSource = environment.Source;
+/// See `makeEnvironment`.
+pub const OwnedEnvironmentMap = environment.OwnedMap;
+/// How a map is placed around the scene.
+pub const EnvironmentSettings = light.EnvironmentSettings;
 
 /// Places what is in a scene and builds the tree over it: a world in which nothing shines and that
 /// is seen by nobody yet. Its memory comes from `gpa` by way of an arena: its few large arrays are
@@ -153,7 +164,8 @@ noinline fn chooseView(
     seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };
     seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
     // What shines from everywhere is a light too.
-    const lights_are_default = seen.lights.len == 0 and from.ambient == null;
+    const has_map = settings.environment.map != null;
+    const lights_are_default = seen.lights.len == 0 and from.ambient == null and !has_map;
     if (lights_are_default) seen.lights = try light.placeRig(arena, &seen.view.camera);
     seen.environment = light.environment(
         lights_are_default,
@@ -161,8 +173,10 @@ noinline fn chooseView(
         settings.ambient,
         settings.background orelse from.background,
     );
+    light.addMap(&seen.environment, &settings.environment, &seen.view.camera);
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
+    seen.facts.environment_is_default = settings.environment.is_default;
 }
 
 /// Gives a geometry that has all else a tree of `settings.lanes`, whose memory comes from `arena`.

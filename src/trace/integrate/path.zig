@@ -25,6 +25,8 @@ pub fn PathState(comptime Kernel: type) type {
         throughput: [Kernel.group_count]Vec3,
         /// Absorption coefficient of what the ray travels in, per metre.
         sigma_a: [Kernel.group_count]Vec3,
+        /// Of the roughest surface on the way: how far the environment is spread.
+        roughness: [Kernel.group_count]Kernel.Rays.F32,
         /// Bounces up to here.
         depth: u32,
         /// Surfaces that the ray has gone on through without a bounce.

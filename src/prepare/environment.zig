@@ -1,0 +1,172 @@
+//! Environment maps: from an image, or from the studio, to all that lookups need.
+//!
+//! In: an equirectangular image of radiance, or none. Out: an octahedral pyramid of radiance, what
+//! lobes of eight roughnesses and of the cosine make of it, and its light cut into parts. By all
+//! threads; the result does not depend on how many.
+
+const std = @import("std");
+const math = @import("../math.zig");
+const parallel = @import("../parallel.zig");
+const world = @import("../world.zig");
+const filter = @import("environment/filter.zig");
+const parts_file = @import("environment/parts.zig");
+const studio = @import("environment/studio.zig");
+const Level = @import("environment/levels.zig").Level;
+const Sky = @import("environment/sky.zig").Sky;
+const Allocator = std.mem.Allocator;
+const Map = world.EnvironmentMap;
+const Texel = world.EnvironmentTexel;
+const vec3 = math.vec3;
+
+/// Texels along the sides of the finest levels.
+const size_max = 1024;
+const studio_size = 256;
+/// Of the levels for lobes, by roughness: 1/8, 2/8 ... 1.
+const glossy_sizes = [_]u32{ 256, 128, 64, 64, 32, 32, 32, 32 };
+const diffuse_size = 32;
+/// Of the level that lights are cut from.
+const parts_size = 64;
+
+pub const Error = error{OutOfMemory} || parallel.Error;
+
+/// Where the radiance comes from.
+pub const Source = union(enum) {
+    studio,
+    /// Changed.
+    sky: *Sky,
+};
+
+/// A map and its memory.
+pub const OwnedMap = struct {
+    arena: std.heap.ArenaAllocator,
+    map: Map,
+
+    /// Frees everything.
+    pub fn deinit(owned: *OwnedMap) void {
+        owned.arena.deinit();
+        owned.* = undefined;
+    }
+};
+
+/// Makes a map.
+pub fn make(gpa: Allocator, source: Source, pool: *parallel.Pool) Error!OwnedMap {
+    var arena_state: std.heap.ArenaAllocator = .init(gpa);
+    errdefer arena_state.deinit();
+    const arena = arena_state.allocator();
+    const pyramid = try makePyramid(arena, source, pool);
+    var scratch: std.heap.ArenaAllocator = .init(gpa);
+    defer scratch.deinit();
+    const tree: filter.Tree = try .init(scratch.allocator(), pyramid);
+    const convolved = try convolveAll(arena, &tree, pyramid[0].size, pool);
+    const glossy = try arena.alloc(world.EnvironmentLevel, glossy_sizes.len);
+    for (glossy, convolved[0..glossy.len]) |*to, level| to.* = level.finished();
+    const radiance = try arena.alloc(world.EnvironmentLevel, pyramid.len);
+    for (radiance, pyramid) |*to, level| to.* = level.finished();
+    const parts = try parts_file.make(arena, tree.levelOf(parts_size));
+    return .{
+        .arena = arena_state,
+        .map = .{
+            .radiance = radiance,
+            .glossy = glossy,
+            .diffuse = convolved[glossy.len].finished(),
+            .parts = parts.parts,
+            .sources = parts.sources,
+        },
+    };
+}
+
+/// The radiance, from the finest level to one of `filter.Tree.size_min`.
+fn makePyramid(arena: Allocator, source: Source, pool: *parallel.Pool) Error![]const Level {
+    const size = switch (source) {
+        .studio => studio_size,
+        .sky => |sky| size: {
+            sky.shrink(2 * size_max);
+            break :size sky.levelSize(parts_size, size_max);
+        },
+    };
+    const count = std.math.log2_int(u32, size / filter.Tree.size_min) + 1;
+    const pyramid = try arena.alloc(Level, count);
+    for (pyramid, 0..) |*level, index| level.* = try .init(arena, size >> @intCast(index));
+    const First = struct {
+        source: Source,
+        level: Level,
+
+        fn fillRow(first: *const @This(), row: usize, _: usize) void {
+            switch (first.source) {
+                .sky => |sky| sky.resampleRow(first.level, row),
+                .studio => for (0..first.level.size) |column| {
+                    const value = studio.radiance(first.level.pointAt(column, row));
+                    first.level.at(column, row).* = .{ value, value, value, 0 };
+                },
+            }
+        }
+    };
+    const first: First = .{ .source = source, .level = pyramid[0] };
+    try pool.forEach(size, &first, First.fillRow);
+    const Halving = struct {
+        finer: Level,
+        level: Level,
+
+        fn fillRow(halving: *const @This(), row: usize, _: usize) void {
+            halving.level.halveRow(halving.finer, row);
+        }
+    };
+    for (pyramid[0 .. count - 1], pyramid[1..]) |finer, level| {
+        const halving: Halving = .{ .finer = finer, .level = level };
+        try pool.forEach(level.size, &halving, Halving.fillRow);
+    }
+    for (pyramid) |level| level.closeBorder();
+    return pyramid;
+}
+
+/// What lobes make of the radiance, by roughness, and last what the cosine does.
+fn convolveAll(
+    arena: Allocator,
+    tree: *const filter.Tree,
+    finest_size: u32,
+    pool: *parallel.Pool,
+) Error![]const Level {
+    var convolution: Convolution = .{ .tree = tree, .levels = undefined };
+    const levels = try arena.alloc(Level, glossy_sizes.len + 1);
+    for (levels[0..glossy_sizes.len], glossy_sizes) |*level, size| {
+        level.* = try .init(arena, @min(size, finest_size));
+    }
+    levels[glossy_sizes.len] = try .init(arena, diffuse_size);
+    convolution.levels = levels;
+    var row_count: usize = 0;
+    for (levels) |level| row_count += level.size / filter.block_height;
+    try pool.forEach(row_count, &convolution, Convolution.fillRows);
+    for (levels) |level| level.closeBorder();
+    return levels;
+}
+
+const Convolution = struct {
+    tree: *const filter.Tree,
+    levels: []const Level,
+
+    /// Some rows of one of the levels.
+    fn fillRows(convolution: *const Convolution, index: usize, _: usize) void {
+        var first = index * filter.block_height;
+        for (convolution.levels, 1..) |level, number| {
+            if (first >= level.size) {
+                first -= level.size;
+                continue;
+            }
+            const lobe: filter.Lobe = if (number > glossy_sizes.len)
+                .cosine
+            else
+                .{ .ggx = @as(f32, @floatFromInt(number)) / glossy_sizes.len };
+            var column: usize = 0;
+            while (column < level.size) : (column += filter.block_width) {
+                filter.convolve(convolution.tree, lobe, level, column, first);
+            }
+            return;
+        }
+    }
+};
+
+test {
+    _ = @import("environment/levels.zig");
+    _ = @import("environment/sky.zig");
+    _ = parts_file;
+}
