@@ -16,13 +16,14 @@ pub const Library = struct {
     files: []const []const u8 = &.{},
     /// C files of ours: the implementation of what is a header only, and the call that we make.
     shims: []const []const u8 = &.{},
-    defines: []const []const u8 = &.{},
+    /// Definitions, and what else a library needs the compiler to be told.
+    flags: []const []const u8 = &.{},
 
     /// Compiles the library into `module`.
     pub fn addTo(library: Library, module: *Module, headers: LazyPath) void {
         const b = module.owner;
         const flags = std.mem.concat(b.allocator, []const u8, &.{
-            &.{ "-std=c11", "-ffp-contract=off", "-fno-sanitize=undefined" }, library.defines,
+            &.{ "-std=c11", "-ffp-contract=off", "-fno-sanitize=undefined" }, library.flags,
         }) catch @panic("OOM");
         module.addIncludePath(headers);
         module.addCSourceFiles(.{
@@ -42,16 +43,25 @@ pub const libdeflate: Library = .{ .name = "libdeflate", .files = &.{
     "libdeflate/lib/arm/cpu_features.c",
     "libdeflate/lib/crc32.c",
     "libdeflate/lib/deflate_compress.c",
+    "libdeflate/lib/deflate_decompress.c",
     "libdeflate/lib/utils.c",
     "libdeflate/lib/x86/cpu_features.c",
     "libdeflate/lib/zlib_compress.c",
+    "libdeflate/lib/zlib_decompress.c",
 } };
 
-/// For tests that decode pictures.
+/// Inflates by libdeflate. A palette that is shorter than its indices is on the stack.
 pub const stb_image: Library = .{
     .name = "stb_image",
+    .shims = &.{"src/decode/stb_image.c"},
+    .flags = &.{"-ftrivial-auto-var-init=zero"},
+};
+
+/// For tests that decode pictures, of formats as well that the program does not.
+pub const stb_image_of_tests: Library = .{
+    .name = "stb_image",
     .files = &.{"stb_image.h"},
-    .defines = &.{
+    .flags = &.{
         "-DSTB_IMAGE_IMPLEMENTATION", "-DSTBI_NO_STDIO",  "-DSTBI_MAX_DIMENSIONS=65536",
         "-DSTBI_ONLY_PNG",            "-DSTBI_ONLY_JPEG", "-DSTBI_ONLY_TGA",
         "-DSTBI_ONLY_BMP",            "-DSTBI_ONLY_HDR",
@@ -65,7 +75,7 @@ pub const stb_image_write: Library = .{
 };
 
 /// What the program holds.
-pub const program = [_]Library{ cgltf, libdeflate, stb_image_write };
+pub const program = [_]Library{ cgltf, libdeflate, stb_image, stb_image_write };
 
 /// A module with `text`: the project's licence, and the notices of what a program is made of.
 pub fn licenses(b: *std.Build, headers: LazyPath, is_musl: bool) *Module {

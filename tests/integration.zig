@@ -10,6 +10,7 @@ const stb_image = @import("stb_image.zig");
 
 test {
     _ = @import("analytic.zig");
+    _ = @import("decode.zig");
     _ = @import("malformed.zig");
     _ = @import("offset.zig");
     _ = @import("output.zig");
