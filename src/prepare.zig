@@ -62,6 +62,8 @@ pub const Error = PoseError || ViewError;
 /// Makes environment maps.
 pub const makeEnvironment = environment.make;
 /// See `makeEnvironment`.
+pub const EnvironmentError = environment.Error;
+/// See `makeEnvironment`.
 pub const EnvironmentSource = environment.Source;
 /// See `makeEnvironment`.
 pub const OwnedEnvironmentMap = environment.OwnedMap;

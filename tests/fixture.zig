@@ -145,6 +145,7 @@ pub const Options = struct {
     thread_count: usize = 1,
     tree_quality: raylane.settings.TreeQuality = .default,
     ambient: ?f32 = null,
+    environment: raylane.settings.Environment = .{ .source = .none },
     background: ?[3]f32 = null,
     transparent: bool = false,
     /// Index into `variant.compiled`.
@@ -170,6 +171,7 @@ pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options)
     try session.view(.{
         .resolution = .{ options.width, options.height },
         .ambient = options.ambient,
+        .environment = options.environment,
         .background = if (options.transparent)
             .transparent
         else if (options.background) |color| .{ .linear = color } else .default,

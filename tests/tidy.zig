@@ -36,7 +36,10 @@ const directions = [_]Row{
     .{ .part = "builtin", .may_import = &.{"scene"} },
     .{ .part = "parse", .may_import = &.{"scene"} },
     .{ .part = "scene", .may_import = &.{} },
-    .{ .part = "prepare", .may_import = &.{ "scene", "world", "simd", "parallel" } },
+    .{
+        .part = "prepare",
+        .may_import = &.{ "decode", "scene", "world", "simd", "parallel" },
+    },
     .{ .part = "world", .may_import = &.{} },
     .{ .part = "trace", .may_import = &.{ "world", "film", "variant", "simd", "parallel" } },
     .{ .part = "film", .may_import = &.{"image"} },

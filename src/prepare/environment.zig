@@ -5,8 +5,9 @@
 //! threads; the result does not depend on how many.
 
 const std = @import("std");
-const math = @import("../math.zig");
+const decode = @import("../decode.zig");
 const parallel = @import("../parallel.zig");
+const simd = @import("../simd.zig");
 const world = @import("../world.zig");
 const filter = @import("environment/filter.zig");
 const parts_file = @import("environment/parts.zig");
@@ -15,8 +16,6 @@ const Level = @import("environment/levels.zig").Level;
 const Sky = @import("environment/sky.zig").Sky;
 const Allocator = std.mem.Allocator;
 const Map = world.EnvironmentMap;
-const Texel = world.EnvironmentTexel;
-const vec3 = math.vec3;
 
 /// Texels along the sides of the finest levels.
 const size_max = 1024;
@@ -32,8 +31,8 @@ pub const Error = error{OutOfMemory} || parallel.Error;
 /// Where the radiance comes from.
 pub const Source = union(enum) {
     studio,
-    /// Changed.
-    sky: *Sky,
+    /// A file of an equirectangular image.
+    image: []const u8,
 };
 
 /// A map and its memory.
@@ -48,12 +47,36 @@ pub const OwnedMap = struct {
     }
 };
 
-/// Makes a map.
-pub fn make(gpa: Allocator, source: Source, pool: *parallel.Pool) Error!OwnedMap {
+/// Makes a map. On `InvalidImage` the reason says why.
+pub fn make(
+    gpa: Allocator,
+    source: Source,
+    pool: *parallel.Pool,
+    reason: *decode.Reason,
+) (Error || decode.Error)!OwnedMap {
+    const mode = simd.setFlushToZero();
+    defer simd.setFloatControl(mode);
+    var sky: ?Sky = switch (source) {
+        .studio => null,
+        .image => |bytes| try readSky(gpa, bytes, reason),
+    };
+    defer if (sky) |*image| image.deinit(gpa);
+    return makeOf(gpa, if (sky) |*image| image else null, pool);
+}
+
+fn readSky(gpa: Allocator, bytes: []const u8, reason: *decode.Reason) decode.Error!Sky {
+    var texels = try decode.decode(gpa, bytes, reason);
+    defer texels.deinit(gpa);
+    return .init(gpa, &texels);
+}
+
+/// Of the studio, where there is no image; that is changed. Not inlined, so that no arithmetic moves
+/// before the mode is set.
+noinline fn makeOf(gpa: Allocator, sky: ?*Sky, pool: *parallel.Pool) Error!OwnedMap {
     var arena_state: std.heap.ArenaAllocator = .init(gpa);
     errdefer arena_state.deinit();
     const arena = arena_state.allocator();
-    const pyramid = try makePyramid(arena, source, pool);
+    const pyramid = try makePyramid(arena, sky, pool);
     var scratch: std.heap.ArenaAllocator = .init(gpa);
     defer scratch.deinit();
     const tree: filter.Tree = try .init(scratch.allocator(), pyramid);
@@ -76,32 +99,25 @@ pub fn make(gpa: Allocator, source: Source, pool: *parallel.Pool) Error!OwnedMap
 }
 
 /// The radiance, from the finest level to one of `filter.Tree.size_min`.
-fn makePyramid(arena: Allocator, source: Source, pool: *parallel.Pool) Error![]const Level {
-    const size = switch (source) {
-        .studio => studio_size,
-        .sky => |sky| size: {
-            sky.shrink(2 * size_max);
-            break :size sky.levelSize(parts_size, size_max);
-        },
-    };
+fn makePyramid(arena: Allocator, sky: ?*Sky, pool: *parallel.Pool) Error![]const Level {
+    if (sky) |image| image.shrink(2 * size_max);
+    const size = if (sky) |image| image.levelSize(parts_size, size_max) else studio_size;
     const count = std.math.log2_int(u32, size / filter.Tree.size_min) + 1;
     const pyramid = try arena.alloc(Level, count);
     for (pyramid, 0..) |*level, index| level.* = try .init(arena, size >> @intCast(index));
     const First = struct {
-        source: Source,
+        sky: ?*const Sky,
         level: Level,
 
         fn fillRow(first: *const @This(), row: usize, _: usize) void {
-            switch (first.source) {
-                .sky => |sky| sky.resampleRow(first.level, row),
-                .studio => for (0..first.level.size) |column| {
-                    const value = studio.radiance(first.level.pointAt(column, row));
-                    first.level.at(column, row).* = .{ value, value, value, 0 };
-                },
+            if (first.sky) |image| return image.resampleRow(first.level, row);
+            for (0..first.level.size) |column| {
+                const value = studio.radiance(first.level.pointAt(column, row));
+                first.level.at(column, row).* = .{ value, value, value, 0 };
             }
         }
     };
-    const first: First = .{ .source = source, .level = pyramid[0] };
+    const first: First = .{ .sky = sky, .level = pyramid[0] };
     try pool.forEach(size, &first, First.fillRow);
     const Halving = struct {
         finer: Level,

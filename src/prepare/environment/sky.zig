@@ -5,6 +5,7 @@
 //! mixed. Arc tangents are a polynomial of + and * alone.
 
 const std = @import("std");
+const decode = @import("../../decode.zig");
 const Level = @import("levels.zig").Level;
 const math = @import("../../math.zig");
 const Texel = @import("../../world.zig").EnvironmentTexel;
@@ -20,7 +21,34 @@ const radiance_max = 1e9;
 pub const Sky = struct {
     width: u32,
     height: u32,
+    /// More of them where it has been shrunk.
     texels: []Texel,
+
+    /// Of decoded texels, whose bytes are codes of sRGB. Frees nothing.
+    pub fn init(gpa: std.mem.Allocator, from: *const decode.Texels) error{OutOfMemory}!Sky {
+        const texels = try gpa.alloc(Texel, @as(usize, from.width) * from.height);
+        const channel_count = from.channel_count;
+        // Grey, perhaps with alpha, or colour.
+        const places: [3]usize = if (channel_count < 3) .{ 0, 0, 0 } else .{ 0, 1, 2 };
+        for (texels, 0..) |*texel, index| {
+            var color: [3]f32 = undefined;
+            for (&color, places) |*channel, place| {
+                const at_index = index * channel_count + place;
+                channel.* = radiance(switch (from.data) {
+                    .bytes => |bytes| math.srgb.decoded[bytes[at_index]],
+                    .floats => |floats| floats[at_index],
+                });
+            }
+            texel.* = .{ color[0], color[1], color[2], 0 };
+        }
+        return .{ .width = from.width, .height = from.height, .texels = texels };
+    }
+
+    /// Frees everything.
+    pub fn deinit(sky: *Sky, gpa: std.mem.Allocator) void {
+        gpa.free(sky.texels);
+        sky.* = undefined;
+    }
 
     /// An octahedral level that holds it has about as many texels.
     pub fn levelSize(sky: *const Sky, size_min: u32, size_max: u32) u32 {
@@ -53,8 +81,8 @@ pub const Sky = struct {
         while (column < level.size) : (column += lane_count) {
             var point: [3][lane_count]f32 = undefined;
             for (0..lane_count) |lane| {
-                const at = level.pointAt(column + lane, row);
-                for (&point, at) |*axis, component| axis[lane] = component;
+                const middle = level.pointAt(column + lane, row);
+                for (&point, middle) |*axis, component| axis[lane] = component;
             }
             const x: Lanes = point[0];
             const y: Lanes = point[1];
@@ -93,7 +121,7 @@ pub const Sky = struct {
 };
 
 /// Radiance as it may be: finite and not negative.
-pub fn radiance(value: f32) f32 {
+fn radiance(value: f32) f32 {
     if (!(value > 0)) return 0;
     return math.flushDenormal(if (value < radiance_max) value else radiance_max);
 }
