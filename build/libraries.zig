@@ -50,6 +50,12 @@ pub const libdeflate: Library = .{ .name = "libdeflate", .files = &.{
     "libdeflate/lib/zlib_decompress.c",
 } };
 
+pub const mikktspace: Library = .{
+    .name = "mikktspace",
+    .shims = &.{"src/prepare/mikktspace.c"},
+    .flags = &.{"-fno-math-errno"},
+};
+
 /// Inflates by libdeflate. A palette that is shorter than its indices is on the stack.
 pub const stb_image: Library = .{
     .name = "stb_image",
@@ -75,7 +81,7 @@ pub const stb_image_write: Library = .{
 };
 
 /// What the program holds.
-pub const program = [_]Library{ cgltf, libdeflate, stb_image, stb_image_write };
+pub const program = [_]Library{ cgltf, libdeflate, mikktspace, stb_image, stb_image_write };
 
 /// A module with `text`: the project's licence, and the notices of what a program is made of.
 pub fn licenses(b: *std.Build, headers: LazyPath, is_musl: bool) *Module {

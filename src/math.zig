@@ -12,7 +12,7 @@ pub const flushDenormal = @import("math/vec3.zig").flushDenormal;
 pub const box3 = @import("math/box3.zig");
 /// Directions as points of a square.
 pub const octahedral = @import("math/octahedral.zig");
-/// Sine, cosine, tangent, exponential, logarithm, power.
+/// Sine, cosine, tangent, arc cosine, exponential, logarithm, power.
 pub const elementary = @import("math/elementary.zig");
 /// The sRGB transfer function.
 pub const srgb = @import("math/srgb.zig");

@@ -29,7 +29,7 @@ pub const Node = struct {
 
 /// A picture in a file: as it came, not decoded.
 pub const Image = struct {
-    /// What messages call it.
+    /// What messages call it, printable, in quotes where it is a name of the file's.
     name: []const u8,
     bytes: []const u8,
 };

@@ -70,6 +70,9 @@ pub const Session = struct {
     scene: ?Scene = null,
     ownership: Ownership = .owned,
     facts: Facts = .{},
+    texture_side_max: u32 = settings.texture_side.default,
+    /// Made by the first `pose` of a scene.
+    loaded: ?prepare.Loaded = null,
     seen: settings.View = .{},
     world: ?World = null,
     environment: Environment = .{},
@@ -105,6 +108,7 @@ pub const Session = struct {
     /// Frees everything and ends the threads.
     pub fn deinit(session: *Session) void {
         session.dropWorld();
+        session.dropLoaded();
         session.dropScene();
         if (session.film) |*film| film.deinit(session.gpa);
         session.environment.deinit();
@@ -126,6 +130,7 @@ pub const Session = struct {
         const scene = try loadScene(session.gpa, session.io, name, choices, session.diagnostic);
         session.adopt(scene, .owned);
         session.output = choices.output;
+        session.texture_side_max = choices.texture_side_max;
         session.start = start;
         session.times.parse_ns = session.since(start);
     }
@@ -133,6 +138,7 @@ pub const Session = struct {
     /// Takes a scene that is in memory, in place of the one before.
     pub fn adopt(session: *Session, scene: Scene, ownership: Ownership) void {
         session.dropWorld();
+        session.dropLoaded();
         session.dropScene();
         session.start = Io.Clock.awake.now(session.io);
         session.environment.dropScene();
@@ -156,10 +162,22 @@ pub const Session = struct {
         session.world = null;
     }
 
-    /// Places the geometry and builds the tree over it. Asserts that there is a scene.
+    fn dropLoaded(session: *Session) void {
+        if (session.loaded) |*loaded| loaded.deinit();
+        session.loaded = null;
+    }
+
+    /// Places the geometry and builds the tree over it; the first time, decodes the textures.
+    /// Asserts that there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
         session.dropWorld();
-        session.world = try prepare.pose(session.gpa, session.io, &session.scene.?, .{
+        const scene = &session.scene.?;
+        if (session.loaded == null) session.loaded = try prepare.load(session.gpa, session.io, scene, .{
+            .pool = &session.pool,
+            .side_max = session.texture_side_max,
+        }, session.diagnostic, &session.times);
+        const loaded = &session.loaded.?;
+        session.world = try prepare.pose(session.gpa, session.io, scene, loaded, .{
             .lanes = chosen.lanes,
             .pool = &session.pool,
             .tree_quality = chosen.tree_quality,
@@ -187,7 +205,9 @@ pub const Session = struct {
         session.times.prepare_ns += session.since(start);
         try prepare.view(&session.world.?, session.io, &session.scene.?, .{
             .camera = choices.camera,
+            .viewpoint = choices.viewpoint,
             .resolution = choices.resolution,
+            .long_side = choices.long_side,
             .ambient = choices.ambient,
             .background = backgroundOf(choices.background),
             .environment = environment,

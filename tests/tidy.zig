@@ -38,7 +38,7 @@ const directions = [_]Row{
     .{ .part = "scene", .may_import = &.{} },
     .{
         .part = "prepare",
-        .may_import = &.{ "decode", "scene", "world", "simd", "parallel" },
+        .may_import = &.{ "scene", "world", "simd", "parallel", "decode", "memory_account" },
     },
     .{ .part = "world", .may_import = &.{} },
     .{ .part = "trace", .may_import = &.{ "world", "film", "variant", "simd", "parallel" } },

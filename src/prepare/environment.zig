@@ -6,6 +6,7 @@
 
 const std = @import("std");
 const decode = @import("../decode.zig");
+const math = @import("../math.zig");
 const parallel = @import("../parallel.zig");
 const simd = @import("../simd.zig");
 const world = @import("../world.zig");
@@ -70,8 +71,8 @@ fn readSky(gpa: Allocator, bytes: []const u8, reason: *decode.Reason) decode.Err
     return .init(gpa, &texels);
 }
 
-/// Of the studio, where there is no image; that is changed. Not inlined, so that no arithmetic moves
-/// before the mode is set.
+/// Of the studio, where there is no image; that is changed. Not inlined, so that no arithmetic
+/// moves before the mode is set.
 noinline fn makeOf(gpa: Allocator, sky: ?*Sky, pool: *parallel.Pool) Error!OwnedMap {
     var arena_state: std.heap.ArenaAllocator = .init(gpa);
     errdefer arena_state.deinit();
@@ -180,6 +181,136 @@ const Convolution = struct {
         }
     }
 };
+
+const testing = std.testing;
+
+/// The mean of a level's texels over directions, each weighted, as is the whole.
+fn meanOf(
+    level: world.EnvironmentLevel,
+    context: anytype,
+    weigh: fn (@TypeOf(context), direction: math.Vec3) f64,
+) [3]f64 {
+    const whole: Level = .{ .size = level.size, .texels = @constCast(level.texels) };
+    var sum: [3]f64 = @splat(0);
+    var total: f64 = 0;
+    for (0..level.size) |row| for (0..level.size) |column| {
+        const direction = math.vec3.normalize(whole.pointAt(column, row)).?;
+        const weight = weigh(context, direction) * whole.solidAngleAt(column, row);
+        const texel = whole.at(column, row).*;
+        inline for (&sum, 0..) |*channel, index| channel.* += weight * texel[index];
+        total += weight;
+    };
+    for (&sum) |*channel| channel.* /= total;
+    return sum;
+}
+
+test "the studio has no hue, and a white sphere is 0.75 in the mean" {
+    var pool: parallel.Pool = .init(2);
+    defer pool.deinit();
+    var owned = try makeOf(testing.allocator, null, &pool);
+    defer owned.deinit();
+    const towards = struct {
+        fn weigh(_: void, direction: math.Vec3) f64 {
+            return if (direction[2] > 0) direction[2] else 0;
+        }
+    }.weigh;
+    const mean = meanOf(owned.map.diffuse, {}, towards);
+    try testing.expectApproxEqAbs(0.75, mean[0], 0.002);
+    try testing.expectEqual(mean[0], mean[1]);
+    try testing.expectEqual(mean[0], mean[2]);
+}
+
+/// A sky with a gradient, a small sun and a coloured lamp; freed by the caller.
+fn testSky(gpa: Allocator) !Sky {
+    const texels = try gpa.alloc(world.EnvironmentTexel, 128 * 64);
+    for (texels, 0..) |*texel, index| {
+        const height = @as(f32, @floatFromInt(index / 128)) / 64;
+        texel.* = .{ 0.2, 0.3 * height, 1 - height, 0 };
+    }
+    texels[20 * 128 + 37] = .{ 2000, 1500, 1000, 0 };
+    for (40..44) |row| for (80..90) |column| {
+        texels[row * 128 + column] = .{ 8, 2, 1, 0 };
+    };
+    return .{ .width = 128, .height = 64, .texels = texels };
+}
+
+test "lobes and irradiance are those of all texels, and the light in parts is the map's" {
+    const gpa = testing.allocator;
+    var pool: parallel.Pool = .init(2);
+    defer pool.deinit();
+    var sky = try testSky(gpa);
+    defer sky.deinit(gpa);
+    var owned = try makeOf(gpa, &sky, &pool);
+    defer owned.deinit();
+    const map = &owned.map;
+    const Case = struct {
+        normal: math.Vec3,
+        alpha_squared: ?f32,
+
+        fn weigh(case: @This(), direction: math.Vec3) f64 {
+            const cosine = math.vec3.dot(case.normal, direction);
+            if (cosine <= 0) return 0;
+            const a = case.alpha_squared orelse return cosine;
+            const slope = (1 + cosine) / 2 * (a - 1) + 1;
+            return cosine / (slope * slope);
+        }
+    };
+    for (0..9) |number| {
+        const level = if (number < 8) map.glossy[number] else map.diffuse;
+        const whole: Level = .{ .size = level.size, .texels = @constCast(level.texels) };
+        const roughness = @as(f32, @floatFromInt(number + 1)) / 8;
+        for ([_]usize{ 3, 10, 17, 28 }) |place| {
+            const column = place * level.size / 32;
+            const row = (31 - place * 7 % 32) * level.size / 32;
+            const case: Case = .{
+                .normal = math.vec3.normalize(whole.pointAt(column, row)).?,
+                .alpha_squared = if (number < 8)
+                    std.math.pow(f32, roughness, 4)
+                else
+                    null,
+            };
+            const expected = meanOf(map.radiance[0], case, Case.weigh);
+            const found = whole.at(column, row).*;
+            inline for (expected, 0..) |channel, index| {
+                errdefer std.debug.print("{d} {d}: {any} {any}\n", .{
+                    number, place, expected, found,
+                });
+                try testing.expectApproxEqRel(channel, found[index], 0.03);
+            }
+        }
+    }
+    const everywhere = struct {
+        fn weigh(_: void, _: math.Vec3) f64 {
+            return 1;
+        }
+    }.weigh;
+    const mean = meanOf(map.radiance[0], {}, everywhere);
+    try testing.expectEqual(1, map.sources.len);
+    const rest = map.parts[map.parts.len - 1].energy;
+    for (mean, rest, map.sources[0].energy) |channel, part, source| {
+        try testing.expectApproxEqRel(channel * 4 * std.math.pi, part + source, 2e-3);
+    }
+}
+
+test "the map does not depend on how many threads make it" {
+    const gpa = testing.allocator;
+    var hashes: [2]u64 = undefined;
+    for (&hashes, [_]usize{ 1, 5 }) |*hash, thread_count| {
+        var pool: parallel.Pool = .init(thread_count);
+        defer pool.deinit();
+        var sky = try testSky(gpa);
+        defer sky.deinit(gpa);
+        var owned = try makeOf(gpa, &sky, &pool);
+        defer owned.deinit();
+        var hasher: std.hash.Wyhash = .init(0);
+        for (owned.map.radiance) |level| hasher.update(std.mem.sliceAsBytes(level.texels));
+        for (owned.map.glossy) |level| hasher.update(std.mem.sliceAsBytes(level.texels));
+        hasher.update(std.mem.sliceAsBytes(owned.map.diffuse.texels));
+        hasher.update(std.mem.sliceAsBytes(owned.map.parts));
+        hash.* = hasher.final();
+    }
+    try testing.expectEqual(hashes[0], hashes[1]);
+}
 
 test {
     _ = @import("environment/levels.zig");

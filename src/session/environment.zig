@@ -128,7 +128,8 @@ fn make(
     source: prepare.EnvironmentSource,
     diagnostic: *Diagnostic,
 ) Error!prepare.OwnedEnvironmentMap {
-    return prepare.makeEnvironment(gpa, source, pool, &diagnostic.message) catch |err| switch (err) {
+    const reason = &diagnostic.message;
+    return prepare.makeEnvironment(gpa, source, pool, reason) catch |err| switch (err) {
         error.InvalidImage => error.InvalidInput,
         else => |other| other,
     };

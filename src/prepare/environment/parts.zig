@@ -1,8 +1,8 @@
 //! The light of a map in an order from which few directional lights can be cut.
 //!
-//! In: the nodes of a level. Out: sources so small and strong that they are lights of their own, and
-//! running sums of the rest along Hilbert's curve (1891) over the octahedral square, whose pieces
-//! are round: pieces of equal luminance, each seen from its centre, stand for the whole (as Agarwal
+//! In: the nodes of a level. Out: sources so small and strong that they are lights of their own,
+//! and running sums of the rest along Hilbert's curve (1891) over the octahedral square, whose
+//! pieces are round: pieces of equal luminance, each seen from its centre, stand for the whole (as Agarwal
 //! et al. 2003, Structured Importance Sampling of Environment Maps).
 
 const std = @import("std");

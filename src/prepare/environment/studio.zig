@@ -1,8 +1,8 @@
 //! The studio: the light that files without any are shown in, computed from a few lamps.
 //!
-//! In: nothing. Out: radiance by direction, seen by a camera that looks along -z: a large soft box
-//! above and behind the camera's left, a weak wide one to the right, a strip behind the model that
-//! lights its rim, a light floor, a mid-grey horizon. Without hue; a white diffuse sphere has a mean
+//! In: nothing. Out: radiance by direction, seen by a camera that looks along -z: a large soft
+//! box above and behind the camera's left, a weak wide one to the right, a strip behind the model
+//! that lights its rim, a light floor, a mid-grey horizon. Without hue; a white diffuse sphere has a mean
 //! radiance of 0.75 towards the camera.
 
 const std = @import("std");
@@ -55,7 +55,7 @@ const ceiling_radiance = 0.3;
 const horizon_fade = 0.08;
 
 /// Makes the mean of a white sphere what it should be.
-const radiance_scale = 1.0;
+const radiance_scale = 0.88725;
 
 /// Radiance from a direction of any length.
 pub fn radiance(towards: Vec3) f32 {

@@ -4,8 +4,8 @@
 //! samples. The light that would arrive is a smooth integral, looked up; shadow rays of a few
 //! directional lights, others in each sample, say what share of it does: for the diffuse part each
 //! light weighs what it adds to the irradiance at this normal, for the glossy part what it adds to
-//! the lobe, which is widened so that some lights are in it. The mean over all samples is that of
-//! all lights: a sample's share may be below 0, and a surface that sees all of the sky has the
+//! the lobe, which is widened so that some lights are in it. The mean over all samples is that
+//! of all lights: a sample's share may be below 0, and a surface that sees all of the sky has the
 //! smooth integral without noise. Light that is kept away comes from surfaces in turn, which are lit
 //! themselves: some of it, in the surface's own colour, is taken to arrive.
 
@@ -86,11 +86,11 @@ fn addShadow(
     var bundle: bundle_file.Bundle(Kernel) = undefined;
     var active: [Kernel.group_count]Rays.Mask = undefined;
     var ray_count: u64 = 0;
-    for (&bundle.groups, &active, receivers, vertices.all, 0..) |*ray, *facing, *receiver, *vertex, group| {
+    for (&bundle.groups, &active, receivers, 0..) |*ray, *facing, *receiver, group| {
         facing.* = .splat(false);
         ray.active = facing.*;
         if (receiver.lit.none()) continue;
-        const point = &vertex.point;
+        const point = &vertices.all[group].point;
         facing.* = receiver.lit.bitAnd(isFacing(Rays, point, .splat(light.to_light)));
         if (facing.none()) continue;
         const primitive = vertices.path.bundle.groups[group].closest.primitive;
@@ -100,13 +100,13 @@ fn addShadow(
     }
     if (ray_count == 0) return 0;
     var transmittances: [Kernel.group_count]Rays.Vec3 = undefined;
-    visibility.transmittance(&bundle, &light.source, coherence, &transmittances);
-    for (active, transmittances, receivers, vertices.all) |facing, transmittance, *receiver, *vertex| {
+    visibility.transmittance(&bundle, &light.source, vertices.all, coherence, &transmittances);
+    for (active, transmittances, receivers, 0..) |facing, transmittance, *receiver, group| {
         if (facing.none()) continue;
         const none: Rays.Vec3 = .splat(.{ 0, 0, 0 });
         const white: Rays.Vec3 = .splat(.{ 1, 1, 1 });
         const hidden: Rays.Vec3 = .select(facing, white.sub(transmittance), none);
-        const weighed = receiver.weigh(&vertex.point, light);
+        const weighed = receiver.weigh(&vertices.all[group].point, light);
         const counted = hidden.scale(.splat(light.weight));
         receiver.hidden_diffuse = receiver.hidden_diffuse.add(weighed.diffuse.mul(counted));
         receiver.hidden_glossy = receiver.hidden_glossy.add(weighed.glossy.mul(counted));
@@ -202,7 +202,8 @@ fn ReceiverOf(comptime Lanes: type) type {
             const specular_albedo = bsdf.mirror.reflected;
             const irradiance = environment_file
                 .irradiance(Lanes, environment, point.normal, receiver.lit);
-            const diffuse_share = share(receiver.whole_diffuse, receiver.hidden_diffuse, bsdf.diffuse);
+            const diffuse_share =
+                share(receiver.whole_diffuse, receiver.hidden_diffuse, bsdf.diffuse);
             var sum = diffuse_albedo.mul(irradiance).mul(diffuse_share);
             const untraced = receiver.lit.andNot(traced);
             if (untraced.any()) {

@@ -1,8 +1,9 @@
 //! Directional lights that stand for an environment map, in sets that samples take turns with.
 //!
-//! In: a map's light in parts. Out: lights whose energies sum to the map's. Small strong sources are
-//! in every set; the rest is cut into as many pieces of the same luminance as all sets have lights
-//! for it, and each set gets every so-manieth, so that it, too, is spread over the whole sky.
+//! In: a map's light in parts. Out: lights whose energies sum to the map's. Small strong sources
+//! are in every set; the rest is cut into as many pieces of the same luminance as all sets have
+//! lights for it, and each set gets every so-manieth, so that it, too, is spread over the whole
+//! sky.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");

@@ -131,6 +131,8 @@ pub fn Whitted(comptime Kernel: type) type {
             path.throughput = @splat(.splat(.{ 1, 1, 1 }));
             path.sigma_a = @splat(.splat(.{ 0, 0, 0 }));
             path.roughness = @splat(.zero());
+            if (whitted.frame.needsFootprints())
+                path.startCones(camera.footprint(view, whitted.settings.sample_count));
             for (&path.bundle.groups) |*ray| whitted.rays.primary += ray.active.popCount();
         }
 
@@ -147,7 +149,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 whitted.find(group, vertex);
                 any_seen = any_seen or vertex.seen.any();
             }
-            if (any_seen and whitted.frame.environment.map != null) whitted.addEnvironment(coherence);
+            if (any_seen and whitted.frame.environment.map != null)
+                whitted.addEnvironment(coherence);
             if (any_seen) for (whitted.frame.lights) |*light| {
                 whitted.rays.shadow += direct.addLight(
                     Kernel,
@@ -182,7 +185,7 @@ pub fn Whitted(comptime Kernel: type) type {
                     environment,
                     ray.line.direction,
                     path.roughness[group],
-                    .zero(),
+                    whitted.spreadOf(group),
                     gone,
                 )),
             );
@@ -190,6 +193,12 @@ pub fn Whitted(comptime Kernel: type) type {
             const background = environment.background;
             const seen: [3]f32 = if (whitted.transparent) .{ 0, 0, 0 } else background;
             whitted.add(group, throughput.mul(.splat(seen)));
+        }
+
+        /// Angle that rays of a group see where they leave the scene, in radians.
+        fn spreadOf(whitted: *const Self, group: usize) F32 {
+            if (whitted.frame.environment.map == null) return .zero();
+            return whitted.path.cone_spread[group].abs();
         }
 
         /// Adds what points that rays see scatter of the environment's light.
@@ -237,7 +246,8 @@ pub fn Whitted(comptime Kernel: type) type {
             const bsdf = &vertex.bsdf;
             const none: Vec3 = .splat(.{ 0, 0, 0 });
             const white: Vec3 = .splat(.{ 1, 1, 1 });
-            const diffuse = bsdf.diffuse.mul(white.sub(bsdf.mirror.reflected));
+            const diffuse = bsdf.diffuse.mul(white.sub(bsdf.mirror.reflected))
+                .scale(vertex.point.material.occlusion);
             const traced = whitted.reflects(vertex);
             var scattered = diffuse.add(.select(traced, none, bsdf.mirror.reflected));
             const ends = whitted.path.depth == whitted.settings.depth_max;
@@ -276,6 +286,8 @@ pub fn Whitted(comptime Kernel: type) type {
             rest.bundle = path.bundle;
             rest.sigma_a = path.sigma_a;
             rest.roughness = path.roughness;
+            rest.cone_width = path.cone_width;
+            rest.cone_spread = path.cone_spread;
             for (&rest.bundle.groups, masks, &whitted.vertices, 0..) |*ray, mask, *vertex, group| {
                 ray.active = mask;
                 if (mask.none()) continue;
@@ -300,6 +312,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 whitted.leave(next, group, vertex.point.normal_geometric, direction);
                 next.throughput[group] = vertex.throughput.mul(vertex.bsdf.mirror.reflected);
                 next.sigma_a[group] = whitted.path.sigma_a[group];
+                if (whitted.frame.needsFootprints())
+                    next.reflectCones(&whitted.path, group, &vertex.point);
             }
         }
 
@@ -324,6 +338,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 const beyond: Vec3 = .select(vertex.point.back, outside, material.sigma_a);
                 const before = whitted.path.sigma_a[group];
                 next.sigma_a[group] = .select(material.volume, beyond, before);
+                if (whitted.frame.needsFootprints())
+                    next.refractCones(&whitted.path, group, &vertex.point);
             }
         }
 
