@@ -353,14 +353,7 @@ const Parser = struct {
             .eye, .target, .up, .orbit, .fov, .ortho => try parser.setViewpoint(given),
             .background => options.view.background = backgroundOf(given.value) orelse
                 return reader.bad(given, "env, transparent, #rrggbb, or R,G,B of 0 or more"),
-            .env => options.view.environment.source = environmentOf(given.value) orelse
-                return reader.bad(given, "a file name, studio or none"),
-            .env_intensity => options.view.environment.intensity = radiance(given.value) orelse
-                return reader.bad(given, "a number of 0 or more"),
-            .env_rotation => options.view.environment.rotation_deg = rotationOf(given.value) orelse
-                return reader.bad(given, "degrees, -3600 to 3600"),
-            .env_shadows => options.view.environment.shadow_count =
-                try reader.number(given, settings.environment_shadow_count),
+            .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
             .ambient => options.view.ambient = radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
             .exposure => options.write.exposure = exposureOf(given.value) orelse
@@ -416,6 +409,22 @@ const Parser = struct {
                 })),
             .ortho => viewpoint.orthographic = true,
             else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    fn setEnvironment(parser: *Parser, given: Reader.Given) Error!void {
+        const reader = &parser.reader;
+        const environment = &parser.options.view.environment;
+        switch (given.id) {
+            .env => environment.source = environmentOf(given.value) orelse
+                return reader.bad(given, "a file name, studio or none"),
+            .env_intensity => environment.intensity = radiance(given.value) orelse
+                return reader.bad(given, "a number of 0 or more"),
+            .env_rotation => environment.rotation_deg = rotationOf(given.value) orelse
+                return reader.bad(given, "degrees, -3600 to 3600"),
+            .env_shadows => environment.shadow_count =
+                try reader.number(given, settings.environment_shadow_count),
+            else => unreachable, // Those that `set` hands on.
         }
     }
 

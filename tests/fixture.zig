@@ -148,6 +148,8 @@ pub const Options = struct {
     environment: raylane.settings.Environment = .{ .source = .none },
     background: ?[3]f32 = null,
     transparent: bool = false,
+    /// The background is the environment.
+    see_environment: bool = false,
     /// Index into `variant.compiled`.
     variant: usize = 0,
 };
@@ -172,7 +174,9 @@ pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options)
         .resolution = .{ options.width, options.height },
         .ambient = options.ambient,
         .environment = options.environment,
-        .background = if (options.transparent)
+        .background = if (options.see_environment)
+            .environment
+        else if (options.transparent)
             .transparent
         else if (options.background) |color| .{ .linear = color } else .default,
     });

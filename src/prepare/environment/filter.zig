@@ -1,11 +1,11 @@
 //! Convolution of an environment map with lobes, by a tree of its texels.
 //!
-//! In: a radiance pyramid. Out: for each direction of a level, the mean of the radiance weighted by
-//! a lobe around it: D(h) (n.l) with h between n and l for GGX as seen along n (Karis 2013), or
+//! In: a radiance pyramid. Out: for each direction of a level, the mean of the radiance weighted
+//! by a lobe around it: D(h) (n.l) with h between n and l for GGX as seen along n (Karis 2013), or
 //! the cosine. The texels of the pyramid are the nodes of a quadtree: what is far from the lobe's
 //! middle counts as one where the lobe hardly changes over it (Barnes and Hut 1986), and lies in
-//! its centre of luminance, so that a small strong source stays where it is. Eight directions go through the
-//! tree together.
+//! its centre of luminance, so that a small strong source stays where it is. Eight directions go
+//! through the tree together.
 
 const std = @import("std");
 const math = @import("../../math.zig");

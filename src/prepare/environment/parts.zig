@@ -2,8 +2,8 @@
 //!
 //! In: the nodes of a level. Out: sources so small and strong that they are lights of their own,
 //! and running sums of the rest along Hilbert's curve (1891) over the octahedral square, whose
-//! pieces are round: pieces of equal luminance, each seen from its centre, stand for the whole (as Agarwal
-//! et al. 2003, Structured Importance Sampling of Environment Maps).
+//! pieces are round: pieces of equal luminance, each seen from its centre, stand for the whole (as
+//! Agarwal et al. 2003, Structured Importance Sampling of Environment Maps).
 
 const std = @import("std");
 const world = @import("../../world.zig");

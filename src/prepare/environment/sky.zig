@@ -50,10 +50,10 @@ pub const Sky = struct {
         sky.* = undefined;
     }
 
-    /// An octahedral level that holds it has about as many texels.
+    /// Texels along the sides of an octahedral level whose texels are nowhere much wider.
     pub fn levelSize(sky: *const Sky, size_min: u32, size_max: u32) u32 {
         var size = size_min;
-        while (size < size_max and size < sky.width) size *= 2;
+        while (size < size_max and size < 2 * sky.width) size *= 2;
         return size;
     }
 

@@ -1,9 +1,9 @@
 //! The studio: the light that files without any are shown in, computed from a few lamps.
 //!
-//! In: nothing. Out: radiance by direction, seen by a camera that looks along -z: a large soft
-//! box above and behind the camera's left, a weak wide one to the right, a strip behind the model
-//! that lights its rim, a light floor, a mid-grey horizon. Without hue; a white diffuse sphere has a mean
-//! radiance of 0.75 towards the camera.
+//! In: nothing. Out: radiance by direction, seen by a camera that looks along -z: a large soft box
+//! above and behind the camera's left, a weak wide one to the right, a strip behind the model that
+//! lights its rim, a light floor, a mid-grey horizon. Without hue; a white diffuse sphere has a
+//! mean radiance of 0.75 towards the camera.
 
 const std = @import("std");
 const math = @import("../../math.zig");

@@ -4,10 +4,10 @@
 //! samples. The light that would arrive is a smooth integral, looked up; shadow rays of a few
 //! directional lights, others in each sample, say what share of it does: for the diffuse part each
 //! light weighs what it adds to the irradiance at this normal, for the glossy part what it adds to
-//! the lobe, which is widened so that some lights are in it. The mean over all samples is that
-//! of all lights: a sample's share may be below 0, and a surface that sees all of the sky has the
-//! smooth integral without noise. Light that is kept away comes from surfaces in turn, which are lit
-//! themselves: some of it, in the surface's own colour, is taken to arrive.
+//! the lobe, which is widened so that some lights are in it. The mean over all samples is that of
+//! all lights: a sample's share may be below 0, and a surface that sees all of the sky has the
+//! smooth integral without noise. Light that is kept away comes from surfaces in turn, which are
+//! lit themselves: some of it, in the surface's own colour, is taken to arrive.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -37,6 +37,25 @@ pub fn Vertices(comptime Kernel: type) type {
         /// No rays go on from here.
         is_end: bool,
     };
+}
+
+/// What rays of a group see that leave the scene, in the lanes asked for.
+pub fn seenBy(
+    comptime Kernel: type,
+    environment: *const world_file.Environment,
+    path: *const path_file.PathState(Kernel),
+    group: usize,
+    asked: Kernel.Rays.Mask,
+) Kernel.Rays.Vec3 {
+    const has_cones = environment.map != null;
+    return environment_file.radiance(
+        Kernel.Rays,
+        environment,
+        path.bundle.groups[group].line.direction,
+        path.roughness[group],
+        if (has_cones) path.cone_spread[group].abs() else .zero(),
+        asked,
+    );
 }
 
 /// Adds the light of the environment. Vertices of coherent rays are near to each other. Returns how

@@ -14,7 +14,6 @@ const bsdf_file = @import("../shade/bsdf.zig");
 const camera = @import("camera.zig");
 const direct = @import("direct.zig");
 const environment_light = @import("environment.zig");
-const environment_shade = @import("../shade/environment.zig");
 const path_file = @import("path.zig");
 const sampler = @import("sampler.zig");
 const tiles = @import("tiles.zig");
@@ -178,27 +177,14 @@ pub fn Whitted(comptime Kernel: type) type {
             if (gone.none()) return;
             const throughput: Vec3 = .select(gone, path.throughput[group], .splat(.{ 0, 0, 0 }));
             const environment = whitted.frame.environment;
-            if (path.depth > 0 or environment.is_seen) return whitted.add(
-                group,
-                throughput.mul(environment_shade.radiance(
-                    Rays,
-                    environment,
-                    ray.line.direction,
-                    path.roughness[group],
-                    whitted.spreadOf(group),
-                    gone,
-                )),
-            );
+            if (path.depth > 0 or environment.is_seen) {
+                const seen = environment_light.seenBy(Kernel, environment, path, group, gone);
+                return whitted.add(group, throughput.mul(seen));
+            }
             whitted.escaped[group] = whitted.escaped[group].add(throughput.x);
             const background = environment.background;
             const seen: [3]f32 = if (whitted.transparent) .{ 0, 0, 0 } else background;
             whitted.add(group, throughput.mul(.splat(seen)));
-        }
-
-        /// Angle that rays of a group see where they leave the scene, in radians.
-        fn spreadOf(whitted: *const Self, group: usize) F32 {
-            if (whitted.frame.environment.map == null) return .zero();
-            return whitted.path.cone_spread[group].abs();
         }
 
         /// Adds what points that rays see scatter of the environment's light.
