@@ -114,12 +114,35 @@ const sections: []const Section = &.{
             .usage = "--tonemap linear",
             .help = "clamp, then encode as sRGB: the only way there is",
         },
-        .{ .usage = "--background COLOR", .help = "transparent, #rrggbb (sRGB) or R,G,B (linear)" },
+        .{
+            .usage = "--background WHAT",
+            .help = "env: the environment, transparent, #rrggbb (sRGB) or\nR,G,B (linear)",
+        },
     } },
     .{ .title = "Scene", .options = &.{
         .{ .usage = "--camera WHICH", .help = "name or index of a camera, or auto: all in view" },
         .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
         .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
+        .{
+            .usage = "--env FILE",
+            .help = "light from all around: an equirectangular image of\n" ++
+                "radiance (hdr, png, jpg), studio or none (default: the\n" ++
+                "scene's, or studio for scenes without light)",
+        },
+        .{ .usage = "--env-intensity X", .help = "multiplies its radiance (default: 1)" },
+        .{
+            .usage = "--env-rotation DEG",
+            .help = "turn it about y, counter-clockwise from above (the\n" ++
+                "studio otherwise turns with the camera)",
+        },
+        .{
+            .usage = "--env-shadows N",
+            .help = "directional lights a sample that stand for it, to find\n" ++
+                "how much of it arrives, " ++ settings.environment_shadow_count.text() ++
+                comptimePrint("\n(default: {d}; 0: all of it everywhere)", .{
+                    settings.environment_shadow_count.default,
+                }),
+        },
         .{
             .usage = "--eye X,Y,Z",
             .help = "where the camera stands, in place of the file's",
@@ -334,7 +357,8 @@ const Parser = struct {
                 return reader.bad(given, "a scene's name or its index"),
             .up_axis => options.load.up_axis = try reader.choice(given, settings.UpAxis),
             .background => options.view.background = backgroundOf(given.value) orelse
-                return reader.bad(given, "transparent, #rrggbb, or R,G,B of 0 or more"),
+                return reader.bad(given, "env, transparent, #rrggbb, or R,G,B of 0 or more"),
+            .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
             .ambient => options.view.ambient = radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
             .exposure => options.write.exposure = exposureOf(given.value) orelse
@@ -351,6 +375,7 @@ const Parser = struct {
                 options.render.sample_count = settings.thesis.sample_count;
                 options.render.depth = settings.thesis.depth;
                 options.thread_count = null;
+                options.view.environment.source = .none;
             },
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .variant => options.render.variant = try parser.variantOf(given.value),
@@ -389,6 +414,22 @@ const Parser = struct {
                 })),
             .ortho => viewpoint.orthographic = true,
             else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    fn setEnvironment(parser: *Parser, given: Reader.Given) Error!void {
+        const reader = &parser.reader;
+        const environment = &parser.options.view.environment;
+        switch (given.id) {
+            .env => environment.source = environmentOf(given.value) orelse
+                return reader.bad(given, "a file name, studio or none"),
+            .env_intensity => environment.intensity = radiance(given.value) orelse
+                return reader.bad(given, "a number of 0 or more"),
+            .env_rotation => environment.rotation_deg = rotationOf(given.value) orelse
+                return reader.bad(given, "degrees, -3600 to 3600"),
+            .env_shadows => environment.shadow_count =
+                try reader.number(given, settings.environment_shadow_count),
+            else => unreachable, // Those that `set` hands on.
         }
     }
 
@@ -553,6 +594,7 @@ const any_index: settings.Range = .{ .min = 0, .max = std.math.maxInt(u32) };
 
 fn backgroundOf(text: []const u8) ?settings.Background {
     if (std.mem.eql(u8, text, "transparent")) return .transparent;
+    if (std.mem.eql(u8, text, "env")) return .environment;
     if (text.len == 7 and text[0] == '#') {
         var codes: [3]u8 = undefined;
         _ = std.fmt.hexToBytes(&codes, text[1..]) catch return null;
@@ -564,6 +606,17 @@ fn backgroundOf(text: []const u8) ?settings.Background {
         component.* = radiance(parts.next() orelse return null) orelse return null;
     }
     return if (parts.next() == null) .{ .linear = color } else null;
+}
+
+fn environmentOf(text: []const u8) ?settings.Environment.Source {
+    if (text.len == 0) return null;
+    if (std.mem.eql(u8, text, "none")) return .none;
+    return if (std.mem.eql(u8, text, "studio")) .studio else .{ .file = text };
+}
+
+fn rotationOf(text: []const u8) ?f32 {
+    const value = number(text) orelse return null;
+    return if (@abs(value) <= 3600) value else null;
 }
 
 fn exposureOf(text: []const u8) ?settings.Exposure {

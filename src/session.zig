@@ -18,9 +18,11 @@ const srgb = math.srgb;
 const statistics = @import("statistics.zig");
 const trace = @import("trace.zig");
 const variant = @import("variant.zig");
+const Environment = @import("session/environment.zig").Environment;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
 const Film = film_file.Film;
+const Identity = @import("identity.zig").Identity;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
@@ -86,10 +88,13 @@ pub const Session = struct {
     loaded: ?prepare.Loaded = null,
     seen: settings.View = .{},
     world: ?World = null,
+    environment: Environment = .{},
+    /// The file that the picture is to replace.
+    output: ?Identity = null,
     film: ?Film = null,
     traced: trace.Statistics = .{},
 
-    pub const Error = LoadError || prepare.Error;
+    pub const Error = LoadError || prepare.Error || @import("session/environment.zig").Error;
 
     /// Whether the scene is freed with the session, or only looked at: then it must live on until
     /// the last `view`.
@@ -119,6 +124,7 @@ pub const Session = struct {
         session.dropLoaded();
         session.dropScene();
         if (session.film) |*film| film.deinit(session.gpa);
+        session.environment.deinit();
         session.pool.deinit();
         session.* = undefined;
     }
@@ -136,6 +142,7 @@ pub const Session = struct {
         const start = Io.Clock.awake.now(session.io);
         const scene = try loadScene(session.gpa, session.io, name, choices, session.diagnostic);
         session.adopt(scene, .owned);
+        session.output = choices.output;
         session.texture_side_max = choices.texture_side_max;
         session.start = start;
         session.times.parse_ns = session.since(start);
@@ -147,6 +154,7 @@ pub const Session = struct {
         session.dropLoaded();
         session.dropScene();
         session.start = Io.Clock.awake.now(session.io);
+        session.environment.dropScene();
         session.scene = scene;
         session.ownership = ownership;
         session.facts = .{
@@ -196,6 +204,20 @@ pub const Session = struct {
     pub fn view(session: *Session, choices: settings.View) Error!void {
         if (session.pool.cancelled.load(.monotonic)) return error.Canceled;
         session.seen = choices;
+        // Until it is chosen anew.
+        session.world.?.environment.map = null;
+        const start = Io.Clock.awake.now(session.io);
+        var environment = try session.environment.choose(
+            session.gpa,
+            session.io,
+            &session.pool,
+            &session.scene.?,
+            &choices.environment,
+            session.output,
+            session.diagnostic,
+        );
+        environment.is_seen = choices.background == .environment;
+        session.times.prepare_ns += session.since(start);
         try prepare.view(&session.world.?, session.io, &session.scene.?, .{
             .camera = choices.camera,
             .viewpoint = choices.viewpoint,
@@ -203,6 +225,7 @@ pub const Session = struct {
             .long_side = choices.long_side,
             .ambient = choices.ambient,
             .background = backgroundOf(choices.background),
+            .environment = environment,
         }, session.diagnostic, &session.times);
     }
 
@@ -348,7 +371,7 @@ pub fn processorCount() usize {
 /// The radiance of a background; null: as the lights have it.
 fn backgroundOf(background: settings.Background) ?[3]f32 {
     return switch (background) {
-        .default => null,
+        .default, .environment => null,
         .transparent => .{ 0, 0, 0 },
         .linear => |color| color,
         .srgb => |codes| .{

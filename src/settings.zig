@@ -55,6 +55,8 @@ pub const exposure_ev_max = 64;
 /// Automatic exposure lets so many of the pixels, in percent, be no brighter than this.
 pub const auto_exposure: struct { percentile: u64, brightness: f32 } =
     .{ .percentile = 95, .brightness = 0.8 };
+/// Directional lights a sample that stand for an environment, to find how much of it arrives.
+pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4 };
 /// Radiance from everywhere in scenes without lights.
 pub const ambient_default: f32 = 0.35;
 
@@ -152,10 +154,33 @@ pub const Background = union(enum) {
     /// As the lights have it.
     default,
     transparent,
+    /// The environment itself.
+    environment,
     /// Codes of red, green and blue.
     srgb: [3]u8,
     /// Radiance of red, green and blue, finite and >= 0.
     linear: [3]f32,
+};
+
+/// Light from all around.
+pub const Environment = struct {
+    source: Source = .default,
+    /// Multiplies its radiance, finite and >= 0.
+    intensity: f32 = 1,
+    /// Turn about y in degrees, counter-clockwise from above; null: none, but the studio turns with
+    /// the camera.
+    rotation_deg: ?f32 = null,
+    /// Within `environment_shadow_count`.
+    shadow_count: u32 = environment_shadow_count.default,
+
+    pub const Source = union(enum) {
+        /// The scene's, or the studio where a scene has no light at all.
+        default,
+        none,
+        studio,
+        /// An image by its name.
+        file: []const u8,
+    };
 };
 
 /// How radiance becomes brightness.
@@ -199,6 +224,7 @@ pub const View = struct {
     long_side: ?u32 = null,
     /// Radiance from everywhere, finite and >= 0; null: as the lights have it.
     ambient: ?f32 = null,
+    environment: Environment = .{},
     background: Background = .default,
 };
 
