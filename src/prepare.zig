@@ -47,6 +47,8 @@ pub const ViewSettings = struct {
     ambient: ?f32 = null,
     /// Linear RGB.
     background: ?math.Vec3 = null,
+    /// Primary rays that leave the scene see what others see.
+    shows_environment: bool = false,
 };
 
 /// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
@@ -153,6 +155,7 @@ noinline fn chooseView(
     seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };
     seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
     // What shines from everywhere is a light too.
+    seen.facts.own_light_count = seen.lights.len;
     const lights_are_default = seen.lights.len == 0 and from.ambient == null;
     if (lights_are_default) seen.lights = try light.placeRig(arena, &seen.view.camera);
     seen.environment = light.environment(
@@ -161,6 +164,8 @@ noinline fn chooseView(
         settings.ambient,
         settings.background orelse from.background,
     );
+    if (settings.shows_environment and from.background == null)
+        seen.environment.background = @splat(seen.environment.ambient);
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
 }

@@ -53,6 +53,8 @@ pub const Facts = struct {
     camera_is_default: bool = false,
     /// The file has no light that shines: the lights are three fixed to the camera.
     lights_are_default: bool = false,
+    /// Lights of the file that shine.
+    own_light_count: usize = 0,
     /// Triangles left out because they have no area or no finite place.
     degenerate_count: u64,
 };

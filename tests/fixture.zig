@@ -147,6 +147,8 @@ pub const Options = struct {
     ambient: ?f32 = null,
     background: ?[3]f32 = null,
     transparent: bool = false,
+    /// Without it, all is radiance.
+    display_referred: bool = false,
     /// Index into `variant.compiled`.
     variant: usize = 0,
 };
@@ -170,6 +172,7 @@ pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options)
     try session.view(.{
         .resolution = .{ options.width, options.height },
         .ambient = options.ambient,
+        .display_referred = options.display_referred,
         .background = if (options.transparent)
             .transparent
         else if (options.background) |color| .{ .linear = color } else .default,
