@@ -203,7 +203,7 @@ const Row = struct {
                 value.* += own;
             };
             if (pixel[3] < 1) for (out, row.behind) |*value, behind| {
-                value.* += (1 - pixel[3]) * behind;
+                if (behind > 0) value.* += (1 - pixel[3]) * behind;
             };
         }
     }
