@@ -159,7 +159,9 @@ fn Curves(comptime count: usize) type {
             const rest = x - @as(V, @floatFromInt(whole)); // Within a half.
             var sum = of(1);
             comptime var n = 8;
-            inline while (n >= 1) : (n -= 1) sum = of(1) + sum * rest * of(std.math.ln2 / @as(f32, n));
+            inline while (n >= 1) : (n -= 1) {
+                sum = of(1) + sum * rest * of(std.math.ln2 / @as(f32, n));
+            }
             const power: V = @bitCast(biased << @as(@Vector(count, u5), @splat(23)));
             return sum * power;
         }
@@ -255,7 +257,8 @@ test "every curve rises from black to white and takes anything" {
         }
         try std.testing.expect(previous > 0.97);
         const inf = std.math.inf(f32);
-        for ([_]f32{ 0, -1, std.math.nan(f32), -inf, inf, 1e38, std.math.floatTrueMin(f32) }) |odd| {
+        const least = std.math.floatTrueMin(f32);
+        for ([_]f32{ 0, -1, std.math.nan(f32), -inf, inf, 1e38, least }) |odd| {
             for (mapOne(mapping, .{ odd, 1, odd })) |value| {
                 try std.testing.expect(value >= 0 and value <= 1);
             }
