@@ -588,7 +588,7 @@ test "a picture that shows next to nothing says what helps, but not with -q" {
             .says = "100 % of what the picture shows is white; --exposure auto makes",
         },
         .{
-            .arguments = &.{ "builtin:cornell", "--exposure=-20" },
+            .arguments = &.{ "builtin:cornell", "--exposure=-40" },
             .says = " % of what the picture shows is black; --exposure auto makes",
         },
         .{ .arguments = &.{"builtin:cornell"}, .says = null },
