@@ -148,16 +148,14 @@ pub fn write(
             try target.finish(&.{file}, diagnostic);
         },
     }
-    return work.tallyOfAll();
+    return work.tally;
 }
 
 const Work = struct {
     rows: encode_file.Rows,
     from_bottom: bool,
     bytes: []align(64) u8 = &.{},
-    clear: std.atomic.Value(u32) = .init(0),
-    black: std.atomic.Value(u32) = .init(0),
-    white: std.atomic.Value(u32) = .init(0),
+    tally: Tally = .{},
 
     /// All rows, by all threads; the caller frees them.
     fn run(work: *Work, gpa: Allocator, pool: *parallel.Pool) Error![]align(64) u8 {
@@ -177,17 +175,9 @@ const Work = struct {
         const bytes = work.bytes[place * row_bytes ..][0..row_bytes];
         const tally = work.rows.encode(@intCast(y), bytes);
         // Sums of whole numbers, whatever their order.
-        _ = work.clear.fetchAdd(@intCast(tally.clear), .monotonic);
-        _ = work.black.fetchAdd(@intCast(tally.black), .monotonic);
-        _ = work.white.fetchAdd(@intCast(tally.white), .monotonic);
-    }
-
-    fn tallyOfAll(work: *const Work) Tally {
-        return .{
-            .clear = work.clear.load(.monotonic),
-            .black = work.black.load(.monotonic),
-            .white = work.white.load(.monotonic),
-        };
+        inline for (comptime std.meta.fieldNames(Tally)) |name| {
+            _ = @atomicRmw(u32, &@field(work.tally, name), .Add, @field(tally, name), .monotonic);
+        }
     }
 };
 

@@ -298,9 +298,7 @@ pub const Session = struct {
 
     /// Says so where the picture shows next to nothing, and what may help.
     fn hint(session: *Session, tally: output.Tally) void {
-        const image = &session.film.?.image;
-        const total: u64 = image.pixels.len;
-        const seen = total - tally.clear;
+        const total = session.film.?.image.pixels.len;
         if (isNearlyAll(tally.clear, total)) return session.hintOf(
             "background",
             tally.clear,
@@ -311,19 +309,19 @@ pub const Session = struct {
                 "--camera auto shows all there is",
         );
         const is_automatic = if (session.appearance) |chosen| chosen.is_automatic else true;
-        if (isNearlyAll(tally.black, seen)) return session.hintOf(
+        if (isNearlyAll(tally.black, tally.covered)) return session.hintOf(
             "black",
             tally.black,
-            seen,
+            tally.covered,
             if (is_automatic)
                 "--env studio or --ambient gives it light"
             else
                 "--exposure auto makes it brighter",
         );
-        if (isNearlyAll(tally.white, seen)) return session.hintOf(
+        if (isNearlyAll(tally.white, tally.covered)) return session.hintOf(
             "white",
             tally.white,
-            seen,
+            tally.covered,
             if (is_automatic)
                 "a lower --exposure makes it darker"
             else

@@ -47,10 +47,11 @@ pub const Picture = struct {
 /// How many pixels look like nothing.
 pub const Tally = struct {
     /// At least half of it shows the background.
-    clear: u64 = 0,
-    /// The others, near the ends of what a display can show.
-    black: u64 = 0,
-    white: u64 = 0,
+    clear: u32 = 0,
+    /// Nothing of it does; among these, near the ends of what a display can show.
+    covered: u32 = 0,
+    black: u32 = 0,
+    white: u32 = 0,
 
     /// Display-referred light of `black` at most: code 6.
     const black_max = 0.0018;
@@ -58,10 +59,10 @@ pub const Tally = struct {
     const white_min = 0.97;
 
     /// Adds another's.
-    pub fn add(tally: *Tally, other: Tally) void {
-        tally.clear += other.clear;
-        tally.black += other.black;
-        tally.white += other.white;
+    fn add(tally: *Tally, other: Tally) void {
+        inline for (comptime std.meta.fieldNames(Tally)) |name| {
+            @field(tally, name) += @field(other, name);
+        }
     }
 };
 
@@ -216,17 +217,22 @@ const share_min = 1e-6;
 inline fn tallyOf(color: [3]V, alpha: V, count: usize) Tally {
     const counted = std.simd.iota(u32, lanes) < @as(@Vector(lanes, u32), @splat(@intCast(count)));
     const clear = counted & (alpha < @as(V, @splat(0.5)));
-    const seen = counted & ~clear;
-    var black = seen;
-    var white = seen;
+    const covered = counted & (alpha > @as(V, @splat(1 - 1.0 / 512.0)));
+    var black = covered;
+    var white = covered;
     inline for (color) |channel| {
         black &= channel < @as(V, @splat(Tally.black_max));
         white &= channel > @as(V, @splat(Tally.white_min));
     }
-    return .{ .clear = countOf(clear), .black = countOf(black), .white = countOf(white) };
+    return .{
+        .clear = countOf(clear),
+        .covered = countOf(covered),
+        .black = countOf(black),
+        .white = countOf(white),
+    };
 }
 
-inline fn countOf(mask: Mask) u64 {
+inline fn countOf(mask: Mask) u32 {
     return std.simd.countTrues(mask);
 }
 
@@ -357,10 +363,10 @@ test "pixels that look like nothing are counted" {
     pixels[1] = .{ 9, 9, 9, 0.4 };
     pixels[2] = .{ 0, 0, 0.001, 1 };
     pixels[9] = .{ 1, 2, 3, 1 };
-    pixels[10] = .{ 1, 2, 0.5, 1 };
+    pixels[10] = .{ 0, 0, 0, 0.9 };
     var bytes: [11][3]u8 = undefined;
     const tally = try encodeForTest(3, &pixels, null, rows_for_test, &bytes);
-    try std.testing.expectEqual(Tally{ .clear = 2, .black = 1, .white = 1 }, tally);
+    try std.testing.expectEqual(Tally{ .clear = 2, .covered = 8, .black = 1, .white = 1 }, tally);
 }
 
 test "alpha is rounded to the nearest code" {
