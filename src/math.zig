@@ -10,7 +10,7 @@ pub const AffineMap = @import("math/affine.zig").Affine;
 pub const flushDenormal = @import("math/vec3.zig").flushDenormal;
 /// Axis-aligned boxes.
 pub const box3 = @import("math/box3.zig");
-/// Sine, cosine, tangent, exponential, logarithm, power.
+/// Sine, cosine, tangent, arc cosine, exponential, logarithm, power.
 pub const elementary = @import("math/elementary.zig");
 /// The sRGB transfer function.
 pub const srgb = @import("math/srgb.zig");

@@ -44,6 +44,11 @@ pub const Frame = struct {
     lights: []const Light,
     environment: *const Environment,
     view: *const View,
+
+    /// Whether what is seen depends on how wide rays are: they have cones then.
+    pub inline fn needsFootprints(frame: *const Frame) bool {
+        return frame.materials.lookups.len > 0;
+    }
 };
 
 /// What was found on the way, for messages and the report; tracing does not read it.
@@ -66,8 +71,8 @@ pub const World = struct {
     /// Where the nodes of the scene are: for cameras and lights, which are placed by the view.
     node_maps: []const math.AffineD,
     materials: Materials,
-    /// Made once a scene, by `prepare.load`; not owned.
-    textures: *const Textures,
+    /// Made once a scene, by `prepare.load`, as are the lookups of the materials; not owned.
+    textures: Textures,
     lights: []const Light = &.{},
     environment: Environment = .{ .ambient = 0, .background = @splat(0) },
     view: View = .nowhere,
@@ -78,7 +83,7 @@ pub const World = struct {
         return .{
             .geometry = &world.geometry,
             .materials = &world.materials,
-            .textures = world.textures,
+            .textures = &world.textures,
             .lights = world.lights,
             .environment = &world.environment,
             .view = &world.view,

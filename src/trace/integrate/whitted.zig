@@ -122,6 +122,8 @@ pub fn Whitted(comptime Kernel: type) type {
             camera.primaryRays(Kernel, view, rectangle, offset, &path.bundle);
             path.throughput = @splat(.splat(.{ 1, 1, 1 }));
             path.sigma_a = @splat(.splat(.{ 0, 0, 0 }));
+            if (whitted.frame.needsFootprints())
+                path.startCones(camera.footprint(view, whitted.settings.sample_count));
             for (&path.bundle.groups) |*ray| whitted.rays.primary += ray.active.popCount();
         }
 
@@ -192,9 +194,10 @@ pub fn Whitted(comptime Kernel: type) type {
         fn scatterAmbient(whitted: *const Self, vertex: *const Vertex) Vec3 {
             const bsdf = &vertex.bsdf;
             const none: Vec3 = .splat(.{ 0, 0, 0 });
+            const diffuse = bsdf.diffuse_albedo.scale(vertex.point.material.occlusion);
             const traced = whitted.reflects(vertex);
             const specular: Vec3 = .select(traced, none, bsdf.specular_albedo);
-            var scattered = bsdf.diffuse_albedo.add(specular);
+            var scattered = diffuse.add(specular);
             const ends = whitted.path.depth == whitted.settings.depth_max;
             if (ends) scattered = scattered.add(bsdf.mirror.transmitted);
             return scattered.scale(.splat(whitted.frame.environment.ambient));
@@ -230,6 +233,7 @@ pub fn Whitted(comptime Kernel: type) type {
             const rest = whitted.stack.push(path.depth, path.transparency_depth + 1);
             rest.bundle = path.bundle;
             rest.sigma_a = path.sigma_a;
+            rest.keepCones(path);
             for (&rest.bundle.groups, masks, &whitted.vertices, 0..) |*ray, mask, *vertex, group| {
                 ray.active = mask;
                 if (mask.none()) continue;
@@ -254,6 +258,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 whitted.leave(next, group, vertex.point.normal_geometric, direction);
                 next.throughput[group] = vertex.throughput.mul(vertex.bsdf.mirror.reflected);
                 next.sigma_a[group] = whitted.path.sigma_a[group];
+                if (whitted.frame.needsFootprints())
+                    next.reflectCones(&whitted.path, group, &vertex.point);
             }
         }
 
@@ -278,6 +284,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 const beyond: Vec3 = .select(vertex.point.back, outside, material.sigma_a);
                 const before = whitted.path.sigma_a[group];
                 next.sigma_a[group] = .select(material.volume, beyond, before);
+                if (whitted.frame.needsFootprints())
+                    next.refractCones(&whitted.path, group, &vertex.point);
             }
         }
 
