@@ -312,6 +312,9 @@ const Job = struct {
     fn sayFacts(job: *Job, world: *const World) void {
         if (!job.options.verbose) return;
         if (world.facts.camera_is_default) job.sayOfScene("view: framed on all there is", .{});
+        if (world.facts.environment_is_default) {
+            job.sayOfScene("environment: the studio", .{});
+        }
         if (world.facts.lights_are_default) {
             job.sayOfScene("lights: three directional ones fixed to the camera", .{});
         } else {

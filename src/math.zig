@@ -10,6 +10,8 @@ pub const AffineMap = @import("math/affine.zig").Affine;
 pub const flushDenormal = @import("math/vec3.zig").flushDenormal;
 /// Axis-aligned boxes.
 pub const box3 = @import("math/box3.zig");
+/// Directions as points of a square.
+pub const octahedral = @import("math/octahedral.zig");
 /// Sine, cosine, tangent, arc cosine, exponential, logarithm, power.
 pub const elementary = @import("math/elementary.zig");
 /// The sRGB transfer function.
@@ -30,6 +32,7 @@ test {
     _ = @import("math/vec3.zig");
     _ = @import("math/affine.zig");
     _ = box3;
+    _ = octahedral;
     _ = elementary;
     _ = srgb;
 }

@@ -18,6 +18,7 @@ const bvh_input = @import("prepare/bvh/input.zig");
 const bvh_wide = @import("prepare/bvh/wide.zig");
 const check = @import("prepare/bvh/check.zig");
 const flatten = @import("prepare/flatten.zig");
+const environment = @import("prepare/environment.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
 const place_file = @import("prepare/pose.zig");
@@ -75,6 +76,7 @@ pub const ViewSettings = struct {
     ambient: ?f32 = null,
     /// Linear RGB.
     background: ?math.Vec3 = null,
+    environment: light.EnvironmentSettings = .{},
 };
 
 /// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
@@ -141,6 +143,17 @@ fn attributesOf(textures: *const texture.TextureSet) flatten.Attributes {
     }
     return attributes;
 }
+
+/// Makes environment maps.
+pub const makeEnvironment = environment.make;
+/// See `makeEnvironment`.
+pub const EnvironmentError = environment.Error;
+/// See `makeEnvironment`.
+pub const EnvironmentSource = environment.Source;
+/// See `makeEnvironment`.
+pub const OwnedEnvironmentMap = environment.OwnedMap;
+/// How a map is placed around the scene.
+pub const EnvironmentSettings = light.EnvironmentSettings;
 
 /// Places what is in a scene and builds the tree over it: a world in which nothing shines and that
 /// is seen by nobody yet. Its memory comes from `gpa` by way of an arena: its few large arrays are
@@ -260,7 +273,9 @@ noinline fn chooseView(
     seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };
     seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
     // What shines from everywhere is a light too.
-    const lights_are_default = seen.lights.len == 0 and from.ambient == null;
+    seen.facts.own_light_count = seen.lights.len;
+    const has_map = settings.environment.map != null;
+    const lights_are_default = seen.lights.len == 0 and from.ambient == null and !has_map;
     if (lights_are_default) seen.lights = try light.placeRig(arena, &seen.view.camera);
     seen.environment = light.environment(
         lights_are_default,
@@ -268,8 +283,10 @@ noinline fn chooseView(
         settings.ambient,
         settings.background orelse from.background,
     );
+    light.addMap(&seen.environment, &settings.environment, &seen.view.camera);
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
+    seen.facts.environment_is_default = settings.environment.is_default;
 }
 
 /// Gives a geometry that has all else a tree of `settings.lanes`, whose memory comes from `arena`.
@@ -839,6 +856,7 @@ test "memory that runs out is an error that leaks nothing" {
 }
 
 test {
+    _ = environment;
     _ = bvh_wide;
     _ = check;
     _ = flatten;

@@ -7,6 +7,7 @@ const std = @import("std");
 const Stringify = std.json.Stringify;
 const Writer = std.Io.Writer;
 const printable = @import("diagnostic.zig").printable;
+const settings = @import("settings.zig");
 const statistics = @import("statistics.zig");
 
 /// One frame.
@@ -34,10 +35,19 @@ pub const Report = struct {
     bvh: Bvh,
     memory_peak_bytes: u64,
     image_hash: u64,
+    /// Null: the picture keeps radiance as it is.
+    appearance: ?Appearance = null,
     warnings: []const []const u8 = &.{},
 
     /// What images became.
     pub const Textures = struct { count: u64 = 0, bytes: u64 = 0 };
+    /// How radiance became what a display can show.
+    pub const Appearance = struct {
+        exposure_ev: f32,
+        /// The exposure was metered.
+        is_automatic: bool,
+        tone_mapping: settings.ToneMapping,
+    };
 
     /// Facts about the tree.
     pub const Bvh = struct {
@@ -91,6 +101,11 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
         report.sample_count,
         if (report.sample_count == 1) "sample" else "samples",
         report.depth,
+    });
+    if (report.appearance) |appearance| try writer.print("exposure     {d} EV{s}, {t}\n", .{
+        appearance.exposure_ev,
+        if (appearance.is_automatic) " (automatic)" else "",
+        appearance.tone_mapping,
     });
     try writer.print("tracer       {s}, {d} {s}\n\n", .{
         report.variant,
@@ -170,6 +185,8 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
         .depth = report.depth,
         .threads = report.thread_count,
         .variant = Text{ .bytes = report.variant },
+        .exposure_ev = if (report.appearance) |appearance| appearance.exposure_ev else null,
+        .tonemap = if (report.appearance) |appearance| appearance.tone_mapping else null,
         .time_ms = .{
             .parse = milliseconds(times.parse_ns),
             .textures = milliseconds(times.texture_ns),
@@ -268,6 +285,7 @@ const report_for_test: Report = .{
     .bvh = .{ .node_count = 5, .depth = 3, .sah_cost = 12.3456, .bytes = 3 << 10 },
     .memory_peak_bytes = 5 << 20,
     .image_hash = 0xabc,
+    .appearance = .{ .exposure_ev = -9.31, .is_automatic = true, .tone_mapping = .neutral },
     .warnings = &.{ "one", "two" },
 };
 
@@ -282,6 +300,7 @@ test "the text, with and without tests counted" {
     const head =
         \\scene        a "b"??.glb, 34 triangles
         \\image        a.png, 1024 x 768, 1 sample a pixel, depth 6
+        \\exposure     -9.31 EV (automatic), neutral
         \\tracer       vector-beam-4, 4 threads
         \\
         \\parse            1.500 ms
@@ -327,6 +346,8 @@ test "the JSON has every key and nothing else" {
         depth: u32,
         threads: u32,
         variant: []const u8,
+        exposure_ev: ?f32,
+        tonemap: ?[]const u8,
         time_ms: struct {
             parse: f64,
             textures: f64,
@@ -349,6 +370,7 @@ test "the JSON has every key and nothing else" {
         var report = report_for_test;
         if (is_bare) {
             report.tests = null;
+            report.appearance = null;
             report.bvh.sah_cost = std.math.inf(f64);
             report.warnings = &.{};
         }
@@ -363,6 +385,9 @@ test "the JSON has every key and nothing else" {
         const value = parsed.value;
         try std.testing.expectEqualStrings("a \"b\"\n\u{fffd}.glb", value.scene);
         try std.testing.expectEqualStrings("0000000000000abc", value.image_hash);
+        try std.testing.expectEqual(@as(?f32, if (is_bare) null else -9.31), value.exposure_ev);
+        try std.testing.expectEqual(is_bare, value.tonemap == null);
+        if (value.tonemap) |name| try std.testing.expectEqualStrings("neutral", name);
         try std.testing.expectEqual(1.5, value.time_ms.parse);
         try std.testing.expectEqual(0.000001, value.time_ms.prepare);
         try std.testing.expectEqual(12_345.678901, value.time_ms.output);

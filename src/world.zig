@@ -6,6 +6,7 @@
 
 const std = @import("std");
 const math = @import("math.zig");
+const environment_file = @import("world/environment.zig");
 const geometry_file = @import("world/geometry.zig");
 const materials_file = @import("world/materials.zig");
 const textures_file = @import("world/textures.zig");
@@ -14,7 +15,12 @@ const view_file = @import("world/view.zig");
 pub const AnyTree = geometry_file.AnyTree;
 pub const Camera = view_file.Camera;
 pub const Child = geometry_file.Child;
-pub const Environment = @import("world/environment.zig").Environment;
+pub const Environment = environment_file.Environment;
+pub const EnvironmentLevel = environment_file.EnvironmentLevel;
+pub const EnvironmentMap = environment_file.EnvironmentMap;
+pub const EnvironmentPart = environment_file.EnvironmentPart;
+pub const EnvironmentSource = environment_file.EnvironmentSource;
+pub const EnvironmentTexel = environment_file.EnvironmentTexel;
 pub const Geometry = geometry_file.Geometry;
 pub const Lookup = textures_file.Lookup;
 pub const Light = @import("world/light.zig").Light;
@@ -47,6 +53,11 @@ pub const Frame = struct {
 
     /// Whether what is seen depends on how wide rays are: they have cones then.
     pub inline fn needsFootprints(frame: *const Frame) bool {
+        return frame.hasTextures() or frame.environment.map != null;
+    }
+
+    /// Whether a material has any.
+    pub inline fn hasTextures(frame: *const Frame) bool {
         return frame.materials.lookups.len > 0;
     }
 };
@@ -58,6 +69,10 @@ pub const Facts = struct {
     camera_is_default: bool = false,
     /// The file has no light that shines: the lights are three fixed to the camera.
     lights_are_default: bool = false,
+    /// The light is the studio's, for want of any other.
+    environment_is_default: bool = false,
+    /// Lights of the file that shine.
+    own_light_count: usize = 0,
     /// Triangles left out because they have no area or no finite place.
     degenerate_count: u64,
 };

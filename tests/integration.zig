@@ -11,6 +11,7 @@ const stb_image = @import("stb_image.zig");
 test {
     _ = @import("analytic.zig");
     _ = @import("decode.zig");
+    _ = @import("environment.zig");
     _ = @import("gltf_textures.zig");
     _ = @import("malformed.zig");
     _ = @import("offset.zig");

@@ -29,6 +29,8 @@ pub fn PathState(comptime Kernel: type) type {
         throughput: [Kernel.group_count]Vec3,
         /// Absorption coefficient of what the ray travels in, per metre.
         sigma_a: [Kernel.group_count]Vec3,
+        /// Of the roughest surface on the way: how far the environment is spread.
+        roughness: [Kernel.group_count]Kernel.Rays.F32,
         /// Ray cones (`ray_cone.zig`): width at the origin in metres, and its growth by distance;
         /// undefined in frames without footprints.
         cone_width: [Kernel.group_count]F32,

@@ -208,7 +208,7 @@ pub fn Visibility(comptime Kernel: type) type {
             const geometry = frame.geometry;
             const all = frame.materials.all;
             // Without vertex colours and textures it is the material's alone.
-            if (geometry.colors.len == 0 and !frame.needsFootprints()) {
+            if (geometry.colors.len == 0 and !frame.hasTextures()) {
                 const numbers = Corners.materialsOf(geometry, hit.primitive, ray.active);
                 return .of(&.of(all, numbers, ray.active), .white);
             }
@@ -218,7 +218,7 @@ pub fn Visibility(comptime Kernel: type) type {
             const materials: material_file.Materials(Rays) =
                 .of(all, corners.material, ray.active);
             const color = corners.colorAt(geometry, barycentrics);
-            if (!frame.needsFootprints()) return .of(&materials, color);
+            if (!frame.hasTextures()) return .of(&materials, color);
             // As wide as what the shadow falls on is seen; a cone with its apex in the light.
             const share: F32 = if (light.kind == .directional)
                 .splat(1)

@@ -160,6 +160,7 @@ pub noinline fn apply(
     const smooth = interaction_file.mix(Lanes, hit.barycentrics, corners.normal);
     const opposite = smooth.dot(point.normal_geometric).lt(.zero());
     point.curvature = .select(opposite, curvature.neg(), curvature);
+    if (!frame.hasTextures()) return;
     const materials: material_file.Materials(Lanes) =
         .of(frame.materials.all, corners.material, hit.mask);
     const place: Place(Lanes) = .{
