@@ -51,6 +51,23 @@ const directions = [12]Direction{
     .{ .azimuth_degrees = -150, .elevation_degrees = -30 },
 };
 
+/// The views of boards that stand upright, as signs and shelves do, to choose from: nearer to their
+/// fronts, so that what is on them can be read. For boards that face x, a quarter turn is added.
+const board_directions = [8]Direction{
+    .{ .azimuth_degrees = 15, .elevation_degrees = 10 },
+    .{ .azimuth_degrees = -15, .elevation_degrees = 10 },
+    .{ .azimuth_degrees = 165, .elevation_degrees = 10 },
+    .{ .azimuth_degrees = -165, .elevation_degrees = 10 },
+    .{ .azimuth_degrees = 15, .elevation_degrees = 45 },
+    .{ .azimuth_degrees = 165, .elevation_degrees = 45 },
+    .{ .azimuth_degrees = 15, .elevation_degrees = -45 },
+    .{ .azimuth_degrees = 165, .elevation_degrees = -45 },
+};
+
+/// The surface of a board is spread along its normal by at most that share of what it is along both
+/// other axes (standard deviations).
+const board_depth_max = 0.25;
+
 /// A view is good enough when it shows at least this share of what the best one shows.
 const visible_share_min = 0.5;
 
@@ -353,7 +370,13 @@ fn areaNormal(geometry: *const world.Geometry, triangle: *const world.Triangle) 
 /// The axes to look along.
 fn chooseBasis(shown: *const Shown, bounds: math.Box3) Basis {
     if (flatFront(shown, bounds)) |front| return .look(vec3d.neg(front), .{ 0, 1, 0 });
-    return .ofDirection(directions[chooseDirection(shown)]);
+    const axis = boardAxis(shown, bounds) orelse
+        return .ofDirection(chooseDirection(shown, &directions));
+    var turned = board_directions;
+    if (axis == 0) for (&turned) |*direction| {
+        direction.azimuth_degrees += 90;
+    };
+    return .ofDirection(chooseDirection(shown, &turned));
 }
 
 /// The direction that the front of a flat model looks to, null for others. Where both sides show as
@@ -415,11 +438,38 @@ const Samples = struct {
     }
 };
 
-/// Index of the first direction that shows enough: the area of fronts (and backs, where they are
+/// The axis, x or z, that a board faces; null for other models. By how the area is spread, so that
+/// a few things before or behind the board do not count much.
+fn boardAxis(shown: *const Shown, bounds: math.Box3) ?usize {
+    const middle: Vec3d = .{ bounds.lower[0], bounds.lower[1], bounds.lower[2] };
+    var all: f64 = 0;
+    var sum: Vec3d = .{ 0, 0, 0 };
+    var squares: Vec3d = .{ 0, 0, 0 };
+    var samples: Samples = .{ .shown = shown };
+    while (samples.next()) |triangle| {
+        const area = vec3d.length(areaNormal(shown.geometry, triangle)) / 3;
+        for (triangle.corner) |vertex| {
+            const at = relativeTo(middle, shown.geometry.positions[vertex]);
+            sum = vec3d.add(sum, vec3d.scale(at, area));
+            squares = vec3d.add(squares, vec3d.scale(vec3d.mul(at, at), area));
+            all += area;
+        }
+    }
+    var variance: Vec3d = undefined;
+    for (&variance, sum, squares) |*to, first, second| {
+        to.* = second / all - (first / all) * (first / all);
+    }
+    const share = board_depth_max * board_depth_max;
+    if (variance[2] <= share * @min(variance[0], variance[1])) return 2;
+    if (variance[0] <= share * @min(variance[1], variance[2])) return 0;
+    return null;
+}
+
+/// The first direction that shows enough: the area of fronts (and backs, where they are
 /// seen too) projected along it. What stands in front of what is not looked at.
-fn chooseDirection(shown: *const Shown) usize {
+fn chooseDirection(shown: *const Shown, choices: []const Direction) Direction {
     var toward: [directions.len]Vec3d = undefined;
-    for (directions, &toward) |direction, *to| {
+    for (choices, toward[0..choices.len]) |direction, *to| {
         to.* = vec3d.neg(Basis.ofDirection(direction).forward);
     }
     var visible: [directions.len]f64 = @splat(0);
@@ -427,14 +477,14 @@ fn chooseDirection(shown: *const Shown) usize {
     while (samples.next()) |triangle| {
         const normal = areaNormal(shown.geometry, triangle);
         const back: f64 = if (shown.materials[triangle.material].double_sided) -1 else 0;
-        for (toward, &visible) |to, *sum| {
+        for (toward[0..choices.len], visible[0..choices.len]) |to, *sum| {
             const projected = vec3d.dot(normal, to);
             sum.* += if (projected > 0) projected else projected * back;
         }
     }
     var best: f64 = 0;
     for (visible) |sum| best = if (sum > best) sum else best;
-    for (visible, 0..) |sum, choice| {
+    for (choices, visible[0..choices.len]) |choice, sum| {
         if (sum >= best * visible_share_min) return choice;
     }
     unreachable; // The best one passes.
