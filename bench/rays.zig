@@ -152,7 +152,10 @@ const Bench = struct {
         }
         for (0..options.subdivide) |_| try input.subdivide(scene);
         try session.pose(.{ .lanes = compiled[options.chosen()[0]].lanes });
-        session.view(.{ .resolution = .{ options.size, options.size } }) catch |err|
+        session.view(.{
+            .resolution = .{ options.size, options.size },
+            .environment = .{ .source = .none },
+        }) catch |err|
             return bench.named(options.scene, err);
         session.dropScene();
     }

@@ -244,6 +244,7 @@ pub const Bench = struct {
             .tree_quality = settings.tree_quality,
             .view = .{
                 .resolution = .{ settings.width, settings.height },
+                .environment = .{ .source = .none },
                 .display_referred = false,
             },
             .sample_count = settings.sample_count,

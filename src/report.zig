@@ -31,6 +31,7 @@ pub const Report = struct {
     rays: statistics.RayCounts,
     /// Null: not counted.
     tests: ?statistics.TestCounts,
+    textures: Textures = .{},
     bvh: Bvh,
     memory_peak_bytes: u64,
     image_hash: u64,
@@ -38,6 +39,8 @@ pub const Report = struct {
     appearance: ?Appearance = null,
     warnings: []const []const u8 = &.{},
 
+    /// What images became.
+    pub const Textures = struct { count: u64 = 0, bytes: u64 = 0 };
     /// How radiance became what a display can show.
     pub const Appearance = struct {
         exposure_ev: f32,
@@ -111,6 +114,7 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
     });
     inline for (.{
         .{ "parse", times.parse_ns },
+        .{ "textures", times.texture_ns },
         .{ "prepare", times.prepare_ns },
         .{ "BVH build", times.bvh_build_ns },
         .{ "trace", times.trace_ns },
@@ -141,6 +145,10 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
         report.bvh.node_count, report.bvh.depth, report.bvh.sah_cost,
     });
     try writeBytes(writer, report.bvh.bytes);
+    if (report.textures.count > 0) {
+        try writer.print("\ntextures     {d}, ", .{report.textures.count});
+        try writeBytes(writer, report.textures.bytes);
+    }
     try writer.writeAll("\nmemory       ");
     try writeBytes(writer, report.memory_peak_bytes);
     try writer.writeAll(" at most\n");
@@ -181,6 +189,7 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
         .tonemap = if (report.appearance) |appearance| appearance.tone_mapping else null,
         .time_ms = .{
             .parse = milliseconds(times.parse_ns),
+            .textures = milliseconds(times.texture_ns),
             .prepare = milliseconds(times.prepare_ns),
             .bvh_build = milliseconds(times.bvh_build_ns),
             .trace = milliseconds(times.trace_ns),
@@ -189,6 +198,7 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
         },
         .rays = report.rays,
         .tests = report.tests,
+        .textures = report.textures,
         .bvh = .{
             .nodes = report.bvh.node_count,
             .depth = report.bvh.depth,
@@ -257,6 +267,7 @@ const report_for_test: Report = .{
     .variant = "vector-beam-4",
     .times = .{
         .parse_ns = 1_500_000,
+        .texture_ns = 250_000,
         .prepare_ns = 1,
         .bvh_build_ns = 0,
         .trace_ns = 2_000_000,
@@ -270,6 +281,7 @@ const report_for_test: Report = .{
         .triangle_issued = 0,
         .triangle_useful = 0,
     },
+    .textures = .{ .count = 2, .bytes = 7 << 10 },
     .bvh = .{ .node_count = 5, .depth = 3, .sah_cost = 12.3456, .bytes = 3 << 10 },
     .memory_peak_bytes = 5 << 20,
     .image_hash = 0xabc,
@@ -292,6 +304,7 @@ test "the text, with and without tests counted" {
         \\tracer       vector-beam-4, 4 threads
         \\
         \\parse            1.500 ms
+        \\textures         0.250 ms
         \\prepare          0.000 ms
         \\BVH build        0.000 ms
         \\trace            2.000 ms
@@ -304,6 +317,7 @@ test "the text, with and without tests counted" {
     ;
     const tail =
         \\BVH          5 nodes, depth 3, SAH cost 12.35, 3.0 KiB
+        \\textures     2, 7.0 KiB
         \\memory       5.0 MiB at most
         \\image hash   0000000000000abc
         \\
@@ -336,6 +350,7 @@ test "the JSON has every key and nothing else" {
         tonemap: ?[]const u8,
         time_ms: struct {
             parse: f64,
+            textures: f64,
             prepare: f64,
             bvh_build: f64,
             trace: f64,
@@ -344,6 +359,7 @@ test "the JSON has every key and nothing else" {
         },
         rays: statistics.RayCounts,
         tests: ?statistics.TestCounts,
+        textures: struct { count: u64, bytes: u64 },
         bvh: struct { nodes: u64, depth: u32, sah_cost: ?f64, bytes: u64 },
         memory_peak_bytes: u64,
         image_hash: []const u8,
@@ -375,6 +391,7 @@ test "the JSON has every key and nothing else" {
         try std.testing.expectEqual(1.5, value.time_ms.parse);
         try std.testing.expectEqual(0.000001, value.time_ms.prepare);
         try std.testing.expectEqual(12_345.678901, value.time_ms.output);
+        try std.testing.expectEqual(7 << 10, value.textures.bytes);
         try std.testing.expectEqual(786_432, value.rays.primary);
         try std.testing.expectEqual(5 << 20, value.memory_peak_bytes);
         try std.testing.expectEqualDeep(report.tests, value.tests);

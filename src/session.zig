@@ -8,18 +8,21 @@
 
 const std = @import("std");
 const builtin_scenes = @import("builtin.zig");
+const math = @import("math.zig");
 const output = @import("output.zig");
 const parallel = @import("parallel.zig");
 const parse = @import("parse.zig");
 const prepare = @import("prepare.zig");
 const settings = @import("settings.zig");
-const srgb = @import("math.zig").srgb;
+const srgb = math.srgb;
 const statistics = @import("statistics.zig");
 const trace = @import("trace.zig");
 const variant = @import("variant.zig");
+const Environment = @import("session/environment.zig").Environment;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
 const Film = film_file.Film;
+const Identity = @import("identity.zig").Identity;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
@@ -39,10 +42,22 @@ pub fn loadScene(
     choices: settings.Load,
     diagnostic: *Diagnostic,
 ) LoadError!Scene {
-    const builtin_name = std.mem.cutPrefix(u8, name, settings.builtin_prefix) orelse
-        return parse.parse(gpa, io, name, choices, diagnostic);
-    return builtin_scenes.build(gpa, builtin_name, diagnostic);
+    var scene = if (std.mem.cutPrefix(u8, name, settings.builtin_prefix)) |builtin_name| builtin: {
+        try parse.checkOnly(choices, diagnostic);
+        break :builtin try builtin_scenes.build(gpa, builtin_name, diagnostic);
+    } else try parse.parse(gpa, io, name, choices, diagnostic);
+    errdefer scene.deinit();
+    if (choices.up_axis == .z) try scene.turn(z_to_y);
+    return scene;
 }
+
+/// A quarter turn about x.
+const z_to_y: math.AffineD = .{
+    .x = .{ 1, 0, 0 },
+    .y = .{ 0, 0, -1 },
+    .z = .{ 0, 1, 0 },
+    .translation = .{ 0, 0, 0 },
+};
 
 /// How the tree over the placed geometry is built.
 pub const Pose = struct {
@@ -68,8 +83,14 @@ pub const Session = struct {
     scene: ?Scene = null,
     ownership: Ownership = .owned,
     facts: Facts = .{},
+    texture_side_max: u32 = settings.texture_side.default,
+    /// Made by the first `pose` of a scene.
+    loaded: ?prepare.Loaded = null,
     seen: settings.View = .{},
     world: ?World = null,
+    environment: Environment = .{},
+    /// The file that the picture is to replace.
+    output: ?Identity = null,
     film: ?Film = null,
     traced: trace.Statistics = .{},
     /// What the film was traced with.
@@ -77,7 +98,7 @@ pub const Session = struct {
     /// What it was written with, where that is not linear.
     appearance: ?Report.Appearance = null,
 
-    pub const Error = LoadError || prepare.Error;
+    pub const Error = LoadError || prepare.Error || @import("session/environment.zig").Error;
 
     /// Whether the scene is freed with the session, or only looked at: then it must live on until
     /// the last `view`.
@@ -107,8 +128,10 @@ pub const Session = struct {
     /// Frees everything and ends the threads.
     pub fn deinit(session: *Session) void {
         session.dropWorld();
+        session.dropLoaded();
         session.dropScene();
         if (session.film) |*film| film.deinit(session.gpa);
+        session.environment.deinit();
         session.pool.deinit();
         session.* = undefined;
     }
@@ -126,6 +149,8 @@ pub const Session = struct {
         const start = Io.Clock.awake.now(session.io);
         const scene = try loadScene(session.gpa, session.io, name, choices, session.diagnostic);
         session.adopt(scene, .owned);
+        session.output = choices.output;
+        session.texture_side_max = choices.texture_side_max;
         session.start = start;
         session.times.parse_ns = session.since(start);
     }
@@ -133,8 +158,10 @@ pub const Session = struct {
     /// Takes a scene that is in memory, in place of the one before.
     pub fn adopt(session: *Session, scene: Scene, ownership: Ownership) void {
         session.dropWorld();
+        session.dropLoaded();
         session.dropScene();
         session.start = Io.Clock.awake.now(session.io);
+        session.environment.dropScene();
         session.scene = scene;
         session.ownership = ownership;
         session.facts = .{
@@ -159,10 +186,24 @@ pub const Session = struct {
         session.world = null;
     }
 
-    /// Places the geometry and builds the tree over it. Asserts that there is a scene.
+    fn dropLoaded(session: *Session) void {
+        if (session.loaded) |*loaded| loaded.deinit();
+        session.loaded = null;
+    }
+
+    /// Places the geometry and builds the tree over it; the first time, decodes the textures.
+    /// Asserts that there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
         session.dropWorld();
-        session.world = try prepare.pose(session.gpa, session.io, &session.scene.?, .{
+        const scene = &session.scene.?;
+        if (session.loaded == null) {
+            session.loaded = try prepare.load(session.gpa, session.io, scene, .{
+                .pool = &session.pool,
+                .side_max = session.texture_side_max,
+            }, session.diagnostic, &session.times);
+        }
+        const loaded = &session.loaded.?;
+        session.world = try prepare.pose(session.gpa, session.io, scene, loaded, .{
             .lanes = chosen.lanes,
             .pool = &session.pool,
             .tree_quality = chosen.tree_quality,
@@ -174,12 +215,28 @@ pub const Session = struct {
     pub fn view(session: *Session, choices: settings.View) Error!void {
         if (session.pool.cancelled.load(.monotonic)) return error.Canceled;
         session.seen = choices;
+        // Until it is chosen anew.
+        session.world.?.environment.map = null;
+        const start = Io.Clock.awake.now(session.io);
+        var environment = try session.environment.choose(
+            session.gpa,
+            session.io,
+            &session.pool,
+            &session.scene.?,
+            &choices.environment,
+            session.output,
+            session.diagnostic,
+        );
+        environment.is_seen = choices.background == .env or choices.background == .studio;
+        session.times.prepare_ns += session.since(start);
         try prepare.view(&session.world.?, session.io, &session.scene.?, .{
             .camera = choices.camera,
+            .viewpoint = choices.viewpoint,
             .resolution = choices.resolution,
+            .long_side = choices.long_side,
             .ambient = choices.ambient,
             .background = radianceOf(choices.background),
-            .shows_environment = choices.background == .env or choices.background == .studio,
+            .environment = environment,
         }, session.diagnostic, &session.times);
     }
 
@@ -349,6 +406,7 @@ pub const Session = struct {
     pub fn report(session: *const Session, choices: settings.Render) Report {
         const image = &session.film.?.image;
         const tree = &session.world.?.facts.tree;
+        const textures = &session.loaded.?.textures;
         return .{
             .triangle_count = session.facts.triangle_count,
             .width = image.width,
@@ -360,6 +418,10 @@ pub const Session = struct {
             .times = session.times,
             .rays = session.traced.rays,
             .tests = session.traced.tests,
+            .textures = .{
+                .count = textures.textures.all.len,
+                .bytes = textures.byte_count,
+            },
             .bvh = .{
                 .node_count = tree.node_count,
                 .depth = tree.depth,

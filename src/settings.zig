@@ -41,6 +41,8 @@ pub const side_small = 512;
 pub const depth: Range = .{ .min = 0, .max = 32, .default = 6 };
 /// Straight pieces that a full circle becomes.
 pub const tessellation: Range = .{ .min = 4, .max = 1024, .default = 32 };
+/// Longest side of a texture, in texels; larger images are halved until they fit.
+pub const texture_side: Range = .{ .min = 1, .max = 32_768, .default = 32_768 };
 /// Sides of tiles, in pixels: multiples of `tile_size_step`.
 pub const tile_size: Range = .{ .min = 4, .max = 512, .default = 32 };
 pub const tile_size_step = 4;
@@ -48,10 +50,14 @@ pub const tile_size_step = 4;
 pub const side: Range = .{ .min = 1, .max = 65_536, .default = 1024 };
 /// Pixels of a picture.
 pub const pixel_count_max = 1 << 28;
+/// The longer side where it alone is given: a square one has as many pixels as there may be.
+pub const long_side: Range = .{ .min = 1, .max = 1 << 14, .default = side.default };
 /// Quality of a JPEG.
 pub const jpeg_quality: Range = .{ .min = 1, .max = 100, .default = 90 };
 /// Largest exposure either way, in stops.
 pub const exposure_ev_max = 64;
+/// Directional lights a sample that stand for an environment, to find how much of it arrives.
+pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4 };
 /// Largest that automatic exposure chooses.
 pub const exposure_auto_ev_max = 10;
 /// Radiance from everywhere in scenes without lights.
@@ -95,6 +101,57 @@ pub const Camera = union(enum) {
     name: []const u8,
 };
 
+/// Whole vertical angle of view, in degrees.
+pub const fov_degrees: struct { min: f32, max: f32 } = .{ .min = 0.01, .max = 179 };
+
+/// Where a camera stands about its target (as model-viewer's `camera-orbit`):
+/// eye = target + radius (sin phi sin theta, cos phi, sin phi cos theta).
+pub const Orbit = struct {
+    /// To the right of +z; finite.
+    theta_degrees: f32,
+    /// From straight above: 0 to 180.
+    phi_degrees: f32,
+    radius: Radius = .default,
+
+    /// Above 0.
+    pub const Radius = union(enum) {
+        metres: f32,
+        /// Of the distance that shows all of the model.
+        share: f32,
+
+        pub const default: Radius = .{ .share = 1 };
+    };
+};
+
+/// A camera of the user's own; what is null follows from a framing of the scene. Numbers are
+/// finite; not both `eye` and `orbit`; `orthographic` without `fov_degrees`.
+pub const Viewpoint = struct {
+    eye: ?[3]f32 = null,
+    target: ?[3]f32 = null,
+    /// What is upwards in the picture, not zero; null: y.
+    up: ?[3]f32 = null,
+    orbit: ?Orbit = null,
+    /// Within `fov_degrees`; by itself, it changes the camera that is there.
+    fov_degrees: ?f32 = null,
+    orthographic: bool = false,
+
+    /// Whether it stands in place of the file's camera.
+    pub fn replacesCamera(viewpoint: *const Viewpoint) bool {
+        return viewpoint.eye != null or viewpoint.target != null or viewpoint.up != null or
+            viewpoint.orbit != null or viewpoint.orthographic;
+    }
+};
+/// Which of a file's scenes to read.
+pub const SceneChoice = union(enum) {
+    /// The one that the file shows.
+    default,
+    index: u32,
+    name: []const u8,
+};
+
+/// The axis of a scene that points up.
+pub const UpAxis = enum { y, z };
+
 /// What is seen where there is nothing.
 pub const Background = union(enum) {
     /// The scene's own, else a quiet gradient.
@@ -108,6 +165,27 @@ pub const Background = union(enum) {
     srgb: [3]u8,
     /// Radiance of red, green and blue, finite and >= 0.
     linear: [3]f32,
+};
+
+/// Light from all around.
+pub const Environment = struct {
+    source: Source = .default,
+    /// Multiplies its radiance, finite and >= 0.
+    intensity: f32 = 1,
+    /// Turn about y in degrees, counter-clockwise from above; null: none, but the studio turns with
+    /// the camera.
+    rotation_deg: ?f32 = null,
+    /// Within `environment_shadow_count`.
+    shadow_count: u32 = environment_shadow_count.default,
+
+    pub const Source = union(enum) {
+        /// The scene's, or the studio where a scene has no light at all.
+        default,
+        none,
+        studio,
+        /// An image by its name.
+        file: []const u8,
+    };
 };
 
 /// How radiance becomes brightness.
@@ -158,6 +236,11 @@ pub const Load = struct {
     allow_outside: bool = false,
     /// Within `tessellation`.
     tessellation: u32 = tessellation.default,
+    /// Within `texture_side`.
+    texture_side_max: u32 = texture_side.default,
+    scene: SceneChoice = .default,
+    /// Where it is not y, the scene is turned about x until it is.
+    up_axis: UpAxis = .y,
     /// A file that is about to be replaced: a scene that is read from it is refused.
     output: ?Identity = null,
 };
@@ -165,11 +248,15 @@ pub const Load = struct {
 /// What is seen of a scene, and by what light.
 pub const View = struct {
     camera: Camera = .default,
-    /// Width and height in pixels; null: the scene's, or its camera's aspect with `side.default` on
-    /// the long side.
+    /// Asserted to be empty but for `fov_degrees` with a camera by index or name.
+    viewpoint: Viewpoint = .{},
+    /// Width and height in pixels; null: the scene's, or its camera's aspect.
     resolution: ?[2]u32 = null,
+    /// Within `long_side`, where there is no `resolution`; null: the scene's, or the default.
+    long_side: ?u32 = null,
     /// Radiance from everywhere, finite and >= 0; null: as the lights have it.
     ambient: ?f32 = null,
+    environment: Environment = .{},
     background: Background = .default,
     /// Colours of unlit surfaces and of the background are the display's, neither exposed nor tone
     /// mapped; without it, as in the thesis, they are radiance, and the background's default comes

@@ -267,6 +267,8 @@ test "mistakes on the command line are usage errors in one line" {
         &.{ "builtin:cornell", "--bvh=best" },
         &.{ "builtin:cornell", "-r8x8", "--camera=no such camera" },
         &.{ "builtin:cornell", "-r8x8", "--camera=99" },
+        &.{ "builtin:cornell", "-r8x8", "--scene=1" },
+        &.{ "builtin:cornell", "-r8x8", "--up-axis=x" },
     }) |arguments| {
         const ending = try sandbox.expectExit(2, arguments);
         try expectOneErrorLine(ending);
@@ -281,7 +283,7 @@ test "help is for everybody, fits a screen and keeps its promises" {
     defer sandbox.deinit();
     const help = try sandbox.expectExit(0, &.{"--help"});
     try testing.expectEqualStrings("", help.stderr);
-    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 60);
+    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 64);
     const again = try sandbox.expectExit(0, &.{ "absent.glb", "--no-such-flag", "-h" });
     try testing.expectEqualStrings(help.stdout, again.stdout);
     // The built-in scenes that the help names are those that there are.
@@ -294,6 +296,45 @@ test "help is for everybody, fits a screen and keeps its promises" {
         try testing.expect(std.mem.find(u8, help.stdout, name) != null);
     }
     try sandbox.expectEmpty();
+}
+
+test "one of several scenes is chosen by its name or index, and z may point up" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("s.gltf",
+        \\{"asset":{"version":"2.0"},"scene":1,
+        \\"scenes":[{"name":"flat","nodes":[0]},{"name":"fl\u0061t z","nodes":[1]},{"nodes":[]}],
+        \\"nodes":[{"mesh":0},{"mesh":0,"matrix":[1,0,0,0,0,0,1,0,0,-1,0,0,0,0,0,1]}],
+        \\"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        \\"accessors":[{"bufferView":0,"componentType":5121,"count":3,"type":"VEC3"}],
+        \\"extensionsUsed":["KHR_mesh_quantization"],
+        \\"bufferViews":[{"buffer":0,"byteLength":11,"byteStride":4}],
+        \\"buffers":[{"byteLength":11,"uri":"data:;base64,AAAAAAEAAAAAAQA="}]}
+    );
+    var pictures: [6][]const u8 = undefined;
+    for (&pictures, [_][2][]const u8{
+        .{ "--scene=flat", "--up-axis=y" },
+        .{ "--scene=0", "--up-axis=y" },
+        .{ "--scene=1", "--up-axis=z" },
+        .{ "--scene=flat z", "--up-axis=z" },
+        .{ "-q", "--up-axis=z" },
+        .{ "-q", "-q" },
+    }) |*picture, choice| {
+        const arguments = [_][]const u8{ "s.gltf", "-q", "-r8x8", "-oa.ppm" } ++ choice;
+        _ = try sandbox.expectExit(0, &arguments);
+        picture.* = try sandbox.read("a.ppm");
+    }
+    for (pictures[1..5]) |picture| try testing.expectEqualStrings(pictures[0], picture);
+    try testing.expect(!std.mem.eql(u8, pictures[0], pictures[5]));
+    const cases = [_][2][]const u8{
+        .{ "--scene=3", "no scene 3; the file has 0 'flat', 1 'flat z', 2\n" },
+        .{ "--scene=x", "no scene 'x'; the file has 0 'flat', 1 'flat z', 2\n" },
+    };
+    for (cases) |case| {
+        const ending = try sandbox.expectExit(2, &.{ "s.gltf", "-r8x8", "-ono.ppm", case[0] });
+        try expectOneErrorLine(ending);
+        try testing.expectStringEndsWith(ending.stderr, case[1]);
+    }
 }
 
 test "a scene is rendered to its name, with a report on stdout" {

@@ -95,6 +95,29 @@ inline fn generate(
         .{ .origin = origin, .direction = point };
 }
 
+/// How wide primary rays are.
+pub const Footprint = struct {
+    /// At the origin, in metres.
+    width: f32,
+    /// Growth by distance, times the length of the ray's direction.
+    slope: f32,
+};
+
+/// The part of a pixel that one of its samples stands for: a square of the same area.
+pub fn footprint(view: *const world_file.View, sample_count: u32) Footprint {
+    const camera = &view.camera;
+    const width: f32 = @floatFromInt(view.width);
+    const height: f32 = @floatFromInt(view.height);
+    const across = vec3.length(camera.right) * (2 / width);
+    const upward = vec3.length(camera.up) * (2 / height);
+    const count: f32 = @floatFromInt(sample_count);
+    const side = @sqrt(across * upward / count);
+    return if (camera.orthographic)
+        .{ .width = side, .slope = 0 }
+    else
+        .{ .width = 0, .slope = side };
+}
+
 /// The directions of the primary rays of a bundle, pixel by pixel; null where they do not share an
 /// origin.
 pub fn grid(view: *const world_file.View, rectangle: Rectangle, offset: Offset) ?Grid {
