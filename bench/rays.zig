@@ -377,9 +377,8 @@ const Bench = struct {
             bench.diagnostic,
         );
         defer target.abandon();
-        try raylane.output.write(bench.gpa, &image, .{
+        _ = try raylane.output.write(bench.gpa, .{ .image = &image }, .{
             .format = .pfm,
-            .exposure = .{ .ev = 0 },
             .pool = &bench.session.pool,
         }, &target, bench.diagnostic);
     }

@@ -245,6 +245,7 @@ pub const Bench = struct {
             .view = .{
                 .resolution = .{ settings.width, settings.height },
                 .environment = .{ .source = .none },
+                .display_referred = false,
             },
             .sample_count = settings.sample_count,
             .depth = settings.depth,

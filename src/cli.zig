@@ -6,6 +6,7 @@
 
 const std = @import("std");
 const bench = @import("cli/bench.zig");
+const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
 const settings = @import("settings.zig");
@@ -105,22 +106,23 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--exposure EV|auto",
-            .help = comptimePrint("brighten by EV stops, or so that {d} % of the pixels\n" ++
-                "are no brighter than {d} (default: 0)", .{
-                settings.auto_exposure.percentile, settings.auto_exposure.brightness,
-            }),
+            .help = "brighten by EV stops, or by what is seen (default:\n" ++
+                "auto for scenes with lights of their own, else 0)",
         },
         .{
-            .usage = "--tonemap linear",
-            .help = "clamp, then encode as sRGB: the only way there is",
+            .usage = "--tonemap CURVE",
+            .help = namesOf(settings.ToneMapping) ++ " (default: neutral)",
         },
         .{
             .usage = "--background WHAT",
-            .help = "env: the environment, transparent, #rrggbb (sRGB) or\nR,G,B (linear)",
+            .help = "env, studio, transparent, a CSS colour (red, #rrggbb)\n" ++
+                "or radiance R,G,B (default: a grey gradient)",
         },
     } },
     .{ .title = "Scene", .options = &.{
         .{ .usage = "--camera WHICH", .help = "name or index of a camera, or auto: all in view" },
+        .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
+        .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
         .{
             .usage = "--env FILE",
             .help = "light from all around: an equirectangular image of\n" ++
@@ -180,7 +182,11 @@ const sections: []const Section = &.{
     .{ .title = "Rendering (PBRT scenes bring their own spp and depth)", .options = &.{
         .{
             .usage = "--spp N",
-            .help = "samples a pixel, " ++ settings.sample_count.textWithDefault(),
+            .help = comptimePrint("samples a pixel, {s} (default: {d}, or {d} where\n" ++
+                "the long side is below {d})", .{
+                settings.sample_count.text(), settings.sample_count.default,
+                settings.sample_count_small,  settings.side_small,
+            }),
         },
         .{
             .usage = "--depth N",
@@ -190,8 +196,8 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--thesis",
-            .help = comptimePrint("{d}x{d}, {d} sample, depth {d}, all CPUs; what follows\n" ++
-                "it still counts", .{
+            .help = comptimePrint("{d}x{d}, {d} sample, depth {d}, linear, all CPUs; what\n" ++
+                "follows it still counts", .{
                 settings.thesis.resolution[0], settings.thesis.resolution[1],
                 settings.thesis.sample_count,  settings.thesis.depth,
             }),
@@ -351,8 +357,11 @@ const Parser = struct {
             .camera => options.view.camera = cameraOf(given.value) orelse
                 return reader.bad(given, "a camera's name, its index, or auto"),
             .eye, .target, .up, .orbit, .fov, .ortho => try parser.setViewpoint(given),
+            .scene => options.load.scene = sceneOf(given.value) orelse
+                return reader.bad(given, "a scene's name or its index"),
+            .up_axis => options.load.up_axis = try reader.choice(given, settings.UpAxis),
             .background => options.view.background = backgroundOf(given.value) orelse
-                return reader.bad(given, "env, transparent, #rrggbb, or R,G,B of 0 or more"),
+                return reader.bad(given, "env, studio, transparent, a colour or R,G,B"),
             .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
             .ambient => options.view.ambient = radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
@@ -360,8 +369,8 @@ const Parser = struct {
                 return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
                     settings.exposure_ev_max, settings.exposure_ev_max,
                 })),
-            .tonemap => if (!std.mem.eql(u8, given.value, "linear")) {
-                return reader.bad(given, "linear");
+            .tonemap => {
+                options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
             },
             .stats => options.stats = try reader.choice(given, Stats),
             .thesis => {
@@ -371,6 +380,10 @@ const Parser = struct {
                 options.render.depth = settings.thesis.depth;
                 options.thread_count = null;
                 options.view.environment.source = .none;
+                options.view.background = .default;
+                options.view.display_referred = false;
+                options.write.exposure = settings.thesis.exposure;
+                options.write.tone_mapping = settings.thesis.tone_mapping;
             },
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .variant => options.render.variant = try parser.variantOf(given.value),
@@ -575,19 +588,25 @@ fn tileSizeOf(text: []const u8) ?u32 {
 fn cameraOf(text: []const u8) ?settings.Camera {
     if (text.len == 0) return null;
     if (std.mem.eql(u8, text, "auto")) return .auto;
-    const any: settings.Range = .{ .min = 0, .max = std.math.maxInt(u32) };
-    const index = integer(text, any) orelse return .{ .name = text };
+    const index = integer(text, any_index) orelse return .{ .name = text };
     return .{ .index = index };
 }
 
+fn sceneOf(text: []const u8) ?settings.SceneChoice {
+    if (text.len == 0) return null;
+    const index = integer(text, any_index) orelse return .{ .name = text };
+    return .{ .index = index };
+}
+
+const any_index: settings.Range = .{ .min = 0, .max = std.math.maxInt(u32) };
+
 fn backgroundOf(text: []const u8) ?settings.Background {
     if (std.mem.eql(u8, text, "transparent")) return .transparent;
-    if (std.mem.eql(u8, text, "env")) return .environment;
-    if (text.len == 7 and text[0] == '#') {
-        var codes: [3]u8 = undefined;
-        _ = std.fmt.hexToBytes(&codes, text[1..]) catch return null;
-        return .{ .srgb = codes };
-    }
+    if (std.mem.eql(u8, text, "env")) return .env;
+    if (std.mem.eql(u8, text, "studio")) return .studio;
+    if (std.mem.cutPrefix(u8, text, "#")) |digits|
+        return .{ .srgb = colors.hexadecimal(digits) orelse return null };
+    if (colors.named(text)) |codes| return .{ .srgb = codes };
     var color: [3]f32 = undefined;
     var parts = std.mem.splitScalar(u8, text, ',');
     for (&color) |*component| {
@@ -733,10 +752,19 @@ test "numbers keep to their ranges" {
         },
         .{
             .flag = "--background",
-            .good = &.{ "transparent", "#000000", "#FFaa01", "0,0,0", "1,0.5,1e3" },
-            .bad = &.{ "#fff", "#gggggg", "#0000000", "red", "1,2", "1,2,3,4", "1,2,-1", ",,", "" },
+            .good = &.{
+                "transparent", "env", "studio", "#000000", "#FFaa01", "#fA1", "red", "0,0,0",
+                "1,0.5,1e3",
+            },
+            .bad = &.{
+                "#ffff", "#gggggg", "#0000000", "rod", "1,2", "1,2,3,4", "1,2,-1", ",,", "", "#",
+            },
         },
-        .{ .flag = "--tonemap", .good = &.{"linear"}, .bad = &.{ "aces", "" } },
+        .{
+            .flag = "--tonemap",
+            .good = &.{ "neutral", "aces", "agx", "linear" },
+            .bad = &.{ "ACES", "reinhard", "" },
+        },
         .{ .flag = "--stats", .good = &.{ "text", "json", "none" }, .bad = &.{ "JSON", "" } },
         .{ .flag = "--bvh", .good = &.{ "fast", "default", "high" }, .bad = &.{ "High", "" } },
         .{
@@ -772,6 +800,8 @@ test "numbers keep to their ranges" {
             .good = &.{ "45", "0.01", "179" },
             .bad = &.{ "0", "180", "-45", "nan", "inf", "", "45deg" },
         },
+        .{ .flag = "--scene", .good = &.{ "0", "4294967296", "b c", "auto" }, .bad = &.{""} },
+        .{ .flag = "--up-axis", .good = &.{ "y", "z" }, .bad = &.{ "", "x", "Z", "-y" } },
         .{ .flag = "--output", .good = &.{ "-", "a.png", "b/A.PPM" }, .bad = &.{ "", "png" } },
     };
     for (cases) |case| {
@@ -796,8 +826,14 @@ test "values arrive as they were meant" {
     try std.testing.expectEqual(.auto, (try optionsForTest(&.{"--camera=auto"})).view.camera);
     const named = (try optionsForTest(&.{"--camera=7a"})).view.camera;
     try std.testing.expectEqualStrings("7a", named.name);
+    try std.testing.expectEqual(7, (try optionsForTest(&.{"--scene=7"})).load.scene.index);
+    const named_scene = (try optionsForTest(&.{"--scene=auto"})).load.scene;
+    try std.testing.expectEqualStrings("auto", named_scene.name);
+    try std.testing.expectEqual(.z, (try optionsForTest(&.{"--up-axis=z"})).load.up_axis);
     const background = (try optionsForTest(&.{"--background=#FF8001"})).view.background;
     try std.testing.expectEqual([3]u8{ 255, 128, 1 }, background.srgb);
+    const name = (try optionsForTest(&.{"--background=Tan"})).view.background;
+    try std.testing.expectEqual([3]u8{ 0xd2, 0xb4, 0x8c }, name.srgb);
     const linear = (try optionsForTest(&.{"--background=0,0.5,2"})).view.background;
     try std.testing.expectEqual([3]f32{ 0, 0.5, 2 }, linear.linear);
     const denormal = (try optionsForTest(&.{"--ambient=1e-40"})).view.ambient;
@@ -864,6 +900,9 @@ test "the last of several options counts, around --thesis too" {
     try std.testing.expectEqual(3, thesis.render.depth);
     try std.testing.expectEqual(1, thesis.render.sample_count);
     try std.testing.expectEqual(null, thesis.thread_count);
+    try std.testing.expectEqual(0, thesis.write.exposure.ev);
+    try std.testing.expectEqual(.linear, thesis.write.tone_mapping);
+    try std.testing.expect(!thesis.view.display_referred);
     const changed = try optionsForTest(&.{ "--thesis", "--depth=9", "-t7" });
     try std.testing.expectEqual(9, changed.render.depth);
     try std.testing.expectEqual(7, changed.thread_count);
@@ -930,6 +969,7 @@ test "the help fits a screen and says what flags take and may be" {
 test {
     _ = bench;
     _ = @import("cli/arguments.zig");
+    _ = colors;
     _ = @import("cli/nearest.zig");
 }
 

@@ -8,9 +8,11 @@
 const std = @import("std");
 const Allocator = std.mem.Allocator;
 const jpeg = @import("decode/jpeg.zig");
+const ktx2 = @import("decode/ktx2.zig");
 const png = @import("decode/png.zig");
 const stb_image = @import("decode/stb_image.zig");
 const texels = @import("decode/texels.zig");
+const webp = @import("decode/webp.zig");
 
 pub const Error = texels.Error;
 pub const Format = texels.Format;
@@ -22,6 +24,8 @@ pub const Texels = texels.Texels;
 pub fn formatOf(file: []const u8) ?Format {
     if (std.mem.startsWith(u8, file, png.signature)) return .png;
     if (std.mem.startsWith(u8, file, jpeg.signature)) return .jpeg;
+    if (webp.isWebp(file)) return .webp;
+    if (std.mem.startsWith(u8, file, ktx2.signature)) return .ktx2;
     for (stb_image.hdr_signatures) |signature| {
         if (std.mem.startsWith(u8, file, signature)) return .hdr;
     }
@@ -30,14 +34,24 @@ pub fn formatOf(file: []const u8) ?Format {
 
 /// The header alone, with all limits checked.
 pub fn info(file: []const u8, reason: *Reason) error{InvalidImage}!Info {
-    const format = try formatWithin(file, reason);
-    return stb_image.info(codecOf(format), file, reason);
+    return switch (try formatWithin(file, reason)) {
+        .png => stb_image.info(.png, file, reason),
+        .jpeg => stb_image.info(.jpeg, file, reason),
+        .webp => webp.info(file, reason),
+        .ktx2 => ktx2.info(file, reason),
+        .hdr => stb_image.info(.hdr, file, reason),
+    };
 }
 
 /// All texels; free them by `Texels.deinit`.
 pub fn decode(gpa: Allocator, file: []const u8, reason: *Reason) Error!Texels {
-    const format = try formatWithin(file, reason);
-    return stb_image.decode(gpa, codecOf(format), file, reason);
+    return switch (try formatWithin(file, reason)) {
+        .png => stb_image.decode(gpa, .png, file, reason),
+        .jpeg => stb_image.decode(gpa, .jpeg, file, reason),
+        .webp => webp.decode(gpa, file, reason),
+        .ktx2 => ktx2.decode(gpa, file, reason),
+        .hdr => stb_image.decode(gpa, .hdr, file, reason),
+    };
 }
 
 fn formatWithin(file: []const u8, reason: *Reason) error{InvalidImage}!Format {
@@ -49,19 +63,13 @@ fn formatWithin(file: []const u8, reason: *Reason) error{InvalidImage}!Format {
     return formatOf(file) orelse texels.invalid(reason, "no image format that is known", .{});
 }
 
-fn codecOf(format: Format) stb_image.Codec {
-    return switch (format) {
-        .png => .png,
-        .jpeg => .jpeg,
-        .hdr => .hdr,
-    };
-}
-
 test {
     _ = jpeg;
+    _ = ktx2;
     _ = png;
     _ = stb_image;
     _ = texels;
+    _ = webp;
 }
 
 test formatOf {

@@ -168,7 +168,7 @@ fn printBench(
 fn exitCodeOf(err: (Job.Error || raylane.bench.Error)) ExitCode {
     return switch (err) {
         error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
-        error.CameraUnknown => .usage,
+        error.CameraUnknown, error.SceneUnknown => .usage,
         error.InvalidInput, error.SceneTooLarge => .invalid,
         error.ImagesDiffer => .differ,
         error.Canceled => unreachable, // Nobody asks for it here.

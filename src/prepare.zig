@@ -22,6 +22,7 @@ const environment = @import("prepare/environment.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
 const place_file = @import("prepare/pose.zig");
+const tangents = @import("prepare/tangents.zig");
 const texture = @import("prepare/texture.zig");
 const view_file = @import("prepare/view.zig");
 const assert = std.debug.assert;
@@ -35,12 +36,16 @@ const World = world.World;
 /// What is made once of a scene, for all of its poses.
 pub const Loaded = struct {
     textures: texture.TextureSet,
+    arena: std.heap.ArenaAllocator,
+    /// The scene's, with the tangents that textures need.
+    meshes: []const scene.Mesh,
     /// What of the scene is drawn: instances whose material can be seen anywhere.
     instances: []const scene.Instance,
 
     /// Frees everything.
     pub fn deinit(loaded: *Loaded) void {
         loaded.textures.deinit();
+        loaded.arena.deinit();
         loaded.* = undefined;
     }
 };
@@ -82,8 +87,8 @@ pub const ViewError = error{ OutOfMemory, CameraUnknown };
 
 pub const Error = LoadError || PoseError || ViewError;
 
-/// Makes what does not depend on where things are: textures. The memory is the result's and comes
-/// from `gpa`. Fills `texture_ns` of `times`.
+/// Makes what does not depend on where things are: textures, and tangents for them. The memory is
+/// the result's and comes from `gpa`. Fills `texture_ns` of `times`.
 pub fn load(
     gpa: Allocator,
     io: std.Io,
@@ -97,17 +102,28 @@ pub fn load(
     const start = Clock.awake.now(io);
     var textures = try texture.load(gpa, from, settings, diagnostic);
     errdefer textures.deinit();
-    const instances = try visibleInstances(&textures, from);
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    errdefer arena.deinit();
+    const instances = try visibleInstances(arena.allocator(), &textures, from);
+    const meshes = try tangents.make(
+        gpa,
+        arena.allocator(),
+        from,
+        instances,
+        &textures,
+        settings.pool,
+        diagnostic,
+    );
     times.texture_ns = nanoseconds(start.durationTo(Clock.awake.now(io)));
-    return .{ .textures = textures, .instances = instances };
+    return .{ .textures = textures, .arena = arena, .meshes = meshes, .instances = instances };
 }
 
 /// Those whose material is all holes, or all clear, are as good as not there.
 fn visibleInstances(
-    textures: *texture.TextureSet,
+    arena: Allocator,
+    textures: *const texture.TextureSet,
     from: *const Scene,
 ) error{OutOfMemory}![]const scene.Instance {
-    const arena = textures.arena.allocator();
     var visible: std.ArrayList(scene.Instance) = try .initCapacity(arena, from.instances.len);
     for (from.instances) |instance| {
         const index = from.meshes[instance.mesh].material;
@@ -165,7 +181,7 @@ pub fn pose(
         gpa,
         arena.allocator(),
         loaded.instances,
-        from.meshes,
+        loaded.meshes,
         attributesOf(&loaded.textures),
         place.maps,
         settings.pool,
@@ -257,6 +273,7 @@ noinline fn chooseView(
     seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };
     seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
     // What shines from everywhere is a light too.
+    seen.facts.own_light_count = seen.lights.len;
     const has_map = settings.environment.map != null;
     const lights_are_default = seen.lights.len == 0 and from.ambient == null and !has_map;
     if (lights_are_default) seen.lights = try light.placeRig(arena, &seen.view.camera);
@@ -703,6 +720,39 @@ test "texture coordinates and tangents are placed where a texture asks for them"
     try std.testing.expectEqual(0, result.materials.all[1].lookup_count);
 }
 
+test "loading that runs out of memory is an error that leaks nothing" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    const arena = from.arena.allocator();
+    from.images = &.{.{
+        .name = "flat",
+        .bytes = try texture.TestImage.png(arena, 1, 1, 3, &.{ 128, 128, 255 }),
+    }};
+    from.textures = &.{.{ .image = 0 }};
+    from.materials = &.{.{ .normal_texture = .{ .texture = 0 } }};
+    var meshes: [1]scene.Mesh = .{from.meshes[0]};
+    meshes[0].texcoords[0] = &.{ .{ 0, 0 }, .{ 1, 0 }, .{ 0, 1 } };
+    from.meshes = &meshes;
+    const one = struct {
+        fn one(failing: std.mem.Allocator, scene_from: *const Scene) !void {
+            var pool: parallel.Pool = .init(1);
+            defer pool.deinit();
+            var diagnostic: Diagnostic = .{};
+            var times: StageTimes = .{};
+            const io = std.testing.io;
+            var loaded =
+                try load(failing, io, scene_from, .{ .pool = &pool }, &diagnostic, &times);
+            defer loaded.deinit();
+            // Made, since the mesh has none: v grows downwards in textures, upwards here.
+            for (loaded.meshes[0].tangents.?) |tangent| {
+                try std.testing.expectEqual([4]f32{ 1, 0, 0, -1 }, tangent);
+            }
+        }
+    }.one;
+    try std.testing.checkAllAllocationFailures(gpa, one, .{&from});
+}
+
 test "what can be seen nowhere is not drawn" {
     const gpa = std.testing.allocator;
     var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
@@ -813,6 +863,7 @@ test {
     _ = light;
     _ = material;
     _ = place_file;
+    _ = tangents;
     _ = texture;
     _ = @import("prepare/pyramid.zig");
     _ = view_file;

@@ -71,6 +71,8 @@ pub const Facts = struct {
     lights_are_default: bool = false,
     /// The light is the studio's, for want of any other.
     environment_is_default: bool = false,
+    /// Lights of the file that shine.
+    own_light_count: usize = 0,
     /// Triangles left out because they have no area or no finite place.
     degenerate_count: u64,
 };

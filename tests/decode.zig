@@ -103,6 +103,15 @@ const cases = [_]Case{
         .hash = 0x5f935426124a561c,
     },
     .{ .name = "rgb-restart.jpg", .channel_count = 3, .tolerance = 12, .hash = 0xf83c7d110405b750 },
+    .{ .name = "rgb-lossless.webp", .channel_count = 3, .hash = 0x2fd8946056d73724 },
+    .{ .name = "rgba-lossless.webp", .channel_count = 4, .hash = 0x31ad9ef0ab1d105e },
+    .{ .name = "rgb.webp", .channel_count = 3, .tolerance = 12, .hash = 0xb6b775057d00f942 },
+    .{ .name = "rgba.webp", .channel_count = 4, .tolerance = 12, .hash = 0xf1b4da5b3a717064 },
+    .{ .name = "etc1s-rgb.ktx2", .channel_count = 3, .tolerance = 60, .hash = 0x8becb1709dd20155 },
+    .{ .name = "etc1s-rgba.ktx2", .channel_count = 4, .tolerance = 60, .hash = 0xdce9258b242c8117 },
+    .{ .name = "uastc-rgb.ktx2", .channel_count = 3, .tolerance = 16, .hash = 0x9da1f0f5e633f562 },
+    .{ .name = "uastc-rgba.ktx2", .channel_count = 4, .tolerance = 16, .hash = 0x6c7edda434a49513 },
+    .{ .name = "uastc-mips.ktx2", .channel_count = 3, .tolerance = 16, .hash = 0x9da1f0f5e633f562 },
 };
 
 /// A file of tests/images; the caller frees it.
@@ -274,7 +283,9 @@ test "random bytes behind a signature are no image" {
     const random = random_state.random();
     var file: [600]u8 = undefined;
     for ([_][]const u8{
-        "\x89PNG\r\n\x1a\n", "\xff\xd8\xff", "#?RADIANCE\n", "#?RGBE\n", "",
+        "\x89PNG\r\n\x1a\n",            "\xff\xd8\xff",
+        "RIFF\xf0\x00\x00\x00WEBPVP8L", "#?RADIANCE\n",
+        "#?RGBE\n",                     "",
     }) |signature| for (0..500) |_| {
         const length = random.intRangeAtMost(usize, signature.len, file.len);
         random.bytes(file[0..length]);

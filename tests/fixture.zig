@@ -150,6 +150,8 @@ pub const Options = struct {
     transparent: bool = false,
     /// The background is the environment.
     see_environment: bool = false,
+    /// Without it, all is radiance.
+    display_referred: bool = false,
     /// Index into `variant.compiled`.
     variant: usize = 0,
 };
@@ -174,8 +176,9 @@ pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options)
         .resolution = .{ options.width, options.height },
         .ambient = options.ambient,
         .environment = options.environment,
+        .display_referred = options.display_referred,
         .background = if (options.see_environment)
-            .environment
+            .env
         else if (options.transparent)
             .transparent
         else if (options.background) |color| .{ .linear = color } else .default,

@@ -20,6 +20,7 @@ test {
     _ = @import("samples.zig");
     _ = @import("beams.zig");
     _ = @import("soup.zig");
+    _ = @import("textures.zig");
     _ = @import("variants.zig");
 }
 

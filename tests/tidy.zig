@@ -172,7 +172,7 @@ const File = struct {
     fn isCode(file: File) bool {
         if (std.mem.eql(u8, std.fs.path.basename(file.path), "SHA256SUMS")) return false;
         const extension = std.fs.path.extension(file.path);
-        for ([_][]const u8{ ".zig", ".zon", ".c", ".h", ".py", ".sh", "" }) |code| {
+        for ([_][]const u8{ ".zig", ".zon", ".c", ".cpp", ".h", ".py", ".sh", "" }) |code| {
             if (std.mem.eql(u8, extension, code)) return true;
         }
         return false;
@@ -231,7 +231,7 @@ fn readTree(arena: Allocator) ![]const File {
 
 fn isText(basename: []const u8) bool {
     const extensions = [_][]const u8{
-        ".zig", ".zon", ".c",   ".h",    ".py",   ".sh", ".md",
+        ".zig", ".zon", ".c",   ".cpp",  ".h",    ".py", ".sh", ".md",
         ".txt", ".tsv", ".svg", ".toml", ".json", "",
     };
     for (extensions) |extension| {

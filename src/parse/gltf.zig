@@ -28,7 +28,7 @@ const Source = @import("gltf/source.zig");
 const Textures = @import("gltf/textures.zig");
 
 /// See parse.zig.
-pub const Error = Source.Error;
+pub const Error = Source.Error || error{SceneUnknown};
 
 /// Reads a file that is in memory; what it names comes from `resources`.
 pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) Error!Scene {
@@ -95,7 +95,7 @@ fn parseDocument(
 /// Puts the parts of the document into the scene.
 fn fill(source: *Source, resources: *Resources) Error!void {
     const builder = source.builder;
-    const origins = try nodes.collect(source);
+    const origins = try nodes.collect(source, resources.settings.scene);
     defer source.gpa.free(origins);
     var textures: Textures = .init(source, resources);
     defer textures.deinit();

@@ -85,8 +85,8 @@ const ChunkResult = struct {
     centroid_bounds: Box3 = .empty,
 };
 
-/// Flattens what is drawn: instances of `meshes` at nodes, of which `maps` holds the world maps. The
-/// soup's arrays come from `arena`, what is needed meanwhile from `gpa`.
+/// Flattens what is drawn: instances of `meshes` at nodes, whose world maps are `maps`. The soup's
+/// arrays come from `arena`, what is needed meanwhile from `gpa`.
 pub fn flatten(
     gpa: std.mem.Allocator,
     arena: std.mem.Allocator,

@@ -527,7 +527,8 @@ test "no texel of an odd side is lost, and all count the same" {
 test "blocks, and what is left of a row, are the averages that they should be" {
     var random_state: std.Random.DefaultPrng = .init(3);
     const random = random_state.random();
-    inline for (.{ .{ Encoding.linear, 3 }, .{ Encoding.linear, 2 }, .{ Encoding.srgb, 3 } }) |kind| {
+    const kinds = .{ .{ Encoding.linear, 3 }, .{ Encoding.linear, 2 }, .{ Encoding.srgb, 3 } };
+    inline for (kinds) |kind| {
         const channel_count = kind[1];
         for ([_]u32{ 2, 6, 16, 34, 70 }) |width| {
             var texels: [70 * 2 * channel_count]u8 = undefined;

@@ -16,7 +16,7 @@ const pyramid_file = @import("pyramid.zig");
 const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
-const quote = @import("../diagnostic.zig").quote;
+const printable = @import("../diagnostic.zig").printable;
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Pyramid = pyramid_file.Pyramid;
@@ -67,6 +67,12 @@ pub const TextureSet = struct {
     /// By material of the scene.
     materials: []const MaterialUse,
     byte_count: u64,
+
+    /// Those of one material of the scene.
+    pub fn lookupsOf(set: *const TextureSet, material: u32) []const world.Lookup {
+        const use = &set.materials[material];
+        return set.lookups[use.first_lookup..][0..use.lookup_count];
+    }
 
     /// Frees everything.
     pub fn deinit(set: *TextureSet) void {
@@ -209,7 +215,7 @@ const Work = struct {
             const matters = from.materials[mesh.material].alpha_mode != .@"opaque";
             if (matters) if (mesh.colors) |colors| {
                 range = .{ .least = std.math.inf(f32), .largest = 0 };
-                for (colors) |color| range = join(range, .{ .least = color[3], .largest = color[3] });
+                for (colors) |color| range = join(range, exactly(color[3]));
             };
             const all = &work.vertex_alpha[mesh.material];
             all.* = if (work.is_drawn[mesh.material]) join(all.*, range) else range;
@@ -217,7 +223,11 @@ const Work = struct {
         }
     }
 
-    fn want(work: *Work, material: *const scene.Material, slot: world.Slot) error{OutOfMemory}!void {
+    fn want(
+        work: *Work,
+        material: *const scene.Material,
+        slot: world.Slot,
+    ) error{OutOfMemory}!void {
         const view = viewOf(material, slot) orelse return;
         const image = work.from.textures[view.texture].image;
         const is_srgb = isLight(slot);
@@ -298,8 +308,8 @@ const Work = struct {
     /// In the order of the images.
     fn warn(work: *const Work, diagnostic: *Diagnostic) void {
         for (work.reasons, work.from.images) |*failure, *image| {
-            if (failure.*) |*reason| diagnostic.warn("image {f} is left out: {s}", .{
-                quote(image.name), reason.text(),
+            if (failure.*) |*reason| diagnostic.warn("{f}: {s}, left out", .{
+                printable(image.name), reason.text(),
             });
         }
     }
@@ -368,6 +378,10 @@ const Work = struct {
         };
     }
 };
+
+fn exactly(alpha: f32) AlphaRange {
+    return .{ .least = alpha, .largest = alpha };
+}
 
 fn join(a: AlphaRange, b: AlphaRange) AlphaRange {
     return .{
@@ -525,7 +539,9 @@ fn store(
     image.texels = image.memory;
     switch (from.data) {
         .bytes => |all| pick(u8, from.channel_count, all, &stored, image.texels),
-        .floats => |all| pickFloats(from.channel_count, all, &stored, request.is_srgb, image.texels),
+        .floats => |all| {
+            pickFloats(from.channel_count, all, &stored, request.is_srgb, image.texels);
+        },
     }
     return image;
 }
@@ -588,7 +604,7 @@ fn alphaRange(texels: *const Texels) AlphaRange {
         },
         .floats => |all| while (at < all.len) : (at += texels.channel_count) {
             const value = if (all[at] < 1) all[at] else 1;
-            range = join(range, .{ .least = value, .largest = value });
+            range = join(range, exactly(value));
         },
     }
     return range;
@@ -840,9 +856,10 @@ test "a broken image costs a warning, the others are there" {
     try testing.expectEqual(2, diagnostic.warning_count);
     for (diagnostic.warnings[0..2], 0..) |*warning, index| {
         var start: [32]u8 = undefined;
-        const expected = try std.fmt.bufPrint(&start, "image 'image {d}' is left out: ", .{index});
+        const expected = try std.fmt.bufPrint(&start, "image {d}: ", .{index});
         try testing.expect(std.mem.startsWith(u8, warning.text(), expected));
-        try testing.expect(warning.text().len > expected.len);
+        try testing.expectStringEndsWith(warning.text(), ", left out");
+        try testing.expect(warning.text().len > expected.len + ", left out".len);
     }
     try testing.expectEqual(1, set.lookups.len);
     try testing.expectEqual(.occlusion, set.lookups[0].slot);

@@ -3,11 +3,12 @@
 
     tests/images/make.py
 
-PNG and HDR are written here, byte by byte; JPEG needs Pillow. All show the same picture of 29 by 17
-pixels, of integers alone.
+PNG and HDR are written here, byte by byte; JPEG and WebP need Pillow, KTX 2 the encoder
+`basisu` beside it. All show the same picture of 29 by 17 pixels, of integers alone.
 """
 import pathlib
 import struct
+import subprocess
 import zlib
 
 FOLDER = pathlib.Path(__file__).parent
@@ -101,8 +102,36 @@ def jpegs():
     rgb.save(FOLDER / "rgb-restart.jpg", quality=95, restart_marker_blocks=1)
 
 
+def webps():
+    from PIL import Image
+    rgb = Image.new("RGB", (WIDTH, HEIGHT))
+    rgb.putdata([tuple(value(x, y, c) for c in range(3))
+                 for y in range(HEIGHT) for x in range(WIDTH)])
+    rgba = Image.new("RGBA", (WIDTH, HEIGHT))
+    rgba.putdata([tuple(value(x, y, c) for c in range(4))
+                  for y in range(HEIGHT) for x in range(WIDTH)])
+    rgb.save(FOLDER / "rgb-lossless.webp", lossless=True)
+    rgba.save(FOLDER / "rgba-lossless.webp", lossless=True, exact=True)
+    rgb.save(FOLDER / "rgb.webp", quality=95)
+    rgba.save(FOLDER / "rgba.webp", quality=95, exact=True)
+
+
+def ktx2s():
+    for name, source, options in [
+            ("etc1s-rgb", "rgb", "-q 255 -comp_level 4"),
+            ("etc1s-rgba", "rgba", "-q 255 -comp_level 4"),
+            ("uastc-rgb", "rgb", "-uastc"),
+            ("uastc-rgba", "rgba", "-uastc"),
+            ("uastc-mips", "rgb", "-uastc -ktx2_no_zstandard -mipmap")]:
+        subprocess.run(["basisu", "-ktx2", "-linear", *options.split(),
+                        "-file", FOLDER / f"{source}.png",
+                        "-output_file", FOLDER / f"{name}.ktx2"], check=True)
+
+
 pngs()
+webps()
 jpegs()
+ktx2s()
 hdr("rle.hdr", WIDTH, True)
 hdr("flat.hdr", WIDTH, False)
 hdr("narrow.hdr", 5, False)

@@ -49,6 +49,12 @@ pub fn PathState(comptime Kernel: type) type {
             }
         }
 
+        /// Gives rays that go straight on from where they started the cones that they have.
+        pub fn keepCones(path: *@This(), before: *const @This()) void {
+            path.cone_width = before.cone_width;
+            path.cone_spread = before.cone_spread;
+        }
+
         /// Gives reflected rays of a group their cones: what they are at a point, and the surface
         /// makes of them.
         pub fn reflectCones(

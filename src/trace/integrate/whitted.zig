@@ -15,7 +15,6 @@ const camera = @import("camera.zig");
 const direct = @import("direct.zig");
 const environment_light = @import("environment.zig");
 const path_file = @import("path.zig");
-const sampler = @import("sampler.zig");
 const tiles = @import("tiles.zig");
 const visibility_file = @import("visibility.zig");
 const Film = @import("../../film.zig").Film;
@@ -60,6 +59,11 @@ pub fn Whitted(comptime Kernel: type) type {
         radiance: [group_count]Vec3,
         /// Share of the sample's primary ray that left the scene.
         escaped: [group_count]F32,
+        /// Colours of the display are kept apart from radiance.
+        keeps_display: bool,
+        /// What the sample's primary ray sees of such colours, and its share of them.
+        displayed: [group_count]Vec3,
+        display_share: [group_count]F32,
         /// Directions of the primary rays of the sample under way, where they share an origin.
         grid: ?Grid,
         stack: path_file.PathStack(Kernel),
@@ -105,9 +109,12 @@ pub fn Whitted(comptime Kernel: type) type {
             film: *Film,
         ) void {
             whitted.transparent = film.layers.contains(.alpha);
+            whitted.keeps_display = film.layers.contains(.display);
             for (first_sample..first_sample + sample_count) |sample| {
                 whitted.radiance = @splat(.splat(.{ 0, 0, 0 }));
                 whitted.escaped = @splat(.zero());
+                whitted.displayed = @splat(.splat(.{ 0, 0, 0 }));
+                whitted.display_share = @splat(.zero());
                 whitted.pushPrimary(rectangle, @intCast(sample));
                 while (whitted.stack.pop()) |path| {
                     // A copy: what the step pushes takes its place.
@@ -115,15 +122,18 @@ pub fn Whitted(comptime Kernel: type) type {
                     whitted.step();
                 }
                 const number: u32 = @intCast(sample);
-                const radiance = &whitted.radiance;
-                camera.expose(Kernel, film, rectangle, number, radiance, &whitted.escaped);
+                const place: camera.Place = .{ .rectangle = rectangle, .sample = number };
+                camera.expose(Kernel, film, .color, place, &whitted.radiance, &whitted.escaped);
+                if (!whitted.keeps_display) continue;
+                const share = &whitted.display_share;
+                camera.expose(Kernel, film, .display, place, &whitted.displayed, share);
             }
         }
 
         fn pushPrimary(whitted: *Self, rectangle: Rectangle, sample: u32) void {
             whitted.sample = sample;
             const view = whitted.frame.view;
-            const offset = sampler.pixelOffset(sample, whitted.settings.sample_count);
+            const offset = whitted.settings.offsets[sample];
             whitted.grid = camera.grid(view, rectangle, offset);
             const path = whitted.stack.push(0, 0);
             camera.primaryRays(Kernel, view, rectangle, offset, &path.bundle);
@@ -224,7 +234,21 @@ pub fn Whitted(comptime Kernel: type) type {
             else
                 material.emissive;
             const shown: Vec3 = .select(material.unlit, material.base_color, glow);
-            whitted.add(group, vertex.throughput.mul(shown));
+            const arriving = vertex.throughput.mul(shown);
+            if (!whitted.keeps_display or whitted.path.depth > 0)
+                return whitted.add(group, arriving);
+            const none: Vec3 = .splat(.{ 0, 0, 0 });
+            whitted.add(group, .select(material.unlit, none, arriving));
+            whitted.addDisplayed(group, .select(material.unlit, arriving, none), .select(
+                material.unlit,
+                vertex.throughput.x,
+                .zero(),
+            ));
+        }
+
+        fn addDisplayed(whitted: *Self, group: usize, color: Vec3, share: F32) void {
+            whitted.displayed[group] = whitted.displayed[group].add(color);
+            whitted.display_share[group] = whitted.display_share[group].add(share);
         }
 
         /// Ambient light that a point scatters: diffusely, and instead of rays that are not traced.
@@ -271,9 +295,8 @@ pub fn Whitted(comptime Kernel: type) type {
             const rest = whitted.stack.push(path.depth, path.transparency_depth + 1);
             rest.bundle = path.bundle;
             rest.sigma_a = path.sigma_a;
+            rest.keepCones(path);
             rest.roughness = path.roughness;
-            rest.cone_width = path.cone_width;
-            rest.cone_spread = path.cone_spread;
             for (&rest.bundle.groups, masks, &whitted.vertices, 0..) |*ray, mask, *vertex, group| {
                 ray.active = mask;
                 if (mask.none()) continue;

@@ -1,7 +1,7 @@
 //! What a material's textures say at a point of a triangle.
 //!
-//! In: lookups of a material, a point and its footprint by barycentric weights. Out: the channels of
-//! each slot, which factors are multiplied with. Lookups that follow each other and are sampled
+//! In: lookups of a material, a point and its footprint by barycentric weights. Out: the channels
+//! of each slot, which factors are multiplied with. Lookups that follow each other and are sampled
 //! alike, as those of most materials are, share places, levels and weights.
 
 const std = @import("std");

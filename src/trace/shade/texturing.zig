@@ -375,10 +375,9 @@ test "coordinates lie between those of the corners, transformed, and no number d
 
 test "the level follows from the width of the cone, its spread, the distance and the angle" {
     var levels: [6]world_file.TextureLevel = undefined;
-    const numbers = struct {
-        const texels: [6][1024]u8 = .{ @splat(0), @splat(1), @splat(2), @splat(3), @splat(4), @splat(5) };
-    };
-    for (&levels, &numbers.texels, 0..) |*level, *texels, number| {
+    var all_texels: [6][1024]u8 = undefined;
+    for (&levels, &all_texels, 0..) |*level, *texels, number| {
+        texels.* = @splat(@intCast(number));
         const side = @as(u32, 32) >> @intCast(number);
         level.* = .{ .width = side, .height = side, .texels = texels };
     }
