@@ -241,24 +241,23 @@ fn ReceiverOf(comptime Lanes: type) type {
             const bsdf = &vertex.bsdf;
             const white: Vec3 = .splat(.{ 1, 1, 1 });
             const roughness = point.material.roughness;
-            const diffuse_albedo = bsdf.diffuse.mul(white.sub(bsdf.mirror.reflected));
-            const specular_albedo = bsdf.mirror.reflected;
             const whole = &receiver.whole;
             const hidden = &receiver.hidden;
-            const around = bsdf.diffuse.add(bsdf.f0).min(white);
+            const around = point.material.base_color.min(white);
             const bounced = around.mul(.splat(mean));
             const irradiance = environment_file
                 .irradiance(Lanes, environment, point.normal, receiver.lit)
                 .mul(openness(whole.diffuse, hidden.diffuse))
                 .add(bounced.mul(bounce(around, hidden.diffuse_sky, whole.diffuse_sky)));
-            var sum = diffuse_albedo.mul(irradiance);
+            var sum = bsdf.diffuse_albedo.mul(irradiance);
             const untraced = receiver.lit.andNot(traced);
             if (untraced.any()) {
                 const lobe = environment_file
                     .radiance(Lanes, environment, receiver.lobe, roughness, .zero(), untraced)
                     .mul(openness(whole.glossy, hidden.glossy))
                     .add(bounced.mul(bounce(around, hidden.glossy_sky, whole.glossy_sky)));
-                sum = sum.add(.select(untraced, specular_albedo.mul(lobe), .splat(.{ 0, 0, 0 })));
+                const seen = bsdf.specular_albedo.mul(lobe);
+                sum = sum.add(.select(untraced, seen, .splat(.{ 0, 0, 0 })));
             }
             if (!is_end) return sum;
             const refraction = bsdf.mirror.refraction;
