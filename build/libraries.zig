@@ -1,4 +1,4 @@
-//! The third-party C libraries: a row each, with what is compiled of them, and how.
+//! The third-party libraries: a row each, with what is compiled of them, and how.
 //!
 //! In: the folder that vendor/fetch fills. Out: their C files in a module of ours, and the notices
 //! that have to go with a program that holds them. All are compiled without the sanitizer of
@@ -9,6 +9,33 @@ const std = @import("std");
 const LazyPath = std.Build.LazyPath;
 const Module = std.Build.Module;
 
+/// Of C++: the language without its run-time library, and how Zig sets up that library's headers.
+const cpp_flags: []const []const u8 = &.{
+    "-std=c++17",
+    "-ffp-contract=off",
+    "-fno-sanitize=undefined",
+    "-fno-exceptions",
+    "-fno-rtti",
+    "-fno-c++-static-destructors",
+    "-fno-threadsafe-statics",
+    "-w",
+    "-DNDEBUG",
+    "-D_LIBCPP_ABI_VERSION=1",
+    "-D_LIBCPP_ABI_NAMESPACE=__1",
+    "-D_LIBCPP_HAS_THREADS=1",
+    "-D_LIBCPP_HAS_MONOTONIC_CLOCK",
+    "-D_LIBCPP_HAS_MUSL_LIBC=1",
+    "-D_LIBCPP_HAS_FILESYSTEM=1",
+    "-D_LIBCPP_HAS_LOCALIZATION",
+    "-D_LIBCPP_HAS_UNICODE",
+    "-D_LIBCPP_HAS_WIDE_CHARACTERS",
+    "-D_LIBCPP_HAS_VENDOR_AVAILABILITY_ANNOTATIONS=0",
+    "-D_LIBCPP_DISABLE_VISIBILITY_ANNOTATIONS",
+    "-D_LIBCPP_PSTL_BACKEND_SERIAL",
+    "-D_LIBCPP_HARDENING_MODE=_LIBCPP_HARDENING_MODE_NONE",
+    "-D_LIBCPP_ASSERTION_SEMANTIC_DEFAULT=_LIBCPP_ASSERTION_SEMANTIC_IGNORE",
+};
+
 /// One library; vendor/libraries.json says where it comes from, under the same name.
 pub const Library = struct {
     name: []const u8,
@@ -16,15 +43,21 @@ pub const Library = struct {
     files: []const []const u8 = &.{},
     /// C files of ours: the implementation of what is a header only, and the call that we make.
     shims: []const []const u8 = &.{},
-    defines: []const []const u8 = &.{},
+    /// One in C++ that includes the library's own files.
+    cpp_shim: ?[]const u8 = null,
+    /// A folder below that one, from where its own files include each other.
+    include: ?[]const u8 = null,
+    /// Definitions, and what else a library needs the compiler to be told.
+    flags: []const []const u8 = &.{},
 
     /// Compiles the library into `module`.
     pub fn addTo(library: Library, module: *Module, headers: LazyPath) void {
         const b = module.owner;
         const flags = std.mem.concat(b.allocator, []const u8, &.{
-            &.{ "-std=c11", "-ffp-contract=off", "-fno-sanitize=undefined" }, library.defines,
+            &.{ "-std=c11", "-ffp-contract=off", "-fno-sanitize=undefined" }, library.flags,
         }) catch @panic("OOM");
         module.addIncludePath(headers);
+        if (library.include) |folder| module.addIncludePath(headers.path(b, folder));
         module.addCSourceFiles(.{
             .root = headers,
             .files = library.files,
@@ -32,7 +65,53 @@ pub const Library = struct {
             .language = .c,
         });
         module.addCSourceFiles(.{ .files = library.shims, .flags = flags });
+        if (library.cpp_shim) |shim| {
+            module.addObjectFile(library.cppArchive(shim, module, headers).getEmittedBin());
+        }
     }
+
+    /// C++ is compiled apart: it sees the headers of Zig's C++ library, whose code, which takes two
+    /// minutes to compile, nothing is linked with.
+    fn cppArchive(
+        library: Library,
+        shim: []const u8,
+        module: *Module,
+        headers: LazyPath,
+    ) *std.Build.Step.Compile {
+        const b = module.owner;
+        const root = b.createModule(.{
+            .target = module.resolved_target,
+            .optimize = module.optimize,
+            .link_libc = true,
+        });
+        for ([_][]const u8{ "libcxx/include", "libcxxabi/include" }) |folder| {
+            // Before those of the libc, which it includes.
+            root.addIncludePath(LazyPath.zig_lib.path(b, folder));
+        }
+        root.addIncludePath(headers);
+        const flags = std.mem.concat(b.allocator, []const u8, &.{
+            cpp_flags, library.flags,
+        }) catch @panic("OOM");
+        root.addCSourceFile(.{ .file = b.path(shim), .flags = flags });
+        return b.addLibrary(.{ .linkage = .static, .name = library.name, .root_module = root });
+    }
+};
+
+/// The transcoder to RGBA alone: no other format, and none of the codecs that compute with floats.
+pub const basisu: Library = .{
+    .name = "basisu",
+    .cpp_shim = "src/decode/basisu.cpp",
+    .flags = &.{
+        "-Isrc/decode/basisu",            "-fno-strict-aliasing",
+        "-DBASISD_SUPPORT_KTX2=0",        "-DBASISD_SUPPORT_KTX2_ZSTD=0",
+        "-DBASISD_SUPPORT_DXT1=0",        "-DBASISD_SUPPORT_DXT5A=0",
+        "-DBASISD_SUPPORT_BC7=0",         "-DBASISD_SUPPORT_BC7_MODE5=0",
+        "-DBASISD_SUPPORT_PVRTC1=0",      "-DBASISD_SUPPORT_PVRTC2=0",
+        "-DBASISD_SUPPORT_ETC2_EAC_A8=0", "-DBASISD_SUPPORT_ETC2_EAC_RG11=0",
+        "-DBASISD_SUPPORT_ASTC=0",        "-DBASISD_SUPPORT_XUASTC=0",
+        "-DBASISD_SUPPORT_ATC=0",         "-DBASISD_SUPPORT_FXT1=0",
+        "-DBASISD_SUPPORT_UASTC_HDR=0",
+    },
 };
 
 pub const cgltf: Library = .{ .name = "cgltf", .shims = &.{"src/parse/cgltf.c"} };
@@ -42,16 +121,74 @@ pub const libdeflate: Library = .{ .name = "libdeflate", .files = &.{
     "libdeflate/lib/arm/cpu_features.c",
     "libdeflate/lib/crc32.c",
     "libdeflate/lib/deflate_compress.c",
+    "libdeflate/lib/deflate_decompress.c",
     "libdeflate/lib/utils.c",
     "libdeflate/lib/x86/cpu_features.c",
     "libdeflate/lib/zlib_compress.c",
+    "libdeflate/lib/zlib_decompress.c",
 } };
 
-/// For tests that decode pictures.
+/// The decoder in plain C. Threads are ours, but its tables are set up under locks. Its one place
+/// of allocations is given names of ours.
+pub const libwebp: Library = .{
+    .name = "libwebp",
+    .files = &.{
+        "libwebp/src/dec/alpha_dec.c",
+        "libwebp/src/dec/buffer_dec.c",
+        "libwebp/src/dec/frame_dec.c",
+        "libwebp/src/dec/io_dec.c",
+        "libwebp/src/dec/quant_dec.c",
+        "libwebp/src/dec/tree_dec.c",
+        "libwebp/src/dec/vp8_dec.c",
+        "libwebp/src/dec/vp8l_dec.c",
+        "libwebp/src/dec/webp_dec.c",
+        "libwebp/src/dsp/alpha_processing.c",
+        "libwebp/src/dsp/cpu.c",
+        "libwebp/src/dsp/dec.c",
+        "libwebp/src/dsp/dec_clip_tables.c",
+        "libwebp/src/dsp/filters.c",
+        "libwebp/src/dsp/lossless.c",
+        "libwebp/src/dsp/rescaler.c",
+        "libwebp/src/dsp/upsampling.c",
+        "libwebp/src/dsp/yuv.c",
+        "libwebp/src/utils/bit_reader_utils.c",
+        "libwebp/src/utils/color_cache_utils.c",
+        "libwebp/src/utils/filters_utils.c",
+        "libwebp/src/utils/huffman_utils.c",
+        "libwebp/src/utils/palette.c",
+        "libwebp/src/utils/quant_levels_dec_utils.c",
+        "libwebp/src/utils/random_utils.c",
+        "libwebp/src/utils/rescaler_utils.c",
+        "libwebp/src/utils/thread_utils.c",
+        "libwebp/src/utils/utils.c",
+    },
+    .shims = &.{"src/decode/webp.c"},
+    .include = "libwebp",
+    .flags = &.{
+        "-DWEBP_USE_THREAD",       "-U__SSE2__",              "-U__SSE4_1__",
+        "-U__AVX2__",              "-U__ARM_NEON__",          "-U__aarch64__",
+        "-Dmalloc=rl_webp_malloc", "-Dcalloc=rl_webp_calloc", "-Dfree=rl_webp_free",
+    },
+};
+
+pub const mikktspace: Library = .{
+    .name = "mikktspace",
+    .shims = &.{"src/prepare/mikktspace.c"},
+    .flags = &.{"-fno-math-errno"},
+};
+
+/// Inflates by libdeflate. A palette that is shorter than its indices is on the stack.
 pub const stb_image: Library = .{
     .name = "stb_image",
+    .shims = &.{"src/decode/stb_image.c"},
+    .flags = &.{"-ftrivial-auto-var-init=zero"},
+};
+
+/// For tests that decode pictures, of formats as well that the program does not.
+pub const stb_image_of_tests: Library = .{
+    .name = "stb_image",
     .files = &.{"stb_image.h"},
-    .defines = &.{
+    .flags = &.{
         "-DSTB_IMAGE_IMPLEMENTATION", "-DSTBI_NO_STDIO",  "-DSTBI_MAX_DIMENSIONS=65536",
         "-DSTBI_ONLY_PNG",            "-DSTBI_ONLY_JPEG", "-DSTBI_ONLY_TGA",
         "-DSTBI_ONLY_BMP",            "-DSTBI_ONLY_HDR",
@@ -64,8 +201,16 @@ pub const stb_image_write: Library = .{
     .shims = &.{"src/output/stb_image_write.c"},
 };
 
+pub const zstd: Library = .{
+    .name = "zstd",
+    .files = &.{"zstd/zstddeclib.c"},
+    .shims = &.{"src/decode/zstd.c"},
+};
+
 /// What the program holds.
-pub const program = [_]Library{ cgltf, libdeflate, stb_image_write };
+pub const program = [_]Library{
+    basisu, cgltf, libdeflate, libwebp, mikktspace, stb_image, stb_image_write, zstd,
+};
 
 /// A module with `text`: the project's licence, and the notices of what a program is made of.
 pub fn licenses(b: *std.Build, headers: LazyPath, is_musl: bool) *Module {

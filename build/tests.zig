@@ -175,7 +175,7 @@ fn integrationProgram(tests: Tests, target: Target) *Compile {
         .error_tracing = target.package.raylane.error_tracing,
         .imports = &.{.{ .name = "raylane", .module = target.package.raylane }},
     });
-    libraries.stb_image.addTo(root, target.package.headers);
+    libraries.stb_image_of_tests.addTo(root, target.package.headers);
     target.package.addKernels(root);
     return tests.program("integration", root);
 }

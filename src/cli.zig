@@ -6,6 +6,7 @@
 
 const std = @import("std");
 const bench = @import("cli/bench.zig");
+const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
 const settings = @import("settings.zig");
@@ -105,18 +106,20 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--exposure EV|auto",
-            .help = comptimePrint("brighten by EV stops, or so that {d} % of the pixels\n" ++
-                "are no brighter than {d} (default: 0)", .{
-                settings.auto_exposure.percentile, settings.auto_exposure.brightness,
-            }),
+            .help = "brighten by EV stops, or by what is seen (default:\n" ++
+                "auto for scenes with lights of their own, else 0)",
         },
         .{
-            .usage = "--tonemap linear",
-            .help = "clamp, then encode as sRGB: the only way there is",
+            .usage = "--tonemap CURVE",
+            .help = namesOf(settings.ToneMapping) ++ " (default: neutral)",
         },
-        .{ .usage = "--background COLOR", .help = "transparent, #rrggbb (sRGB) or R,G,B (linear)" },
+        .{
+            .usage = "--background WHAT",
+            .help = "env, studio, transparent, a CSS colour (red, #rrggbb)\n" ++
+                "or radiance R,G,B (default: a grey gradient)",
+        },
     } },
-    .{ .title = "Scene", .options = &.{
+    .{ .title = "Camera", .options = &.{
         .{ .usage = "--camera WHICH", .help = "name or index of a camera, or auto: all in view" },
         .{
             .usage = "--eye X,Y,Z",
@@ -128,12 +131,36 @@ const sections: []const Section = &.{
         },
         .{ .usage = "--up X,Y,Z", .help = "what is upwards in the picture (default: 0,1,0)" },
         .{
-            .usage = "--orbit THETA,PHI[,R]",
+            .usage = "--orbit THETA,PHI,R",
             .help = "stand about the target, degrees from +z and from\n" ++
                 "above, R metres or percent (default: 100%, all seen)",
         },
         .{ .usage = "--fov DEG", .help = "vertical angle of view, in place of the camera's" },
         .{ .usage = "--ortho", .help = "no perspective" },
+    } },
+    .{ .title = "Scene", .options = &.{
+        .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
+        .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
+        .{
+            .usage = "--env FILE",
+            .help = "light from all around: an equirectangular image of\n" ++
+                "radiance (hdr, png, jpg), studio or none (default:\n" ++
+                "the scene's, or studio for scenes without light)",
+        },
+        .{ .usage = "--env-intensity X", .help = "multiplies its radiance (default: 1)" },
+        .{
+            .usage = "--env-rotation DEG",
+            .help = "turn it about y, counter-clockwise from above (the\n" ++
+                "studio otherwise turns with the camera)",
+        },
+        .{
+            .usage = "--env-shadows N",
+            .help = "directional lights a sample that stand for it, to\n" ++
+                "find how much of it arrives, " ++ settings.environment_shadow_count.text() ++
+                comptimePrint("\n(default: {d}; 0: all of it everywhere)", .{
+                    settings.environment_shadow_count.default,
+                }),
+        },
         .{
             .usage = "--ambient L",
             .help = comptimePrint("radiance from all sides (default: {d} for scenes\n" ++
@@ -145,6 +172,11 @@ const sections: []const Section = &.{
                 settings.tessellation.textWithDefault(),
         },
         .{
+            .usage = "--max-texture-size N",
+            .help = comptimePrint("halve larger images on loading until no side is\n" ++
+                "longer, {s}", .{settings.texture_side.text()}),
+        },
+        .{
             .usage = "--allow-outside",
             .help = "let the scene name files outside of its own folder",
         },
@@ -152,7 +184,11 @@ const sections: []const Section = &.{
     .{ .title = "Rendering (PBRT scenes bring their own spp and depth)", .options = &.{
         .{
             .usage = "--spp N",
-            .help = "samples a pixel, " ++ settings.sample_count.textWithDefault(),
+            .help = comptimePrint("samples a pixel, {s} (default: {d}, or {d} where\n" ++
+                "the long side is below {d})", .{
+                settings.sample_count.text(), settings.sample_count.default,
+                settings.sample_count_small,  settings.side_small,
+            }),
         },
         .{
             .usage = "--depth N",
@@ -162,8 +198,8 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--thesis",
-            .help = comptimePrint("{d}x{d}, {d} sample, depth {d}, all CPUs; what follows\n" ++
-                "it still counts", .{
+            .help = comptimePrint("{d}x{d}, {d} sample, depth {d}, linear, all CPUs; what\n" ++
+                "follows it still counts", .{
                 settings.thesis.resolution[0], settings.thesis.resolution[1],
                 settings.thesis.sample_count,  settings.thesis.depth,
             }),
@@ -323,30 +359,31 @@ const Parser = struct {
             .camera => options.view.camera = cameraOf(given.value) orelse
                 return reader.bad(given, "a camera's name, its index, or auto"),
             .eye, .target, .up, .orbit, .fov, .ortho => try parser.setViewpoint(given),
+            .scene => options.load.scene = sceneOf(given.value) orelse
+                return reader.bad(given, "a scene's name or its index"),
+            .up_axis => options.load.up_axis = try reader.choice(given, settings.UpAxis),
             .background => options.view.background = backgroundOf(given.value) orelse
-                return reader.bad(given, "transparent, #rrggbb, or R,G,B of 0 or more"),
+                return reader.bad(given, "env, studio, transparent, a colour or R,G,B"),
+            .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
             .ambient => options.view.ambient = radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
             .exposure => options.write.exposure = exposureOf(given.value) orelse
                 return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
                     settings.exposure_ev_max, settings.exposure_ev_max,
                 })),
-            .tonemap => if (!std.mem.eql(u8, given.value, "linear")) {
-                return reader.bad(given, "linear");
+            .tonemap => {
+                options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
             },
             .stats => options.stats = try reader.choice(given, Stats),
-            .thesis => {
-                options.view.resolution = settings.thesis.resolution;
-                options.view.long_side = null;
-                options.render.sample_count = settings.thesis.sample_count;
-                options.render.depth = settings.thesis.depth;
-                options.thread_count = null;
-            },
+            .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .variant => options.render.variant = try parser.variantOf(given.value),
             .count_tests => options.count_tests = true,
             .tessellation => {
                 options.load.tessellation = try reader.number(given, settings.tessellation);
+            },
+            .max_texture_size => {
+                options.load.texture_side_max = try reader.number(given, settings.texture_side);
             },
             .allow_outside => options.load.allow_outside = true,
             .quiet => options.quiet = true,
@@ -356,6 +393,20 @@ const Parser = struct {
             .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
         }
+    }
+
+    fn setThesis(parser: *Parser) void {
+        const options = &parser.options;
+        options.view.resolution = settings.thesis.resolution;
+        options.view.long_side = null;
+        options.render.sample_count = settings.thesis.sample_count;
+        options.render.depth = settings.thesis.depth;
+        options.thread_count = null;
+        options.view.environment.source = .none;
+        options.view.background = .default;
+        options.view.display_referred = false;
+        options.write.exposure = settings.thesis.exposure;
+        options.write.tone_mapping = settings.thesis.tone_mapping;
     }
 
     fn setViewpoint(parser: *Parser, given: Reader.Given) Error!void {
@@ -376,6 +427,22 @@ const Parser = struct {
                 })),
             .ortho => viewpoint.orthographic = true,
             else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    fn setEnvironment(parser: *Parser, given: Reader.Given) Error!void {
+        const reader = &parser.reader;
+        const environment = &parser.options.view.environment;
+        switch (given.id) {
+            .env => environment.source = environmentOf(given.value) orelse
+                return reader.bad(given, "a file name, studio or none"),
+            .env_intensity => environment.intensity = radiance(given.value) orelse
+                return reader.bad(given, "a number of 0 or more"),
+            .env_rotation => environment.rotation_deg = rotationOf(given.value) orelse
+                return reader.bad(given, "degrees, -3600 to 3600"),
+            .env_shadows => environment.shadow_count =
+                try reader.number(given, settings.environment_shadow_count),
+            else => unreachable, // Those that `set` hands on.
         }
     }
 
@@ -526,24 +593,42 @@ fn tileSizeOf(text: []const u8) ?u32 {
 fn cameraOf(text: []const u8) ?settings.Camera {
     if (text.len == 0) return null;
     if (std.mem.eql(u8, text, "auto")) return .auto;
-    const any: settings.Range = .{ .min = 0, .max = std.math.maxInt(u32) };
-    const index = integer(text, any) orelse return .{ .name = text };
+    const index = integer(text, any_index) orelse return .{ .name = text };
     return .{ .index = index };
 }
 
+fn sceneOf(text: []const u8) ?settings.SceneChoice {
+    if (text.len == 0) return null;
+    const index = integer(text, any_index) orelse return .{ .name = text };
+    return .{ .index = index };
+}
+
+const any_index: settings.Range = .{ .min = 0, .max = std.math.maxInt(u32) };
+
 fn backgroundOf(text: []const u8) ?settings.Background {
     if (std.mem.eql(u8, text, "transparent")) return .transparent;
-    if (text.len == 7 and text[0] == '#') {
-        var codes: [3]u8 = undefined;
-        _ = std.fmt.hexToBytes(&codes, text[1..]) catch return null;
-        return .{ .srgb = codes };
-    }
+    if (std.mem.eql(u8, text, "env")) return .env;
+    if (std.mem.eql(u8, text, "studio")) return .studio;
+    if (std.mem.cutPrefix(u8, text, "#")) |digits|
+        return .{ .srgb = colors.hexadecimal(digits) orelse return null };
+    if (colors.named(text)) |codes| return .{ .srgb = codes };
     var color: [3]f32 = undefined;
     var parts = std.mem.splitScalar(u8, text, ',');
     for (&color) |*component| {
         component.* = radiance(parts.next() orelse return null) orelse return null;
     }
     return if (parts.next() == null) .{ .linear = color } else null;
+}
+
+fn environmentOf(text: []const u8) ?settings.Environment.Source {
+    if (text.len == 0) return null;
+    if (std.mem.eql(u8, text, "none")) return .none;
+    return if (std.mem.eql(u8, text, "studio")) .studio else .{ .file = text };
+}
+
+fn rotationOf(text: []const u8) ?f32 {
+    const value = number(text) orelse return null;
+    return if (@abs(value) <= 3600) value else null;
 }
 
 fn exposureOf(text: []const u8) ?settings.Exposure {
@@ -672,10 +757,19 @@ test "numbers keep to their ranges" {
         },
         .{
             .flag = "--background",
-            .good = &.{ "transparent", "#000000", "#FFaa01", "0,0,0", "1,0.5,1e3" },
-            .bad = &.{ "#fff", "#gggggg", "#0000000", "red", "1,2", "1,2,3,4", "1,2,-1", ",,", "" },
+            .good = &.{
+                "transparent", "env", "studio", "#000000", "#FFaa01", "#fA1", "red", "0,0,0",
+                "1,0.5,1e3",
+            },
+            .bad = &.{
+                "#ffff", "#gggggg", "#0000000", "rod", "1,2", "1,2,3,4", "1,2,-1", ",,", "", "#",
+            },
         },
-        .{ .flag = "--tonemap", .good = &.{"linear"}, .bad = &.{ "aces", "" } },
+        .{
+            .flag = "--tonemap",
+            .good = &.{ "neutral", "aces", "agx", "linear" },
+            .bad = &.{ "ACES", "reinhard", "" },
+        },
         .{ .flag = "--stats", .good = &.{ "text", "json", "none" }, .bad = &.{ "JSON", "" } },
         .{ .flag = "--bvh", .good = &.{ "fast", "default", "high" }, .bad = &.{ "High", "" } },
         .{
@@ -711,6 +805,8 @@ test "numbers keep to their ranges" {
             .good = &.{ "45", "0.01", "179" },
             .bad = &.{ "0", "180", "-45", "nan", "inf", "", "45deg" },
         },
+        .{ .flag = "--scene", .good = &.{ "0", "4294967296", "b c", "auto" }, .bad = &.{""} },
+        .{ .flag = "--up-axis", .good = &.{ "y", "z" }, .bad = &.{ "", "x", "Z", "-y" } },
         .{ .flag = "--output", .good = &.{ "-", "a.png", "b/A.PPM" }, .bad = &.{ "", "png" } },
     };
     for (cases) |case| {
@@ -735,8 +831,14 @@ test "values arrive as they were meant" {
     try std.testing.expectEqual(.auto, (try optionsForTest(&.{"--camera=auto"})).view.camera);
     const named = (try optionsForTest(&.{"--camera=7a"})).view.camera;
     try std.testing.expectEqualStrings("7a", named.name);
+    try std.testing.expectEqual(7, (try optionsForTest(&.{"--scene=7"})).load.scene.index);
+    const named_scene = (try optionsForTest(&.{"--scene=auto"})).load.scene;
+    try std.testing.expectEqualStrings("auto", named_scene.name);
+    try std.testing.expectEqual(.z, (try optionsForTest(&.{"--up-axis=z"})).load.up_axis);
     const background = (try optionsForTest(&.{"--background=#FF8001"})).view.background;
     try std.testing.expectEqual([3]u8{ 255, 128, 1 }, background.srgb);
+    const name = (try optionsForTest(&.{"--background=Tan"})).view.background;
+    try std.testing.expectEqual([3]u8{ 0xd2, 0xb4, 0x8c }, name.srgb);
     const linear = (try optionsForTest(&.{"--background=0,0.5,2"})).view.background;
     try std.testing.expectEqual([3]f32{ 0, 0.5, 2 }, linear.linear);
     const denormal = (try optionsForTest(&.{"--ambient=1e-40"})).view.ambient;
@@ -803,6 +905,9 @@ test "the last of several options counts, around --thesis too" {
     try std.testing.expectEqual(3, thesis.render.depth);
     try std.testing.expectEqual(1, thesis.render.sample_count);
     try std.testing.expectEqual(null, thesis.thread_count);
+    try std.testing.expectEqual(0, thesis.write.exposure.ev);
+    try std.testing.expectEqual(.linear, thesis.write.tone_mapping);
+    try std.testing.expect(!thesis.view.display_referred);
     const changed = try optionsForTest(&.{ "--thesis", "--depth=9", "-t7" });
     try std.testing.expectEqual(9, changed.render.depth);
     try std.testing.expectEqual(7, changed.thread_count);
@@ -869,6 +974,7 @@ test "the help fits a screen and says what flags take and may be" {
 test {
     _ = bench;
     _ = @import("cli/arguments.zig");
+    _ = colors;
     _ = @import("cli/nearest.zig");
 }
 

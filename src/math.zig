@@ -10,7 +10,9 @@ pub const AffineMap = @import("math/affine.zig").Affine;
 pub const flushDenormal = @import("math/vec3.zig").flushDenormal;
 /// Axis-aligned boxes.
 pub const box3 = @import("math/box3.zig");
-/// Sine, cosine, tangent, exponential, logarithm, power.
+/// Directions as points of a square.
+pub const octahedral = @import("math/octahedral.zig");
+/// Sine, cosine, tangent, arc cosine, exponential, logarithm, power.
 pub const elementary = @import("math/elementary.zig");
 /// The sRGB transfer function.
 pub const srgb = @import("math/srgb.zig");
@@ -30,6 +32,7 @@ test {
     _ = @import("math/vec3.zig");
     _ = @import("math/affine.zig");
     _ = box3;
+    _ = octahedral;
     _ = elementary;
     _ = srgb;
 }

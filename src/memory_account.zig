@@ -158,6 +158,14 @@ pub const LibraryHeap = struct {
         return .{ .user = heap, .allocate = allocate, .resize = resize, .release = release };
     }
 
+    /// Takes a block out of the heap: all of its memory, for the caller to free by `huge_pages`.
+    pub fn take(heap: *LibraryHeap, memory: *anyopaque) []align(64) u8 {
+        const head = headOf(memory);
+        heap.blocks.remove(&head.node);
+        const block: [*]align(64) u8 = @ptrCast(@alignCast(head));
+        return block[0..head.bytes];
+    }
+
     fn free(heap: *LibraryHeap, head: *Head) void {
         const memory: [*]align(64) u8 = @ptrCast(@alignCast(head));
         huge_pages.free(heap.gpa, memory[0..head.bytes]);
@@ -274,9 +282,14 @@ test LibraryHeap {
     hooks.release(&heap, larger);
     hooks.release(&heap, null);
     try std.testing.expect(alignmentOf(@ptrCast(empty)));
+    const taken: [*]u8 = @ptrCast(hooks.allocate(&heap, 500).?);
+    taken[499] = 7;
+    const block = heap.take(taken);
+    defer huge_pages.free(account.allocator(), block);
+    try std.testing.expectEqual(7, block[block.len - 1]);
     // What is left is freed.
     heap.deinit();
-    try std.testing.expectEqual(0, account.used.load(.monotonic));
+    try std.testing.expectEqual(block.len, account.used.load(.monotonic));
 }
 
 fn alignmentOf(memory: [*]const u8) bool {

@@ -10,6 +10,9 @@ const stb_image = @import("stb_image.zig");
 
 test {
     _ = @import("analytic.zig");
+    _ = @import("decode.zig");
+    _ = @import("environment.zig");
+    _ = @import("gltf_textures.zig");
     _ = @import("malformed.zig");
     _ = @import("offset.zig");
     _ = @import("output.zig");
@@ -17,6 +20,7 @@ test {
     _ = @import("samples.zig");
     _ = @import("beams.zig");
     _ = @import("soup.zig");
+    _ = @import("textures.zig");
     _ = @import("variants.zig");
 }
 

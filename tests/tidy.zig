@@ -36,7 +36,10 @@ const directions = [_]Row{
     .{ .part = "builtin", .may_import = &.{"scene"} },
     .{ .part = "parse", .may_import = &.{"scene"} },
     .{ .part = "scene", .may_import = &.{} },
-    .{ .part = "prepare", .may_import = &.{ "scene", "world", "simd", "parallel" } },
+    .{
+        .part = "prepare",
+        .may_import = &.{ "scene", "world", "simd", "parallel", "decode", "memory_account" },
+    },
     .{ .part = "world", .may_import = &.{} },
     .{ .part = "trace", .may_import = &.{ "world", "film", "variant", "simd", "parallel" } },
     .{ .part = "film", .may_import = &.{"image"} },
@@ -45,6 +48,7 @@ const directions = [_]Row{
     .{ .part = "output", .may_import = &.{ "image", "memory_account", "parallel" } },
     .{ .part = "report", .may_import = &.{} },
     .{ .part = "energy", .may_import = &.{} },
+    .{ .part = "decode", .may_import = &.{"memory_account"} },
     .{ .part = "diagnostic", .may_import = &.{} },
     .{ .part = "huge_pages", .may_import = &.{} },
     .{ .part = "identity", .may_import = &.{} },
@@ -123,7 +127,7 @@ const long_generics = [_]LongGeneric{
     .{
         .path = "src/trace/integrate/whitted.zig",
         .name = "Whitted",
-        .lines = 290,
+        .lines = 340,
         .why = "one algorithm over one state",
     },
     .{
@@ -168,7 +172,7 @@ const File = struct {
     fn isCode(file: File) bool {
         if (std.mem.eql(u8, std.fs.path.basename(file.path), "SHA256SUMS")) return false;
         const extension = std.fs.path.extension(file.path);
-        for ([_][]const u8{ ".zig", ".zon", ".c", ".h", ".py", ".sh", "" }) |code| {
+        for ([_][]const u8{ ".zig", ".zon", ".c", ".cpp", ".h", ".py", ".sh", "" }) |code| {
             if (std.mem.eql(u8, extension, code)) return true;
         }
         return false;
@@ -227,7 +231,7 @@ fn readTree(arena: Allocator) ![]const File {
 
 fn isText(basename: []const u8) bool {
     const extensions = [_][]const u8{
-        ".zig", ".zon", ".c",   ".h",    ".py",   ".sh", ".md",
+        ".zig", ".zon", ".c",   ".cpp",  ".h",    ".py", ".sh", ".md",
         ".txt", ".tsv", ".svg", ".toml", ".json", "",
     };
     for (extensions) |extension| {

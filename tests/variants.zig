@@ -33,7 +33,12 @@ fn expectHash(expected: u64, image: *const raylane.image.Image, what: []const u8
     return error.TestExpectedHash;
 }
 
-fn expectAllVariants(scene: *const raylane.scene.Scene, base: fixture.Options, hash: u64) !void {
+/// Renders a scene by every variant.
+pub fn expectAllVariants(
+    scene: *const raylane.scene.Scene,
+    base: fixture.Options,
+    hash: u64,
+) !void {
     inline for (.{ 4, 8, 16 }) |lanes| {
         var diagnostic: raylane.diagnostic.Diagnostic = .{};
         var session: raylane.session.Session =

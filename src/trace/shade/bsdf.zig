@@ -212,6 +212,8 @@ fn testPoint(view: [3]f32) Interaction(Single) {
         .opacity = .splat(1),
         .error_ulps = .zero(),
         .offset_max = .zero(),
+        .cone_width = .zero(),
+        .curvature = .zero(),
         .material = .{
             .base_color = .splat(.{ 1, 1, 1 }),
             .emissive = .splat(.{ 0, 0, 0 }),
@@ -221,6 +223,7 @@ fn testPoint(view: [3]f32) Interaction(Single) {
             .ior = .splat(1.5),
             .transmission = .splat(0),
             .sigma_a = .splat(.{ 0, 0, 0 }),
+            .occlusion = .splat(1),
             .unlit = .splat(false),
             .volume = .splat(false),
         },
