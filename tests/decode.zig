@@ -184,8 +184,51 @@ test "Radiance HDR comes as floats, exactly" {
     }
 }
 
+test "OpenEXR comes as floats, exactly" {
+    for ([_]struct { []const u8, u8 }{
+        .{ "rgb.exr", 3 },     .{ "rgba.exr", 4 }, .{ "rgba-piz.exr", 4 },
+        .{ "rgb-piz.exr", 3 }, .{ "gray.exr", 1 }, .{ "gray-alpha.exr", 2 },
+    }) |case| {
+        const file = try imageFile(case[0]);
+        defer testing.allocator.free(file);
+        var reason: decode.Reason = .{};
+        errdefer std.debug.print("{s}: {s}\n", .{ case[0], reason.text() });
+        const info = try decode.info(file, &reason);
+        var texels = try decode.decode(testing.allocator, file, &reason);
+        defer texels.deinit(testing.allocator);
+        try testing.expectEqual(decode.Info{
+            .format = .exr,
+            .width = width,
+            .height = height,
+            .channel_count = case[1],
+            .is_float = true,
+        }, info);
+        for (texels.data.floats, 0..) |found, index| {
+            const x = index / case[1] % width;
+            const y = index / case[1] / width;
+            const expected: f32 = @floatFromInt(colourOf(x, y, case[1])[index % case[1]]);
+            try testing.expectEqual(expected, found);
+        }
+    }
+}
+
+test "what is no radiance in OpenEXR becomes one" {
+    const file = try imageFile("wild.exr");
+    defer testing.allocator.free(file);
+    var reason: decode.Reason = .{};
+    var texels = try decode.decode(testing.allocator, file, &reason);
+    defer texels.deinit(testing.allocator);
+    for (texels.data.floats, 0..) |found, index| {
+        const expected = [_]f32{ 0, 65_504, 0, 1 };
+        try testing.expectEqual(expected[index % width % 4], found);
+    }
+}
+
 const names = blk: {
-    var list: []const []const u8 = &.{ "rle.hdr", "flat.hdr", "narrow.hdr" };
+    var list: []const []const u8 = &.{
+        "rle.hdr",     "flat.hdr", "narrow.hdr",     "rgb.exr",  "rgba.exr", "rgba-piz.exr",
+        "rgb-piz.exr", "gray.exr", "gray-alpha.exr", "wild.exr",
+    };
     for (cases) |case| list = list ++ .{case.name};
     break :blk list;
 };
