@@ -152,7 +152,10 @@ const Bench = struct {
         }
         for (0..options.subdivide) |_| try input.subdivide(scene);
         try session.pose(.{ .lanes = compiled[options.chosen()[0]].lanes });
-        session.view(.{ .resolution = .{ options.size, options.size } }) catch |err|
+        session.view(.{
+            .resolution = .{ options.size, options.size },
+            .environment = .{ .source = .none },
+        }) catch |err|
             return bench.named(options.scene, err);
         session.dropScene();
     }
@@ -374,9 +377,8 @@ const Bench = struct {
             bench.diagnostic,
         );
         defer target.abandon();
-        try raylane.output.write(bench.gpa, &image, .{
+        _ = try raylane.output.write(bench.gpa, .{ .image = &image }, .{
             .format = .pfm,
-            .exposure = .{ .ev = 0 },
             .pool = &bench.session.pool,
         }, &target, bench.diagnostic);
     }

@@ -160,7 +160,10 @@ fn measure(
     defer session.deinit();
     try session.load(options.scene, .{});
     try session.pose(.{ .lanes = cost.width });
-    try session.view(.{ .resolution = .{ options.size, options.size } });
+    try session.view(.{
+        .resolution = .{ options.size, options.size },
+        .environment = .{ .source = .none },
+    });
     session.dropScene();
     worlds.wide = session.world.?;
     const builds = try buildAll(gpa, arena, options, &session.pool, &worlds);

@@ -242,7 +242,11 @@ pub const Bench = struct {
             .scene = name,
             .load = .{ .allow_outside = settings.allow_outside, .output = settings.output },
             .tree_quality = settings.tree_quality,
-            .view = .{ .resolution = .{ settings.width, settings.height } },
+            .view = .{
+                .resolution = .{ settings.width, settings.height },
+                .environment = .{ .source = .none },
+                .display_referred = false,
+            },
             .sample_count = settings.sample_count,
             .depth = settings.depth,
         }, settings.thread_count, bench.diagnostic, bench.meter, progress);

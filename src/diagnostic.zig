@@ -202,8 +202,8 @@ test printable {
 
 test "the same warning is said once, and their number is bounded" {
     var diagnostic: Diagnostic = .{};
-    diagnostic.warn("textures are not read yet", .{});
-    diagnostic.warn("textures are not read yet", .{});
+    diagnostic.warn("skins are not applied yet", .{});
+    diagnostic.warn("skins are not applied yet", .{});
     try std.testing.expectEqual(1, diagnostic.warning_count);
     for (0..100) |index| diagnostic.warn("number {d}", .{index});
     try std.testing.expectEqual(warning_count_max, diagnostic.warning_count);

@@ -1,7 +1,7 @@
 //! Data 3: the film, where samples add up to a picture.
 //!
 //! `trace` adds a pixel's samples to it one by one and in order, so that the sum has the same bits
-//! however pixels are shared out; in the end the sums become an image in their own place, which
+//! however pixels are shared out; in the end the sums become images in their own places, which
 //! `output` reads.
 
 const std = @import("std");
@@ -18,6 +18,8 @@ pub const Layer = enum {
     /// Share of a pixel that shows something, in the image's fourth channel: the background is left
     /// clear. Without it pixels are covered all over.
     alpha,
+    /// Surfaces whose colours are the display's, apart from radiance, in an image of their own.
+    display,
 };
 
 /// See `Layer`.
@@ -32,6 +34,9 @@ pub const Film = struct {
     /// By pixel the sums of radiance and of the share that escaped; finished pixels as `Image` has
     /// them.
     image: Image,
+    /// With `Layer.display`: by pixel the sums of the colours that are the display's and of their
+    /// shares of the pixel, then the means. `image` counts these shares as covered, too.
+    display: ?Image,
 
     const V4 = @Vector(4, f32);
 
@@ -43,11 +48,18 @@ pub const Film = struct {
         layers: Layers,
     ) error{OutOfMemory}!Film {
         assert(layers.contains(.color));
-        return .{ .layers = layers, .image = try .init(gpa, width, height) };
+        var image: Image = try .init(gpa, width, height);
+        errdefer image.deinit(gpa);
+        return .{
+            .layers = layers,
+            .image = image,
+            .display = if (layers.contains(.display)) try .init(gpa, width, height) else null,
+        };
     }
 
     /// Frees everything.
     pub fn deinit(film: *Film, gpa: std.mem.Allocator) void {
+        if (film.display) |*display| display.deinit(gpa);
         film.image.deinit(gpa);
         film.* = undefined;
     }
@@ -55,7 +67,16 @@ pub const Film = struct {
     /// Adds a sample to a pixel: its radiance and, fourth, the share of it that saw nothing. The
     /// samples of a pixel come in order; number 0 begins it anew.
     pub inline fn add(film: *Film, x: u32, y: u32, number: u32, sample: [4]f32) void {
-        const pixel = film.image.at(x, y);
+        addTo(film.image.at(x, y), number, sample);
+    }
+
+    /// Adds a sample's colours of the display to a pixel and, fourth, their share of it. Asserts
+    /// that there is such a layer.
+    pub inline fn addDisplay(film: *Film, x: u32, y: u32, number: u32, sample: [4]f32) void {
+        addTo(film.display.?.at(x, y), number, sample);
+    }
+
+    inline fn addTo(pixel: *[4]f32, number: u32, sample: [4]f32) void {
         const sum: V4 = if (number == 0) @splat(0) else pixel.*;
         const value: V4 = sample;
         const limit: V4 = @splat(radiance_max);
@@ -69,18 +90,32 @@ pub const Film = struct {
         const count: V4 = @splat(@floatFromInt(sample_count));
         var non_finite_count: u64 = 0;
         for (rectangle.y0..rectangle.y1) |y| {
-            const row = film.image.pixels[y * film.image.width ..];
-            for (row[rectangle.x0..rectangle.x1]) |*pixel| {
-                var mean: [4]f32 = @as(V4, pixel.*) / count;
+            const start = y * film.image.width;
+            for (start + rectangle.x0..start + rectangle.x1) |at| {
+                var mean: [4]f32 = @as(V4, film.image.pixels[at]) / count;
                 const shown = 1 - mean[3];
                 mean[3] = if (!film.layers.contains(.alpha)) 1 else if (shown > 0) shown else 0;
-                pixel.* = mean;
-                if (std.math.isFinite((mean[0] + mean[1]) + (mean[2] + mean[3]))) continue;
+                film.image.pixels[at] = mean;
+                var sum = (mean[0] + mean[1]) + (mean[2] + mean[3]);
+                if (film.display) |*display| {
+                    const color: [4]f32 = @as(V4, display.pixels[at]) / count;
+                    display.pixels[at] = color;
+                    sum += (color[0] + color[1]) + (color[2] + color[3]);
+                }
+                if (std.math.isFinite(sum)) continue;
                 non_finite_count += 1;
-                pixel.* = .{ 0, 0, 0, 1 };
+                film.image.pixels[at] = .{ 0, 0, 0, 1 };
+                if (film.display) |*display| display.pixels[at] = @splat(0);
             }
         }
         return non_finite_count;
+    }
+
+    /// The identity of the picture: that of its image, where the film has no other.
+    pub fn hash(film: *const Film) u64 {
+        const of_image = film.image.hash();
+        const display = if (film.display) |*image| image else return of_image;
+        return std.hash.XxHash64.hash(of_image, std.mem.sliceAsBytes(display.pixels));
     }
 };
 
@@ -103,4 +138,28 @@ test "means of samples, alpha where it is wanted, black for what is not a number
         try std.testing.expectEqual(mean, film.image.at(1, 1).*);
         try std.testing.expectEqual([4]f32{ 0, 0, 0, 1 }, film.image.at(2, 1).*);
     }
+}
+
+test "colours of the display have means and a part in the hash of their own" {
+    const gpa = std.testing.allocator;
+    const layers: Layers = .init(.{ .color = true, .alpha = true, .display = true });
+    var film: Film = try .init(gpa, 2, 1, layers);
+    defer film.deinit(gpa);
+    const colors = [_][4]f32{ .{ 0.5, 0.25, 0, 0.5 }, .{ 0, 0, 0, 0 } };
+    for (colors, 0..) |color, number| for (0..2) |x| {
+        film.add(@intCast(x), 0, @intCast(number), .{ 0, 0, 0, 1 - color[3] });
+        film.addDisplay(@intCast(x), 0, @intCast(number), color);
+    };
+    const all: Rectangle = .{ .x0 = 0, .y0 = 0, .x1 = 2, .y1 = 1 };
+    try std.testing.expectEqual(0, film.finish(all, 2));
+    try std.testing.expectEqual([4]f32{ 0, 0, 0, 0.25 }, film.image.at(0, 0).*);
+    try std.testing.expectEqual([4]f32{ 0.25, 0.125, 0, 0.25 }, film.display.?.at(0, 0).*);
+    const before = film.hash();
+    try std.testing.expect(before != film.image.hash());
+    film.display.?.at(1, 0)[2] = 0.5;
+    try std.testing.expect(before != film.hash());
+
+    for (0..2) |x| film.addDisplay(@intCast(x), 0, 0, .{ std.math.nan(f32), 0, 0, 1 });
+    try std.testing.expectEqual(2, film.finish(all, 1));
+    try std.testing.expectEqual([4]f32{ 0, 0, 0, 0 }, film.display.?.at(1, 0).*);
 }

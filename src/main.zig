@@ -168,7 +168,7 @@ fn printBench(
 fn exitCodeOf(err: (Job.Error || raylane.bench.Error)) ExitCode {
     return switch (err) {
         error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
-        error.CameraUnknown => .usage,
+        error.CameraUnknown, error.SceneUnknown => .usage,
         error.InvalidInput, error.SceneTooLarge => .invalid,
         error.ImagesDiffer => .differ,
         error.Canceled => unreachable, // Nobody asks for it here.
@@ -312,6 +312,9 @@ const Job = struct {
     fn sayFacts(job: *Job, world: *const World) void {
         if (!job.options.verbose) return;
         if (world.facts.camera_is_default) job.sayOfScene("view: framed on all there is", .{});
+        if (world.facts.environment_is_default) {
+            job.sayOfScene("environment: the studio", .{});
+        }
         if (world.facts.lights_are_default) {
             job.sayOfScene("lights: three directional ones fixed to the camera", .{});
         } else {

@@ -10,8 +10,12 @@ pub const AffineMap = @import("math/affine.zig").Affine;
 pub const flushDenormal = @import("math/vec3.zig").flushDenormal;
 /// Axis-aligned boxes.
 pub const box3 = @import("math/box3.zig");
+/// Directions as points of a square.
+pub const octahedral = @import("math/octahedral.zig");
 /// Sine, cosine, tangent, arc cosine, exponential, logarithm, power.
 pub const elementary = @import("math/elementary.zig");
+/// Directions on a square.
+pub const equal_area = @import("math/equal_area.zig");
 /// The sRGB transfer function.
 pub const srgb = @import("math/srgb.zig");
 
@@ -30,6 +34,8 @@ test {
     _ = @import("math/vec3.zig");
     _ = @import("math/affine.zig");
     _ = box3;
+    _ = octahedral;
     _ = elementary;
+    _ = equal_area;
     _ = srgb;
 }

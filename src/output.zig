@@ -1,7 +1,7 @@
 //! Stage 4: `Image` -> file.
 //!
-//! In: a finished frame. Out: a file in one of seven formats, whole and in its place, or nothing at
-//! all. Colours are made by all threads; the bytes depend on the frame and the settings alone.
+//! In: a finished picture. Out: a file in one of seven formats, whole and in its place, or nothing
+//! at all. Colours are made by all threads; the bytes depend on the picture and the settings alone.
 
 const std = @import("std");
 const choices = @import("settings.zig");
@@ -12,12 +12,21 @@ const huge_pages = @import("huge_pages.zig");
 const parallel = @import("parallel.zig");
 const stb_image_write = @import("output/stb_image_write.zig");
 const target_file = @import("output/target.zig");
-const tonemap = @import("output/tonemap.zig");
+const encode_file = @import("output/encode.zig");
+const exposure_file = @import("output/exposure.zig");
 const assert = std.debug.assert;
 
 pub const Target = target_file.Target;
 /// What a target fails with.
 pub const TargetError = target_file.Error;
+/// What is behind a picture.
+pub const Background = @import("output/background.zig").Background;
+/// What is written: the layers of a film.
+pub const Picture = encode_file.Picture;
+/// How many pixels look like nothing.
+pub const Tally = encode_file.Tally;
+/// The exposure that suits a picture, in stops.
+pub const meter = exposure_file.meter;
 /// What targets create until they are in place.
 pub const TemporaryFiles = @import("output/temporary.zig").TemporaryFiles;
 
@@ -29,7 +38,7 @@ fn sideMax(format: choices.Format) u32 {
     };
 }
 
-fn formOf(format: choices.Format, transparent: bool) tonemap.Form {
+fn formOf(format: choices.Format, transparent: bool) encode_file.Form {
     return switch (format) {
         .png, .tga => if (transparent) .rgba else .rgb,
         .jpg, .bmp, .ppm => .rgb,
@@ -40,10 +49,13 @@ fn formOf(format: choices.Format, transparent: bool) tonemap.Form {
 
 pub const Settings = struct {
     format: choices.Format = .png,
-    /// Of the formats that are not linear.
-    exposure: choices.Exposure = .{ .ev = 0 },
-    /// Keep alpha, where the format has it; otherwise the picture is over black.
+    /// In stops, of the formats that are not linear.
+    exposure_ev: f32 = 0,
+    /// Of the same formats.
+    tone_mapping: choices.ToneMapping = .linear,
+    /// Keep alpha, where the format has it.
     transparent: bool = false,
+    background: Background = .none,
     /// Within `settings.jpeg_quality`.
     jpeg_quality: u8 = choices.jpeg_quality.default,
     pool: *parallel.Pool,
@@ -75,41 +87,50 @@ pub fn check(
     );
 }
 
-/// Encodes the frame and moves it to its place. Closes the target in any case.
+/// Whether a format keeps radiance as it is, without exposure and tone mapping.
+pub fn isLinear(format: choices.Format) bool {
+    return switch (formOf(format, false)) {
+        .linear, .radiance => true,
+        .rgb, .rgba => false,
+    };
+}
+
+/// Encodes the picture and moves it to its place. Closes the target in any case. Returns how many
+/// pixels look like nothing, of the formats that are not linear.
 pub fn write(
     gpa: Allocator,
-    image: *const Image,
+    picture: Picture,
     settings: Settings,
     target: *Target,
     diagnostic: *Diagnostic,
-) Error!void {
+) Error!Tally {
     defer target.abandon();
     const format = settings.format;
+    const image = picture.image;
     try check(format, settings.transparent, image.width, image.height, diagnostic);
     const form = formOf(format, settings.transparent);
-    const rows: tonemap.Rows = .{
-        .image = image,
-        .form = form,
-        .scale = switch (form) {
-            .linear, .radiance => 1,
-            .rgb, .rgba => switch (settings.exposure) {
-                .ev => |ev| tonemap.scaleOf(ev),
-                .auto => try tonemap.autoScale(gpa, image),
-            },
+    var work: Work = .{
+        .rows = .{
+            .picture = picture,
+            .form = form,
+            .scale = exposure_file.scaleOf(settings.exposure_ev),
+            .tone_mapping = settings.tone_mapping,
+            .background = settings.background,
         },
+        .from_bottom = format == .pfm,
     };
-    const pixels = try encodeRows(gpa, rows, settings.pool, format == .pfm);
+    const pixels = try work.run(gpa, settings.pool);
     defer huge_pages.free(gpa, pixels);
 
     var buffer: [48]u8 = undefined;
     const size = .{ image.width, image.height };
     // Two numbers of 10 digits and 10 bytes more fit.
-    return switch (format) {
-        .ppm => target.finish(&.{
+    switch (format) {
+        .ppm => try target.finish(&.{
             std.mem.print(&buffer, "P6\n{d} {d}\n255\n", size) catch unreachable, pixels,
         }, diagnostic),
         // A negative scale says little-endian.
-        .pfm => target.finish(&.{
+        .pfm => try target.finish(&.{
             std.mem.print(&buffer, "PF\n{d} {d}\n-1.0\n", size) catch unreachable, pixels,
         }, diagnostic),
         inline .png, .jpg, .tga, .bmp, .hdr => |coded| {
@@ -124,41 +145,39 @@ pub fn write(
                 .quality = settings.jpeg_quality,
             });
             defer gpa.free(file);
-            return target.finish(&.{file}, diagnostic);
+            try target.finish(&.{file}, diagnostic);
         },
-    };
-}
-
-/// All rows, by all threads; the caller frees them.
-fn encodeRows(
-    gpa: Allocator,
-    rows: tonemap.Rows,
-    pool: *parallel.Pool,
-    from_bottom: bool,
-) Error![]align(64) u8 {
-    comptime assert(@import("builtin").cpu.arch.endian() == .little);
-    const height = rows.image.height;
-    const byte_count = std.math.mul(usize, rows.byteCount(), height) catch
-        return error.OutOfMemory;
-    const work: Work = .{
-        .rows = rows,
-        .from_bottom = from_bottom,
-        .bytes = try huge_pages.alloc(gpa, u8, byte_count),
-    };
-    errdefer huge_pages.free(gpa, work.bytes);
-    try pool.forEach(height, &work, Work.encodeRow);
-    return work.bytes;
+    }
+    return work.tally;
 }
 
 const Work = struct {
-    rows: tonemap.Rows,
+    rows: encode_file.Rows,
     from_bottom: bool,
-    bytes: []align(64) u8,
+    bytes: []align(64) u8 = &.{},
+    tally: Tally = .{},
 
-    fn encodeRow(work: *const Work, y: usize, _: usize) void {
+    /// All rows, by all threads; the caller frees them.
+    fn run(work: *Work, gpa: Allocator, pool: *parallel.Pool) Error![]align(64) u8 {
+        comptime assert(@import("builtin").cpu.arch.endian() == .little);
+        const height = work.rows.picture.image.height;
+        const byte_count = std.math.mul(usize, work.rows.byteCount(), height) catch
+            return error.OutOfMemory;
+        work.bytes = try huge_pages.alloc(gpa, u8, byte_count);
+        errdefer huge_pages.free(gpa, work.bytes);
+        try pool.forEach(height, work, Work.encodeRow);
+        return work.bytes;
+    }
+
+    fn encodeRow(work: *Work, y: usize, _: usize) void {
         const row_bytes = work.rows.byteCount();
-        const place = if (work.from_bottom) work.rows.image.height - 1 - y else y;
-        work.rows.encode(@intCast(y), work.bytes[place * row_bytes ..][0..row_bytes]);
+        const place = if (work.from_bottom) work.rows.picture.image.height - 1 - y else y;
+        const bytes = work.bytes[place * row_bytes ..][0..row_bytes];
+        const tally = work.rows.encode(@intCast(y), bytes);
+        // Sums of whole numbers, whatever their order.
+        inline for (comptime std.meta.fieldNames(Tally)) |name| {
+            _ = @atomicRmw(u32, &@field(work.tally, name), .Add, @field(tally, name), .monotonic);
+        }
     }
 };
 
@@ -166,13 +185,17 @@ test {
     _ = stb_image_write;
     _ = target_file;
     _ = @import("output/temporary.zig");
-    _ = tonemap;
+    _ = @import("output/background.zig");
+    _ = @import("output/tonemap.zig");
+    _ = encode_file;
+    _ = exposure_file;
 }
 
 const TestSettings = struct {
     format: choices.Format = .png,
-    exposure: choices.Exposure = .{ .ev = 0 },
+    exposure_ev: f32 = 0,
     transparent: bool = false,
+    background: Background = .none,
 };
 
 /// What `write` leaves in a file called `name`; the caller frees it.
@@ -193,10 +216,11 @@ fn writeForTest(
     var diagnostic: Diagnostic = .{};
     var temporaries: TemporaryFiles = .{};
     var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
-    try write(gpa, image, .{
+    _ = try write(gpa, .{ .image = image }, .{
         .format = settings.format,
-        .exposure = settings.exposure,
+        .exposure_ev = settings.exposure_ev,
         .transparent = settings.transparent,
+        .background = settings.background,
         .pool = &pool,
     }, &target, &diagnostic);
     return folder.readFileAlloc(io, name, gpa, .unlimited);
@@ -213,7 +237,7 @@ test "the same frame in every format" {
 
     const ppm_file = try writeForTest(folder.dir, "a.ppm", &image, .{
         .format = .ppm,
-        .exposure = .{ .ev = -1 },
+        .exposure_ev = -1,
         .transparent = true,
     });
     defer gpa.free(ppm_file);
@@ -222,10 +246,11 @@ test "the same frame in every format" {
 
     const pfm_file = try writeForTest(folder.dir, "a.pfm", &image, .{
         .format = .pfm,
-        .exposure = .auto,
+        .exposure_ev = 3,
+        .background = .{ .srgb = .{ 0, 0, 255 } },
     });
     defer gpa.free(pfm_file);
-    const linear = [_]f32{ 0.25, 0.5, 0, 1, 2, 4 };
+    const linear = [_]f32{ 0.25, 0.5, 0.5, 1, 2, 4 };
     try std.testing.expectEqualSlices(u8, "PF\n2 1\n-1.0\n", pfm_file[0..12]);
     try std.testing.expectEqualSlices(u8, std.mem.asBytes(&linear), pfm_file[12..]);
 
@@ -257,8 +282,9 @@ test "memory that runs out leaves no file, whenever it does" {
         var diagnostic: Diagnostic = .{};
         var temporaries: TemporaryFiles = .{};
         var target: Target = try .openFile(io, &temporaries, path, &diagnostic);
-        const settings: Settings = .{ .format = format, .exposure = .auto, .pool = &pool };
-        const result = write(failing.allocator(), &image, settings, &target, &diagnostic);
+        const settings: Settings = .{ .format = format, .pool = &pool };
+        const picture: Picture = .{ .image = &image };
+        const result = write(failing.allocator(), picture, settings, &target, &diagnostic);
         try std.testing.expectError(error.OutOfMemory, result);
         var entries = folder.dir.iterate();
         try std.testing.expectEqual(null, try entries.next(io));

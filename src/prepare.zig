@@ -18,9 +18,12 @@ const bvh_input = @import("prepare/bvh/input.zig");
 const bvh_wide = @import("prepare/bvh/wide.zig");
 const check = @import("prepare/bvh/check.zig");
 const flatten = @import("prepare/flatten.zig");
+const environment = @import("prepare/environment.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
 const place_file = @import("prepare/pose.zig");
+const tangents = @import("prepare/tangents.zig");
+const texture = @import("prepare/texture.zig");
 const view_file = @import("prepare/view.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
@@ -29,6 +32,29 @@ const Scene = scene.Scene;
 const StageTimes = statistics.StageTimes;
 const TreeQuality = choices.TreeQuality;
 const World = world.World;
+
+/// What is made once of a scene, for all of its poses.
+pub const Loaded = struct {
+    textures: texture.TextureSet,
+    arena: std.heap.ArenaAllocator,
+    /// The scene's, with the tangents that textures need.
+    meshes: []const scene.Mesh,
+    /// What of the scene is drawn: instances whose material can be seen anywhere.
+    instances: []const scene.Instance,
+
+    /// Frees everything.
+    pub fn deinit(loaded: *Loaded) void {
+        loaded.textures.deinit();
+        loaded.arena.deinit();
+        loaded.* = undefined;
+    }
+};
+
+/// How textures are made, and by whom.
+pub const LoadSettings = texture.Settings;
+
+/// `SceneTooLarge`: the textures are; the diagnostic says more.
+pub const LoadError = texture.Error;
 
 /// How the geometry is made ready, and by whom.
 pub const PoseSettings = struct {
@@ -41,12 +67,16 @@ pub const PoseSettings = struct {
 /// What is seen of it, and in what light.
 pub const ViewSettings = struct {
     camera: choices.Camera = .default,
+    viewpoint: choices.Viewpoint = .{},
     /// Width and height in pixels, at least 1 each.
     resolution: ?[2]u32 = null,
+    /// Where there is no resolution, pixels of the longer side.
+    long_side: ?u32 = null,
     /// Radiance from everywhere, at least 0.
     ambient: ?f32 = null,
     /// Linear RGB.
     background: ?math.Vec3 = null,
+    environment: light.EnvironmentSettings = .{},
 };
 
 /// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
@@ -55,16 +85,86 @@ pub const PoseError = error{ OutOfMemory, SceneTooLarge } || parallel.Error;
 /// `CameraUnknown`: no camera has that name or index; the diagnostic says more.
 pub const ViewError = error{ OutOfMemory, CameraUnknown };
 
-pub const Error = PoseError || ViewError;
+pub const Error = LoadError || PoseError || ViewError;
+
+/// Makes what does not depend on where things are: textures, and tangents for them. The memory is
+/// the result's and comes from `gpa`. Fills `texture_ns` of `times`.
+pub fn load(
+    gpa: Allocator,
+    io: std.Io,
+    from: *const Scene,
+    settings: LoadSettings,
+    diagnostic: *Diagnostic,
+    times: *StageTimes,
+) LoadError!Loaded {
+    const mode = simd.setFlushToZero();
+    defer simd.setFloatControl(mode);
+    const start = Clock.awake.now(io);
+    var textures = try texture.load(gpa, from, settings, diagnostic);
+    errdefer textures.deinit();
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    errdefer arena.deinit();
+    const instances = try visibleInstances(arena.allocator(), &textures, from);
+    const meshes = try tangents.make(
+        gpa,
+        arena.allocator(),
+        from,
+        instances,
+        &textures,
+        settings.pool,
+        diagnostic,
+    );
+    times.texture_ns = nanoseconds(start.durationTo(Clock.awake.now(io)));
+    return .{ .textures = textures, .arena = arena, .meshes = meshes, .instances = instances };
+}
+
+/// Those whose material is all holes, or all clear, are as good as not there.
+fn visibleInstances(
+    arena: Allocator,
+    textures: *const texture.TextureSet,
+    from: *const Scene,
+) error{OutOfMemory}![]const scene.Instance {
+    var visible: std.ArrayList(scene.Instance) = try .initCapacity(arena, from.instances.len);
+    for (from.instances) |instance| {
+        const index = from.meshes[instance.mesh].material;
+        if (material.isVisible(&from.materials[index], &textures.materials[index])) {
+            visible.appendAssumeCapacity(instance);
+        }
+    }
+    return visible.items;
+}
+
+/// What of the vertices the textures ask for.
+fn attributesOf(textures: *const texture.TextureSet) flatten.Attributes {
+    var attributes: flatten.Attributes = .{};
+    for (textures.lookups) |lookup| {
+        attributes.texcoord_sets[lookup.texcoord_set] = true;
+        if (lookup.slot == .normal) attributes.tangents = true;
+    }
+    return attributes;
+}
+
+/// Makes environment maps.
+pub const makeEnvironment = environment.make;
+/// See `makeEnvironment`.
+pub const EnvironmentError = environment.Error;
+/// See `makeEnvironment`.
+pub const EnvironmentSource = environment.Source;
+/// See `makeEnvironment`.
+pub const OwnedEnvironmentMap = environment.OwnedMap;
+/// How a map is placed around the scene.
+pub const EnvironmentSettings = light.EnvironmentSettings;
 
 /// Places what is in a scene and builds the tree over it: a world in which nothing shines and that
 /// is seen by nobody yet. Its memory comes from `gpa` by way of an arena: its few large arrays are
 /// a block of `gpa` each, of which the arena asks for half as much again but touches only what is
-/// used. Fills `prepare_ns` and `bvh_build_ns` of `times`.
+/// used. What was loaded of the scene has to live as long. Fills `prepare_ns` and `bvh_build_ns` of
+/// `times`.
 pub fn pose(
     gpa: Allocator,
     io: std.Io,
     from: *const Scene,
+    loaded: *const Loaded,
     settings: PoseSettings,
     diagnostic: *Diagnostic,
     times: *StageTimes,
@@ -77,20 +177,36 @@ pub fn pose(
     var arena: std.heap.ArenaAllocator = .init(gpa);
     errdefer arena.deinit();
     const place = try place_file.compose(arena.allocator(), from);
-    const soup = try flatten
-        .flatten(gpa, arena.allocator(), from, place.maps, settings.pool, diagnostic);
+    const soup = try flatten.flatten(
+        gpa,
+        arena.allocator(),
+        loaded.instances,
+        loaded.meshes,
+        attributesOf(&loaded.textures),
+        place.maps,
+        settings.pool,
+        diagnostic,
+    );
     var geometry: world.Geometry = .{
         .tree = world.Geometry.empty.tree,
         .positions = soup.positions,
         .normals = soup.normals,
         .colors = soup.colors,
+        .texcoords = soup.texcoords,
+        .tangents = soup.tangents,
         .triangles = soup.triangles,
         .bounds = soup.bounds,
         .centroid_bounds = soup.centroid_bounds,
         .padding = .init(place_file.round(place.center), soup.bounds),
         .size = @floatCast(place.size),
     };
-    const materials = try material.place(arena.allocator(), from, soup.triangles);
+    const materials = try material.place(
+        arena.allocator(),
+        from,
+        loaded.instances,
+        &loaded.textures,
+        soup.triangles,
+    );
     const tree_start = Clock.awake.now(io);
     const tree_facts = try buildTree(gpa, arena.allocator(), &geometry, settings);
     const end = Clock.awake.now(io);
@@ -102,7 +218,7 @@ pub fn pose(
         .geometry = geometry,
         .node_maps = place.maps,
         .materials = materials,
-        .textures = &.empty,
+        .textures = loaded.textures.textures,
         .facts = .{ .tree = tree_facts, .degenerate_count = soup.dropped_count },
     };
     if (builtin.mode == .debug) try check.check(gpa, &result);
@@ -146,14 +262,20 @@ noinline fn chooseView(
         from,
         seen.node_maps,
         &seen.geometry,
-        settings.camera,
-        settings.resolution,
+        &.{
+            .camera = settings.camera,
+            .viewpoint = settings.viewpoint,
+            .resolution = settings.resolution,
+            .long_side = settings.long_side,
+        },
         diagnostic,
     );
     seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };
     seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
     // What shines from everywhere is a light too.
-    const lights_are_default = seen.lights.len == 0 and from.ambient == null;
+    seen.facts.own_light_count = seen.lights.len;
+    const has_map = settings.environment.map != null;
+    const lights_are_default = seen.lights.len == 0 and from.ambient == null and !has_map;
     if (lights_are_default) seen.lights = try light.placeRig(arena, &seen.view.camera);
     seen.environment = light.environment(
         lights_are_default,
@@ -161,8 +283,10 @@ noinline fn chooseView(
         settings.ambient,
         settings.background orelse from.background,
     );
+    light.addMap(&seen.environment, &settings.environment, &seen.view.camera);
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
+    seen.facts.environment_is_default = settings.environment.is_default;
 }
 
 /// Gives a geometry that has all else a tree of `settings.lanes`, whose memory comes from `arena`.
@@ -235,7 +359,13 @@ const TestSettings = struct {
 fn prepareForTest(gpa: Allocator, from: *const Scene, settings: PoseSettings) !World {
     var diagnostic: Diagnostic = .{};
     var times: StageTimes = .{};
-    var result = try pose(gpa, std.testing.io, from, settings, &diagnostic, &times);
+    // Without textures the world keeps nothing of it.
+    var loaded = try load(gpa, std.testing.io, from, .{
+        .pool = settings.pool,
+    }, &diagnostic, &times);
+    defer loaded.deinit();
+    assert(loaded.textures.lookups.len == 0);
+    var result = try pose(gpa, std.testing.io, from, &loaded, settings, &diagnostic, &times);
     errdefer result.deinit();
     try view(&result, std.testing.io, from, .{}, &diagnostic, &times);
     return result;
@@ -514,6 +644,135 @@ test "colours are white where a mesh has none" {
     try std.testing.expectEqual([4]f32{ 0, 0, 1, 0.5 }, result.geometry.colors[5]);
 }
 
+test "texture coordinates and tangents are placed where a texture asks for them" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    const arena = from.arena.allocator();
+    const texels: [3]u8 = .{ 128, 128, 255 };
+    from.images = &.{.{
+        .name = "flat",
+        .bytes = try texture.TestImage.png(arena, 1, 1, 3, &texels),
+    }};
+    from.textures = &.{.{ .image = 0 }};
+    from.materials = &.{
+        .{ .normal_texture = .{ .texture = 0, .texcoord_set = 1 }, .normal_scale = 0.5 },
+        .{},
+    };
+    var meshes: [2]scene.Mesh = @splat(from.meshes[0]);
+    meshes[0].texcoords = .{ &.{ .{ 9, 9 }, .{ 9, 9 }, .{ 9, 9 } }, &.{
+        .{ 0, 0 }, .{ 1, 0 }, .{ 0, 1 },
+    }, null, null };
+    meshes[0].normals = &.{ .{ 0, 0, 1 }, .{ 0, 0, 1 }, .{ 0, 0, 1 } };
+    meshes[0].tangents = &.{ .{ 1, 0, 0, 1 }, .{ 0, 1, 0, -1 }, .{ 0.6, 0.8, 0, 1 } };
+    meshes[1].material = 1;
+    from.meshes = &meshes;
+    from.nodes = &.{
+        .{ .parent = scene.none, .local = .scale(.{ 2, 1, 1 }) },
+        .{ .parent = scene.none, .local = .scale(.{ -3, 1, 1 }) },
+    };
+    from.instances = &.{
+        .{ .mesh = 0, .node = 0 }, .{ .mesh = 0, .node = 1 }, .{ .mesh = 1, .node = 0 },
+    };
+    from.check();
+    var pool: parallel.Pool = .init(2);
+    defer pool.deinit();
+    var diagnostic: Diagnostic = .{};
+    var times: StageTimes = .{};
+    const io = std.testing.io;
+    var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
+    defer loaded.deinit();
+    var result = try pose(gpa, io, &from, &loaded, .{
+        .lanes = 4,
+        .pool = &pool,
+    }, &diagnostic, &times);
+    defer result.deinit();
+    const geometry = &result.geometry;
+    for ([_]usize{ 0, 2, 3 }) |set| try std.testing.expectEqual(0, geometry.texcoords[set].len);
+    for ([_]usize{ 0, 3 }) |first| {
+        const placed = geometry.texcoords[1][first..][0..3];
+        try std.testing.expectEqualSlices([2]f32, meshes[0].texcoords[1].?, placed);
+    }
+    for (geometry.texcoords[1][6..]) |none| try std.testing.expectEqual([2]f32{ 0, 0 }, none);
+    try std.testing.expectEqual(9, geometry.tangents.len);
+    for (geometry.tangents[6..]) |none| {
+        try std.testing.expectEqual([4]f32{ 0, 0, 0, 1 }, none);
+    }
+    // The bitangent goes where the node takes it.
+    for (meshes[0].tangents.?, 0..) |tangent, vertex| for ([_]f32{ 2, -3 }, 0..) |scale, node| {
+        const normal = math.vec3.normalize(geometry.normals[3 * node + vertex]).?;
+        const placed = geometry.tangents[3 * node + vertex];
+        const direction = math.vec3.normalize(placed[0..3].*).?;
+        const expected = math.vec3.normalize(.{ scale * tangent[0], tangent[1], 0 }).?;
+        const bitangent = math.vec3.scale(math.vec3.cross(normal, direction), placed[3]);
+        const sources: math.Vec3 = .{ -tangent[1] * tangent[3], tangent[0] * tangent[3], 0 };
+        const mapped: math.Vec3 = .{ scale * sources[0], sources[1], 0 };
+        try std.testing.expect(math.vec3.dot(bitangent, mapped) > 0.5);
+        for (expected, direction) |a, b| try std.testing.expectApproxEqAbs(a, b, 1e-6);
+    };
+    const used = &result.materials.all[0];
+    try std.testing.expectEqual(0.5, used.normal_scale);
+    try std.testing.expectEqual(1, used.lookup_count);
+    const lookup = &result.materials.lookups[used.first_lookup];
+    try std.testing.expectEqual(1, lookup.texcoord_set);
+    const texture_of = &result.frame().textures.all[lookup.texture];
+    try std.testing.expectEqualSlices(u8, &texels, texture_of.levels[0].texels);
+    try std.testing.expectEqual(0, result.materials.all[1].lookup_count);
+}
+
+test "loading that runs out of memory is an error that leaks nothing" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    const arena = from.arena.allocator();
+    from.images = &.{.{
+        .name = "flat",
+        .bytes = try texture.TestImage.png(arena, 1, 1, 3, &.{ 128, 128, 255 }),
+    }};
+    from.textures = &.{.{ .image = 0 }};
+    from.materials = &.{.{ .normal_texture = .{ .texture = 0 } }};
+    var meshes: [1]scene.Mesh = .{from.meshes[0]};
+    meshes[0].texcoords[0] = &.{ .{ 0, 0 }, .{ 1, 0 }, .{ 0, 1 } };
+    from.meshes = &meshes;
+    const one = struct {
+        fn one(failing: std.mem.Allocator, scene_from: *const Scene) !void {
+            var pool: parallel.Pool = .init(1);
+            defer pool.deinit();
+            var diagnostic: Diagnostic = .{};
+            var times: StageTimes = .{};
+            const io = std.testing.io;
+            var loaded =
+                try load(failing, io, scene_from, .{ .pool = &pool }, &diagnostic, &times);
+            defer loaded.deinit();
+            // Made, since the mesh has none: v grows downwards in textures, upwards here.
+            for (loaded.meshes[0].tangents.?) |tangent| {
+                try std.testing.expectEqual([4]f32{ 1, 0, 0, -1 }, tangent);
+            }
+        }
+    }.one;
+    try std.testing.checkAllAllocationFailures(gpa, one, .{&from});
+}
+
+test "what can be seen nowhere is not drawn" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    from.materials = &.{
+        .{ .alpha_mode = .blend, .base_color = .{ 1, 1, 1, 0 } },
+        .{ .alpha_mode = .mask, .base_color = .{ 1, 1, 1, 0.9 } },
+    };
+    var meshes: [2]scene.Mesh = @splat(from.meshes[0]);
+    meshes[1].material = 1;
+    from.meshes = &meshes;
+    from.instances = &.{ .{ .mesh = 0, .node = 0 }, .{ .mesh = 1, .node = 0 } };
+    var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 1 });
+    defer result.deinit();
+    try std.testing.expectEqual(1, result.geometry.triangles.len);
+    try std.testing.expectEqual(1, result.geometry.triangles[0].material);
+    // No place of the other is a hole.
+    try std.testing.expect(!result.materials.has_holes and !result.materials.has_transparency);
+}
+
 test "many instances keep their order over many chunks, gaps closed" {
     const gpa = std.testing.allocator;
     // Good, without area, good: moved apart by the node.
@@ -597,12 +856,16 @@ test "memory that runs out is an error that leaks nothing" {
 }
 
 test {
+    _ = environment;
     _ = bvh_wide;
     _ = check;
     _ = flatten;
     _ = light;
     _ = material;
     _ = place_file;
+    _ = tangents;
+    _ = texture;
+    _ = @import("prepare/pyramid.zig");
     _ = view_file;
     _ = @import("prepare/framing.zig");
     _ = @import("prepare/mikktspace.zig");

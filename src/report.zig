@@ -7,6 +7,7 @@ const std = @import("std");
 const Stringify = std.json.Stringify;
 const Writer = std.Io.Writer;
 const printable = @import("diagnostic.zig").printable;
+const settings = @import("settings.zig");
 const statistics = @import("statistics.zig");
 
 /// One frame.
@@ -30,10 +31,23 @@ pub const Report = struct {
     rays: statistics.RayCounts,
     /// Null: not counted.
     tests: ?statistics.TestCounts,
+    textures: Textures = .{},
     bvh: Bvh,
     memory_peak_bytes: u64,
     image_hash: u64,
+    /// Null: the picture keeps radiance as it is.
+    appearance: ?Appearance = null,
     warnings: []const []const u8 = &.{},
+
+    /// What images became.
+    pub const Textures = struct { count: u64 = 0, bytes: u64 = 0 };
+    /// How radiance became what a display can show.
+    pub const Appearance = struct {
+        exposure_ev: f32,
+        /// The exposure was metered.
+        is_automatic: bool,
+        tone_mapping: settings.ToneMapping,
+    };
 
     /// Facts about the tree.
     pub const Bvh = struct {
@@ -88,6 +102,11 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
         if (report.sample_count == 1) "sample" else "samples",
         report.depth,
     });
+    if (report.appearance) |appearance| try writer.print("exposure     {d} EV{s}, {t}\n", .{
+        appearance.exposure_ev,
+        if (appearance.is_automatic) " (automatic)" else "",
+        appearance.tone_mapping,
+    });
     try writer.print("tracer       {s}, {d} {s}\n\n", .{
         report.variant,
         report.thread_count,
@@ -95,6 +114,7 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
     });
     inline for (.{
         .{ "parse", times.parse_ns },
+        .{ "textures", times.texture_ns },
         .{ "prepare", times.prepare_ns },
         .{ "BVH build", times.bvh_build_ns },
         .{ "trace", times.trace_ns },
@@ -125,6 +145,10 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
         report.bvh.node_count, report.bvh.depth, report.bvh.sah_cost,
     });
     try writeBytes(writer, report.bvh.bytes);
+    if (report.textures.count > 0) {
+        try writer.print("\ntextures     {d}, ", .{report.textures.count});
+        try writeBytes(writer, report.textures.bytes);
+    }
     try writer.writeAll("\nmemory       ");
     try writeBytes(writer, report.memory_peak_bytes);
     try writer.writeAll(" at most\n");
@@ -161,8 +185,11 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
         .depth = report.depth,
         .threads = report.thread_count,
         .variant = Text{ .bytes = report.variant },
+        .exposure_ev = if (report.appearance) |appearance| appearance.exposure_ev else null,
+        .tonemap = if (report.appearance) |appearance| appearance.tone_mapping else null,
         .time_ms = .{
             .parse = milliseconds(times.parse_ns),
+            .textures = milliseconds(times.texture_ns),
             .prepare = milliseconds(times.prepare_ns),
             .bvh_build = milliseconds(times.bvh_build_ns),
             .trace = milliseconds(times.trace_ns),
@@ -171,6 +198,7 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
         },
         .rays = report.rays,
         .tests = report.tests,
+        .textures = report.textures,
         .bvh = .{
             .nodes = report.bvh.node_count,
             .depth = report.bvh.depth,
@@ -239,6 +267,7 @@ const report_for_test: Report = .{
     .variant = "vector-beam-4",
     .times = .{
         .parse_ns = 1_500_000,
+        .texture_ns = 250_000,
         .prepare_ns = 1,
         .bvh_build_ns = 0,
         .trace_ns = 2_000_000,
@@ -252,9 +281,11 @@ const report_for_test: Report = .{
         .triangle_issued = 0,
         .triangle_useful = 0,
     },
+    .textures = .{ .count = 2, .bytes = 7 << 10 },
     .bvh = .{ .node_count = 5, .depth = 3, .sah_cost = 12.3456, .bytes = 3 << 10 },
     .memory_peak_bytes = 5 << 20,
     .image_hash = 0xabc,
+    .appearance = .{ .exposure_ev = -9.31, .is_automatic = true, .tone_mapping = .neutral },
     .warnings = &.{ "one", "two" },
 };
 
@@ -269,9 +300,11 @@ test "the text, with and without tests counted" {
     const head =
         \\scene        a "b"??.glb, 34 triangles
         \\image        a.png, 1024 x 768, 1 sample a pixel, depth 6
+        \\exposure     -9.31 EV (automatic), neutral
         \\tracer       vector-beam-4, 4 threads
         \\
         \\parse            1.500 ms
+        \\textures         0.250 ms
         \\prepare          0.000 ms
         \\BVH build        0.000 ms
         \\trace            2.000 ms
@@ -284,6 +317,7 @@ test "the text, with and without tests counted" {
     ;
     const tail =
         \\BVH          5 nodes, depth 3, SAH cost 12.35, 3.0 KiB
+        \\textures     2, 7.0 KiB
         \\memory       5.0 MiB at most
         \\image hash   0000000000000abc
         \\
@@ -312,8 +346,11 @@ test "the JSON has every key and nothing else" {
         depth: u32,
         threads: u32,
         variant: []const u8,
+        exposure_ev: ?f32,
+        tonemap: ?[]const u8,
         time_ms: struct {
             parse: f64,
+            textures: f64,
             prepare: f64,
             bvh_build: f64,
             trace: f64,
@@ -322,6 +359,7 @@ test "the JSON has every key and nothing else" {
         },
         rays: statistics.RayCounts,
         tests: ?statistics.TestCounts,
+        textures: struct { count: u64, bytes: u64 },
         bvh: struct { nodes: u64, depth: u32, sah_cost: ?f64, bytes: u64 },
         memory_peak_bytes: u64,
         image_hash: []const u8,
@@ -332,6 +370,7 @@ test "the JSON has every key and nothing else" {
         var report = report_for_test;
         if (is_bare) {
             report.tests = null;
+            report.appearance = null;
             report.bvh.sah_cost = std.math.inf(f64);
             report.warnings = &.{};
         }
@@ -346,9 +385,13 @@ test "the JSON has every key and nothing else" {
         const value = parsed.value;
         try std.testing.expectEqualStrings("a \"b\"\n\u{fffd}.glb", value.scene);
         try std.testing.expectEqualStrings("0000000000000abc", value.image_hash);
+        try std.testing.expectEqual(@as(?f32, if (is_bare) null else -9.31), value.exposure_ev);
+        try std.testing.expectEqual(is_bare, value.tonemap == null);
+        if (value.tonemap) |name| try std.testing.expectEqualStrings("neutral", name);
         try std.testing.expectEqual(1.5, value.time_ms.parse);
         try std.testing.expectEqual(0.000001, value.time_ms.prepare);
         try std.testing.expectEqual(12_345.678901, value.time_ms.output);
+        try std.testing.expectEqual(7 << 10, value.textures.bytes);
         try std.testing.expectEqual(786_432, value.rays.primary);
         try std.testing.expectEqual(5 << 20, value.memory_peak_bytes);
         try std.testing.expectEqualDeep(report.tests, value.tests);

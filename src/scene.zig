@@ -29,7 +29,7 @@ pub const Node = struct {
 
 /// A picture in a file: as it came, not decoded.
 pub const Image = struct {
-    /// What messages call it.
+    /// What messages call it, printable, in quotes where it is a name of the file's.
     name: []const u8,
     bytes: []const u8,
 };
@@ -132,6 +132,12 @@ pub const Material = struct {
     occlusion_strength: f32 = 1,
     /// Red, green, blue (sRGB), multiplied with `emissive`.
     emissive_texture: ?TextureView = null,
+
+    /// Whether it has any.
+    pub fn hasTextures(material: *const Material) bool {
+        inline for (texture_fields) |field| if (@field(material, field) != null) return true;
+        return false;
+    }
 };
 
 /// The textures of a material.
@@ -142,12 +148,21 @@ pub const texture_fields = [_][]const u8{
 
 /// Light from all around, as an image by direction.
 pub const EnvironmentMap = struct {
-    /// Index into `Scene.images`; equirectangular, see docs/environment.md.
+    /// Index into `Scene.images`.
     image: u32,
+    projection: Projection = .equirectangular,
     /// Multiplies the image's radiance.
     scale: Vec3 = .{ 1, 1, 1 },
-    /// From the world's directions to those of the image.
+    /// From the world's directions to those of the image: a rotation, which may mirror.
     rotation: AffineD = .identity,
+
+    /// Where an image has a direction, (0, 0) its upper left corner and (1, 1) its lower right one.
+    pub const Projection = enum {
+        /// u = atan2(z, x) / 2 pi + 1/2, v = acos(y) / pi, see docs/environment.md.
+        equirectangular,
+        /// A square: `math.equal_area`.
+        octahedral,
+    };
 };
 
 /// A light source (KHR_lights_punctual); it shines from its node's origin along its node's -z.
@@ -226,6 +241,24 @@ pub const Scene = struct {
         scene.* = undefined;
     }
 
+    /// Turns everything about the origin, the light from all around as well.
+    pub fn turn(scene: *Scene, rotation: AffineD) error{OutOfMemory}!void {
+        const nodes = try scene.arena.allocator().dupe(Node, scene.nodes);
+        for (nodes) |*node| {
+            if (node.parent == none) node.local = rotation.compose(node.local);
+        }
+        scene.nodes = nodes;
+        if (scene.environment) |*map| {
+            const back: AffineD = .{
+                .x = .{ rotation.x[0], rotation.y[0], rotation.z[0] },
+                .y = .{ rotation.x[1], rotation.y[1], rotation.z[1] },
+                .z = .{ rotation.x[2], rotation.y[2], rotation.z[2] },
+                .translation = .{ 0, 0, 0 },
+            };
+            map.rotation = map.rotation.compose(back);
+        }
+    }
+
     /// Triangles drawn, every instance counted.
     pub fn triangleCount(scene: *const Scene) u64 {
         var count: u64 = 0;
@@ -271,6 +304,32 @@ pub const Scene = struct {
 test {
     _ = Builder;
     _ = Grid;
+}
+
+test "a scene turns about the origin, roots first, and its surroundings with it" {
+    var builder: Builder = .init(std.testing.allocator);
+    errdefer builder.deinit();
+    const root = try builder.addNode(none, .translate(.{ 1, 2, 3 }));
+    _ = try builder.addNode(root, .translate(.{ 5, 0, 0 }));
+    const image = try builder.addImage(.{ .name = "", .bytes = "" });
+    builder.scene.environment = .{ .image = image };
+    var scene = try builder.finish();
+    defer scene.deinit();
+    // A quarter turn about x.
+    try scene.turn(.{
+        .x = .{ 1, 0, 0 },
+        .y = .{ 0, 0, -1 },
+        .z = .{ 0, 1, 0 },
+        .translation = .{ 0, 0, 0 },
+    });
+    scene.check();
+    const place = scene.nodes[0].local;
+    try std.testing.expectEqual(math.Vec3d{ 1, 3, -2 }, place.translation);
+    try std.testing.expectEqual(math.Vec3d{ 0, 1, 0 }, place.direction(.{ 0, 0, 1 }));
+    try std.testing.expectEqual(math.Vec3d{ 5, 0, 0 }, scene.nodes[1].local.translation);
+    // What is above now was at z.
+    const map = scene.environment.?.rotation;
+    try std.testing.expectEqual(math.Vec3d{ 0, 0, 1 }, map.direction(.{ 0, 1, 0 }));
 }
 
 test "an empty scene is a scene" {

@@ -8,18 +8,21 @@
 
 const std = @import("std");
 const builtin_scenes = @import("builtin.zig");
+const math = @import("math.zig");
 const output = @import("output.zig");
 const parallel = @import("parallel.zig");
 const parse = @import("parse.zig");
 const prepare = @import("prepare.zig");
 const settings = @import("settings.zig");
-const srgb = @import("math.zig").srgb;
+const srgb = math.srgb;
 const statistics = @import("statistics.zig");
 const trace = @import("trace.zig");
 const variant = @import("variant.zig");
+const Environment = @import("session/environment.zig").Environment;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
 const Film = film_file.Film;
+const Identity = @import("identity.zig").Identity;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
@@ -39,10 +42,22 @@ pub fn loadScene(
     choices: settings.Load,
     diagnostic: *Diagnostic,
 ) LoadError!Scene {
-    const builtin_name = std.mem.cutPrefix(u8, name, settings.builtin_prefix) orelse
-        return parse.parse(gpa, io, name, choices, diagnostic);
-    return builtin_scenes.build(gpa, builtin_name, diagnostic);
+    var scene = if (std.mem.cutPrefix(u8, name, settings.builtin_prefix)) |builtin_name| builtin: {
+        try parse.checkOnly(choices, diagnostic);
+        break :builtin try builtin_scenes.build(gpa, builtin_name, diagnostic);
+    } else try parse.parse(gpa, io, name, choices, diagnostic);
+    errdefer scene.deinit();
+    if (choices.up_axis == .z) try scene.turn(z_to_y);
+    return scene;
 }
+
+/// A quarter turn about x.
+const z_to_y: math.AffineD = .{
+    .x = .{ 1, 0, 0 },
+    .y = .{ 0, 0, -1 },
+    .z = .{ 0, 1, 0 },
+    .translation = .{ 0, 0, 0 },
+};
 
 /// How the tree over the placed geometry is built.
 pub const Pose = struct {
@@ -68,12 +83,22 @@ pub const Session = struct {
     scene: ?Scene = null,
     ownership: Ownership = .owned,
     facts: Facts = .{},
+    texture_side_max: u32 = settings.texture_side.default,
+    /// Made by the first `pose` of a scene.
+    loaded: ?prepare.Loaded = null,
     seen: settings.View = .{},
     world: ?World = null,
+    environment: Environment = .{},
+    /// The file that the picture is to replace.
+    output: ?Identity = null,
     film: ?Film = null,
     traced: trace.Statistics = .{},
+    /// What the film was traced with.
+    rendered: settings.Render = .{},
+    /// What it was written with, where that is not linear.
+    appearance: ?Report.Appearance = null,
 
-    pub const Error = LoadError || prepare.Error;
+    pub const Error = LoadError || prepare.Error || @import("session/environment.zig").Error;
 
     /// Whether the scene is freed with the session, or only looked at: then it must live on until
     /// the last `view`.
@@ -84,6 +109,9 @@ pub const Session = struct {
         triangle_count: u64 = 0,
         sample_count: ?u32 = null,
         depth: ?u32 = null,
+        has_background: bool = false,
+        /// Something drawn has colours of the display.
+        has_unlit: bool = false,
     };
 
     /// A session with `thread_count` threads, the caller's among them; null: as many as there are
@@ -100,8 +128,10 @@ pub const Session = struct {
     /// Frees everything and ends the threads.
     pub fn deinit(session: *Session) void {
         session.dropWorld();
+        session.dropLoaded();
         session.dropScene();
         if (session.film) |*film| film.deinit(session.gpa);
+        session.environment.deinit();
         session.pool.deinit();
         session.* = undefined;
     }
@@ -119,6 +149,8 @@ pub const Session = struct {
         const start = Io.Clock.awake.now(session.io);
         const scene = try loadScene(session.gpa, session.io, name, choices, session.diagnostic);
         session.adopt(scene, .owned);
+        session.output = choices.output;
+        session.texture_side_max = choices.texture_side_max;
         session.start = start;
         session.times.parse_ns = session.since(start);
     }
@@ -126,14 +158,20 @@ pub const Session = struct {
     /// Takes a scene that is in memory, in place of the one before.
     pub fn adopt(session: *Session, scene: Scene, ownership: Ownership) void {
         session.dropWorld();
+        session.dropLoaded();
         session.dropScene();
         session.start = Io.Clock.awake.now(session.io);
+        session.environment.dropScene();
         session.scene = scene;
         session.ownership = ownership;
         session.facts = .{
             .triangle_count = scene.triangleCount(),
             .sample_count = scene.sample_count,
             .depth = scene.depth,
+            .has_background = scene.background != null,
+            .has_unlit = for (scene.instances) |instance| {
+                if (scene.materials[scene.meshes[instance.mesh].material].unlit) break true;
+            } else false,
         };
     }
 
@@ -148,10 +186,24 @@ pub const Session = struct {
         session.world = null;
     }
 
-    /// Places the geometry and builds the tree over it. Asserts that there is a scene.
+    fn dropLoaded(session: *Session) void {
+        if (session.loaded) |*loaded| loaded.deinit();
+        session.loaded = null;
+    }
+
+    /// Places the geometry and builds the tree over it; the first time, decodes the textures.
+    /// Asserts that there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
         session.dropWorld();
-        session.world = try prepare.pose(session.gpa, session.io, &session.scene.?, .{
+        const scene = &session.scene.?;
+        if (session.loaded == null) {
+            session.loaded = try prepare.load(session.gpa, session.io, scene, .{
+                .pool = &session.pool,
+                .side_max = session.texture_side_max,
+            }, session.diagnostic, &session.times);
+        }
+        const loaded = &session.loaded.?;
+        session.world = try prepare.pose(session.gpa, session.io, scene, loaded, .{
             .lanes = chosen.lanes,
             .pool = &session.pool,
             .tree_quality = chosen.tree_quality,
@@ -163,11 +215,28 @@ pub const Session = struct {
     pub fn view(session: *Session, choices: settings.View) Error!void {
         if (session.pool.cancelled.load(.monotonic)) return error.Canceled;
         session.seen = choices;
+        // Until it is chosen anew.
+        session.world.?.environment.map = null;
+        const start = Io.Clock.awake.now(session.io);
+        var environment = try session.environment.choose(
+            session.gpa,
+            session.io,
+            &session.pool,
+            &session.scene.?,
+            &choices.environment,
+            session.output,
+            session.diagnostic,
+        );
+        environment.is_seen = choices.background == .env or choices.background == .studio;
+        session.times.prepare_ns += session.since(start);
         try prepare.view(&session.world.?, session.io, &session.scene.?, .{
             .camera = choices.camera,
+            .viewpoint = choices.viewpoint,
             .resolution = choices.resolution,
+            .long_side = choices.long_side,
             .ambient = choices.ambient,
-            .background = backgroundOf(choices.background),
+            .background = radianceOf(choices.background),
+            .environment = environment,
         }, session.diagnostic, &session.times);
     }
 
@@ -175,6 +244,8 @@ pub const Session = struct {
     pub fn render(session: *Session, choices: settings.Render) Error!void {
         const film = try session.sizedFilm();
         const start = Io.Clock.awake.now(session.io);
+        session.rendered = choices;
+        session.appearance = null;
         session.traced = try trace.trace(
             session.gpa,
             choices.variant,
@@ -221,22 +292,121 @@ pub const Session = struct {
         target: *output.Target,
         choices: settings.Write,
     ) output.Error!void {
+        defer target.abandon();
+        session.appearance = if (output.isLinear(choices.format)) null else .{
+            .exposure_ev = try session.exposureOf(choices.exposure),
+            .is_automatic = session.isMetered(choices.exposure),
+            .tone_mapping = choices.tone_mapping,
+        };
         const start = Io.Clock.awake.now(session.io);
-        try output.write(session.gpa, &session.film.?.image, .{
+        const film = &session.film.?;
+        const tally = try output.write(session.gpa, .{
+            .image = &film.image,
+            .display = if (film.display) |*display| display else null,
+        }, .{
             .format = choices.format,
-            .exposure = choices.exposure,
+            .exposure_ev = if (session.appearance) |appearance| appearance.exposure_ev else 0,
+            .tone_mapping = choices.tone_mapping,
             .transparent = session.seen.background == .transparent,
+            .background = session.behind(),
             .jpeg_quality = @intCast(choices.jpeg_quality),
             .pool = &session.pool,
         }, target, session.diagnostic);
         session.times.output_ns = session.since(start);
         session.times.total_ns = session.since(session.start);
+        session.hint(tally);
+    }
+
+    fn isMetered(session: *const Session, exposure: settings.Exposure) bool {
+        return switch (exposure) {
+            .ev => false,
+            .auto => true,
+            .default => session.world.?.facts.own_light_count > 0,
+        };
+    }
+
+    /// In stops: as chosen, or by a small picture of the view, so that it does not depend on the
+    /// pixels that are to be written. Its time counts as tracing.
+    fn exposureOf(session: *Session, exposure: settings.Exposure) trace.Error!f32 {
+        if (!session.isMetered(exposure)) return if (exposure == .ev) exposure.ev else 0;
+        const start = Io.Clock.awake.now(session.io);
+        const world = &session.world.?;
+        const whole = world.view;
+        defer world.view = whole;
+        const longest: f32 = @floatFromInt(@max(whole.width, whole.height));
+        const scale = @min(1, @as(f32, meter_side) / longest);
+        inline for (.{ &world.view.width, &world.view.height }) |side| {
+            side.* = @max(1, @as(u32, @intFromFloat(@as(f32, @floatFromInt(side.*)) * scale)));
+        }
+        var layers = session.layersOf();
+        layers.insert(.alpha);
+        var film: Film = try .init(session.gpa, world.view.width, world.view.height, layers);
+        defer film.deinit(session.gpa);
+        var chosen = session.traceSettings(session.rendered);
+        chosen.sample_count = 1;
+        chosen.progress = .none;
+        const variant_index = session.rendered.variant;
+        _ = try trace.trace(session.gpa, variant_index, &world.frame(), &film, chosen);
+        const display = if (film.display) |*other| other else null;
+        const ev = try output.meter(session.gpa, &film.image, display);
+        session.times.trace_ns += session.since(start);
+        return ev;
+    }
+
+    /// Says so where the picture shows next to nothing, and what may help.
+    fn hint(session: *Session, tally: output.Tally) void {
+        const total = session.film.?.image.pixels.len;
+        if (isNearlyAll(tally.clear, total)) return session.hintOf(
+            "background",
+            tally.clear,
+            total,
+            if (session.world.?.facts.camera_is_default)
+                "--orbit and --fov choose another view"
+            else
+                "--camera auto shows all there is",
+        );
+        const is_automatic = if (session.appearance) |chosen| chosen.is_automatic else true;
+        if (isNearlyAll(tally.black, tally.covered)) return session.hintOf(
+            "black",
+            tally.black,
+            tally.covered,
+            if (is_automatic)
+                "--env studio or --ambient gives it light"
+            else
+                "--exposure auto makes it brighter",
+        );
+        if (isNearlyAll(tally.white, tally.covered)) return session.hintOf(
+            "white",
+            tally.white,
+            tally.covered,
+            if (is_automatic)
+                "a lower --exposure makes it darker"
+            else
+                "--exposure auto makes it darker",
+        );
+    }
+
+    fn isNearlyAll(count: u64, total: u64) bool {
+        return count * 100 > total * 95;
+    }
+
+    fn hintOf(
+        session: *Session,
+        what: []const u8,
+        count: u64,
+        total: u64,
+        help: []const u8,
+    ) void {
+        session.diagnostic.warn("{d} % of what the picture shows is {s}; {s}", .{
+            count * 100 / total, what, help,
+        });
     }
 
     /// What the picture took; what the user called things is the caller's to fill in.
     pub fn report(session: *const Session, choices: settings.Render) Report {
         const image = &session.film.?.image;
         const tree = &session.world.?.facts.tree;
+        const textures = &session.loaded.?.textures;
         return .{
             .triangle_count = session.facts.triangle_count,
             .width = image.width,
@@ -248,6 +418,10 @@ pub const Session = struct {
             .times = session.times,
             .rays = session.traced.rays,
             .tests = session.traced.tests,
+            .textures = .{
+                .count = textures.textures.all.len,
+                .bytes = textures.byte_count,
+            },
             .bvh = .{
                 .node_count = tree.node_count,
                 .depth = tree.depth,
@@ -255,13 +429,15 @@ pub const Session = struct {
                 .bytes = tree.bytes,
             },
             .memory_peak_bytes = memoryPeakBytes(),
-            .image_hash = image.hash(),
+            .image_hash = session.film.?.hash(),
+            .appearance = session.appearance,
         };
     }
 
     fn sampleCount(session: *const Session, choices: settings.Render) u32 {
+        const seen = &session.world.?.view;
         return choices.sample_count orelse session.facts.sample_count orelse
-            settings.sample_count.default;
+            settings.samplesFor(seen.width, seen.height);
     }
 
     fn depthOf(session: *const Session, choices: settings.Render) u32 {
@@ -279,15 +455,42 @@ pub const Session = struct {
         };
     }
 
-    /// A film of the view's size, with alpha where the background is to be seen through.
+    /// What the film keeps: alpha where the background is no radiance, and colours of the display
+    /// where there are some.
+    fn layersOf(session: *const Session) film_file.Layers {
+        const seen = &session.seen;
+        const facts = &session.facts;
+        return .init(.{
+            .color = true,
+            .alpha = switch (seen.background) {
+                .transparent => true,
+                .srgb => seen.display_referred,
+                .default => seen.display_referred and !facts.has_background,
+                .env, .studio, .linear => false,
+            },
+            .display = seen.display_referred and facts.has_unlit,
+        });
+    }
+
+    /// What is behind the film where that has alpha.
+    fn behind(session: *const Session) output.Background {
+        if (!session.seen.display_referred) return .none;
+        return switch (session.seen.background) {
+            .default => if (session.facts.has_background) .none else .gradient,
+            .srgb => |codes| .{ .srgb = codes },
+            .transparent, .env, .studio, .linear => .none,
+        };
+    }
+
+    /// A film of the view's size.
     fn sizedFilm(session: *Session) error{OutOfMemory}!*Film {
         const view_size = &session.world.?.view;
-        const has_alpha = session.seen.background == .transparent;
-        const layers: film_file.Layers = .init(.{ .color = true, .alpha = has_alpha });
+        const layers = session.layersOf();
         if (session.film) |*film| {
             film.layers = layers;
             const image = &film.image;
-            if (image.width == view_size.width and image.height == view_size.height) return film;
+            if (image.width == view_size.width and image.height == view_size.height and
+                (film.display != null) == layers.contains(.display)) return film;
             film.deinit(session.gpa);
             session.film = null;
         }
@@ -305,10 +508,13 @@ pub fn processorCount() usize {
     return @min(std.Thread.getCpuCount() catch 1, parallel.thread_count_max);
 }
 
-/// The radiance of a background; null: as the lights have it.
-fn backgroundOf(background: settings.Background) ?[3]f32 {
+/// Pixels on the long side of the picture that is metered.
+const meter_side = 64;
+
+/// The radiance of a background; null: as the lights or the scene have it.
+fn radianceOf(background: settings.Background) ?[3]f32 {
     return switch (background) {
-        .default => null,
+        .default, .env, .studio => null,
         .transparent => .{ 0, 0, 0 },
         .linear => |color| color,
         .srgb => |codes| .{
@@ -370,7 +576,7 @@ test "a scene that is loaded once gives each view the picture it has alone" {
     try testing.expect(tests.box_issued > 0 and session.film.?.image.hash() == hashes[2]);
     const made = session.report(.{ .depth = 2 });
     try testing.expectEqual(2, made.depth);
-    try testing.expectEqual(24 * 16, made.rays.primary);
+    try testing.expectEqual(24 * 16 * settings.sample_count_small, made.rays.primary);
     try testing.expectEqual(hashes[2], made.image_hash);
 }
 

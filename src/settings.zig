@@ -31,12 +31,18 @@ pub const Range = struct {
 
 /// Threads; by default as many as there are processors.
 pub const thread_count: Range = .{ .min = 1, .max = 256 };
-/// Samples a pixel.
-pub const sample_count: Range = .{ .min = 1, .max = 4096, .default = 1 };
+/// Samples a pixel; in small pictures each pixel has more to show.
+pub const sample_count: Range = .{ .min = 1, .max = 4096, .default = 4 };
+/// See `samplesFor`.
+pub const sample_count_small = 8;
+/// Pictures whose long side has fewer pixels are small.
+pub const side_small = 512;
 /// Bounces after the primary ray: reflections and refractions in a row.
 pub const depth: Range = .{ .min = 0, .max = 32, .default = 6 };
 /// Straight pieces that a full circle becomes.
 pub const tessellation: Range = .{ .min = 4, .max = 1024, .default = 32 };
+/// Longest side of a texture, in texels; larger images are halved until they fit.
+pub const texture_side: Range = .{ .min = 1, .max = 32_768, .default = 32_768 };
 /// Sides of tiles, in pixels: multiples of `tile_size_step`.
 pub const tile_size: Range = .{ .min = 4, .max = 512, .default = 32 };
 pub const tile_size_step = 4;
@@ -44,13 +50,16 @@ pub const tile_size_step = 4;
 pub const side: Range = .{ .min = 1, .max = 65_536, .default = 1024 };
 /// Pixels of a picture.
 pub const pixel_count_max = 1 << 28;
+/// The longer side where it alone is given: a square one has as many pixels as there may be.
+pub const long_side: Range = .{ .min = 1, .max = 1 << 14, .default = side.default };
 /// Quality of a JPEG.
 pub const jpeg_quality: Range = .{ .min = 1, .max = 100, .default = 90 };
 /// Largest exposure either way, in stops.
 pub const exposure_ev_max = 64;
-/// Automatic exposure lets so many of the pixels, in percent, be no brighter than this.
-pub const auto_exposure: struct { percentile: u64, brightness: f32 } =
-    .{ .percentile = 95, .brightness = 0.8 };
+/// Directional lights a sample that stand for an environment, to find how much of it arrives.
+pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4 };
+/// Largest that automatic exposure chooses.
+pub const exposure_auto_ev_max = 10;
 /// Radiance from everywhere in scenes without lights.
 pub const ambient_default: f32 = 0.35;
 
@@ -92,31 +101,134 @@ pub const Camera = union(enum) {
     name: []const u8,
 };
 
+/// Whole vertical angle of view, in degrees.
+pub const fov_degrees: struct { min: f32, max: f32 } = .{ .min = 0.01, .max = 179 };
+
+/// Where a camera stands about its target (as model-viewer's `camera-orbit`):
+/// eye = target + radius (sin phi sin theta, cos phi, sin phi cos theta).
+pub const Orbit = struct {
+    /// To the right of +z; finite.
+    theta_degrees: f32,
+    /// From straight above: 0 to 180.
+    phi_degrees: f32,
+    radius: Radius = .default,
+
+    /// Above 0.
+    pub const Radius = union(enum) {
+        metres: f32,
+        /// Of the distance that shows all of the model.
+        share: f32,
+
+        pub const default: Radius = .{ .share = 1 };
+    };
+};
+
+/// A camera of the user's own; what is null follows from a framing of the scene. Numbers are
+/// finite; not both `eye` and `orbit`; `orthographic` without `fov_degrees`.
+pub const Viewpoint = struct {
+    eye: ?[3]f32 = null,
+    target: ?[3]f32 = null,
+    /// What is upwards in the picture, not zero; null: y.
+    up: ?[3]f32 = null,
+    orbit: ?Orbit = null,
+    /// Within `fov_degrees`; by itself, it changes the camera that is there.
+    fov_degrees: ?f32 = null,
+    orthographic: bool = false,
+
+    /// Whether it stands in place of the file's camera.
+    pub fn replacesCamera(viewpoint: *const Viewpoint) bool {
+        return viewpoint.eye != null or viewpoint.target != null or viewpoint.up != null or
+            viewpoint.orbit != null or viewpoint.orthographic;
+    }
+};
+/// Which of a file's scenes to read.
+pub const SceneChoice = union(enum) {
+    /// The one that the file shows.
+    default,
+    index: u32,
+    name: []const u8,
+};
+
+/// The axis of a scene that points up.
+pub const UpAxis = enum { y, z };
+
 /// What is seen where there is nothing.
 pub const Background = union(enum) {
-    /// As the lights have it.
+    /// The scene's own, else a quiet gradient.
     default,
+    /// What lights the scene from all around.
+    env,
+    /// The studio, whatever lights the scene.
+    studio,
     transparent,
-    /// Codes of red, green and blue.
+    /// Codes of red, green and blue, as they are to be in the picture.
     srgb: [3]u8,
     /// Radiance of red, green and blue, finite and >= 0.
     linear: [3]f32,
 };
 
+/// Light from all around.
+pub const Environment = struct {
+    source: Source = .default,
+    /// Multiplies its radiance, finite and >= 0.
+    intensity: f32 = 1,
+    /// Turn about y in degrees, counter-clockwise from above; null: none, but the studio turns with
+    /// the camera.
+    rotation_deg: ?f32 = null,
+    /// Within `environment_shadow_count`.
+    shadow_count: u32 = environment_shadow_count.default,
+
+    pub const Source = union(enum) {
+        /// The scene's, or the studio where a scene has no light at all.
+        default,
+        none,
+        studio,
+        /// An image by its name.
+        file: []const u8,
+    };
+};
+
 /// How radiance becomes brightness.
 pub const Exposure = union(enum) {
-    /// Stops: radiance 2^-ev is white. |ev| <= `exposure_ev_max`.
+    /// Automatic where the scene has lights of its own, else 0.
+    default,
+    /// Stops: radiance 2^-ev is white before tone mapping. |ev| <= `exposure_ev_max`.
     ev: f32,
-    /// See `auto_exposure`.
+    /// By what the view shows, within `exposure_auto_ev_max`.
     auto,
 };
 
+/// How exposed radiance becomes what a display can show.
+pub const ToneMapping = enum {
+    /// Khronos PBR Neutral.
+    neutral,
+    /// A fit of ACES's reference rendering and output transforms.
+    aces,
+    /// A fit of AgX.
+    agx,
+    /// Cut off at 1.
+    linear,
+};
+
 /// The settings of the thesis, which `--thesis` and the benchmark begin with.
-pub const thesis: struct { resolution: [2]u32, sample_count: u32, depth: u32 } = .{
+pub const thesis: struct {
+    resolution: [2]u32,
+    sample_count: u32,
+    depth: u32,
+    exposure: Exposure,
+    tone_mapping: ToneMapping,
+} = .{
     .resolution = .{ 1024, 1024 },
     .sample_count = 1,
     .depth = 3,
+    .exposure = .{ .ev = 0 },
+    .tone_mapping = .linear,
 };
+
+/// Samples a pixel of a picture, where nobody says how many.
+pub fn samplesFor(width: u32, height: u32) u32 {
+    return if (@max(width, height) < side_small) sample_count_small else sample_count.default;
+}
 
 /// How a scene is read.
 pub const Load = struct {
@@ -124,6 +236,11 @@ pub const Load = struct {
     allow_outside: bool = false,
     /// Within `tessellation`.
     tessellation: u32 = tessellation.default,
+    /// Within `texture_side`.
+    texture_side_max: u32 = texture_side.default,
+    scene: SceneChoice = .default,
+    /// Where it is not y, the scene is turned about x until it is.
+    up_axis: UpAxis = .y,
     /// A file that is about to be replaced: a scene that is read from it is refused.
     output: ?Identity = null,
 };
@@ -131,19 +248,27 @@ pub const Load = struct {
 /// What is seen of a scene, and by what light.
 pub const View = struct {
     camera: Camera = .default,
-    /// Width and height in pixels; null: the scene's, or its camera's aspect with `side.default` on
-    /// the long side.
+    /// Asserted to be empty but for `fov_degrees` with a camera by index or name.
+    viewpoint: Viewpoint = .{},
+    /// Width and height in pixels; null: the scene's, or its camera's aspect.
     resolution: ?[2]u32 = null,
+    /// Within `long_side`, where there is no `resolution`; null: the scene's, or the default.
+    long_side: ?u32 = null,
     /// Radiance from everywhere, finite and >= 0; null: as the lights have it.
     ambient: ?f32 = null,
+    environment: Environment = .{},
     background: Background = .default,
+    /// Colours of unlit surfaces and of the background are the display's, neither exposed nor tone
+    /// mapped; without it, as in the thesis, they are radiance, and the background's default comes
+    /// with the lights.
+    display_referred: bool = true,
 };
 
 /// How rays are traced.
 pub const Render = struct {
     /// Index into `variant.compiled`.
     variant: usize = 0,
-    /// Null: the scene's, or `sample_count.default`.
+    /// Null: the scene's, or by `samplesFor`.
     sample_count: ?u32 = null,
     /// Null: the scene's, or `depth.default`.
     depth: ?u32 = null,
@@ -153,7 +278,8 @@ pub const Render = struct {
 /// How a picture is encoded.
 pub const Write = struct {
     format: Format = .png,
-    exposure: Exposure = .{ .ev = 0 },
+    exposure: Exposure = .default,
+    tone_mapping: ToneMapping = .neutral,
     /// Within `jpeg_quality`.
     jpeg_quality: u32 = jpeg_quality.default,
 };

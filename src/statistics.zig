@@ -8,6 +8,8 @@ const std = @import("std");
 /// Wall-clock time of each stage in nanoseconds.
 pub const StageTimes = struct {
     parse_ns: u64 = 0,
+    /// Decoding images, and all that is made of them.
+    texture_ns: u64 = 0,
     /// All of `prepare` but the tree.
     prepare_ns: u64 = 0,
     bvh_build_ns: u64 = 0,

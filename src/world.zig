@@ -6,6 +6,7 @@
 
 const std = @import("std");
 const math = @import("math.zig");
+const environment_file = @import("world/environment.zig");
 const geometry_file = @import("world/geometry.zig");
 const materials_file = @import("world/materials.zig");
 const textures_file = @import("world/textures.zig");
@@ -14,7 +15,12 @@ const view_file = @import("world/view.zig");
 pub const AnyTree = geometry_file.AnyTree;
 pub const Camera = view_file.Camera;
 pub const Child = geometry_file.Child;
-pub const Environment = @import("world/environment.zig").Environment;
+pub const Environment = environment_file.Environment;
+pub const EnvironmentLevel = environment_file.EnvironmentLevel;
+pub const EnvironmentMap = environment_file.EnvironmentMap;
+pub const EnvironmentPart = environment_file.EnvironmentPart;
+pub const EnvironmentSource = environment_file.EnvironmentSource;
+pub const EnvironmentTexel = environment_file.EnvironmentTexel;
 pub const Geometry = geometry_file.Geometry;
 pub const Lookup = textures_file.Lookup;
 pub const Light = @import("world/light.zig").Light;
@@ -44,6 +50,16 @@ pub const Frame = struct {
     lights: []const Light,
     environment: *const Environment,
     view: *const View,
+
+    /// Whether what is seen depends on how wide rays are: they have cones then.
+    pub inline fn needsFootprints(frame: *const Frame) bool {
+        return frame.hasTextures() or frame.environment.map != null;
+    }
+
+    /// Whether a material has any.
+    pub inline fn hasTextures(frame: *const Frame) bool {
+        return frame.materials.lookups.len > 0;
+    }
 };
 
 /// What was found on the way, for messages and the report; tracing does not read it.
@@ -53,6 +69,10 @@ pub const Facts = struct {
     camera_is_default: bool = false,
     /// The file has no light that shines: the lights are three fixed to the camera.
     lights_are_default: bool = false,
+    /// The light is the studio's, for want of any other.
+    environment_is_default: bool = false,
+    /// Lights of the file that shine.
+    own_light_count: usize = 0,
     /// Triangles left out because they have no area or no finite place.
     degenerate_count: u64,
 };
@@ -66,8 +86,8 @@ pub const World = struct {
     /// Where the nodes of the scene are: for cameras and lights, which are placed by the view.
     node_maps: []const math.AffineD,
     materials: Materials,
-    /// Made once a scene, by `prepare.load`; not owned.
-    textures: *const Textures,
+    /// Made once a scene, by `prepare.load`, as are the lookups of the materials; not owned.
+    textures: Textures,
     lights: []const Light = &.{},
     environment: Environment = .{ .ambient = 0, .background = @splat(0) },
     view: View = .nowhere,
@@ -78,7 +98,7 @@ pub const World = struct {
         return .{
             .geometry = &world.geometry,
             .materials = &world.materials,
-            .textures = world.textures,
+            .textures = &world.textures,
             .lights = world.lights,
             .environment = &world.environment,
             .view = &world.view,

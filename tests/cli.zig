@@ -205,6 +205,58 @@ fn triangleScene(arena: std.mem.Allocator) ![]const u8 {
     return file.written();
 }
 
+/// A cube from -1 to 1 whose faces shine in a colour each: 255 or 0 of red, green and blue by the
+/// bits of their number, one more than twice the axis and, towards its negative end, another one.
+fn coloredCube(sandbox: *Sandbox) !void {
+    var buffer: Io.Writer.Allocating = .init(sandbox.arena_state.allocator());
+    var json: Io.Writer.Allocating = .init(sandbox.arena_state.allocator());
+    const out = &json.writer;
+    try out.writeAll(
+        \\{"asset":{"version":"2.0"},"extensionsUsed":["KHR_materials_unlit"],"scene":0,
+        \\"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        \\"buffers":[{"uri":"cube.bin","byteLength":432}],
+        \\"bufferViews":[{"buffer":0,"byteLength":432}],"materials":[
+    );
+    for (1..7) |number| try out.print(
+        \\{s}{{"extensions":{{"KHR_materials_unlit":{{}}}},"pbrMetallicRoughness":
+        \\{{"baseColorFactor":[{d},{d},{d},1]}}}}
+    , .{ if (number > 1) "," else "", number & 1, number >> 1 & 1, number >> 2 });
+    try out.writeAll("],\"accessors\":[");
+    for (0..6) |face| try out.print(
+        \\{s}{{"bufferView":0,"byteOffset":{d},"count":6,"componentType":5126,"type":"VEC3",
+        \\"min":[-1,-1,-1],"max":[1,1,1]}}
+    , .{ if (face > 0) "," else "", 72 * face });
+    try out.writeAll("],\"meshes\":[{\"primitives\":[");
+    for (0..6) |face| {
+        try out.print("{s}{{\"attributes\":{{\"POSITION\":{d}}},\"material\":{d}}}", .{
+            if (face > 0) "," else "", face, face,
+        });
+        const side: f32 = if (face % 2 == 0) 1 else -1;
+        for ([6]u2{ 0, 1, 3, 3, 2, 0 }) |bits| {
+            const at = [2]f32{ if (bits & 1 != 0) 1 else -1, if (bits & 2 != 0) 1 else -1 };
+            var corner: [3]f32 = undefined;
+            corner[face / 2] = side;
+            corner[(face / 2 + 1) % 3] = at[0] * side;
+            corner[(face / 2 + 2) % 3] = at[1];
+            for (corner) |x| try buffer.writer.writeInt(u32, @bitCast(x), .little);
+        }
+    }
+    try out.writeAll("]}]}");
+    try sandbox.write("cube.gltf", json.written());
+    try sandbox.write("cube.bin", buffer.written());
+}
+
+/// A pixel of a picture, as the number of a face of the cube; 0 for what is black.
+fn faceAt(ppm: []const u8, width: usize, height: usize, x: usize, y: usize) !usize {
+    const pixels = ppm[ppm.len - 3 * width * height ..];
+    var number: usize = 0;
+    for (pixels[3 * (y * width + x) ..][0..3], 0..) |code, bit| {
+        try testing.expect(code == 0 or code == 255);
+        if (code == 255) number |= @as(usize, 1) << @intCast(bit);
+    }
+    return number;
+}
+
 /// Expects what every error must be: one line `raylane: ...`, ended, and nothing on stdout.
 fn expectOneErrorLine(ending: Ending) !void {
     try testing.expectStringStartsWith(ending.stderr, "raylane: ");
@@ -267,6 +319,19 @@ test "mistakes on the command line are usage errors in one line" {
         &.{ "builtin:cornell", "--bvh=best" },
         &.{ "builtin:cornell", "-r8x8", "--camera=no such camera" },
         &.{ "builtin:cornell", "-r8x8", "--camera=99" },
+        &.{ "builtin:cornell", "-r8x8", "--scene=1" },
+        &.{ "builtin:cornell", "-r8x8", "--up-axis=x" },
+        &.{ "builtin:cornell", "-r16385" },
+        &.{ "builtin:cornell", "--eye=1,2,nan" },
+        &.{ "builtin:cornell", "--target=inf,2,3" },
+        &.{ "builtin:cornell", "--up=0,0,0" },
+        &.{ "builtin:cornell", "--fov=180" },
+        &.{ "builtin:cornell", "--orbit=0,181" },
+        &.{ "builtin:cornell", "--orbit=0,90,-1%" },
+        &.{ "builtin:cornell", "--ortho", "--fov=40" },
+        &.{ "builtin:cornell", "--eye=1,2,3", "--orbit=0,90" },
+        &.{ "builtin:cornell", "--eye=1,2,3", "--target=1,2,3" },
+        &.{ "builtin:cornell", "--camera=0", "--eye=1,2,3" },
     }) |arguments| {
         const ending = try sandbox.expectExit(2, arguments);
         try expectOneErrorLine(ending);
@@ -276,12 +341,72 @@ test "mistakes on the command line are usage errors in one line" {
     try testing.expect(std.mem.find(u8, near.stderr, "'--resolution'") != null);
 }
 
+test "the camera stands where the options say" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try coloredCube(&sandbox);
+    const Case = struct {
+        options: []const []const u8,
+        /// Faces in the middle, and at the left and the right.
+        middle: usize = 0,
+        left: usize = 0,
+        right: usize = 0,
+    };
+    // From 3 metres by 90 degrees, a face covers the middle half of the picture, and so it does in
+    // an orthographic picture 4 metres high.
+    const square = [_][]const u8{ "--fov=90", "--target=0,0,0" };
+    for ([_]Case{
+        .{ .options = &square ++ .{"--orbit=0,90,3"}, .middle = 5 },
+        .{ .options = &square ++ .{"--orbit=90,90,3"}, .middle = 1 },
+        .{ .options = &square ++ .{"--orbit=180,90,3"}, .middle = 6 },
+        .{ .options = &square ++ .{"--orbit=-90,90,3"}, .middle = 2 },
+        .{ .options = &square ++ .{"--orbit=0,0,3"}, .middle = 3 },
+        .{ .options = &square ++ .{"--orbit=0,180,3"}, .middle = 4 },
+        .{ .options = &square ++ .{"--eye=0,3,0"}, .middle = 3 },
+        .{ .options = &.{ "--ortho", "--orbit=0,90,5.494955" }, .middle = 5 },
+        .{ .options = &.{ "--ortho", "--eye=0,0,5.494955" }, .middle = 5 },
+    }) |case| {
+        errdefer for (case.options) |option| std.debug.print("{s} ", .{option});
+        const picture = try cubePicture(&sandbox, case.options);
+        for ([_]usize{ 2, 13, 18, 32, 45, 50, 61 }) |at| {
+            const face: usize = if (at > 16 and at < 48) case.middle else 0;
+            try testing.expectEqual(face, try faceAt(picture, 64, 64, at, 32));
+            try testing.expectEqual(face, try faceAt(picture, 64, 64, 32, at));
+        }
+    }
+    for ([_]Case{
+        .{ .options = &square ++ .{"--eye=3,0,3"}, .left = 5, .right = 1 },
+        .{ .options = &square ++ .{ "--eye=3,0,3", "--up=0,-1,0" }, .left = 1, .right = 5 },
+        .{ .options = &square ++ .{ "--orbit=45,90,4.3", "--up=0,-2,0" }, .left = 1, .right = 5 },
+        .{ .options = &.{"--orbit=45,90"}, .left = 5, .right = 1 },
+        .{ .options = &.{ "--orbit=45,90,100%", "--ortho" }, .left = 5, .right = 1 },
+    }) |case| {
+        errdefer for (case.options) |option| std.debug.print("{s} ", .{option});
+        const picture = try cubePicture(&sandbox, case.options);
+        try testing.expectEqual(case.left, try faceAt(picture, 64, 64, 26, 32));
+        try testing.expectEqual(case.right, try faceAt(picture, 64, 64, 37, 32));
+        for ([_]usize{ 0, 63 }) |at| {
+            try testing.expectEqual(0, try faceAt(picture, 64, 64, at, 32));
+        }
+    }
+    const wide = try sandbox.expectExit(0, &.{ "cube.gltf", "-r64", "-qo-", "--format=ppm" });
+    try testing.expectStringStartsWith(wide.stdout, "P6\n64 48\n");
+}
+
+fn cubePicture(sandbox: *Sandbox, options: []const []const u8) ![]const u8 {
+    const arguments = try std.mem.concat(sandbox.arena_state.allocator(), []const u8, &.{
+        &.{ "cube.gltf", "-r64x64", "-qo-", "--format=ppm", "--spp=1", "--background=#000000" },
+        options,
+    });
+    return (try sandbox.expectExit(0, arguments)).stdout;
+}
+
 test "help is for everybody, fits a screen and keeps its promises" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
     const help = try sandbox.expectExit(0, &.{"--help"});
     try testing.expectEqualStrings("", help.stderr);
-    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 60);
+    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 100);
     const again = try sandbox.expectExit(0, &.{ "absent.glb", "--no-such-flag", "-h" });
     try testing.expectEqualStrings(help.stdout, again.stdout);
     // The built-in scenes that the help names are those that there are.
@@ -294,6 +419,45 @@ test "help is for everybody, fits a screen and keeps its promises" {
         try testing.expect(std.mem.find(u8, help.stdout, name) != null);
     }
     try sandbox.expectEmpty();
+}
+
+test "one of several scenes is chosen by its name or index, and z may point up" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("s.gltf",
+        \\{"asset":{"version":"2.0"},"scene":1,
+        \\"scenes":[{"name":"flat","nodes":[0]},{"name":"fl\u0061t z","nodes":[1]},{"nodes":[]}],
+        \\"nodes":[{"mesh":0},{"mesh":0,"matrix":[1,0,0,0,0,0,1,0,0,-1,0,0,0,0,0,1]}],
+        \\"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        \\"accessors":[{"bufferView":0,"componentType":5121,"count":3,"type":"VEC3"}],
+        \\"extensionsUsed":["KHR_mesh_quantization"],
+        \\"bufferViews":[{"buffer":0,"byteLength":11,"byteStride":4}],
+        \\"buffers":[{"byteLength":11,"uri":"data:;base64,AAAAAAEAAAAAAQA="}]}
+    );
+    var pictures: [6][]const u8 = undefined;
+    for (&pictures, [_][2][]const u8{
+        .{ "--scene=flat", "--up-axis=y" },
+        .{ "--scene=0", "--up-axis=y" },
+        .{ "--scene=1", "--up-axis=z" },
+        .{ "--scene=flat z", "--up-axis=z" },
+        .{ "-q", "--up-axis=z" },
+        .{ "-q", "-q" },
+    }) |*picture, choice| {
+        const arguments = [_][]const u8{ "s.gltf", "-q", "-r8x8", "-oa.ppm" } ++ choice;
+        _ = try sandbox.expectExit(0, &arguments);
+        picture.* = try sandbox.read("a.ppm");
+    }
+    for (pictures[1..5]) |picture| try testing.expectEqualStrings(pictures[0], picture);
+    try testing.expect(!std.mem.eql(u8, pictures[0], pictures[5]));
+    const cases = [_][2][]const u8{
+        .{ "--scene=3", "no scene 3; the file has 0 'flat', 1 'flat z', 2\n" },
+        .{ "--scene=x", "no scene 'x'; the file has 0 'flat', 1 'flat z', 2\n" },
+    };
+    for (cases) |case| {
+        const ending = try sandbox.expectExit(2, &.{ "s.gltf", "-r8x8", "-ono.ppm", case[0] });
+        try expectOneErrorLine(ending);
+        try testing.expectStringEndsWith(ending.stderr, case[1]);
+    }
 }
 
 test "a scene is rendered to its name, with a report on stdout" {
@@ -348,6 +512,7 @@ const Stats = struct {
     bvh: struct { nodes: u64, depth: u32, sah_cost: ?f64, bytes: u64 },
     memory_peak_bytes: u64,
     image_hash: []const u8,
+    exposure_ev: ?f32,
     warnings: []const []const u8,
 };
 
@@ -378,7 +543,7 @@ test "the report as JSON says what was done" {
     try testing.expectEqual(16, stats.image_hash.len);
 
     const plain = try sandbox.expectExit(0, &.{
-        "builtin:cornell", "--stats", "json", "-r16x8", "--depth=3", "-t1", "--tile-size=4",
+        "builtin:cornell", "--thesis", "--stats", "json", "-r16x8", "-t1", "--tile-size=4",
     });
     const plain_stats = try statsOf(&sandbox, plain.stdout);
     try testing.expectEqual(null, plain_stats.tests);
@@ -386,7 +551,7 @@ test "the report as JSON says what was done" {
 
     // Another tree of less cost, the same picture.
     const careful = try sandbox.expectExit(0, &.{
-        "builtin:cornell", "--stats=json", "-r16x8", "--depth=3", "--bvh=high",
+        "builtin:cornell", "--thesis", "--stats=json", "-r16x8", "--bvh=high",
     });
     const careful_stats = try statsOf(&sandbox, careful.stdout);
     try testing.expectEqualStrings(stats.image_hash, careful_stats.image_hash);
@@ -473,10 +638,24 @@ test "background, exposure and transparency reach the pixels" {
     const Case = struct { arguments: []const []const u8, pixel: [3]u8 };
     for ([_]Case{
         .{ .arguments = &.{"--background=#ff8001"}, .pixel = .{ 255, 128, 1 } },
-        .{ .arguments = &.{"--background=0,0.5,1"}, .pixel = .{ 0, 188, 255 } },
-        .{ .arguments = &.{ "--background=0,0.5,1", "--exposure=-1" }, .pixel = .{ 0, 137, 188 } },
-        .{ .arguments = &.{ "--background=9,9,9", "--exposure=auto" }, .pixel = @splat(231) },
+        .{ .arguments = &.{ "--background=#f81", "--exposure=3" }, .pixel = .{ 255, 136, 17 } },
+        .{ .arguments = &.{ "--background=Olive", "--tonemap=agx" }, .pixel = .{ 128, 128, 0 } },
+        .{
+            .arguments = &.{ "--background=0,0.5,1", "--tonemap=linear" },
+            .pixel = .{ 0, 188, 255 },
+        },
+        .{
+            .arguments = &.{ "--background=0,0.5,1", "--tonemap=linear", "--exposure=-1" },
+            .pixel = .{ 0, 137, 188 },
+        },
+        // What the display is to show of 0.5 by PBR Neutral: less by 0.04.
+        .{ .arguments = &.{"--background=0.5,0.5,0.5"}, .pixel = @splat(181) },
         .{ .arguments = &.{"--background=transparent"}, .pixel = .{ 0, 0, 0 } },
+        // The middle of the gradient, and what surrounds a scene without lights.
+        .{ .arguments = &.{}, .pixel = @splat(135) },
+        .{ .arguments = &.{ "--ambient=0.25", "--background=env" }, .pixel = @splat(126) },
+        // By the thesis: without curve and gradient.
+        .{ .arguments = &.{ "--thesis", "-r1x1" }, .pixel = @splat(160) },
     }) |case| {
         const arena = sandbox.arena_state.allocator();
         const ending = try sandbox.expectExit(0, try std.mem.concat(arena, []const u8, &.{
@@ -489,6 +668,117 @@ test "background, exposure and transparency reach the pixels" {
     // The header's colour type: RGB and RGBA.
     try testing.expectEqual(2, opaque_png.stdout[25]);
     try testing.expectEqual(6, clear_png.stdout[25]);
+}
+
+/// A triangle that fills the view, as it is painted: sRGB codes 255, 128 and 0.
+const unlit_scene =
+    \\{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],
+    \\"nodes":[{"mesh":0},{"camera":0,"translation":[0,0,1]}],
+    \\"cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1}}],
+    \\"extensionsUsed":["KHR_materials_unlit"],
+    \\"materials":[{"extensions":{"KHR_materials_unlit":{}},
+    \\"pbrMetallicRoughness":{"baseColorFactor":[1,0.21586,0,1]}}],
+    \\"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],
+    \\"buffers":[{"byteLength":36,"uri":"t.bin"}],"bufferViews":[{"buffer":0,"byteLength":36}],
+    \\"accessors":[{"bufferView":0,"count":3,"componentType":5126,"type":"VEC3",
+    \\"min":[-9,-9,0],"max":[9,9,0]}]}
+;
+const unlit_corners = [_]f32{ -9, -9, 0, 9, -9, 0, 0, 9, 0 };
+
+test "an unlit surface comes out as it is painted, whatever the exposure and the curve" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("u.gltf", unlit_scene);
+    try sandbox.write("t.bin", std.mem.sliceAsBytes(&unlit_corners));
+    for ([_][]const u8{ "neutral", "aces", "agx", "linear" }) |curve| {
+        for ([_][]const u8{ "0", "-5", "4", "auto" }) |exposure| {
+            errdefer std.debug.print("{s} {s}\n", .{ curve, exposure });
+            const ending = try sandbox.expectExit(0, &.{
+                "u.gltf",     "-q",     "-r3x2",     "-o-", "--format=ppm",
+                "--exposure", exposure, "--tonemap", curve,
+            });
+            const pixels = ending.stdout["P6\n3 2\n255\n".len..];
+            for (0..6) |index| {
+                try testing.expectEqualSlices(u8, &.{ 255, 128, 0 }, pixels[index * 3 ..][0..3]);
+            }
+        }
+    }
+    // By the thesis it is radiance.
+    const thesis = try sandbox.expectExit(0, &.{
+        "u.gltf", "--thesis", "-r1x1", "--exposure=-1", "-q", "-o-", "--format=ppm",
+    });
+    try testing.expectEqualSlices(u8, &.{ 188, 92, 0 }, thesis.stdout["P6\n1 1\n255\n".len..]);
+}
+
+test "the exposure is metered by lights of the file alone, and the report says it" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const metered = try sandbox.expectExit(0, &.{ "builtin:cornell", "-r40x30" });
+    try testing.expect(std.mem.find(u8, metered.stdout, " EV (automatic), neutral\n") != null);
+    const json = try sandbox.expectExit(0, &.{
+        "builtin:cornell", "-q", "-r40x30", "--stats=json",
+    });
+    const ev = (try statsOf(&sandbox, json.stdout)).exposure_ev.?;
+    try testing.expect(ev > -2 and ev < 2 and ev != 0);
+    // The number that is said gives the same picture again.
+    const arena = sandbox.arena_state.allocator();
+    const again = try sandbox.expectExit(0, &.{
+        "builtin:cornell", "-r40x30", "-o-", try arena.print("--exposure={d}", .{ev}),
+    });
+    try testing.expectEqualSlices(u8, try sandbox.read("cornell.png"), again.stdout);
+
+    try sandbox.write("empty.gltf", empty_scene);
+    const unlit = try sandbox.expectExit(0, &.{ "empty.gltf", "-q", "-r4x4", "--stats=json" });
+    try testing.expectEqual(0, (try statsOf(&sandbox, unlit.stdout)).exposure_ev.?);
+    const linear = try sandbox.expectExit(0, &.{
+        "empty.gltf", "-q", "-r4x4", "--stats=json", "-oa.pfm",
+    });
+    try testing.expectEqual(null, (try statsOf(&sandbox, linear.stdout)).exposure_ev);
+}
+
+test "a picture that shows next to nothing says what helps, but not with -q" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("empty.gltf", empty_scene);
+    const Case = struct { arguments: []const []const u8, says: ?[]const u8 };
+    for ([_]Case{
+        .{
+            .arguments = &.{"empty.gltf"},
+            .says = "100 % of what the picture shows is background; --orbit",
+        },
+        .{ .arguments = &.{ "empty.gltf", "--background=0.3,0.3,0.3" }, .says = null },
+        .{
+            .arguments = &.{ "empty.gltf", "--background=9,9,9", "--exposure=1" },
+            .says = "100 % of what the picture shows is white; --exposure auto makes",
+        },
+        .{
+            .arguments = &.{ "builtin:cornell", "--exposure=-40" },
+            .says = " % of what the picture shows is black; --exposure auto makes",
+        },
+        .{ .arguments = &.{"builtin:cornell"}, .says = null },
+    }) |case| {
+        const arena = sandbox.arena_state.allocator();
+        const common = [_][]const u8{ "-r40x40", "--stats=json" };
+        const loud = try sandbox.expectExit(
+            0,
+            try std.mem.concat(arena, []const u8, &.{ &common, case.arguments }),
+        );
+        const warnings = (try statsOf(&sandbox, loud.stdout)).warnings;
+        const last = if (warnings.len > 0) warnings[warnings.len - 1] else "";
+        errdefer std.debug.print("{s}\n{s}\n", .{ case.arguments[0], loud.stderr });
+        if (case.says) |text| {
+            try testing.expect(std.mem.find(u8, last, text) != null);
+            try testing.expect(std.mem.find(u8, loud.stderr, text) != null);
+        } else {
+            try testing.expect(std.mem.find(u8, last, "of what the picture shows") == null);
+        }
+        const quiet = try sandbox.expectExit(
+            0,
+            try std.mem.concat(arena, []const u8, &.{ &.{"-q"}, case.arguments, &.{"-r40x40"} }),
+        );
+        try testing.expectEqualStrings("", quiet.stdout);
+        try testing.expectEqualStrings("", quiet.stderr);
+    }
 }
 
 test "warnings go to stderr, and nowhere with -q" {
@@ -1010,7 +1300,7 @@ test "the benchmark measures every variant, prints tables and keeps the samples"
     }
     // The image is the one that rendering makes.
     const rendered = try sandbox.expectExit(0, &.{
-        "builtin:cornell", "-r16x16", "--depth=3", "--stats=json",
+        "builtin:cornell", "--thesis", "-r16x16", "--stats=json",
     });
     const stats = try statsOf(&sandbox, rendered.stdout);
     try testing.expectEqualStrings(stats.image_hash, scene.image_hash);

@@ -145,8 +145,13 @@ pub const Options = struct {
     thread_count: usize = 1,
     tree_quality: raylane.settings.TreeQuality = .default,
     ambient: ?f32 = null,
+    environment: raylane.settings.Environment = .{ .source = .none },
     background: ?[3]f32 = null,
     transparent: bool = false,
+    /// The background is the environment.
+    see_environment: bool = false,
+    /// Without it, all is radiance.
+    display_referred: bool = false,
     /// Index into `variant.compiled`.
     variant: usize = 0,
 };
@@ -170,7 +175,11 @@ pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options)
     try session.view(.{
         .resolution = .{ options.width, options.height },
         .ambient = options.ambient,
-        .background = if (options.transparent)
+        .environment = options.environment,
+        .display_referred = options.display_referred,
+        .background = if (options.see_environment)
+            .env
+        else if (options.transparent)
             .transparent
         else if (options.background) |color| .{ .linear = color } else .default,
     });

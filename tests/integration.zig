@@ -11,13 +11,17 @@ const stb_image = @import("stb_image.zig");
 test {
     _ = @import("analytic.zig");
     _ = @import("decode.zig");
+    _ = @import("environment.zig");
+    _ = @import("gltf_textures.zig");
     _ = @import("malformed.zig");
     _ = @import("offset.zig");
     _ = @import("output.zig");
     _ = @import("pbrt.zig");
+    _ = @import("pbrt_textures.zig");
     _ = @import("samples.zig");
     _ = @import("beams.zig");
     _ = @import("soup.zig");
+    _ = @import("textures.zig");
     _ = @import("variants.zig");
 }
 

@@ -238,9 +238,18 @@ test "JSON, the asset and its extensions" {
         .{ "\"asset\":{\"version\":\"2.0\",", "\"asset\":{", wrong("asset: 'version' is missing") },
         .{ "\"asset\"", "\"assets\"", wrong("the document: 'asset' is missing") },
         .{ "\"asset\"", "\"\\u0061sset\"", .fine },
-        .{ "[\"KHR_lights_punctual\"]", "[\"KHR_texture_transform\"]", odd(
-            "the required extension 'KHR_texture_transform' is not supported yet, " ++
-                "the picture lacks what it adds",
+        .{ "[\"KHR_lights_punctual\"]", "[\"KHR_texture_transform\"]", .fine },
+        .{ "[\"KHR_lights_punctual\"]", "[\"KHR_materials_sheen\"]", odd(
+            "not rendered: the extensions 'KHR_materials_sheen'",
+        ) },
+        .{
+            "\"KHR_materials_volume\"],",
+            "\"A_b\",\"KHR_materials_clearcoat\",\"A_b\",\"KHR_xmp\",\"KHR_materials_sheen\"],",
+            odd("not rendered: the extensions 'A_b', 'KHR_materials_clearcoat', " ++
+                "'KHR_materials_sheen'"),
+        },
+        .{ "\"KHR_materials_volume\"],", "\"\",\"b\",\"c\",\"d\",\"e\",\"f\",\"g\"],", odd(
+            "not rendered: the extensions '', 'b', 'c', 'd', 'e', 'f' and others",
         ) },
         .{ "[\"KHR_lights_punctual\"]", "[\"EXT_meshopt_compression\"]", wrong(
             "the required extension 'EXT_meshopt_compression' is not supported",
@@ -742,6 +751,8 @@ test "the corpus comes out as its manifest says" {
         // That a picture is empty is worth a warning, whatever the reason.
         const is_empty = std.mem.find(u8, line, "{policy:nothing-to-render}") != null;
         if (is_empty and std.mem.eql(u8, outcome, "warn")) continue;
+        // Whether an image is broken shows when it is decoded.
+        if (std.mem.find(u8, line, "[image-") != null and std.mem.eql(u8, outcome, "ok")) continue;
         failed_count += 1;
         std.debug.print("{s}: {s} instead of {s}\n", .{ name, outcome, expected });
     }
@@ -756,6 +767,7 @@ fn outcomeOf(path: []const u8) []const u8 {
             return if (said.message.text().len > 0) "error" else "an error without a message";
         },
         error.OutOfMemory => return "out of memory",
+        error.SceneUnknown => unreachable, // The file's own is asked for.
     };
     defer scene.deinit();
     scene.check();

@@ -46,8 +46,10 @@ fn Decoded(comptime Channel: type) type {
 
 const Settings = struct {
     format: raylane.settings.Format = .png,
-    exposure: raylane.settings.Exposure = .{ .ev = 0 },
+    exposure_ev: f32 = 0,
+    tone_mapping: raylane.settings.ToneMapping = .linear,
     transparent: bool = false,
+    background: raylane.output.Background = .none,
     jpeg_quality: u8 = raylane.settings.jpeg_quality.default,
     thread_count: usize = 1,
 };
@@ -75,10 +77,12 @@ fn written(image: *const Image, settings: Settings) ![]u8 {
     var target: raylane.output.Target = try .openFile(io, &temporaries, path, &diagnostic);
     var pool: raylane.parallel.Pool = .init(settings.thread_count);
     defer pool.deinit();
-    try raylane.output.write(gpa, image, .{
+    _ = try raylane.output.write(gpa, .{ .image = image }, .{
         .format = settings.format,
-        .exposure = settings.exposure,
+        .exposure_ev = settings.exposure_ev,
+        .tone_mapping = settings.tone_mapping,
         .transparent = settings.transparent,
+        .background = settings.background,
         .jpeg_quality = settings.jpeg_quality,
         .pool = &pool,
     }, &target, &diagnostic);
@@ -112,7 +116,7 @@ test "PNG, TGA and BMP hold the encoded colours" {
         defer image.deinit(testing.allocator);
         var decoded = try roundTrip(&image, .{
             .format = format,
-            .exposure = .{ .ev = 1 },
+            .exposure_ev = 1,
             // Alpha is left out where the format has none.
             .transparent = format == .bmp,
         });
@@ -122,7 +126,9 @@ test "PNG, TGA and BMP hold the encoded colours" {
         try testing.expectEqual(3, decoded.channel_count);
         for (image.pixels, 0..) |pixel, index| {
             for (0..3) |channel| {
-                const expected = srgb.encode(pixel[channel] * 2);
+                // Mapped where it is, then mixed with black.
+                const whole = pixel[channel] / pixel[3] * 2;
+                const expected = srgb.encode(@min(whole, 1) * pixel[3]);
                 try testing.expectEqual(expected, decoded.pixels[index * 3 + channel]);
             }
         }
@@ -137,7 +143,7 @@ test "JPEG comes near to the colours, nearer with more quality" {
         for (image.pixels, 0..) |*pixel, index| {
             const x: f32 = @floatFromInt(index % size[0]);
             const y: f32 = @floatFromInt(index / size[0]);
-            pixel.* = .{ x / 1000, y / 1000, (x + y) / 2000, 0.5 };
+            pixel.* = .{ x / 1000, y / 1000, (x + y) / 2000, 1 };
             for (pixel[0..3]) |*value| value.* -= @floor(value.*);
         }
         var errors: [3]f64 = @splat(0);
@@ -174,7 +180,7 @@ test "HDR holds radiance to its eight bits, whatever the exposure" {
         image.pixels[image.pixels.len - 1] = .{ -2, 0, std.math.floatMin(f32), 0 };
         const file = try written(&image, .{
             .format = .hdr,
-            .exposure = .auto,
+            .exposure_ev = 2,
             .transparent = true,
         });
         defer testing.allocator.free(file);
@@ -199,7 +205,7 @@ test "PFM holds every bit, rows from the bottom" {
     var image = try testImage(testing.allocator, 2, 3);
     defer image.deinit(testing.allocator);
     image.pixels[0] = .{ std.math.floatTrueMin(f32), -1, 1e30, 0.25 };
-    const file = try written(&image, .{ .format = .pfm, .exposure = .{ .ev = 3 } });
+    const file = try written(&image, .{ .format = .pfm, .exposure_ev = 3 });
     defer testing.allocator.free(file);
     const header = "PF\n2 3\n-1.0\n";
     try testing.expectStringStartsWith(file, header);
@@ -329,16 +335,46 @@ test "what does not compress is stored, and decoded all the same" {
     }
 }
 
-test "the automatic exposure makes 95 % of the pixels no brighter than 0.8" {
-    var image: Image = try .init(testing.allocator, 100, 1);
+test "every tone mapping has the same bytes on every machine" {
+    var image = try checkers(testing.allocator);
     defer image.deinit(testing.allocator);
-    for (image.pixels, 0..) |*pixel, index| {
-        const gray: f32 = @floatFromInt(index + 1);
-        pixel.* = .{ gray, gray, gray, 1 };
+    // From black to well above white.
+    for (image.pixels) |*pixel| {
+        for (pixel[0..3]) |*value| value.* *= 8 * value.*;
     }
-    var decoded = try roundTrip(&image, .{ .exposure = .auto });
-    defer decoded.deinit();
-    // The 95th of a hundred pixels lies at 0.8 itself.
-    try testing.expectEqual(srgb.encode(0.8), decoded.pixels[94 * 3]);
-    try testing.expect(decoded.pixels[95 * 3] > srgb.encode(0.8));
+    const expected = [_]struct { raylane.settings.ToneMapping, u64 }{
+        .{ .neutral, 0x2c8351a8f3a0abff }, .{ .aces, 0x35fcff03d22687e7 },
+        .{ .agx, 0xc2e1eb3f42ed55e8 },     .{ .linear, 0xf38969dfafae228d },
+    };
+    for (expected) |case| {
+        const file = try written(&image, .{
+            .format = .ppm,
+            .tone_mapping = case[0],
+            .background = .gradient,
+        });
+        defer testing.allocator.free(file);
+        const hash = std.hash.XxHash64.hash(0, file);
+        errdefer std.debug.print("{t}: 0x{x}\n", .{ case[0], hash });
+        try testing.expectEqual(case[1], hash);
+    }
+}
+
+test "a background comes out as it was typed, in every format that keeps codes" {
+    var image: Image = try .init(testing.allocator, 19, 3);
+    defer image.deinit(testing.allocator);
+    @memset(image.pixels, .{ 0, 0, 0, 0 });
+    for ([_]raylane.settings.Format{ .png, .tga, .bmp }) |format| {
+        for ([_][3]u8{ .{ 0, 1, 2 }, .{ 255, 254, 128 }, .{ 11, 12, 13 } }) |codes| {
+            var decoded = try roundTrip(&image, .{
+                .format = format,
+                .exposure_ev = 5,
+                .tone_mapping = .agx,
+                .background = .{ .srgb = codes },
+            });
+            defer decoded.deinit();
+            for (0..image.pixels.len) |index| {
+                try testing.expectEqual(codes, decoded.pixels[index * 3 ..][0..3].*);
+            }
+        }
+    }
 }

@@ -107,7 +107,7 @@ pub const Stages = struct {
     }
 
     pub fn hash(stages: *const Stages) u64 {
-        return stages.session.film.?.image.hash();
+        return stages.session.film.?.hash();
     }
 
     /// A clock that never goes back, in nanoseconds.

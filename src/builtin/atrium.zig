@@ -135,7 +135,7 @@ pub fn build(gpa: Allocator) Allocator.Error!Scene {
         .eye = .{ -9.1, 1.75, 1.7 },
         .target = .{ 3, 3.5, -0.7 },
         .y_fov_deg = 60,
-        .aspect = 1.5,
+        .resolution = .{ 1024, 683 },
     });
     return builder.finish();
 }

@@ -29,7 +29,7 @@ pub fn build(gpa: Allocator) Allocator.Error!Scene {
         .eye = .{ 2.78, 2.73, -8 },
         .target = .{ 2.78, 2.73, -7 },
         .y_fov_deg = 39.3077,
-        .aspect = 1,
+        .resolution = .{ 1024, 1024 },
     });
     return builder.finish();
 }

@@ -52,7 +52,7 @@ pub fn build(gpa: Allocator) Allocator.Error!Scene {
         .eye = .{ 0.4, 1.5, 6.2 },
         .target = .{ 0, -0.12, 0 },
         .y_fov_deg = 36,
-        .aspect = 4.0 / 3.0,
+        .resolution = .{ 1024, 768 },
     });
     return builder.finish();
 }

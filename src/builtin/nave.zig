@@ -109,7 +109,7 @@ pub fn build(gpa: Allocator) Allocator.Error!Scene {
         .eye = .{ -14, 2.3, 0.5 },
         .target = .{ 4, 5.2, -0.2 },
         .y_fov_deg = 62,
-        .aspect = 1.5,
+        .resolution = .{ 1024, 683 },
     });
     return builder.finish();
 }

@@ -16,8 +16,8 @@ pub const View = struct {
     target: Point,
     /// Full vertical angle.
     y_fov_deg: f64,
-    /// Width over height.
-    aspect: f32,
+    /// Of its picture, in pixels.
+    resolution: [2]u32,
 };
 
 /// Adds a point light; `intensity` in candela.
@@ -52,18 +52,19 @@ fn addLight(
     try builder.addLight(.{ .kind = kind, .node = node, .color = color, .intensity = intensity });
 }
 
-/// Adds a camera.
+/// Adds a camera, and the size of its picture.
 pub fn addCamera(builder: *scene_data.Builder, view: View) Error!void {
-    assert(view.y_fov_deg > 0 and view.y_fov_deg < 180 and view.aspect > 0);
+    assert(view.y_fov_deg > 0 and view.y_fov_deg < 180);
     const place = lookAt(view.eye, view.target - view.eye);
     try builder.addCamera(.{
         .name = view.name,
         .node = try builder.addNode(scene_data.none, .of(place)),
         .projection = .{ .perspective = .{
             .y_fov_rad = @floatCast(view.y_fov_deg * (std.math.pi / 180.0)),
-            .aspect = view.aspect,
+            .aspect = null,
         } },
     });
+    builder.scene.resolution = view.resolution;
 }
 
 /// The placement at `origin` whose -z points along `forward` and whose y points up as far as it

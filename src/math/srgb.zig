@@ -9,7 +9,7 @@ const elementary = @import("elementary.zig");
 const assert = std.debug.assert;
 
 /// Linear light of a code given as a fraction of the largest. Asserts 0 <= fraction <= 1.
-fn linear(fraction: f64) f64 {
+pub fn linear(fraction: f64) f64 {
     assert(fraction >= 0 and fraction <= 1);
     if (fraction <= 0.04045) return fraction / 12.92;
     return elementary.pow((fraction + 0.055) / 1.055, 2.4);

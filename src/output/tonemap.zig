@@ -1,258 +1,283 @@
-//! From linear radiance to bytes: exposure, clamping, the sRGB encoding.
+//! Tone mapping: exposed radiance to linear light that a display can show.
 //!
-//! In: rows of premultiplied linear RGBA, finite. Out: rows of RGB (over black) or RGBA bytes
-//! (not premultiplied), or of the floats themselves. A multiplication and an exact encoding: the
-//! same bytes on every target.
+//! In: colours of several pixels, each channel a vector, at least 0. Out: the same by one of four
+//! curves. + - * / and comparisons alone, the powers from series: the same bits on every target.
 
 const std = @import("std");
-const Allocator = std.mem.Allocator;
-const Image = @import("../image.zig").Image;
-const math = @import("../math.zig");
 const settings = @import("../settings.zig");
-const assert = std.debug.assert;
 
-const auto = settings.auto_exposure;
+/// Exposed radiance at most, so that no curve overflows: white for all of them.
+const exposed_max = 1e6;
 
-/// The factor of an exposure in stops, 2^ev. Asserts that it is within f32's normal range.
-pub fn scaleOf(ev: f32) f32 {
-    assert(@abs(ev) <= 100);
-    return @floatCast(math.elementary.pow(2, ev));
+/// Colours of the display, each channel 0..1. What is not a number counts as 0.
+pub fn map(
+    comptime mapping: settings.ToneMapping,
+    comptime count: usize,
+    exposed: [3]@Vector(count, f32),
+) [3]@Vector(count, f32) {
+    const Curve = Curves(count);
+    var color: [3]@Vector(count, f32) = undefined;
+    inline for (&color, exposed) |*to, from| to.* = Curve.clamp(from, exposed_max);
+    color = switch (mapping) {
+        .neutral => Curve.neutral(color),
+        .aces => Curve.aces(color),
+        .agx => Curve.agx(color),
+        .linear => color,
+    };
+    inline for (&color) |*channel| channel.* = Curve.clamp(channel.*, 1);
+    return color;
 }
 
-/// The factor that brings the 95th percentile of luminance to 0.8: the least luminance that 95 % of
-/// the pixels do not exceed. Pixels of alpha 0 do not count; 1 where nothing is left or all is
-/// black.
-pub fn autoScale(gpa: Allocator, image: *const Image) error{OutOfMemory}!f32 {
-    const counts = try gpa.alloc(u32, 1 << 16);
-    defer gpa.free(counts);
-    // Floats >= 0 are ordered as their bits are: select the upper half first, the lower within it.
-    @memset(counts, 0);
-    var pixel_count: u64 = 0;
-    for (image.pixels) |pixel| {
-        if (pixel[3] == 0) continue;
-        counts[luminanceBits(pixel) >> 16] += 1;
-        pixel_count += 1;
-    }
-    if (pixel_count == 0) return 1;
-    const rank = (pixel_count * auto.percentile + 99) / 100 - 1;
-    const upper = select(counts, rank);
-    @memset(counts, 0);
-    for (image.pixels) |pixel| {
-        const bits = luminanceBits(pixel);
-        if (pixel[3] != 0 and bits >> 16 == upper.index) counts[bits & 0xffff] += 1;
-    }
-    const lower = select(counts, upper.rank);
-    const luminance: f32 = @bitCast(upper.index << 16 | lower.index);
-    if (luminance < std.math.floatMin(f32)) return 1;
-    const scale = auto.brightness / luminance;
-    return if (scale < std.math.floatMin(f32)) std.math.floatMin(f32) else scale;
-}
+fn Curves(comptime count: usize) type {
+    return struct {
+        const V = @Vector(count, f32);
+        const Color = [3]V;
 
-/// The bin that holds the element of this rank, and its rank within the bin.
-fn select(counts: []const u32, rank: u64) struct { index: u32, rank: u64 } {
-    var rest = rank;
-    for (counts, 0..) |count, index| {
-        if (rest < count) return .{ .index = @intCast(index), .rank = rest };
-        rest -= count;
-    }
-    unreachable; // The rank is below the number of elements.
-}
+        inline fn of(value: f32) V {
+            return @splat(value);
+        }
 
-/// Bits of the luminance of Rec. 709 primaries, 0 where it is not above 0.
-fn luminanceBits(pixel: [4]f32) u32 {
-    const luminance = (0.2126 * pixel[0] + 0.7152 * pixel[1]) + 0.0722 * pixel[2];
-    return if (luminance > 0) @bitCast(luminance) else 0;
-}
+        inline fn min(a: V, b: V) V {
+            return @select(f32, a < b, a, b);
+        }
 
-/// What a row becomes.
-pub const Form = enum {
-    /// sRGB bytes, over black.
-    rgb,
-    /// With alpha, not premultiplied.
-    rgba,
-    /// Floats as they are, over black.
-    linear,
-    /// Floats that a pixel of Radiance HDR can hold: none below 0, none that has no exponent there.
-    radiance,
-};
+        inline fn max(a: V, b: V) V {
+            return @select(f32, a > b, a, b);
+        }
 
-/// The frame as rows of bytes.
-pub const Rows = struct {
-    image: *const Image,
-    /// Exposure, of sRGB bytes.
-    scale: f32,
-    form: Form,
+        /// Within 0..limit.
+        inline fn clamp(value: V, limit: f32) V {
+            return min(max(value, of(0)), of(limit));
+        }
 
-    /// Bytes of a row.
-    pub fn byteCount(rows: Rows) usize {
-        return @as(usize, rows.image.width) * bytesOf(rows.form);
-    }
+        /// The product of a matrix, by rows, and a colour.
+        inline fn transform(comptime matrix: [3][3]f32, color: Color) Color {
+            var result: Color = undefined;
+            inline for (&result, matrix) |*to, row| {
+                to.* = (of(row[0]) * color[0] + of(row[1]) * color[1]) + of(row[2]) * color[2];
+            }
+            return result;
+        }
 
-    /// Encodes row y. Asserts that `bytes` has the length of one.
-    pub fn encode(rows: Rows, y: u32, bytes: []u8) void {
-        assert(y < rows.image.height and bytes.len == rows.byteCount());
-        const row = rows.image.pixels[@as(usize, y) * rows.image.width ..][0..rows.image.width];
-        switch (rows.form) {
-            .rgb => encodeRgb(row, rows.scale, std.mem.bytesAsSlice([3]u8, bytes)),
-            .rgba => encodeRgba(row, rows.scale, std.mem.bytesAsSlice([4]u8, bytes)),
-            .linear => for (row, std.mem.bytesAsSlice([3]f32, bytes)) |pixel, *out| {
-                out.* = pixel[0..3].*;
-            },
-            .radiance => for (row, std.mem.bytesAsSlice([3]f32, bytes)) |pixel, *out| {
-                for (out, pixel[0..3]) |*held, value| {
-                    held.* = if (value > 0) @min(value, radiance_max) else 0;
+        /// Khronos PBR Neutral (its specification of 2024): base colours up to 0.8 come out as they
+        /// are, less what a dielectric reflects; brighter ones are compressed and lose saturation.
+        fn neutral(color: Color) Color {
+            const reflected = 0.04;
+            const compression_start = 0.8 - reflected;
+            const desaturation = 0.15;
+            const least = min(min(color[0], color[1]), color[2]);
+            const small = least - of(1.0 / (4.0 * reflected)) * least * least;
+            const offset = @select(f32, least < of(2 * reflected), small, of(reflected));
+            var shifted: Color = undefined;
+            inline for (&shifted, color) |*to, from| to.* = from - offset;
+
+            const peak = max(max(shifted[0], shifted[1]), shifted[2]);
+            const room: f32 = 1 - compression_start;
+            const new_peak = of(1) - of(room * room) / (peak + of(room - compression_start));
+            const share = of(1) / (of(desaturation) * (peak - new_peak) + of(1));
+            const is_bright = peak >= of(compression_start);
+            // Where it is not bright the peak may be 0.
+            const gain = new_peak / max(peak, of(compression_start));
+            var result: Color = undefined;
+            inline for (&result, shifted) |*to, from| {
+                const compressed = from * gain * share + new_peak * (of(1) - share);
+                to.* = @select(f32, is_bright, compressed, from);
+            }
+            return result;
+        }
+
+        /// S. Hill's fit of the ACES reference rendering transform and its output transform for
+        /// sRGB, with the exposure of 1/0.6 that three.js gives it.
+        fn aces(color: Color) Color {
+            var exposed: Color = undefined;
+            inline for (&exposed, color) |*to, from| to.* = from * of(1.0 / 0.6);
+            var fitted = transform(.{
+                .{ 0.59719, 0.35458, 0.04823 },
+                .{ 0.07600, 0.90834, 0.01566 },
+                .{ 0.02840, 0.13383, 0.83777 },
+            }, exposed);
+            inline for (&fitted) |*v| {
+                const above = v.* * (v.* + of(0.0245786)) - of(0.000090537);
+                const below = v.* * (of(0.983729) * v.* + of(0.4329510)) + of(0.238081);
+                v.* = above / below;
+            }
+            return transform(.{
+                .{ 1.60475, -0.53108, -0.07367 },
+                .{ -0.10208, 1.10813, -0.00605 },
+                .{ -0.00327, -0.07276, 1.07602 },
+            }, fitted);
+        }
+
+        /// B. Wrensch's fit of T. Sobotka's AgX, in Rec. 2020 primaries as three.js and Blender.
+        fn agx(color: Color) Color {
+            const ev_min = -12.47393;
+            const ev_max = 4.026069;
+            var curved = transform(agx_inset, transform(rec2020_of_srgb, color));
+            inline for (&curved) |*v| {
+                const stops = log2(max(v.*, of(1e-10)));
+                const x = clamp((stops - of(ev_min)) * of(1.0 / (ev_max - ev_min)), 1);
+                var sum = of(15.5);
+                inline for (.{ -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232 }) |coefficient| {
+                    sum = sum * x + of(coefficient);
                 }
-            },
+                v.* = sum;
+            }
+            var light = transform(comptime inverse(agx_outset_inverse), curved);
+            inline for (&light) |*v| {
+                const power = exp2(of(2.2) * log2(max(v.*, of(1e-10))));
+                v.* = @select(f32, v.* > of(1e-10), power, of(0));
+            }
+            return transform(srgb_of_rec2020, light);
         }
-    }
+
+        /// The logarithm to base 2 of normal numbers, within 2 ulps of the larger of it and 1.
+        fn log2(x: V) V {
+            const bits: @Vector(count, u32) = @bitCast(x);
+            // The mantissa in 0.75..1.5, so that the logarithm of 1 is 0 whichever side it is from.
+            const from_below = bits -% @as(@Vector(count, u32), @splat(0x3f400000));
+            const exponent: @Vector(count, i32) =
+                @as(@Vector(count, i32), @bitCast(from_below)) >>
+                @as(@Vector(count, u5), @splat(23));
+            const mantissa_bits = bits -% (@as(@Vector(count, u32), @bitCast(exponent)) <<
+                @as(@Vector(count, u5), @splat(23)));
+            const m: V = @bitCast(mantissa_bits);
+            // log m = 2 artanh s, |s| <= 0.2: what is left out is below 2^-26.
+            const s = (m - of(1)) / (m + of(1));
+            const ss = s * s;
+            var sum = of(2.0 / 11.0 / std.math.ln2);
+            inline for (.{ 9.0, 7.0, 5.0, 3.0, 1.0 }) |odd| {
+                sum = sum * ss + of(2.0 / odd / std.math.ln2);
+            }
+            return s * sum + @as(V, @floatFromInt(exponent));
+        }
+
+        /// 2 to the power of x, -100..100, with a relative error of a few ulps.
+        fn exp2(x: V) V {
+            // Truncated from above 0: rounded to the nearest.
+            const biased: @Vector(count, i32) = @intFromFloat(x + of(127.5));
+            const whole = biased - @as(@Vector(count, i32), @splat(127));
+            const rest = x - @as(V, @floatFromInt(whole)); // Within a half.
+            var sum = of(1);
+            comptime var n = 8;
+            inline while (n >= 1) : (n -= 1) {
+                sum = of(1) + sum * rest * of(std.math.ln2 / @as(f32, n));
+            }
+            const power: V = @bitCast(biased << @as(@Vector(count, u5), @splat(23)));
+            return sum * power;
+        }
+    };
+}
+
+/// From Rec. 2020 primaries to those of sRGB (ITU-R BT.2407).
+const srgb_of_rec2020: [3][3]f32 = .{
+    .{ 1.6605, -0.5876, -0.0728 },
+    .{ -0.1246, 1.1329, -0.0083 },
+    .{ -0.0182, -0.1006, 1.1187 },
+};
+const rec2020_of_srgb = inverse(srgb_of_rec2020);
+const agx_inset: [3][3]f32 = .{
+    .{ 0.856627153315983, 0.0951212405381588, 0.0482516061458583 },
+    .{ 0.137318972929847, 0.761241990602591, 0.101439036467562 },
+    .{ 0.11189821299995, 0.0767994186031903, 0.811302368396859 },
+};
+const agx_outset_inverse: [3][3]f32 = .{
+    .{ 0.899796955911611, 0.0871996192028351, 0.013003424885555 },
+    .{ 0.11142098895748, 0.875575586156966, 0.0130034248855548 },
+    .{ 0.11142098895748, 0.0871996192028349, 0.801379391839686 },
 };
 
-/// Bytes of a pixel.
-pub fn bytesOf(form: Form) u8 {
-    return switch (form) {
-        .rgb => 3,
-        .rgba => 4,
-        .linear, .radiance => @sizeOf([3]f32),
+/// By Cramer's rule.
+fn inverse(comptime matrix: [3][3]f32) [3][3]f32 {
+    var adjugate: [3][3]f64 = undefined;
+    for (0..3) |row| for (0..3) |column| {
+        const a = .{ (column + 1) % 3, (column + 2) % 3 };
+        const b = .{ (row + 1) % 3, (row + 2) % 3 };
+        adjugate[row][column] = @as(f64, matrix[a[0]][b[0]]) * matrix[a[1]][b[1]] -
+            @as(f64, matrix[a[0]][b[1]]) * matrix[a[1]][b[0]];
     };
-}
-
-/// The largest mantissa and exponent of RGBE.
-const radiance_max: f32 = 0x1.fep126;
-
-const Pixel = @Vector(4, f32);
-
-/// One row over black. Asserts that both rows have the same length.
-fn encodeRgb(row: []const [4]f32, scale: f32, bytes: [][3]u8) void {
-    assert(row.len == bytes.len);
-    for (row, bytes) |pixel, *out| {
-        out.* = math.srgb.encodeLanes(4, pixel * @as(Pixel, @splat(scale)))[0..3].*;
+    var determinant: f64 = 0;
+    for (0..3) |index| determinant += matrix[0][index] * adjugate[index][0];
+    var result: [3][3]f32 = undefined;
+    for (&result, adjugate) |*to, from| {
+        for (to, from) |*value, part| value.* = @floatCast(part / determinant);
     }
+    return result;
 }
 
-/// One row with alpha: colours are divided by it before they are encoded, alpha itself is linear.
-/// Asserts that both rows have the same length.
-fn encodeRgba(row: []const [4]f32, scale: f32, bytes: [][4]u8) void {
-    assert(row.len == bytes.len);
-    for (row, bytes) |pixel, *out| {
-        const alpha = alphaCode(pixel[3]);
-        if (alpha == 0) {
-            out.* = @splat(0);
-            continue;
+const aces_of_grey: [3]f32 = .{ 0.213105, 0.213105, 0.213103 };
+const aces_of_orange: [3]f32 = .{ 1.000000, 0.670759, 0.241900 };
+const agx_of_grey: [3]f32 = .{ 0.214524, 0.214520, 0.214515 };
+const agx_of_orange: [3]f32 = .{ 0.988769, 0.523761, 0.332398 };
+
+/// Maps one colour.
+fn mapOne(comptime mapping: settings.ToneMapping, color: [3]f32) [3]f32 {
+    const mapped = map(mapping, 1, .{ .{color[0]}, .{color[1]}, .{color[2]} });
+    return .{ mapped[0][0], mapped[1][0], mapped[2][0] };
+}
+
+fn expectColor(comptime mapping: settings.ToneMapping, color: [3]f32, expected: [3]f32) !void {
+    const found = mapOne(mapping, color);
+    errdefer std.debug.print("{t} {any}: {any}\n", .{ mapping, color, found });
+    for (expected, found) |wanted, value| try std.testing.expectApproxEqAbs(wanted, value, 2e-5);
+}
+
+test "neutral keeps base colours, less what is reflected, and whitens highlights" {
+    try expectColor(.neutral, .{ 0.5, 0.3, 0.2 }, .{ 0.46, 0.26, 0.16 });
+    try expectColor(.neutral, .{ 0.04, 0.04, 0.04 }, .{ 0.01, 0.01, 0.01 });
+    try expectColor(.neutral, .{ 0, 0.5, 0 }, .{ 0, 0.5, 0 });
+    // By hand: peak 0.96, new peak 1 - 0.0576 / 0.44, no colour to lose.
+    try expectColor(.neutral, .{ 1, 1, 1 }, @splat(0.8690909));
+    // By hand: peak 10, new peak 1 - 0.0576 / 9.48, share 1 / 2.4.
+    const new_peak = 1 - 0.0576 / 9.48;
+    const share = 1.0 / (0.15 * (10.0 - new_peak) + 1);
+    try expectColor(.neutral, .{ 10, 0, 0 }, .{
+        new_peak, new_peak * (1 - share), new_peak * (1 - share),
+    });
+}
+
+test "aces and agx at values that were worked out in double precision" {
+    try expectColor(.aces, .{ 0.18, 0.18, 0.18 }, aces_of_grey);
+    try expectColor(.aces, .{ 4, 0.5, 0.05 }, aces_of_orange);
+    try expectColor(.agx, .{ 0.18, 0.18, 0.18 }, agx_of_grey);
+    try expectColor(.agx, .{ 4, 0.5, 0.05 }, agx_of_orange);
+}
+
+test "linear is cut off at 1" {
+    try expectColor(.linear, .{ 0.25, 1, 1.5 }, .{ 0.25, 1, 1 });
+}
+
+test "every curve rises from black to white and takes anything" {
+    inline for (comptime std.enums.values(settings.ToneMapping)) |mapping| {
+        var previous: f32 = -1;
+        var gray: f32 = 0x1p-14;
+        while (gray < 64) : (gray *= 1.01) {
+            const mapped = mapOne(mapping, @splat(gray));
+            try std.testing.expect(mapped[1] >= previous);
+            previous = mapped[1];
         }
-        const color = pixel / @as(Pixel, @splat(pixel[3]));
-        out.* = math.srgb.encodeLanes(4, color * @as(Pixel, @splat(scale)));
-        out[3] = alpha;
+        try std.testing.expect(previous > 0.97);
+        const inf = std.math.inf(f32);
+        const least = std.math.floatTrueMin(f32);
+        for ([_]f32{ 0, -1, std.math.nan(f32), -inf, inf, 1e38, least }) |odd| {
+            for (mapOne(mapping, .{ odd, 1, odd })) |value| {
+                try std.testing.expect(value >= 0 and value <= 1);
+            }
+        }
+        for (mapOne(mapping, @splat(0))) |value| try std.testing.expect(value < 1e-4);
+        for (mapOne(mapping, @splat(inf))) |value| try std.testing.expect(value > 0.97);
     }
 }
 
-/// The nearest of 256 codes; in f64 the product is exact.
-fn alphaCode(alpha: f32) u8 {
-    assert(!std.math.isNan(alpha));
-    if (!(alpha > 0)) return 0;
-    if (alpha >= 1) return 255;
-    return @intFromFloat(@as(f64, alpha) * 255 + 0.5);
-}
-
-/// A picture of one row of grays with alpha 1.
-fn grayImage(gpa: Allocator, values: []const f32) !Image {
-    const image: Image = try .init(gpa, @intCast(values.len), 1);
-    for (image.pixels, values) |*pixel, value| pixel.* = .{ value, value, value, 1 };
-    return image;
-}
-
-fn autoScaleOf(values: []const f32) !f32 {
-    var image = try grayImage(std.testing.allocator, values);
-    defer image.deinit(std.testing.allocator);
-    return autoScale(std.testing.allocator, &image);
-}
-
-test "an exposure is a power of two" {
-    try std.testing.expectEqual(1, scaleOf(0));
-    try std.testing.expectApproxEqRel(8, scaleOf(3), 1e-6);
-    try std.testing.expectApproxEqRel(0.25, scaleOf(-2), 1e-6);
-    try std.testing.expectApproxEqRel(std.math.sqrt2, scaleOf(0.5), 1e-6);
-    try std.testing.expect(scaleOf(64) < std.math.inf(f32) and scaleOf(-64) > 0);
-}
-
-test "the automatic exposure is exact about its percentile" {
-    var random = std.Random.DefaultPrng.init(3);
-    for ([_]usize{ 1, 2, 19, 20, 21, 100, 1999 }) |count| {
-        var values: [2000]f32 = undefined;
-        // Neighbours in the upper bits, so that both halves of the selection matter.
-        for (values[0..count]) |*value| value.* = 1 + random.random().float(f32) * 0x1p-10;
-        const scale = try autoScaleOf(values[0..count]);
-        std.mem.sort(f32, values[0..count], {}, std.sort.asc(f32));
-        const expected = values[(count * 95 + 99) / 100 - 1];
-        const gray: [4]f32 = .{ expected, expected, expected, 1 };
-        try std.testing.expectEqual(0.8 / @as(f32, @bitCast(luminanceBits(gray))), scale);
+test "logarithm and power are near to the library's" {
+    var random = std.Random.DefaultPrng.init(5);
+    const Curve = Curves(1);
+    for (0..20_000) |_| {
+        const x = (random.random().float(f32) - 0.5) * 150;
+        const power = Curve.exp2(.{x})[0];
+        try std.testing.expectApproxEqRel(@as(f32, @floatCast(@exp2(@as(f64, x)))), power, 1e-6);
+        const back = Curve.log2(.{power})[0];
+        try std.testing.expectApproxEqAbs(@log2(@as(f64, power)), back, 3e-7 * (1 + @abs(x)));
     }
-}
-
-test "the automatic exposure at the edges" {
-    try std.testing.expectEqual(1, try autoScaleOf(&.{0}));
-    try std.testing.expectEqual(1, try autoScaleOf(&.{ -1, 0, -0.0 }));
-    const zeros: [95]f32 = @splat(0);
-    try std.testing.expectEqual(1, try autoScaleOf(&(zeros ++ [_]f32{ 9, 9, 9, 9, 9 })));
-    try std.testing.expect(try autoScaleOf(&.{std.math.floatMax(f32)}) > 0);
-    try std.testing.expect(try autoScaleOf(&.{std.math.floatMin(f32)}) < std.math.inf(f32));
-
-    const gpa = std.testing.allocator;
-    var image = try grayImage(gpa, &.{ 1, 1, 5 });
-    defer image.deinit(gpa);
-    image.pixels[2] = .{ 0, 0, 0, 0 };
-    const two = try autoScale(gpa, &image);
-    try std.testing.expectEqual(try autoScaleOf(&.{ 1, 1 }), two);
-    image.pixels[0][3] = 0;
-    image.pixels[1][3] = 0;
-    try std.testing.expectEqual(1, try autoScale(gpa, &image));
-}
-
-test encodeRgb {
-    const row = [_][4]f32{
-        .{ 0, 0.5, 1, 1 },
-        .{ 0.25, 2, -1, 0.5 },
-        .{ std.math.floatMax(f32), std.math.floatTrueMin(f32), 0.0031308, 0 },
-    };
-    var bytes: [3][3]u8 = undefined;
-    encodeRgb(&row, 1, &bytes);
-    try std.testing.expectEqual([3]u8{ 0, 188, 255 }, bytes[0]);
-    try std.testing.expectEqual([3]u8{ 137, 255, 0 }, bytes[1]);
-    try std.testing.expectEqual([3]u8{ 255, 0, 10 }, bytes[2]);
-    encodeRgb(&row, 2, &bytes);
-    try std.testing.expectEqual([3]u8{ 0, 255, 255 }, bytes[0]);
-    try std.testing.expectEqual([3]u8{ 188, 255, 0 }, bytes[1]);
-    // Too bright for a float after exposure: white, not a wrapped number.
-    try std.testing.expectEqual(255, bytes[2][0]);
-    encodeRgb(&.{}, 1, &.{});
-}
-
-test encodeRgba {
-    const row = [_][4]f32{
-        .{ 0.25, 0.5, 0, 0.5 }, // 0.5, 1 and 0 before it was premultiplied.
-        .{ 0, 0, 0, 0 },
-        .{ 1, 1, 1, 1 },
-        .{ 0.5, 0.5, 0.5, 0.001 }, // Nearer to code 0: nothing is left of it.
-        .{ 0.001, 0, 0, 0.002 },
-        .{ 1, 1, 1, 2 },
-    };
-    var bytes: [6][4]u8 = undefined;
-    encodeRgba(&row, 1, &bytes);
-    try std.testing.expectEqual([4]u8{ 188, 255, 0, 128 }, bytes[0]);
-    try std.testing.expectEqual([4]u8{ 0, 0, 0, 0 }, bytes[1]);
-    try std.testing.expectEqual([4]u8{ 255, 255, 255, 255 }, bytes[2]);
-    try std.testing.expectEqual([4]u8{ 0, 0, 0, 0 }, bytes[3]);
-    try std.testing.expectEqual([4]u8{ 188, 0, 0, 1 }, bytes[4]);
-    try std.testing.expectEqual(255, bytes[5][3]);
-}
-
-test "alpha is rounded to the nearest code" {
-    for (0..256) |code| {
-        const exact = @as(f32, @floatFromInt(code)) / 255;
-        try std.testing.expectEqual(code, alphaCode(exact));
-    }
-    for (0..255) |code| {
-        const half: f32 = @floatCast((@as(f64, @floatFromInt(code)) + 0.5) / 255);
-        try std.testing.expectEqual(code, alphaCode(half - half * 0x1p-22));
-        try std.testing.expectEqual(code + 1, alphaCode(half + half * 0x1p-22));
-    }
+    try std.testing.expectEqual(0, Curve.log2(.{1})[0]);
+    try std.testing.expectEqual(1, Curve.exp2(.{0})[0]);
 }

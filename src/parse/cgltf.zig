@@ -51,6 +51,22 @@ pub const cgltf_primitive_type = enum(c_uint) {
 pub const cgltf_alpha_mode = enum(c_uint) { @"opaque", mask, blend, _ };
 pub const cgltf_camera_type = enum(c_uint) { invalid, perspective, orthographic, _ };
 pub const cgltf_light_type = enum(c_uint) { invalid, directional, point, spot, _ };
+pub const cgltf_filter_type = enum(c_uint) {
+    undefined = 0,
+    nearest = 9728,
+    linear = 9729,
+    nearest_mipmap_nearest = 9984,
+    linear_mipmap_nearest = 9985,
+    nearest_mipmap_linear = 9986,
+    linear_mipmap_linear = 9987,
+    _,
+};
+pub const cgltf_wrap_mode = enum(c_uint) {
+    repeat = 10497,
+    clamp_to_edge = 33071,
+    mirrored_repeat = 33648,
+    _,
+};
 
 const String = [*c]u8;
 const cgltf_bool = c_int;
@@ -110,7 +126,50 @@ pub const cgltf_attribute = extern struct {
     data: [*c]cgltf_accessor,
 };
 
-pub const cgltf_texture_view = extern struct { texture: ?*anyopaque, texcoord: [10]u32 };
+pub const cgltf_image = extern struct {
+    name: String,
+    uri: String,
+    buffer_view: [*c]cgltf_buffer_view,
+    mime_type: String,
+    extras: Tail,
+};
+
+pub const cgltf_sampler = extern struct {
+    name: String,
+    mag_filter: cgltf_filter_type,
+    min_filter: cgltf_filter_type,
+    wrap_s: cgltf_wrap_mode,
+    wrap_t: cgltf_wrap_mode,
+    extras: Tail,
+};
+
+pub const cgltf_texture = extern struct {
+    name: String,
+    image: [*c]cgltf_image,
+    sampler: [*c]cgltf_sampler,
+    has_basisu: cgltf_bool,
+    basisu_image: [*c]cgltf_image,
+    has_webp: cgltf_bool,
+    webp_image: [*c]cgltf_image,
+    extras: Tail,
+};
+
+pub const cgltf_texture_transform = extern struct {
+    offset: [2]f32,
+    rotation: f32,
+    scale: [2]f32,
+    has_texcoord: cgltf_bool,
+    texcoord: c_int,
+};
+
+pub const cgltf_texture_view = extern struct {
+    texture: [*c]cgltf_texture,
+    texcoord: c_int,
+    /// The strength of an occlusion texture as well.
+    scale: f32,
+    has_transform: cgltf_bool,
+    transform: cgltf_texture_transform,
+};
 
 pub const cgltf_pbr_metallic_roughness = extern struct {
     base_color_texture: cgltf_texture_view,
@@ -121,7 +180,8 @@ pub const cgltf_pbr_metallic_roughness = extern struct {
 };
 
 pub const cgltf_pbr_specular_glossiness = extern struct {
-    diffuse_texture: [2]cgltf_texture_view,
+    diffuse_texture: cgltf_texture_view,
+    specular_glossiness_texture: cgltf_texture_view,
     diffuse_factor: [4]f32,
     specular_factor: [3]f32,
     glossiness_factor: f32,
@@ -168,7 +228,8 @@ pub const cgltf_material = extern struct {
     diffuse_transmission: extern struct { factors: Textured(1, 4), color: Textured(1, 0) },
     anisotropy: extern struct { strength: [2]f32, texture: Textured(1, 0) },
     dispersion: f32,
-    normal_texture: [2]cgltf_texture_view,
+    normal_texture: cgltf_texture_view,
+    occlusion_texture: cgltf_texture_view,
     emissive_texture: cgltf_texture_view,
     emissive_factor: [3]f32,
     alpha_mode: cgltf_alpha_mode,
@@ -305,7 +366,9 @@ pub const cgltf_data = extern struct {
     buffer_views_count: usize,
     buffers: [*c]cgltf_buffer,
     buffers_count: usize,
-    images: [3]usize,
+    images: [*c]cgltf_image,
+    images_count: usize,
+    textures: [*c]cgltf_texture,
     textures_count: usize,
     samplers: [2]usize,
     skins: [*c]cgltf_skin,

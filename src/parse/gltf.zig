@@ -2,7 +2,7 @@
 //!
 //! In: a file's bytes. Out: a checked `Scene`; nothing of the file or of cgltf remains. The order
 //! is that of trust: container, JSON text, document, extensions, buffers, accessors, and only then
-//! the parts.
+//! the parts. Images stay as they are: prepare decodes them.
 
 const std = @import("std");
 const accessors = @import("gltf/accessors.zig");
@@ -11,7 +11,6 @@ const container = @import("gltf/container.zig");
 const escapes = @import("json/escapes.zig");
 const json = @import("json.zig");
 const limits = @import("gltf/limits.zig");
-const materials = @import("gltf/materials.zig");
 const nodes = @import("gltf/nodes.zig");
 const scene_data = @import("../scene.zig");
 const schema = @import("gltf/schema.zig");
@@ -20,14 +19,16 @@ const Allocator = std.mem.Allocator;
 const Buffers = @import("gltf/buffers.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Document = @import("gltf/document.zig");
+const Materials = @import("gltf/materials.zig");
 const Meshes = @import("gltf/meshes.zig");
 const Resources = @import("resource.zig");
 const Scene = scene_data.Scene;
 const Skins = @import("gltf/skins.zig");
 const Source = @import("gltf/source.zig");
+const Textures = @import("gltf/textures.zig");
 
 /// See parse.zig.
-pub const Error = Source.Error;
+pub const Error = Source.Error || error{SceneUnknown};
 
 /// Reads a file that is in memory; what it names comes from `resources`.
 pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) Error!Scene {
@@ -60,7 +61,7 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
     source.buffers = buffers.list;
     source.decoded_bytes_left = limits.decodedBytesMax(input_bytes);
     try accessors.checkAll(&source);
-    try fill(&source);
+    try fill(&source, resources);
     const scene = try builder.finish();
     warnOfGaps(&source, &scene);
     return scene;
@@ -92,11 +93,15 @@ fn parseDocument(
 }
 
 /// Puts the parts of the document into the scene.
-fn fill(source: *Source) Error!void {
+fn fill(source: *Source, resources: *Resources) Error!void {
     const builder = source.builder;
-    const origins = try nodes.collect(source);
+    const origins = try nodes.collect(source, resources.settings.scene);
     defer source.gpa.free(origins);
-    var meshes: Meshes = .{ .source = source };
+    var textures: Textures = .init(source, resources);
+    defer textures.deinit();
+    var materials: Materials = try .init(source, &textures);
+    defer materials.deinit();
+    var meshes: Meshes = .{ .source = source, .materials = &materials };
     defer meshes.deinit();
     var skins: Skins = .{ .source = source };
     defer skins.deinit();
@@ -121,15 +126,11 @@ fn fill(source: *Source) Error!void {
             if (views.readLight(source, raw, node_index)) |light| try builder.addLight(light);
         }
     }
-    try materials.read(source, meshes.default_material_used);
+    try materials.finish();
 }
 
 /// Says what the picture will lack.
 fn warnOfGaps(source: *const Source, scene: *const Scene) void {
-    if (source.data.textures_count > 0) source.warn(
-        "textures are not read yet: materials show their factors alone",
-        .{},
-    );
     if (scene.triangleCount() == 0) {
         source.warn("nothing to render: no triangles", .{});
     } else if (!hasArea(scene)) {

@@ -31,7 +31,8 @@ pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
 /// Largest file that is read, in bytes.
 pub const file_bytes_max: u64 = 2 << 30;
 
-/// What a file holds, and which one it is. The bytes are the caller's, from `gpa`.
+/// What a file holds, and which one it is. The bytes are the caller's, from `gpa` unless another
+/// allocator is asked for.
 pub const File = struct { bytes: [:0]const u8, identity: ?Identity };
 
 gpa: Allocator,
@@ -65,8 +66,8 @@ pub fn open(
 ) Error!Scene {
     var resources: Resources = .{ .gpa = gpa, .io = io, .folder = .cwd(), .settings = settings };
     resources.settings.allow_outside = true; // The user may name any file.
-    const main = resources.load(path, &diagnostic.message) catch |err| return switch (err) {
-        error.NotRegular => error.InputOutput,
+    const main = resources.load(gpa, path, &diagnostic.message) catch |err| return switch (err) {
+        error.NotRegular, error.Overwritten => error.InputOutput,
         else => |other| other,
     };
     errdefer gpa.free(main.bytes);
@@ -78,6 +79,38 @@ pub fn open(
 
 /// Reads a file that the scene names. On an error `reason` says why not, as what follows the name.
 pub fn read(resources: *Resources, path: []const u8, reason: *Reason) Error!File {
+    return resources.readNamed(resources.gpa, path, reason) catch |err| switch (err) {
+        error.NotRegular => error.InvalidInput,
+        error.Overwritten => error.InputOutput,
+        else => |other| other,
+    };
+}
+
+/// `Unreadable`: there is a picture without the file. `Overwritten`: the output would replace it,
+/// which nobody wants, whether the picture needs it or not.
+pub const OptionalError = error{ OutOfMemory, Unreadable, Overwritten };
+
+/// Reads a file that a picture can do without into memory from `allocator`; otherwise as `read`.
+pub fn readOptional(
+    resources: *Resources,
+    allocator: Allocator,
+    path: []const u8,
+    reason: *Reason,
+) OptionalError!File {
+    return resources.readNamed(allocator, path, reason) catch |err| switch (err) {
+        error.InvalidInput, error.InputOutput, error.NotRegular => error.Unreadable,
+        else => |other| other,
+    };
+}
+
+const LoadError = Error || error{ NotRegular, Overwritten };
+
+fn readNamed(
+    resources: *Resources,
+    allocator: Allocator,
+    path: []const u8,
+    reason: *Reason,
+) LoadError!File {
     if (path.len == 0 or std.mem.findScalar(u8, path, 0) != null)
         return refuse(reason, error.InvalidInput, "is not a valid path");
     if (!resources.settings.allow_outside and leavesFolder(path)) return refuse(
@@ -85,17 +118,15 @@ pub fn read(resources: *Resources, path: []const u8, reason: *Reason) Error!File
         error.InvalidInput,
         "is outside the scene's folder (see --allow-outside)",
     );
-    return resources.load(path, reason) catch |err| switch (err) {
-        error.NotRegular => error.InvalidInput,
-        else => |other| other,
-    };
+    return resources.load(allocator, path, reason);
 }
 
 fn load(
     resources: *Resources,
+    allocator: Allocator,
     path: []const u8,
     reason: *Reason,
-) (Error || error{NotRegular})!File {
+) LoadError!File {
     const io = resources.io;
     const handle = std.posix.openat(resources.folder.handle, path, .{
         .ACCMODE = .RDONLY,
@@ -107,7 +138,7 @@ fn load(
     defer file.close(io);
     const identity: ?Identity = .of(handle);
     if (Identity.eql(resources.settings.output, identity))
-        return refuse(reason, error.InputOutput, "would be overwritten by the output");
+        return refuse(reason, error.Overwritten, "would be overwritten by the output");
     const stat = file.stat(io) catch |err| return refuseError(reason, err);
     if (stat.kind == .directory) return refuse(reason, error.NotRegular, "is a folder");
     if (stat.kind != .file) return refuse(reason, error.NotRegular, "is not a regular file");
@@ -121,8 +152,8 @@ fn load(
         error.InvalidInput,
         std.fmt.comptimePrint("is over the limit of {d} bytes", .{file_bytes_max}),
     );
-    const bytes = try resources.gpa.allocSentinel(u8, @intCast(stat.size), 0);
-    errdefer resources.gpa.free(bytes);
+    const bytes = try allocator.allocSentinel(u8, @intCast(stat.size), 0);
+    errdefer allocator.free(bytes);
     const count = file.readPositionalAll(io, bytes, 0) catch |err|
         return refuseError(reason, err);
     if (count < bytes.len) return refuse(reason, error.InputOutput, "changed while it was read");
@@ -233,7 +264,15 @@ test "regular files of the scene's folder only, and the reason in words" {
     gpa.free((try resources.read("link", &reason)).bytes);
     try std.testing.expectError(error.InvalidInput, resources.read("/dev/null", &reason));
     try std.testing.expectEqualStrings("is not a regular file", reason.text());
+    for ([_][]const u8{ "/dev/null", "no such file", "" }) |path| try std.testing.expectError(
+        error.Unreadable,
+        resources.readOptional(gpa, path, &reason),
+    );
     resources.settings.output = file.identity;
     try std.testing.expectError(error.InputOutput, resources.read("../a", &reason));
+    try std.testing.expectError(
+        error.Overwritten,
+        resources.readOptional(gpa, "../a", &reason),
+    );
     try std.testing.expectEqualStrings("would be overwritten by the output", reason.text());
 }

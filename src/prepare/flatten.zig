@@ -37,11 +37,21 @@ pub const element_count_max = bvh_split.number_limit;
 /// Vertices or triangles a thread takes at a time.
 const chunk_size = 1 << 14;
 
+const texcoord_set_count = scene.texcoord_set_count;
+
+/// What of the vertices the materials' textures ask for.
+pub const Attributes = struct {
+    texcoord_sets: [texcoord_set_count]bool = @splat(false),
+    tangents: bool = false,
+};
+
 /// All that there is to hit, in world space.
 pub const TriangleSoup = struct {
     positions: []const Vec3,
     normals: []const Vec3,
     colors: []const [4]f32,
+    texcoords: [texcoord_set_count][]const [2]f32,
+    tangents: []const [4]f32,
     triangles: []const world.Triangle,
     /// Box of the triangles' corners, empty without triangles.
     bounds: Box3,
@@ -55,6 +65,7 @@ pub const TriangleSoup = struct {
 const Draw = struct {
     mesh: *const scene.Mesh,
     map: AffineD,
+    direction_map: Affine,
     normal_map: Affine,
     /// The map turns fronts into backs.
     mirrored: bool,
@@ -74,35 +85,38 @@ const ChunkResult = struct {
     centroid_bounds: Box3 = .empty,
 };
 
-/// Flattens the whole scene. `maps` holds a world map for each node. The soup's arrays come from
-/// `arena`, what is needed meanwhile from `gpa`.
+/// Flattens what is drawn: instances of `meshes` at nodes, whose world maps are `maps`. The soup's
+/// arrays come from `arena`, what is needed meanwhile from `gpa`.
 pub fn flatten(
     gpa: std.mem.Allocator,
     arena: std.mem.Allocator,
-    from: *const scene.Scene,
+    instances: []const scene.Instance,
+    meshes: []const scene.Mesh,
+    attributes: Attributes,
     maps: []const AffineD,
     pool: *parallel.Pool,
     diagnostic: *Diagnostic,
 ) Error!TriangleSoup {
-    assert(maps.len == from.nodes.len);
-    const draws = try gpa.alloc(Draw, from.instances.len);
+    const draws = try gpa.alloc(Draw, instances.len);
     defer gpa.free(draws);
-    const size = try plan(gpa, from, maps, draws, diagnostic);
+    const size = try plan(gpa, instances, meshes, maps, draws, diagnostic);
+    const count = size.vertex_count;
 
     var work: Work = .{
         .draws = draws,
-        .positions = try huge_pages.alloc(arena, Vec3, size.vertex_count),
-        .normals = try huge_pages.alloc(arena, Vec3, size.vertex_count),
-        .colors = try huge_pages.alloc(
-            arena,
-            [4]f32,
-            if (size.has_colors) size.vertex_count else 0,
-        ),
+        .positions = try huge_pages.alloc(arena, Vec3, count),
+        .normals = try huge_pages.alloc(arena, Vec3, count),
+        .colors = try huge_pages.alloc(arena, [4]f32, if (size.has_colors) count else 0),
+        .texcoords = undefined,
+        .tangents = try huge_pages.alloc(arena, [4]f32, if (attributes.tangents) count else 0),
         .triangles = try huge_pages.alloc(arena, world.Triangle, size.triangle_count),
         .chunks = try gpa.alloc(ChunkResult, chunkCount(size.triangle_count)),
     };
     defer gpa.free(work.chunks);
-    try pool.forEach(chunkCount(size.vertex_count), &work, Work.placeVertices);
+    for (&work.texcoords, attributes.texcoord_sets) |*set, is_used| {
+        set.* = try huge_pages.alloc(arena, [2]f32, if (is_used) count else 0);
+    }
+    try pool.forEach(chunkCount(count), &work, Work.placeVertices);
     try pool.forEach(work.chunks.len, &work, Work.placeTriangles);
     return work.finish(diagnostic);
 }
@@ -116,29 +130,32 @@ fn chunkCount(count: usize) usize {
 /// Fills `draws` and adds up their sizes.
 fn plan(
     gpa: std.mem.Allocator,
-    from: *const scene.Scene,
+    instances: []const scene.Instance,
+    meshes: []const scene.Mesh,
     maps: []const AffineD,
     draws: []Draw,
     diagnostic: *Diagnostic,
 ) Error!Size {
-    assert(draws.len == from.instances.len);
-    const ranges = try gpa.alloc(?VertexRange, from.meshes.len);
+    assert(draws.len == instances.len);
+    const ranges = try gpa.alloc(?VertexRange, meshes.len);
     defer gpa.free(ranges);
     @memset(ranges, null);
 
     var size: Size = .{};
     var vertex_total: u64 = 0;
     var triangle_total: u64 = 0;
-    for (from.instances, draws) |instance, *draw| {
-        const mesh = &from.meshes[instance.mesh];
+    for (instances, draws) |instance, *draw| {
+        const mesh = &meshes[instance.mesh];
         if (ranges[instance.mesh] == null) ranges[instance.mesh] = .of(mesh.triangles);
         const range = ranges[instance.mesh].?;
         const map = maps[instance.node];
         const mirrored = map.determinant() < 0;
+        const scaled = scaledDown(.of(map));
         draw.* = .{
             .mesh = mesh,
             .map = map,
-            .normal_map = normalMap(.of(map), mirrored),
+            .direction_map = scaled,
+            .normal_map = normalMap(scaled, mirrored),
             .mirrored = mirrored,
             .vertex_source = range.first,
             .vertex_count = range.count,
@@ -182,22 +199,30 @@ const VertexRange = struct {
     }
 };
 
-/// The map for normals: cofactors, which turn with a mirroring map's winding, so turned back for
-/// those, and scaled so that neither tiny nor huge maps leave the range of an f32.
-fn normalMap(map: Affine, mirrored: bool) Affine {
+/// The linear part over its largest entry, so that neither tiny nor huge maps leave the range of an
+/// f32 when its entries are multiplied.
+fn scaledDown(map: Affine) Affine {
     var largest: f32 = 0;
     for ([_]Vec3{ map.x, map.y, map.z }) |axis| {
         for (axis) |entry| largest = if (@abs(entry) > largest) @abs(entry) else largest;
     }
     if (!(largest > std.math.floatMin(f32)) or largest == std.math.inf(f32)) largest = 1;
-    const x = divide(map.x, largest);
-    const y = divide(map.y, largest);
-    const z = divide(map.z, largest);
+    return .{
+        .x = divide(map.x, largest),
+        .y = divide(map.y, largest),
+        .z = divide(map.z, largest),
+        .translation = .{ 0, 0, 0 },
+    };
+}
+
+/// The map for normals: cofactors, which turn with a mirroring map's winding, so turned back for
+/// those.
+fn normalMap(scaled: Affine, mirrored: bool) Affine {
     const sign: f32 = if (mirrored) -1 else 1;
     return .{
-        .x = vec3.scale(vec3.cross(y, z), sign),
-        .y = vec3.scale(vec3.cross(z, x), sign),
-        .z = vec3.scale(vec3.cross(x, y), sign),
+        .x = vec3.scale(vec3.cross(scaled.y, scaled.z), sign),
+        .y = vec3.scale(vec3.cross(scaled.z, scaled.x), sign),
+        .z = vec3.scale(vec3.cross(scaled.x, scaled.y), sign),
         .translation = .{ 0, 0, 0 },
     };
 }
@@ -220,6 +245,8 @@ const Work = struct {
     positions: []Vec3,
     normals: []Vec3,
     colors: [][4]f32,
+    texcoords: [texcoord_set_count][][2]f32,
+    tangents: [][4]f32,
     triangles: []world.Triangle,
     chunks: []ChunkResult,
 
@@ -253,11 +280,11 @@ const Work = struct {
         } else {
             @memset(work.normals[from..to], .{ 0, 0, 0 });
         }
-        if (work.colors.len == 0) return;
-        if (draw.mesh.colors) |colors| {
-            @memcpy(work.colors[from..to], colors[source..][0..count]);
-        } else {
-            @memset(work.colors[from..to], .{ 1, 1, 1, 1 });
+        if (work.tangents.len > 0) placeTangents(draw, work.tangents[from..to], source);
+        const white: [4]f32 = .{ 1, 1, 1, 1 };
+        if (work.colors.len > 0) copy(work.colors[from..to], draw.mesh.colors, source, white);
+        for (work.texcoords, draw.mesh.texcoords) |to_set, set| {
+            if (to_set.len > 0) copy(to_set[from..to], set, source, .{ 0, 0 });
         }
     }
 
@@ -340,6 +367,10 @@ const Work = struct {
             .positions = work.positions,
             .normals = work.normals,
             .colors = work.colors,
+            .texcoords = .{
+                work.texcoords[0], work.texcoords[1], work.texcoords[2], work.texcoords[3],
+            },
+            .tangents = work.tangents,
             .triangles = work.triangles[0..kept_count],
             .bounds = bounds,
             .centroid_bounds = centroid_bounds,
@@ -347,6 +378,23 @@ const Work = struct {
         };
     }
 };
+
+/// Copies what the vertices from `source` on have, or what counts where they have nothing.
+fn copy(to: anytype, from: anytype, source: usize, missing: std.meta.Elem(@TypeOf(to))) void {
+    if (from) |all| @memcpy(to, all[source..][0..to.len]) else @memset(to, missing);
+}
+
+/// Tangents lie in the surface and go where directions go. The bitangent, which goes there too, is
+/// cross(normal, tangent) times the sign: mirroring maps turn the cross product, so the sign turns
+/// with it.
+fn placeTangents(draw: *const Draw, to: [][4]f32, source: usize) void {
+    const tangents = draw.mesh.tangents orelse return @memset(to, .{ 0, 0, 0, 1 });
+    const sign: f32 = if (draw.mirrored) -1 else 1;
+    for (to, tangents[source..][0..to.len]) |*to_t, t| {
+        const mapped = tameNormal(draw.direction_map.direction(t[0..3].*));
+        to_t.* = .{ mapped[0], mapped[1], mapped[2], t[3] * sign };
+    }
+}
 
 /// Index of the last draw whose `field` is at most `position`, so that what follows holds it.
 fn lastAtOrBefore(draws: []const Draw, comptime field: []const u8, position: usize) usize {

@@ -155,6 +155,64 @@ pub fn environment(
     return .{ .ambient = radiance, .background = background orelse @splat(shown) };
 }
 
+/// A map, and how it is placed around the scene.
+pub const EnvironmentSettings = struct {
+    map: ?*const world.EnvironmentMap = null,
+    /// Nobody asked for it.
+    is_default: bool = false,
+    /// Turns with the camera.
+    is_studio: bool = false,
+    /// From the world's directions to those of the map, before any rotation.
+    to_map: AffineD = .identity,
+    scale: Vec3 = .{ 1, 1, 1 },
+    /// See `settings.Environment`.
+    rotation_deg: ?f32 = null,
+    /// Primary rays see it.
+    is_seen: bool = false,
+    shadow_count: u32 = 0,
+};
+
+/// Puts a map, if there is one, around what the camera sees.
+pub fn addMap(
+    to: *world.Environment,
+    chosen: *const EnvironmentSettings,
+    camera: *const world.Camera,
+) void {
+    to.map = chosen.map orelse return;
+    to.scale = chosen.scale;
+    to.is_seen = chosen.is_seen;
+    to.shadow_count = chosen.shadow_count;
+    // Cosine and sine of the turn.
+    const turn: [2]f64 = if (chosen.rotation_deg) |degrees| turn: {
+        const angle_rad = @as(f64, degrees) * (std.math.pi / 180.0);
+        break :turn .{ math.elementary.cos(angle_rad), math.elementary.sin(angle_rad) };
+    } else if (chosen.is_studio) azimuth(camera) else .{ 1, 0 };
+    const back: [3]math.Vec3d = .{
+        .{ turn[0], 0, -turn[1] },
+        .{ 0, 1, 0 },
+        .{ turn[1], 0, turn[0] },
+    };
+    const map = &chosen.to_map;
+    for (&to.to_map, 0..) |*row, axis| {
+        const first = vec3d.scale(back[0], map.x[axis]);
+        const second = vec3d.scale(back[1], map.y[axis]);
+        const third = vec3d.scale(back[2], map.z[axis]);
+        row.* = pose.round(vec3d.add(vec3d.add(first, second), third));
+    }
+}
+
+/// Cosine and sine of the turn about y that a camera has which looked along -z; of one that looks
+/// straight up or down by its upper side.
+fn azimuth(camera: *const world.Camera) [2]f64 {
+    const forward = vec3.normalize(camera.forward).?;
+    const up = vec3.normalize(camera.up).?;
+    // The upper side leans away from where it looks up to, and over to it where it looks down.
+    const lean: f32 = if (forward[1] > 0) -1 else 1;
+    const level = vec3.add(forward, vec3.scale(up, lean * @abs(forward[1])));
+    const flat = vec3d.normalize(.{ level[0], 0, level[2] }) orelse return .{ 1, 0 };
+    return .{ -flat[2], -flat[0] };
+}
+
 test "a spot shines along its node's -z from its node's origin, scale aside" {
     const half = @sqrt(@as(f32, 0.5)); // A quarter turn about y: -z becomes -x.
     const maps = [_]AffineD{

@@ -9,21 +9,28 @@ const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
+const AlphaRange = @import("texture.zig").AlphaRange;
+const MaterialUse = @import("texture.zig").MaterialUse;
+const TextureSet = @import("texture.zig").TextureSet;
 
 /// Darkest attenuation colour: a channel at 0 would absorb without bound.
 const attenuation_color_min = 1e-4;
 
-/// The world's materials in the order of the scene's; `triangles` are the world's.
+/// The world's materials in the order of the scene's; `triangles` are the world's, of `instances`.
 pub fn place(
     arena: Allocator,
     from: *const scene.Scene,
+    instances: []const scene.Instance,
+    textures: *const TextureSet,
     triangles: []const world.Triangle,
 ) error{OutOfMemory}!world.Materials {
     const converted = try arena.alloc(world.Material, from.materials.len);
-    for (from.materials, converted) |*material, *to| to.* = convert(material);
+    for (from.materials, textures.materials, converted) |*material, *use, *to| {
+        to.* = convert(material, use);
+    }
     var has_transparency = false;
     var has_holes = false;
-    for (from.instances) |instance| {
+    for (instances) |instance| {
         const used = &converted[from.meshes[instance.mesh].material];
         has_transparency = has_transparency or isTransparent(used);
         has_holes = has_holes or used.alpha_cutoff >= 0;
@@ -31,9 +38,19 @@ pub fn place(
     const stops_all = !has_transparency and !has_holes;
     return .{
         .all = converted,
+        .lookups = textures.lookups,
         .has_transparency = has_transparency,
         .has_holes = has_holes,
         .occluders = if (stops_all) &.{} else try occluders(arena, converted, triangles),
+    };
+}
+
+/// Whether there is any place where a surface of this material can be seen.
+pub fn isVisible(from: *const scene.Material, use: *const MaterialUse) bool {
+    return switch (from.alpha_mode) {
+        .@"opaque" => true,
+        .mask => use.alpha.largest >= from.alpha_cutoff,
+        .blend => use.alpha.largest > 0,
     };
 }
 
@@ -42,10 +59,13 @@ fn isTransparent(material: *const world.Material) bool {
     return material.blend > 0 or material.transmission > 0;
 }
 
-fn convert(from: *const scene.Material) world.Material {
+/// Alpha counts where the mode says so, and some place of the material is not all there.
+fn convert(from: *const scene.Material, use: *const MaterialUse) world.Material {
     assert(from.ior >= 1);
+    const has_holes = from.alpha_mode == .mask and use.alpha.least < from.alpha_cutoff;
+    const blends = from.alpha_mode == .blend and use.alpha.least < 1;
     var base_color = from.base_color;
-    if (from.alpha_mode == .@"opaque") base_color[3] = 1;
+    if (!has_holes and !blends) base_color[3] = 1;
     const f0_root = (from.ior - 1) / (from.ior + 1);
     return .{
         .base_color = base_color,
@@ -56,11 +76,15 @@ fn convert(from: *const scene.Material) world.Material {
         .ior = from.ior,
         .transmission = from.transmission,
         .sigma_a = if (from.volume) absorption(from) else .{ 0, 0, 0 },
-        .alpha_cutoff = if (from.alpha_mode == .mask) from.alpha_cutoff else -1,
-        .blend = flag(from.alpha_mode == .blend),
+        .alpha_cutoff = if (has_holes) from.alpha_cutoff else -1,
+        .blend = flag(blends),
         .double_sided = flag(from.double_sided),
         .unlit = flag(from.unlit),
         .volume = flag(from.volume),
+        .normal_scale = from.normal_scale,
+        .occlusion_strength = from.occlusion_strength,
+        .first_lookup = use.first_lookup,
+        .lookup_count = use.lookup_count,
     };
 }
 
@@ -101,19 +125,25 @@ fn flag(condition: bool) f32 {
     return if (condition) 1 else 0;
 }
 
+/// Of a material without textures on vertices without colours.
+fn testConvert(from: *const scene.Material) world.Material {
+    const alpha = from.base_color[3];
+    return convert(from, &.{ .alpha = .{ .least = alpha, .largest = alpha } });
+}
+
 test "alpha counts only where the mode says so" {
     const from: scene.Material = .{ .base_color = .{ 0.1, 0.2, 0.3, 0.4 } };
-    try std.testing.expectEqual([4]f32{ 0.1, 0.2, 0.3, 1 }, convert(&from).base_color);
-    try std.testing.expectEqual(-1, convert(&from).alpha_cutoff);
+    try std.testing.expectEqual([4]f32{ 0.1, 0.2, 0.3, 1 }, testConvert(&from).base_color);
+    try std.testing.expectEqual(-1, testConvert(&from).alpha_cutoff);
     var mask = from;
     mask.alpha_mode = .mask;
-    try std.testing.expectEqual(0.5, convert(&mask).alpha_cutoff);
-    try std.testing.expectEqual(0.4, convert(&mask).base_color[3]);
-    try std.testing.expect(!isTransparent(&convert(&mask)));
+    try std.testing.expectEqual(0.5, testConvert(&mask).alpha_cutoff);
+    try std.testing.expectEqual(0.4, testConvert(&mask).base_color[3]);
+    try std.testing.expect(!isTransparent(&testConvert(&mask)));
     var blend = from;
     blend.alpha_mode = .blend;
-    try std.testing.expectEqual(-1, convert(&blend).alpha_cutoff);
-    try std.testing.expect(isTransparent(&convert(&blend)));
+    try std.testing.expectEqual(-1, testConvert(&blend).alpha_cutoff);
+    try std.testing.expect(isTransparent(&testConvert(&blend)));
 }
 
 test "light is stopped where nothing blends, has holes or lets it through" {
@@ -122,14 +152,16 @@ test "light is stopped where nothing blends, has holes or lets it through" {
         .{ .{}, true },
         .{ .{ .transmission = 0.5, .metallic = 0 }, false },
         .{ .{ .transmission = 1, .metallic = 1 }, true },
-        .{ .{ .alpha_mode = .blend }, false },
-        .{ .{ .alpha_mode = .mask, .alpha_cutoff = 0 }, false },
-    }) |case| try std.testing.expectEqual(case[1], convert(&case[0]).stopsLight());
+        .{ .{ .alpha_mode = .blend, .base_color = .{ 1, 1, 1, 0.9 } }, false },
+        .{ .{ .alpha_mode = .blend }, true },
+        .{ .{ .alpha_mode = .mask, .base_color = .{ 1, 1, 1, 0.4 } }, false },
+        .{ .{ .alpha_mode = .mask, .base_color = .{ 1, 1, 1, 0.5 } }, true },
+    }) |case| try std.testing.expectEqual(case[1], testConvert(&case[0]).stopsLight());
 }
 
 test "reflectance of glass and of nothing" {
-    try std.testing.expectApproxEqRel(@as(f32, 0.04), convert(&.{}).dielectric_f0, 1e-6);
-    try std.testing.expectEqual(0, convert(&.{ .ior = 1 }).dielectric_f0);
+    try std.testing.expectApproxEqRel(@as(f32, 0.04), testConvert(&.{}).dielectric_f0, 1e-6);
+    try std.testing.expectEqual(0, testConvert(&.{ .ior = 1 }).dielectric_f0);
 }
 
 test "white light turns to the attenuation colour after the attenuation distance" {
@@ -139,17 +171,31 @@ test "white light turns to the attenuation colour after the attenuation distance
         .attenuation_color = .{ 1, 0.5, 0 },
         .attenuation_distance = 2,
     };
-    const result = convert(&from);
+    const result = testConvert(&from);
     try std.testing.expectEqual(0, result.sigma_a[0]);
     try std.testing.expectApproxEqRel(@as(f32, 0.34657359), result.sigma_a[1], 1e-6);
     try std.testing.expectApproxEqRel(@as(f32, 4.6051702), result.sigma_a[2], 1e-6);
     var thin = from;
     thin.volume = false;
-    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, convert(&thin).sigma_a);
+    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, testConvert(&thin).sigma_a);
     var clear = from;
     clear.attenuation_distance = std.math.inf(f32);
-    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, convert(&clear).sigma_a);
+    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, testConvert(&clear).sigma_a);
     var dense = from;
     dense.attenuation_distance = std.math.floatMin(f32);
-    try std.testing.expect(math.vec3.isFinite(convert(&dense).sigma_a));
+    try std.testing.expect(math.vec3.isFinite(testConvert(&dense).sigma_a));
+}
+
+test "what is all holes or all clear is seen nowhere" {
+    const Case = struct { scene.AlphaMode, AlphaRange, bool };
+    for ([_]Case{
+        .{ .@"opaque", .{ .least = 0, .largest = 0 }, true },
+        .{ .mask, .{ .least = 0, .largest = 0.4 }, false },
+        .{ .mask, .{ .least = 0, .largest = 0.5 }, true },
+        .{ .blend, .{ .least = 0, .largest = 0 }, false },
+        .{ .blend, .{ .least = 0, .largest = 0.01 }, true },
+    }) |case| {
+        const seen = isVisible(&.{ .alpha_mode = case[0] }, &.{ .alpha = case[1] });
+        try std.testing.expectEqual(case[2], seen);
+    }
 }

@@ -1,8 +1,9 @@
 //! Vertex attributes: the accessors that a primitive draws from, each of the right kind.
 //!
 //! In: a primitive's attributes, indices and morph targets. Out: the accessors of its positions,
-//! normals and colours. The kinds are those of glTF 2.0, section 3.7.2.1, and of
-//! KHR_mesh_quantization; an attribute that is not drawn has to be of its kind as well.
+//! normals, colours, texture coordinates and tangents. The kinds are those of glTF 2.0, section
+//! 3.7.2.1, and of KHR_mesh_quantization; an attribute that is not drawn has to be of its kind as
+//! well.
 
 const std = @import("std");
 const c = @import("../cgltf.zig");
@@ -10,6 +11,7 @@ const accessors = @import("../accessor.zig");
 const asset = @import("asset.zig");
 const diagnostic = @import("../../diagnostic.zig");
 const gltf_accessors = @import("accessors.zig");
+const scene = @import("../../scene.zig");
 const Meshes = @import("meshes.zig");
 const Source = @import("source.zig");
 const Accessor = accessors.Accessor;
@@ -21,6 +23,8 @@ pub const Used = struct {
     position: ?u32 = null,
     normal: ?u32 = null,
     color: ?u32 = null,
+    tangent: ?u32 = null,
+    texcoords: [scene.texcoord_set_count]?u32 = @splat(null),
 };
 
 /// Finds and checks the attributes of a primitive, and those of its morph targets. Without
@@ -44,13 +48,7 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
     for (list) |*attribute| {
         const index = accessorIndex(source, attribute);
         try checkAttribute(source, attribute, index, positions.count, place);
-        if (attribute.index != 0) continue;
-        const slot: *?u32 = switch (attribute.type) {
-            .position => &used.position,
-            .normal => &used.normal,
-            .color => &used.color,
-            else => continue,
-        };
+        const slot = slotOf(&used, attribute) orelse continue;
         if (slot.* != null) {
             return source.fail("{f}: {f} stands twice", .{ place, quote(attribute) });
         }
@@ -62,6 +60,22 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
         }
     }
     return used;
+}
+
+/// Where an attribute goes; null: it is not drawn.
+fn slotOf(used: *Used, attribute: *const c.cgltf_attribute) ?*?u32 {
+    const set = attribute.index;
+    if (attribute.type == .texcoord) {
+        return if (set >= 0 and set < used.texcoords.len) &used.texcoords[@intCast(set)] else null;
+    }
+    if (set != 0) return null;
+    return switch (attribute.type) {
+        .position => &used.position,
+        .normal => &used.normal,
+        .color => &used.color,
+        .tangent => &used.tangent,
+        else => null,
+    };
 }
 
 /// The accessor of a primitive's indices.

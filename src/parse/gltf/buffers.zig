@@ -1,7 +1,7 @@
 //! The bytes of glTF's buffers: from the GLB, from data URIs, from files beside the scene.
 //!
 //! In: the document, the GLB's binary chunk, the files of the scene. Out: for each buffer as many
-//! bytes as its byteLength says (glTF 2.0, section 3.6.1). Images are not opened.
+//! bytes as its byteLength says (glTF 2.0, section 3.6.1). Images: textures.zig.
 
 const std = @import("std");
 const c = @import("../cgltf.zig");
@@ -82,26 +82,25 @@ const Reader = struct {
     }
 
     fn fromUri(reader: Reader) Error![]const u8 {
+        const gpa = reader.buffers.gpa;
         const text = std.mem.span(@as([*:0]const u8, reader.raw.uri));
-        switch (uri.classify(text)) {
-            .base64 => |digits| {
-                // Before anything of that size is allocated.
-                if (reader.raw.size > digits.len / 4 * 3 + 3) return reader.fail(
-                    "byteLength {d} is more than its data URI holds",
-                    .{reader.raw.size},
-                );
-                const gpa = reader.buffers.gpa;
-                return reader.own(uri.decodeBase64(gpa, digits) catch |err| return switch (err) {
-                    error.OutOfMemory => error.OutOfMemory,
-                    error.NotBase64 => reader.fail("its data URI is not valid base64", .{}),
-                });
+        const kind = uri.classify(text);
+        // Before anything of that size is allocated.
+        if (kind == .base64 and reader.raw.size > kind.base64.len / 4 * 3 + 3) return reader.fail(
+            "byteLength {d} is more than its data URI holds",
+            .{reader.raw.size},
+        );
+        var reason: diagnostic_data.Message = .{};
+        const target = uri.resolve(gpa, gpa, text, &reason) catch |err| return switch (err) {
+            error.OutOfMemory => error.OutOfMemory,
+            error.InvalidInput => reader.fail("{s}", .{reason.text()}),
+        };
+        switch (target) {
+            .bytes => |bytes| return reader.own(bytes),
+            .path => |path| {
+                defer gpa.free(path);
+                return reader.fromFile(text, path);
             },
-            .data_not_base64 => return reader.fail("its data URI is not base64", .{}),
-            .scheme => |scheme| return reader.fail(
-                "URIs of the scheme {f} are not read, only files and data",
-                .{quote(scheme)},
-            ),
-            .path => |encoded| return reader.fromFile(encoded),
         }
     }
 
@@ -112,18 +111,12 @@ const Reader = struct {
         return bytes;
     }
 
-    fn fromFile(reader: Reader, encoded: []const u8) Error![]const u8 {
-        const gpa = reader.buffers.gpa;
-        const text = try escapes.decodeString(gpa, encoded);
-        defer gpa.free(text);
-        const path = uri.decodePath(gpa, text) catch |err| return switch (err) {
-            error.OutOfMemory => error.OutOfMemory,
-            error.BadEscape => reader.fail("{f} is not a valid path", .{quote(text)}),
-        };
-        defer gpa.free(path);
+    fn fromFile(reader: Reader, encoded: []const u8, path: []const u8) Error![]const u8 {
         var reason: diagnostic_data.Message = .{};
         const file = reader.resources.read(path, &reason) catch |err| {
             if (err == error.OutOfMemory) return err;
+            const text = try escapes.decodeString(reader.buffers.gpa, encoded);
+            defer reader.buffers.gpa.free(text);
             const parts = .{ reader.index, quote(text), reason.text() };
             return reader.diagnostic.fail(err, "buffer {d}: {f} {s}", parts);
         };

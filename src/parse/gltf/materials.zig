@@ -1,33 +1,130 @@
 //! glTF's materials: metallic-roughness factors and those of the extensions that are traced.
 //!
 //! In: materials (glTF 2.0, section 3.9; KHR_materials_ior, _transmission, _volume,
-//! _emissive_strength, _unlit). Out: the scene's materials with every factor in its range, in the
-//! order of the file. Textures are not read: where one would decide, the factor stands alone, and
-//! what would be wrong at its full value (metal, glow) counts as absent.
+//! _emissive_strength, _unlit, _pbrSpecularGlossiness). Out: the scene's materials with every
+//! factor in its range, in the order of the file, and behind them those that the file does not
+//! have. The textures of a material are read once something is drawn with it.
 
 const std = @import("std");
 const c = @import("../cgltf.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
-const Source = @import("source.zig");
 const Error = Source.Error;
+const Source = @import("source.zig");
+const Textures = @import("textures.zig");
 const Vec3 = math.Vec3;
+const Materials = @This();
 
 /// Index of refraction that stands for KHR_materials_ior's 0, "Fresnel's term is 1".
 const ior_total = 1e6;
 
 const float_max = std.math.floatMax(f32);
 
-/// Adds all materials to the scene; `default_added` puts glTF's default material behind them.
-pub fn read(source: *const Source, default_added: bool) Error!void {
-    for (0..source.data.materials_count) |index| {
-        const reader: Reader = .{ .source = source, .index = index };
-        const material = reader.read(Source.item(source.data.materials, index));
-        _ = try source.builder.addMaterial(material);
-    }
-    if (default_added) _ = try source.builder.addMaterial(.{});
+source: *const Source,
+textures: *Textures,
+/// Those of the file as far as they are read, by their indices.
+list: []?scene.Material,
+/// Those that come behind them.
+added: std.ArrayList(scene.Material) = .empty,
+/// glTF's default material, as an index into the scene's.
+default: ?u32 = null,
+/// By material: the one without its normal texture.
+smooth: std.AutoHashMapUnmanaged(u32, u32) = .empty,
+
+/// Nothing is read yet. Free with `deinit`.
+pub fn init(source: *const Source, textures: *Textures) Error!Materials {
+    const list = try source.gpa.alloc(?scene.Material, source.data.materials_count);
+    @memset(list, null);
+    return .{ .source = source, .textures = textures, .list = list };
 }
 
+/// Frees what is not the scene's.
+pub fn deinit(materials: *Materials) void {
+    const gpa = materials.source.gpa;
+    gpa.free(materials.list);
+    materials.added.deinit(gpa);
+    materials.smooth.deinit(gpa);
+    materials.* = undefined;
+}
+
+/// A material that something is drawn with, its textures included.
+pub fn use(materials: *Materials, index: u32) Error!*const scene.Material {
+    const file_count = materials.list.len;
+    if (index >= file_count) return &materials.added.items[index - file_count];
+    const slot = &materials.list[index];
+    if (slot.* == null) {
+        const reader: Reader = .{ .source = materials.source, .index = index };
+        const raw = Source.item(materials.source.data.materials, index);
+        var material = reader.read(raw);
+        try materials.readTextures(raw, index, &material);
+        slot.* = material;
+    }
+    return &slot.*.?;
+}
+
+/// The material of what has none (glTF 2.0, section 3.7.2.1).
+pub fn useDefault(materials: *Materials) Error!u32 {
+    if (materials.default == null) materials.default = try materials.add(.{});
+    return materials.default.?;
+}
+
+/// A material without its normal texture, for meshes without its coordinates: they have no
+/// tangents, so it cannot bend anything.
+pub fn useSmooth(materials: *Materials, index: u32) Error!u32 {
+    if (materials.smooth.get(index)) |known| return known;
+    var material = (try materials.use(index)).*;
+    material.normal_texture = null;
+    const smooth = try materials.add(material);
+    try materials.smooth.put(materials.source.gpa, index, smooth);
+    return smooth;
+}
+
+fn add(materials: *Materials, material: scene.Material) Error!u32 {
+    const index = materials.list.len + materials.added.items.len;
+    try materials.added.append(materials.source.gpa, material);
+    return @intCast(index);
+}
+
+/// Adds all materials to the scene.
+pub fn finish(materials: *Materials) Error!void {
+    for (materials.list, 0..) |known, index| {
+        const reader: Reader = .{ .source = materials.source, .index = index };
+        const material = known orelse
+            reader.read(Source.item(materials.source.data.materials, index));
+        _ = try materials.source.builder.addMaterial(material);
+    }
+    for (materials.added.items) |material| {
+        _ = try materials.source.builder.addMaterial(material);
+    }
+}
+
+fn readTextures(
+    materials: *Materials,
+    raw: *const c.cgltf_material,
+    index: usize,
+    material: *scene.Material,
+) Error!void {
+    const textures = materials.textures;
+    const metal = &raw.pbr_metallic_roughness;
+    if (raw.has_pbr_metallic_roughness != 0) {
+        material.base_color_texture =
+            try textures.view(&metal.base_color_texture, index, "baseColorTexture");
+        material.metallic_roughness_texture = try textures.view(
+            &metal.metallic_roughness_texture,
+            index,
+            "metallicRoughnessTexture",
+        );
+    } else if (raw.has_pbr_specular_glossiness != 0) {
+        const diffuse = &raw.pbr_specular_glossiness.diffuse_texture;
+        material.base_color_texture = try textures.view(diffuse, index, "diffuseTexture");
+    }
+    material.normal_texture = try textures.view(&raw.normal_texture, index, "normalTexture");
+    material.occlusion_texture =
+        try textures.view(&raw.occlusion_texture, index, "occlusionTexture");
+    material.emissive_texture = try textures.view(&raw.emissive_texture, index, "emissiveTexture");
+}
+
+/// Reads the factors of one material.
 const Reader = struct {
     source: *const Source,
     index: usize,
@@ -45,13 +142,23 @@ const Reader = struct {
             .unlit = raw.unlit != 0,
         };
         if (raw.has_pbr_metallic_roughness != 0) {
-            reader.readMetallicRoughness(&raw.pbr_metallic_roughness, &material);
+            const metal = &raw.pbr_metallic_roughness;
+            material.base_color = reader.color4("baseColorFactor", metal.base_color_factor);
+            material.metallic = reader.unit("metallicFactor", metal.metallic_factor);
+            material.roughness = reader.unit("roughnessFactor", metal.roughness_factor);
         } else if (raw.has_pbr_specular_glossiness != 0) {
             source.warn("KHR_materials_pbrSpecularGlossiness is approximated", .{});
             const gloss = &raw.pbr_specular_glossiness;
             material.base_color = reader.color4("diffuseFactor", gloss.diffuse_factor);
             material.metallic = 0;
             material.roughness = 1 - reader.unit("glossinessFactor", gloss.glossiness_factor);
+        }
+        if (raw.normal_texture.texture != null) {
+            material.normal_scale = math.flushDenormal(raw.normal_texture.scale);
+        }
+        if (raw.occlusion_texture.texture != null) {
+            const strength = raw.occlusion_texture.scale;
+            material.occlusion_strength = reader.unit("occlusionTexture.strength", strength);
         }
         material.emissive = reader.readEmissive(raw);
         if (raw.has_ior != 0) material.ior = reader.readIor(raw.ior);
@@ -63,20 +170,7 @@ const Reader = struct {
         return material;
     }
 
-    fn readMetallicRoughness(
-        reader: Reader,
-        raw: *const c.cgltf_pbr_metallic_roughness,
-        material: *scene.Material,
-    ) void {
-        material.base_color = reader.color4("baseColorFactor", raw.base_color_factor);
-        material.roughness = reader.unit("roughnessFactor", raw.roughness_factor);
-        const metallic = reader.unit("metallicFactor", raw.metallic_factor);
-        const textured = raw.metallic_roughness_texture.texture != null;
-        material.metallic = if (textured) 0 else metallic;
-    }
-
     fn readEmissive(reader: Reader, raw: *const c.cgltf_material) Vec3 {
-        if (raw.emissive_texture.texture != null) return .{ 0, 0, 0 };
         const factor = reader.color3("emissiveFactor", raw.emissive_factor);
         if (raw.has_emissive_strength == 0) return factor;
         const strength = reader.clamp(

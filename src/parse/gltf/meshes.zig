@@ -1,7 +1,9 @@
 //! glTF's meshes become triangle lists with one material each.
 //!
-//! In: primitives (glTF 2.0, section 3.7.2). Out: `scene.Mesh`es in the scene's memory. What
-//! several primitives share is decoded once. Every index has been compared with the number of
+//! In: primitives (glTF 2.0, section 3.7.2). Out: `scene.Mesh`es in the scene's memory, with the
+//! texture coordinates and tangents that their material's textures need. A set of coordinates that
+//! is missing counts as 0, as it does in other viewers. What several primitives share is decoded
+//! once. Every index has been compared with the number of
 //! vertices, every number is finite; strips and fans are taken apart (section 3.7.2.1).
 
 const std = @import("std");
@@ -10,6 +12,7 @@ const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const accessors = @import("../accessor.zig");
 const attributes = @import("attributes.zig");
+const Materials = @import("materials.zig");
 const Source = @import("source.zig");
 const Accessor = accessors.Accessor;
 const Error = Source.Error;
@@ -18,14 +21,17 @@ const Meshes = @This();
 const assert = std.debug.assert;
 
 source: *Source,
+materials: *Materials,
 /// Index in the scene of a glTF mesh's first primitive, and how many are drawn.
 ranges: std.AutoHashMapUnmanaged(u32, Range) = .empty,
 positions: std.AutoHashMapUnmanaged(u32, []const Vec3) = .empty,
 normals: std.AutoHashMapUnmanaged(u32, []const Vec3) = .empty,
 colors: std.AutoHashMapUnmanaged(u32, []const [4]f32) = .empty,
+texcoords: std.AutoHashMapUnmanaged(u32, []const [2]f32) = .empty,
+tangents: std.AutoHashMapUnmanaged(u32, []const [4]f32) = .empty,
 triangles: std.AutoHashMapUnmanaged(Connection, []const [3]u32) = .empty,
-/// Whether a primitive without a material has been met, and needs the default one.
-default_material_used: bool = false,
+/// Whether a mesh without the coordinates of its textures has been met.
+coordinates_missed: bool = false,
 
 /// Meshes `first..first + count` of the scene.
 pub const Range = struct { first: u32, count: u32 };
@@ -44,11 +50,9 @@ const Mode = enum { triangles, strip, fan };
 /// Frees what is not the scene's.
 pub fn deinit(meshes: *Meshes) void {
     const gpa = meshes.source.gpa;
-    meshes.ranges.deinit(gpa);
-    meshes.positions.deinit(gpa);
-    meshes.normals.deinit(gpa);
-    meshes.colors.deinit(gpa);
-    meshes.triangles.deinit(gpa);
+    inline for (.{
+        "ranges", "positions", "normals", "colors", "texcoords", "tangents", "triangles",
+    }) |name| @field(meshes, name).deinit(gpa);
     meshes.* = undefined;
 }
 
@@ -100,9 +104,8 @@ fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Er
     const vertex_count: u32 = @intCast(source.data.accessors[position].count);
     const triangles = try meshes.connect(primitive, mode, vertex_count, place);
     if (triangles.len == 0) return null;
-    const positions = try meshes.floats(3, &meshes.positions, position);
-    return .{
-        .positions = positions,
+    var mesh: scene.Mesh = .{
+        .positions = try meshes.floats(3, &meshes.positions, position),
         .normals = if (used.normal) |index|
             try meshes.floats(3, &meshes.normals, index)
         else
@@ -112,14 +115,40 @@ fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Er
         .material = if (primitive.material) |material|
             Source.indexOf(source.data.materials, material)
         else
-            meshes.defaultMaterial(),
+            try meshes.materials.useDefault(),
     };
+    try meshes.decodeForTextures(&mesh, &used, place);
+    return mesh;
 }
 
-/// The default material comes after the file's own.
-fn defaultMaterial(meshes: *Meshes) u32 {
-    meshes.default_material_used = true;
-    return @intCast(meshes.source.data.materials_count);
+/// What the textures of its material need of a mesh, and no more.
+fn decodeForTextures(
+    meshes: *Meshes,
+    mesh: *scene.Mesh,
+    used: *const attributes.Used,
+    place: Place,
+) Error!void {
+    const material = try meshes.materials.use(mesh.material);
+    inline for (scene.texture_fields) |field| if (@field(material, field)) |view| {
+        const set = view.texcoord_set;
+        if (mesh.texcoords[set] == null) {
+            if (used.texcoords[set]) |index| {
+                mesh.texcoords[set] = try meshes.floats(2, &meshes.texcoords, index);
+            } else if (!meshes.coordinates_missed) {
+                meshes.coordinates_missed = true;
+                meshes.source.warn(
+                    "{f}: without TEXCOORD_{d}, where its material's textures look: taken as 0",
+                    .{ place, set },
+                );
+            }
+        }
+    };
+    const normal_texture = material.normal_texture orelse return;
+    if (mesh.texcoords[normal_texture.texcoord_set] == null) {
+        mesh.material = try meshes.materials.useSmooth(mesh.material);
+    } else if (mesh.normals != null) { // Without, they count for nothing.
+        if (used.tangent) |index| mesh.tangents = try meshes.decodeTangents(index);
+    }
 }
 
 fn floats(
@@ -139,6 +168,22 @@ fn floats(
     );
     try cache.put(source.gpa, index, out);
     return out;
+}
+
+/// Tangents whose fourth number is 1 or -1.
+fn decodeTangents(meshes: *Meshes, index: u32) Error![]const [4]f32 {
+    if (meshes.tangents.get(index)) |known| return known;
+    const source = meshes.source;
+    const accessor = try attributes.required(source, index);
+    try source.charge(@as(u64, accessor.count) * @sizeOf([4]f32));
+    const tangents = try source.arena.alloc([4]f32, accessor.count);
+    if (accessors.decodeFloats(4, accessor, tangents)) |bad| return source.fail(
+        "accessor {d}: element {d} is not finite",
+        .{ index, bad },
+    );
+    for (tangents) |*tangent| tangent[3] = if (tangent[3] < 0) -1 else 1;
+    try meshes.tangents.put(source.gpa, index, tangents);
+    return tangents;
 }
 
 /// Colours as RGBA, none below 0 and no alpha above 1.

@@ -8,6 +8,10 @@ const std = @import("std");
 const json = @import("../json.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
+const escapes = @import("../json/escapes.zig");
+const quote = @import("../../diagnostic.zig").quote;
+const Choice = @import("../../settings.zig").SceneChoice;
+const c = @import("../cgltf.zig");
 const Source = @import("source.zig");
 const schema = @import("schema.zig");
 const AffineD = math.AffineD;
@@ -19,9 +23,11 @@ const assert = std.debug.assert;
 /// A node that waits for its turn.
 const Pending = struct { origin: u32, parent: u32 };
 
-/// Adds the nodes of the scene that the file shows: `scene`, else the first one, else every root.
-/// Returns the index of the glTF node of each, which the caller frees with the source's `gpa`.
-pub fn collect(source: *const Source) Error![]const u32 {
+/// Adds the nodes of the scene that is asked for, by default the one that the file shows: `scene`,
+/// else the first one, else every root. Returns the index of the glTF node of each, which the
+/// caller frees with the source's `gpa`.
+pub fn collect(source: *const Source, choice: Choice) (Error || error{SceneUnknown})![]const u32 {
+    const shown = try choose(source, choice);
     const gpa = source.gpa;
     const node_count = source.data.nodes_count;
     var in_tree = try findTrees(source);
@@ -30,7 +36,7 @@ pub fn collect(source: *const Source) Error![]const u32 {
     defer stack.deinit(gpa);
     var listed = try std.DynamicBitSetUnmanaged.initEmpty(gpa, node_count);
     defer listed.deinit(gpa);
-    try pushRoots(source, &in_tree, &stack, &listed);
+    try pushRoots(source, shown, &in_tree, &stack, &listed);
 
     var origins: std.ArrayList(u32) = .empty;
     errdefer origins.deinit(gpa);
@@ -50,18 +56,71 @@ pub fn collect(source: *const Source) Error![]const u32 {
     return origins.toOwnedSlice(gpa);
 }
 
+/// The scene that is asked for; null: the file has none, and none is asked for.
+fn choose(
+    source: *const Source,
+    choice: Choice,
+) error{ OutOfMemory, SceneUnknown }!?*const c.cgltf_scene {
+    const data = source.data;
+    const list = Source.slice(data.scenes, data.scenes_count);
+    switch (choice) {
+        .default => return if (data.scene != null)
+            Source.item(data.scene, 0)
+        else if (list.len > 0)
+            &list[0]
+        else
+            null,
+        .index => |index| if (index < list.len) return &list[index],
+        .name => |wanted| for (list) |*candidate| {
+            if (candidate.name == null) continue;
+            const name = try escapes.decodeString(source.gpa, std.mem.span(candidate.name));
+            defer source.gpa.free(name);
+            if (std.mem.eql(u8, name, wanted)) return candidate;
+        },
+    }
+    const known: SceneList = .{ .gpa = source.gpa, .scenes = list };
+    return switch (choice) {
+        .default => unreachable, // Has been answered.
+        inline else => |wanted| source.diagnostic.fail(
+            error.SceneUnknown,
+            if (@TypeOf(wanted) == u32) "no scene {d}; {f}" else "no scene {f}; {f}",
+            .{ if (@TypeOf(wanted) == u32) wanted else quote(wanted), known },
+        ),
+    };
+}
+
+/// Prints the scenes of a file: index and name, if any.
+const SceneList = struct {
+    gpa: std.mem.Allocator,
+    scenes: []const c.cgltf_scene,
+
+    /// Called by `{f}`.
+    pub fn format(list: SceneList, writer: *std.Io.Writer) std.Io.Writer.Error!void {
+        if (list.scenes.len == 0) return writer.writeAll("the file has none");
+        try writer.writeAll("the file has ");
+        for (list.scenes, 0..) |*entry, index| {
+            if (index > 0) try writer.writeAll(", ");
+            try writer.print("{d}", .{index});
+            if (entry.name == null) continue;
+            const name = escapes.decodeString(list.gpa, std.mem.span(entry.name)) catch
+                continue; // An index alone will do.
+            defer list.gpa.free(name);
+            try writer.print(" {f}", .{quote(name)});
+        }
+    }
+};
+
 /// The roots of the shown scene, the first on top.
 fn pushRoots(
     source: *const Source,
+    chosen: ?*const c.cgltf_scene,
     in_tree: *const std.DynamicBitSetUnmanaged,
     stack: *std.ArrayList(Pending),
     listed: *std.DynamicBitSetUnmanaged,
 ) Error!void {
     const gpa = source.gpa;
     const data = source.data;
-    const shown = if (data.scene) |chosen| chosen else if (data.scenes_count > 0)
-        data.scenes
-    else {
+    const shown = chosen orelse {
         for (0..data.nodes_count) |reversed| {
             const index = data.nodes_count - 1 - reversed;
             if (data.nodes[index].parent != null) continue;
@@ -69,7 +128,7 @@ fn pushRoots(
         }
         return;
     };
-    const roots = Source.slice(shown[0].nodes, shown[0].nodes_count);
+    const roots = Source.slice(shown.nodes, shown.nodes_count);
     for (0..roots.len) |reversed| {
         const index = Source.indexOf(data.nodes, roots[roots.len - 1 - reversed]);
         if (listed.isSet(index)) return source.fail(

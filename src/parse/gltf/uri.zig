@@ -1,10 +1,60 @@
 //! URIs of glTF: data in the text itself, or the path of a file beside it.
 //!
 //! In: a URI reference (RFC 3986; data URIs: RFC 2397). Out: the bytes of a base64 data URI, or a
-//! path with its percent signs decoded, for resource.zig to judge.
+//! path with its percent signs decoded, for resource.zig to judge. A backslash is no separator in a
+//! URI, but exporters write it and browsers read it as one (WHATWG URL), so it is.
 
 const std = @import("std");
+const diagnostic = @import("../../diagnostic.zig");
+const escapes = @import("../json/escapes.zig");
 const Allocator = std.mem.Allocator;
+const quote = diagnostic.quote;
+
+/// What a URI stands for; free what is in it.
+pub const Target = union(enum) { bytes: [:0]u8, path: []u8 };
+
+/// Resolves a URI as it stands in a JSON text. On an error but that of memory, `reason` says what
+/// is wrong. Bytes come from `allocator`, a path from `gpa`.
+pub fn resolve(
+    gpa: Allocator,
+    allocator: Allocator,
+    encoded: []const u8,
+    reason: *diagnostic.Message,
+) error{ OutOfMemory, InvalidInput }!Target {
+    switch (classify(encoded)) {
+        .base64 => |digits| return .{
+            .bytes = decodeBase64(allocator, digits) catch |err| switch (err) {
+                error.OutOfMemory => |failure| return failure,
+                error.NotBase64 => return refuse(reason, "its data URI is not valid base64", .{}),
+            },
+        },
+        .data_not_base64 => return refuse(reason, "its data URI is not base64", .{}),
+        .scheme => |scheme| return if (scheme.len == 1)
+            refuse(reason, "{f} is an absolute path with a drive of Windows", .{quote(encoded)})
+        else
+            refuse(reason, "URIs of the scheme {f} are not read, only files and data", .{
+                quote(scheme),
+            }),
+        .path => {},
+    }
+    const text = try escapes.decodeString(gpa, encoded);
+    defer gpa.free(text);
+    const path = decodePath(gpa, text) catch |err| switch (err) {
+        error.OutOfMemory => |failure| return failure,
+        error.BadEscape => return refuse(reason, "{f} is not a valid path", .{quote(text)}),
+    };
+    std.mem.replaceScalar(u8, path, '\\', '/');
+    return .{ .path = path };
+}
+
+fn refuse(
+    reason: *diagnostic.Message,
+    comptime format: []const u8,
+    arguments: anytype,
+) error{InvalidInput} {
+    reason.set(format, arguments);
+    return error.InvalidInput;
+}
 
 /// What a URI is.
 pub const Kind = union(enum) {
@@ -84,6 +134,34 @@ test classify {
     try expectEqualStrings("x", classify("x:y").scheme);
     for ([_][]const u8{ "", "a.bin", "a/b:c", "1:2", "./x:y", "%41:" }) |path| {
         try expectEqualStrings(path, classify(path).path);
+    }
+}
+
+test resolve {
+    const gpa = std.testing.allocator;
+    var reason: diagnostic.Message = .{};
+    const paths = [_][2][]const u8{
+        .{ "a%20b.png", "a b.png" },      .{ ".\\\\a\\\\b.png", "./a/b.png" },
+        .{ "a\\u00e9%5Cb", "a\u{e9}/b" },
+    };
+    for (paths) |case| {
+        const target = try resolve(gpa, gpa, case[0], &reason);
+        defer gpa.free(target.path);
+        try std.testing.expectEqualStrings(case[1], target.path);
+    }
+    const target = try resolve(gpa, gpa, "data:;base64,QUI", &reason);
+    defer gpa.free(target.bytes);
+    try std.testing.expectEqualStrings("AB", target.bytes);
+    const wrong = [_][2][]const u8{
+        .{ "c:\\\\a.png", "'c:\\\\a.png' is an absolute path with a drive of Windows" },
+        .{ "ftp://a", "URIs of the scheme 'ftp' are not read, only files and data" },
+        .{ "data:,a", "its data URI is not base64" },
+        .{ "data:;base64,a", "its data URI is not valid base64" },
+        .{ "a%2", "'a%2' is not a valid path" },
+    };
+    for (wrong) |case| {
+        try std.testing.expectError(error.InvalidInput, resolve(gpa, gpa, case[0], &reason));
+        try std.testing.expectEqualStrings(case[1], reason.text());
     }
 }
 

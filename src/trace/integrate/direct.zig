@@ -50,7 +50,7 @@ pub fn addLight(
     }
     if (ray_count == 0) return 0;
     var transmittances: [Kernel.group_count]Vec3 = undefined;
-    visibility.transmittance(&bundle, light, coherence, &transmittances);
+    visibility.transmittance(&bundle, light, vertices, coherence, &transmittances);
     for (active, transmittances, unshadowed, radiance) |arrives, transmittance, worth, *sum| {
         if (arrives.none()) continue;
         const light_seen = worth.mul(transmittance);

@@ -9,6 +9,8 @@ const ray_file = @import("../traverse/ray.zig");
 const bsdf_file = @import("../shade/bsdf.zig");
 const interaction_file = @import("../shade/interaction.zig");
 const exponential = @import("../shade/exponential.zig");
+const ray_cone = @import("../shade/ray_cone.zig");
+const camera = @import("camera.zig");
 const visibility = @import("visibility.zig");
 const assert = std.debug.assert;
 const Frame = @import("../../world.zig").Frame;
@@ -18,17 +20,72 @@ pub const depth_limit = @import("../../settings.zig").depth.max;
 
 /// Rays to be traced, and what they are worth.
 pub fn PathState(comptime Kernel: type) type {
+    const F32 = Kernel.Rays.F32;
     const Vec3 = Kernel.Rays.Vec3;
+    const Interaction = interaction_file.Interaction(Kernel.Rays);
     return struct {
         bundle: bundle_file.Bundle(Kernel),
         /// Share of what the ray sees that reaches the pixel.
         throughput: [Kernel.group_count]Vec3,
         /// Absorption coefficient of what the ray travels in, per metre.
         sigma_a: [Kernel.group_count]Vec3,
+        /// Of the roughest surface on the way: how far the environment is spread.
+        roughness: [Kernel.group_count]Kernel.Rays.F32,
+        /// Ray cones (`ray_cone.zig`): width at the origin in metres, and its growth by distance;
+        /// undefined in frames without footprints.
+        cone_width: [Kernel.group_count]F32,
+        cone_spread: [Kernel.group_count]F32,
         /// Bounces up to here.
         depth: u32,
         /// Surfaces that the ray has gone on through without a bounce.
         transparency_depth: u32,
+
+        /// Gives primary rays their cones.
+        pub fn startCones(path: *@This(), start: camera.Footprint) void {
+            const slope: F32 = .splat(start.slope);
+            path.cone_width = @splat(.splat(start.width));
+            for (&path.bundle.groups, &path.cone_spread) |*ray, *spread| {
+                spread.* = slope.div(ray.line.direction.length());
+            }
+        }
+
+        /// Gives rays that go straight on from where they started the cones that they have.
+        pub fn keepCones(path: *@This(), before: *const @This()) void {
+            path.cone_width = before.cone_width;
+            path.cone_spread = before.cone_spread;
+        }
+
+        /// Gives reflected rays of a group their cones: what they are at a point, and the surface
+        /// makes of them.
+        pub fn reflectCones(
+            path: *@This(),
+            before: *const @This(),
+            group: usize,
+            point: *const Interaction,
+        ) void {
+            const spread = before.cone_spread[group];
+            const width = point.cone_width;
+            path.cone_width[group] = width;
+            path.cone_spread[group] =
+                ray_cone.reflected(Kernel.Rays, spread, width, point.curvature);
+        }
+
+        /// The same of rays that go through the surface, bent if it bounds a volume.
+        pub fn refractCones(
+            path: *@This(),
+            before: *const @This(),
+            group: usize,
+            point: *const Interaction,
+        ) void {
+            const material = &point.material;
+            const eta = F32.select(point.back, material.ior, F32.splat(1).div(material.ior));
+            const spread = before.cone_spread[group];
+            const width = point.cone_width;
+            const bent =
+                ray_cone.refracted(Kernel.Rays, spread, width, point.curvature, eta);
+            path.cone_width[group] = width;
+            path.cone_spread[group] = .select(material.volume, bent, spread);
+        }
 
         /// What is left of a group's throughput at a distance: Beer and Lambert's law.
         pub fn throughputAt(
@@ -100,7 +157,7 @@ pub fn Vertex(comptime Lanes: type) type {
             vertex.seen = .splat(false);
             const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
             if (ray.active.andNot(missed).none()) return;
-            vertex.point = visibility.interactionOf(Lanes, frame, ray);
+            vertex.point = visibility.interactionOf(Lanes, frame, path, group);
             const point = &vertex.point;
             point.opacity = Lanes.F32.select(point.culled, .zero(), point.opacity);
             vertex.bsdf = .of(point);

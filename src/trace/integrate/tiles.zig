@@ -20,6 +20,7 @@ const world_file = @import("../../world.zig");
 const statistics = @import("../../statistics.zig");
 const parallel = @import("../../parallel.zig");
 const film_file = @import("../../film.zig");
+const sampler = @import("sampler.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Film = film_file.Film;
@@ -31,6 +32,8 @@ pub const Settings = struct {
     pool: *parallel.Pool,
     /// Samples a pixel, at least 1.
     sample_count: u32 = choices.sample_count.default,
+    /// Where these are in each pixel: `render` fills it in.
+    offsets: []const sampler.Offset = &.{},
     /// Bounces after the primary ray, at most `settings.depth.max`.
     depth_max: u32 = choices.depth.default,
     /// Side of a tile in pixels, at least 1.
@@ -132,8 +135,14 @@ pub fn render(
     gpa: Allocator,
     frame: *const Frame,
     film: *Film,
-    settings: *const Settings,
+    chosen: *const Settings,
 ) Error!Statistics {
+    const offsets = try gpa.alloc(sampler.Offset, chosen.sample_count);
+    defer gpa.free(offsets);
+    sampler.place(offsets);
+    var with_offsets = chosen.*;
+    with_offsets.offsets = offsets;
+    const settings = &with_offsets;
     var tiles: Tiles = .init(film.image.width, film.image.height, settings);
     tiles.states = try gpa.alloc(Tiles.State, tiles.count);
     defer gpa.free(tiles.states);

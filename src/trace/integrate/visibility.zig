@@ -15,6 +15,7 @@ const multi_hit = @import("../traverse/multi_hit.zig");
 const triangle = @import("../traverse/triangle.zig");
 const interaction_file = @import("../shade/interaction.zig");
 const material_file = @import("../shade/material.zig");
+const texturing = @import("../shade/texturing.zig");
 const Grid = @import("../traverse/beam/grid.zig").Grid;
 const Frame = world_file.Frame;
 const Light = world_file.Light;
@@ -40,6 +41,7 @@ pub fn Visibility(comptime Kernel: type) type {
     const group_count = Kernel.group_count;
     const Bundle = bundle_file.Bundle(Kernel);
     const Coherence = dispatch.Coherence;
+    const Interaction = interaction_file.Interaction(Rays);
 
     return struct {
         frame: *const Frame,
@@ -63,18 +65,20 @@ pub fn Visibility(comptime Kernel: type) type {
             return dispatch.closestHit(Kernel, geometry, bundle, grid, &visibility.tests);
         }
 
-        /// Transmittance of shadow rays (`shadowRay`) of this light, in the lanes of active rays;
-        /// which rays are active is undefined afterwards. Coherent ones end near to each other.
+        /// Transmittance of shadow rays (`shadowRay`) of this light to vertices, in the lanes of
+        /// active rays; which rays are active is undefined afterwards. Coherent ones end near to
+        /// each other.
         pub fn transmittance(
             visibility: *Self,
             bundle: *Bundle,
             light: *const Light,
+            vertices: anytype,
             coherence: Coherence,
             transmittances: *[group_count]Vec3,
         ) void {
             const materials = visibility.frame.materials;
             if (materials.has_transparency or materials.has_holes)
-                visibility.attenuated(bundle, light, coherence, transmittances)
+                visibility.attenuated(bundle, light, vertices, coherence, transmittances)
             else
                 visibility.occluded(bundle, light, coherence, transmittances);
         }
@@ -101,6 +105,7 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *Self,
             bundle: *Bundle,
             light: *const Light,
+            vertices: anytype,
             coherence: Coherence,
             transmittances: *[group_count]Vec3,
         ) void {
@@ -115,7 +120,15 @@ pub fn Visibility(comptime Kernel: type) type {
                 var any_left = false;
                 for (&bundle.groups, transmittances, 0..) |*ray, *value, group| {
                     if (ray.active.none()) continue;
-                    visibility.attenuate(ray, group, value, &weakened_counts[group]);
+                    const point = &vertices[group].point;
+                    visibility.attenuate(
+                        ray,
+                        light,
+                        point,
+                        group,
+                        value,
+                        &weakened_counts[group],
+                    );
                     any_left = any_left or ray.active.any();
                 }
                 if (!any_left) return;
@@ -154,6 +167,8 @@ pub fn Visibility(comptime Kernel: type) type {
         fn attenuate(
             visibility: *const Self,
             ray: *ray_file.Ray(Rays),
+            light: *const Light,
+            point: *const Interaction,
             group: usize,
             value: *Vec3,
             weakened_count: *F32,
@@ -168,7 +183,7 @@ pub fn Visibility(comptime Kernel: type) type {
                 ray.active = ray.active.andNot(next.primitive.eq(.splat(ray_file.no_primitive)));
                 if (ray.active.none()) return;
                 ray.tnear = next;
-                const through = visibility.attenuationAt(ray, next.primitive);
+                const through = visibility.attenuationAt(ray, light, point, next);
                 value.* = .select(ray.active, value.mul(through.share), value.*);
                 weakened_count.* =
                     weakened_count.add(F32.select(through.weakens, one, .zero()));
@@ -184,43 +199,75 @@ pub fn Visibility(comptime Kernel: type) type {
         fn attenuationAt(
             visibility: *const Self,
             ray: *const ray_file.Ray(Rays),
-            primitive: Rays.I32,
+            light: *const Light,
+            point: *const Interaction,
+            hit: ray_file.Hit(Rays),
         ) material_file.Attenuation(Rays) {
             const Corners = interaction_file.Corners(Rays);
-            const geometry = visibility.frame.geometry;
-            const all = visibility.frame.materials.all;
-            // Without vertex colours it is the material's alone.
-            if (geometry.colors.len == 0) {
-                const numbers = Corners.materialsOf(geometry, primitive, ray.active);
+            const frame = visibility.frame;
+            const geometry = frame.geometry;
+            const all = frame.materials.all;
+            // Without vertex colours and textures it is the material's alone.
+            if (geometry.colors.len == 0 and !frame.hasTextures()) {
+                const numbers = Corners.materialsOf(geometry, hit.primitive, ray.active);
                 return .of(&.of(all, numbers, ray.active), .white);
             }
-            const corners: Corners = .of(geometry, primitive, ray.active);
+            const corners: Corners = .of(geometry, hit.primitive, ray.active);
             const weights = triangle.edgeFunctionsOf(Rays, corners.position, ray.line);
-            const color = corners.colorAt(geometry, weights.barycentrics());
-            return .of(&.of(all, corners.material, ray.active), color);
+            const barycentrics = weights.barycentrics();
+            const materials: material_file.Materials(Rays) =
+                .of(all, corners.material, ray.active);
+            const color = corners.colorAt(geometry, barycentrics);
+            if (!frame.hasTextures()) return .of(&materials, color);
+            // As wide as what the shadow falls on is seen; a cone with its apex in the light.
+            const share: F32 = if (light.kind == .directional)
+                .splat(1)
+            else if (light.from_receiver)
+                F32.splat(1).sub(hit.t)
+            else
+                hit.t;
+            return .of(&materials, texturing.colored(Rays, frame, &materials, &.{
+                .asked = ray.active,
+                .primitive = hit.primitive,
+                .barycentrics = barycentrics,
+                .axes = .ofCorners(
+                    corners.position,
+                    ray.line.direction.normalize(),
+                    point.cone_width.mul(share),
+                ),
+            }, color));
         }
     };
 }
 
-/// The points that rays see. Asserts that some active ray hit something.
+/// The points that the rays of a group of a `PathState` see. Asserts that some active ray hit
+/// something.
 pub fn interactionOf(
     comptime Lanes: type,
     frame: *const Frame,
-    ray: *const ray_file.Ray(Lanes),
+    path: anytype,
+    group: usize,
 ) interaction_file.Interaction(Lanes) {
+    const ray = &path.bundle.groups[group];
     const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
     const hit = ray.active.andNot(missed);
     std.debug.assert(hit.any());
     const corners: interaction_file.Corners(Lanes) =
         .of(frame.geometry, ray.closest.primitive, hit);
     const weights = triangle.edgeFunctionsOf(Lanes, corners.position, ray.line);
-    return interaction_file.resolve(Lanes, frame, &corners, &.{
+    const at: interaction_file.Hit(Lanes) = .{
         .mask = hit,
         .origin = ray.line.origin,
         .direction = ray.line.direction,
         .t = ray.closest.t,
         .barycentrics = weights.barycentrics(),
-    });
+    };
+    var point = interaction_file.resolve(Lanes, frame, &corners, &at);
+    if (frame.needsFootprints()) {
+        const cone = [2]Lanes.F32{ path.cone_width[group], path.cone_spread[group] };
+        texturing.apply(Lanes, frame, &corners, &at, ray.closest.primitive, cone, &point);
+    }
+    return point;
 }
 
 /// The shadow rays of points off surfaces (`Interaction.offsetOrigin`), which never hit the

@@ -13,11 +13,12 @@ const dispatch = @import("../traverse/dispatch.zig");
 const bsdf_file = @import("../shade/bsdf.zig");
 const camera = @import("camera.zig");
 const direct = @import("direct.zig");
+const environment_light = @import("environment.zig");
 const path_file = @import("path.zig");
-const sampler = @import("sampler.zig");
 const tiles = @import("tiles.zig");
 const visibility_file = @import("visibility.zig");
 const Film = @import("../../film.zig").Film;
+const EnvironmentLights = @import("environment_lights.zig").EnvironmentLights;
 const Grid = @import("../traverse/beam/grid.zig").Grid;
 const Rectangle = @import("../../film.zig").Rectangle;
 const assert = std.debug.assert;
@@ -53,13 +54,21 @@ pub fn Whitted(comptime Kernel: type) type {
         transparent: bool,
         rays: statistics.RayCounts,
         visibility: visibility_file.Visibility(Kernel),
+        environment_lights: EnvironmentLights,
         /// Radiance of the sample under way.
         radiance: [group_count]Vec3,
         /// Share of the sample's primary ray that left the scene.
         escaped: [group_count]F32,
+        /// Colours of the display are kept apart from radiance.
+        keeps_display: bool,
+        /// What the sample's primary ray sees of such colours, and its share of them.
+        displayed: [group_count]Vec3,
+        display_share: [group_count]F32,
         /// Directions of the primary rays of the sample under way, where they share an origin.
         grid: ?Grid,
         stack: path_file.PathStack(Kernel),
+        /// Number of the sample under way.
+        sample: u32,
         /// Of the step under way.
         path: PathState,
         vertices: Vertices,
@@ -76,6 +85,7 @@ pub fn Whitted(comptime Kernel: type) type {
             whitted.settings = settings;
             whitted.rays = .{};
             whitted.visibility.init(frame);
+            whitted.environment_lights = .init(frame.environment, settings.sample_count);
             whitted.stack.count = 0;
             return whitted;
         }
@@ -99,9 +109,12 @@ pub fn Whitted(comptime Kernel: type) type {
             film: *Film,
         ) void {
             whitted.transparent = film.layers.contains(.alpha);
+            whitted.keeps_display = film.layers.contains(.display);
             for (first_sample..first_sample + sample_count) |sample| {
                 whitted.radiance = @splat(.splat(.{ 0, 0, 0 }));
                 whitted.escaped = @splat(.zero());
+                whitted.displayed = @splat(.splat(.{ 0, 0, 0 }));
+                whitted.display_share = @splat(.zero());
                 whitted.pushPrimary(rectangle, @intCast(sample));
                 while (whitted.stack.pop()) |path| {
                     // A copy: what the step pushes takes its place.
@@ -109,19 +122,26 @@ pub fn Whitted(comptime Kernel: type) type {
                     whitted.step();
                 }
                 const number: u32 = @intCast(sample);
-                const radiance = &whitted.radiance;
-                camera.expose(Kernel, film, rectangle, number, radiance, &whitted.escaped);
+                const place: camera.Place = .{ .rectangle = rectangle, .sample = number };
+                camera.expose(Kernel, film, .color, place, &whitted.radiance, &whitted.escaped);
+                if (!whitted.keeps_display) continue;
+                const share = &whitted.display_share;
+                camera.expose(Kernel, film, .display, place, &whitted.displayed, share);
             }
         }
 
         fn pushPrimary(whitted: *Self, rectangle: Rectangle, sample: u32) void {
+            whitted.sample = sample;
             const view = whitted.frame.view;
-            const offset = sampler.pixelOffset(sample, whitted.settings.sample_count);
+            const offset = whitted.settings.offsets[sample];
             whitted.grid = camera.grid(view, rectangle, offset);
             const path = whitted.stack.push(0, 0);
             camera.primaryRays(Kernel, view, rectangle, offset, &path.bundle);
             path.throughput = @splat(.splat(.{ 1, 1, 1 }));
             path.sigma_a = @splat(.splat(.{ 0, 0, 0 }));
+            path.roughness = @splat(.zero());
+            if (whitted.frame.needsFootprints())
+                path.startCones(camera.footprint(view, whitted.settings.sample_count));
             for (&path.bundle.groups) |*ray| whitted.rays.primary += ray.active.popCount();
         }
 
@@ -138,6 +158,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 whitted.find(group, vertex);
                 any_seen = any_seen or vertex.seen.any();
             }
+            if (any_seen and whitted.frame.environment.map != null)
+                whitted.addEnvironment(coherence);
             if (any_seen) for (whitted.frame.lights) |*light| {
                 whitted.rays.shadow += direct.addLight(
                     Kernel,
@@ -165,12 +187,36 @@ pub fn Whitted(comptime Kernel: type) type {
             if (gone.none()) return;
             const throughput: Vec3 = .select(gone, path.throughput[group], .splat(.{ 0, 0, 0 }));
             const environment = whitted.frame.environment;
-            var seen: [3]f32 = @splat(environment.ambient);
-            if (path.depth == 0) {
-                whitted.escaped[group] = whitted.escaped[group].add(throughput.x);
-                seen = if (whitted.transparent) .{ 0, 0, 0 } else environment.background;
+            if (path.depth > 0 or environment.is_seen) {
+                const seen = environment_light.seenBy(Kernel, environment, path, group, gone);
+                return whitted.add(group, throughput.mul(seen));
             }
+            whitted.escaped[group] = whitted.escaped[group].add(throughput.x);
+            const background = environment.background;
+            const seen: [3]f32 = if (whitted.transparent) .{ 0, 0, 0 } else background;
             whitted.add(group, throughput.mul(.splat(seen)));
+        }
+
+        /// Adds what points that rays see scatter of the environment's light.
+        fn addEnvironment(whitted: *Self, coherence: dispatch.Coherence) void {
+            var vertices: environment_light.Vertices(Kernel) = .{
+                .path = &whitted.path,
+                .all = &whitted.vertices,
+                .traced = @splat(.splat(false)),
+                .is_end = whitted.path.depth == whitted.settings.depth_max,
+            };
+            for (&vertices.traced, &whitted.vertices) |*traced, *vertex| {
+                if (vertex.seen.any()) traced.* = whitted.reflects(vertex);
+            }
+            whitted.rays.shadow += environment_light.addLight(
+                Kernel,
+                &whitted.visibility,
+                &whitted.environment_lights,
+                whitted.sample,
+                &vertices,
+                coherence,
+                &whitted.radiance,
+            );
         }
 
         inline fn add(whitted: *Self, group: usize, radiance: Vec3) void {
@@ -183,19 +229,36 @@ pub fn Whitted(comptime Kernel: type) type {
             vertex.find(whitted.frame, &whitted.path, group);
             if (vertex.seen.none()) return;
             const material = &vertex.point.material;
-            const glow = material.emissive.add(whitted.scatterAmbient(vertex));
+            const glow = if (whitted.frame.environment.map == null)
+                material.emissive.add(whitted.scatterAmbient(vertex))
+            else
+                material.emissive;
             const shown: Vec3 = .select(material.unlit, material.base_color, glow);
-            whitted.add(group, vertex.throughput.mul(shown));
+            const arriving = vertex.throughput.mul(shown);
+            if (!whitted.keeps_display or whitted.path.depth > 0)
+                return whitted.add(group, arriving);
+            const none: Vec3 = .splat(.{ 0, 0, 0 });
+            whitted.add(group, .select(material.unlit, none, arriving));
+            whitted.addDisplayed(group, .select(material.unlit, arriving, none), .select(
+                material.unlit,
+                vertex.throughput.x,
+                .zero(),
+            ));
+        }
+
+        fn addDisplayed(whitted: *Self, group: usize, color: Vec3, share: F32) void {
+            whitted.displayed[group] = whitted.displayed[group].add(color);
+            whitted.display_share[group] = whitted.display_share[group].add(share);
         }
 
         /// Ambient light that a point scatters: diffusely, and instead of rays that are not traced.
         fn scatterAmbient(whitted: *const Self, vertex: *const Vertex) Vec3 {
             const bsdf = &vertex.bsdf;
             const none: Vec3 = .splat(.{ 0, 0, 0 });
-            const white: Vec3 = .splat(.{ 1, 1, 1 });
-            const diffuse = bsdf.diffuse.mul(white.sub(bsdf.mirror.reflected));
+            const diffuse = bsdf.diffuse_albedo.scale(vertex.point.material.occlusion);
             const traced = whitted.reflects(vertex);
-            var scattered = diffuse.add(.select(traced, none, bsdf.mirror.reflected));
+            const specular: Vec3 = .select(traced, none, bsdf.specular_albedo);
+            var scattered = diffuse.add(specular);
             const ends = whitted.path.depth == whitted.settings.depth_max;
             if (ends) scattered = scattered.add(bsdf.mirror.transmitted);
             return scattered.scale(.splat(whitted.frame.environment.ambient));
@@ -231,6 +294,8 @@ pub fn Whitted(comptime Kernel: type) type {
             const rest = whitted.stack.push(path.depth, path.transparency_depth + 1);
             rest.bundle = path.bundle;
             rest.sigma_a = path.sigma_a;
+            rest.keepCones(path);
+            rest.roughness = path.roughness;
             for (&rest.bundle.groups, masks, &whitted.vertices, 0..) |*ray, mask, *vertex, group| {
                 ray.active = mask;
                 if (mask.none()) continue;
@@ -255,6 +320,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 whitted.leave(next, group, vertex.point.normal_geometric, direction);
                 next.throughput[group] = vertex.throughput.mul(vertex.bsdf.mirror.reflected);
                 next.sigma_a[group] = whitted.path.sigma_a[group];
+                if (whitted.frame.needsFootprints())
+                    next.reflectCones(&whitted.path, group, &vertex.point);
             }
         }
 
@@ -279,6 +346,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 const beyond: Vec3 = .select(vertex.point.back, outside, material.sigma_a);
                 const before = whitted.path.sigma_a[group];
                 next.sigma_a[group] = .select(material.volume, beyond, before);
+                if (whitted.frame.needsFootprints())
+                    next.refractCones(&whitted.path, group, &vertex.point);
             }
         }
 
@@ -304,6 +373,7 @@ pub fn Whitted(comptime Kernel: type) type {
             const point = &whitted.vertices[group].point;
             const origin = point.offsetOrigin(away, .zero());
             const from = whitted.path.bundle.groups[group].closest.primitive;
+            next.roughness[group] = whitted.path.roughness[group].max(point.material.roughness);
             const ray = &next.bundle.groups[group];
             ray.* = .endless(.init(origin, direction), from, ray.active);
         }

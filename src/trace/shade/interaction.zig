@@ -51,6 +51,10 @@ pub fn Interaction(comptime Lanes: type) type {
         error_ulps: Lanes.F32,
         /// And how far at most.
         offset_max: Lanes.F32,
+        /// Width of the ray's cone in metres, negative behind a focus, and how much the surface
+        /// bulges towards the ray, see `ray_cone.zig`; undefined in frames without footprints.
+        cone_width: Lanes.F32,
+        curvature: Lanes.F32,
         material: material_file.Material(Lanes),
 
         /// The position off the surface by what rounding may do, on the side that `away`, the
@@ -190,6 +194,8 @@ pub inline fn resolve(
         .error_ulps = offset.errorUlps(Lanes, corners, position, face, plane, distance),
         .offset_max = padsOf(Lanes, &frame.geometry.padding, corners, hit.origin)
             .mul(.splat(offset.pads_max)),
+        .cone_width = undefined,
+        .curvature = undefined,
         .material = material,
     };
 }
@@ -207,13 +213,18 @@ inline fn padsOf(
     return pad.add(padding.shiftOf(Lanes, origin));
 }
 
-inline fn mix(comptime Lanes: type, barycentrics: [3]Lanes.F32, corners: [3]Lanes.Vec3) Lanes.Vec3 {
+/// What corners have, between them.
+pub inline fn mix(
+    comptime Lanes: type,
+    barycentrics: [3]Lanes.F32,
+    corners: [3]Lanes.Vec3,
+) Lanes.Vec3 {
     const first_two = corners[0].scale(barycentrics[0]).add(corners[1].scale(barycentrics[1]));
     return first_two.add(corners[2].scale(barycentrics[2]));
 }
 
 /// Unit length for vectors whose squares may leave the range of floats.
-inline fn unit(comptime Lanes: type, vector: Lanes.Vec3) Lanes.Vec3 {
+pub inline fn unit(comptime Lanes: type, vector: Lanes.Vec3) Lanes.Vec3 {
     const size = vector.abs();
     const largest = size.x.max(size.y).max(size.z);
     return vector.scale(Lanes.F32.splat(1).div(largest)).normalize();
@@ -226,10 +237,18 @@ fn shadingNormal(
     smooth: Lanes.Vec3,
     normal_geometric: Lanes.Vec3,
 ) Lanes.Vec3 {
-    const size = smooth.abs();
-    const usable = size.x.max(size.y).max(size.z).gt(.splat(1e-15));
-    const safe: Lanes.Vec3 = .select(usable, smooth, normal_geometric);
-    const normal = unit(Lanes, safe);
+    const normal = unit(Lanes, usableNormal(Lanes, smooth, normal_geometric));
     const opposite = normal.dot(normal_geometric).lt(.zero());
     return .select(opposite, normal.neg(), normal);
+}
+
+/// Interpolated normals, or others where vertices have none (zero).
+pub inline fn usableNormal(
+    comptime Lanes: type,
+    smooth: Lanes.Vec3,
+    other: Lanes.Vec3,
+) Lanes.Vec3 {
+    const size = smooth.abs();
+    const usable = size.x.max(size.y).max(size.z).gt(.splat(1e-15));
+    return .select(usable, smooth, other);
 }

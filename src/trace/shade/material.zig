@@ -17,6 +17,8 @@ pub fn Material(comptime Lanes: type) type {
         ior: Lanes.F32,
         transmission: Lanes.F32,
         sigma_a: Lanes.Vec3,
+        /// Share of the light from all sides that arrives.
+        occlusion: Lanes.F32,
         unlit: Lanes.Mask,
         volume: Lanes.Mask,
     };
@@ -106,6 +108,7 @@ pub inline fn load(
         .ior = materials.float("ior"),
         .transmission = materials.float("transmission"),
         .sigma_a = materials.color("sigma_a"),
+        .occlusion = .splat(1),
         .unlit = materials.float("unlit").gt(zero),
         .volume = materials.float("volume").gt(zero),
     };

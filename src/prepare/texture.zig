@@ -1,0 +1,1102 @@
+//! Textures: the images that drawn materials use become pyramids, by all threads.
+//!
+//! In: encoded images, textures and materials of a scene. Out: pyramids of 8-bit texels, and for
+//! each material how it looks them up. An image is decoded once, keeps the channels that some
+//! material uses, and is freed at once; one that is used both as light, by the sRGB curve, and as
+//! numbers becomes two textures. Large images go first, and only as many at once as the memory for
+//! it allows. What comes out depends neither on the order nor on the threads. An image that is
+//! broken costs a warning, and whoever uses it does without.
+
+const std = @import("std");
+const decode = @import("../decode.zig");
+const huge_pages = @import("../huge_pages.zig");
+const math = @import("../math.zig");
+const parallel = @import("../parallel.zig");
+const pyramid_file = @import("pyramid.zig");
+const scene = @import("../scene.zig");
+const world = @import("../world.zig");
+const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const printable = @import("../diagnostic.zig").printable;
+const assert = std.debug.assert;
+const Allocator = std.mem.Allocator;
+const Pyramid = pyramid_file.Pyramid;
+const Texels = decode.Texels;
+
+/// How textures are made, and by whom.
+pub const Settings = struct {
+    pool: *parallel.Pool,
+    /// Larger images are halved until they fit, at least 1.
+    side_max: u32 = pyramid_file.side_max,
+};
+
+/// `SceneTooLarge`: the diagnostic says more.
+pub const Error = error{ OutOfMemory, SceneTooLarge } || parallel.Error;
+
+/// Bytes of all textures of a scene, at most.
+const texture_bytes_max: u64 = 4 << 30;
+
+/// Bytes of images that are decoded at the same time, what the libraries need included; one image
+/// may be larger. Where all textures take more than twice as much, it is half of that.
+const decode_bytes_max: u64 = 64 << 20;
+
+/// Channel of a lookup that there is not: it counts as 1.
+const missing: u8 = 255;
+
+/// The least and the largest that alpha is on a surface.
+pub const AlphaRange = struct {
+    least: f32 = 1,
+    largest: f32 = 1,
+};
+
+/// How one material looks textures up.
+pub const MaterialUse = struct {
+    /// `TextureSet.lookups[first_lookup..][0..lookup_count]`.
+    first_lookup: u32 = 0,
+    lookup_count: u32 = 0,
+    /// Of factor, texture and vertices together, wherever the material is drawn.
+    alpha: AlphaRange = .{},
+};
+
+/// All textures of a scene, and who uses them.
+pub const TextureSet = struct {
+    arena: std.heap.ArenaAllocator,
+    pyramids: []const Pyramid,
+    textures: world.Textures,
+    /// Of all materials, one after the other.
+    lookups: []const world.Lookup,
+    /// By material of the scene.
+    materials: []const MaterialUse,
+    byte_count: u64,
+
+    /// Those of one material of the scene.
+    pub fn lookupsOf(set: *const TextureSet, material: u32) []const world.Lookup {
+        const use = &set.materials[material];
+        return set.lookups[use.first_lookup..][0..use.lookup_count];
+    }
+
+    /// Frees everything.
+    pub fn deinit(set: *TextureSet) void {
+        for (set.pyramids) |*pyramid| pyramid.deinit(set.arena.child_allocator);
+        set.arena.deinit();
+        set.* = undefined;
+    }
+};
+
+/// An image, and what is wanted of it.
+const Request = struct {
+    image: u32,
+    is_srgb: bool,
+    /// Red, green, blue, alpha.
+    wanted: [4]bool = @splat(false),
+    /// Alpha below it is a hole, for some material: the first that says so.
+    cutoff: ?f32 = null,
+    /// What came of it; null: nothing.
+    pyramid: ?Pyramid = null,
+    /// Where each channel is stored, or `missing`.
+    stored: [4]u8 = @splat(missing),
+    channel_count: u8 = 0,
+    alpha: AlphaRange = .{},
+    /// Index of the texture.
+    texture: u32 = 0,
+};
+
+/// One image to decode.
+const Task = struct {
+    image: u32,
+    info: decode.Info,
+    /// At most two requests: as light, as numbers. Indices, or `scene.none`.
+    requests: [2]u32,
+
+    /// Bytes while it is decoded: texels, and as much for the library.
+    fn bytes(task: *const Task) u64 {
+        const info = &task.info;
+        const channel_bytes: u64 = if (info.is_float) 4 else 1;
+        return 2 * channel_bytes * info.channel_count * info.width * info.height;
+    }
+
+    fn isLarger(_: void, a: Task, b: Task) bool {
+        return if (a.bytes() == b.bytes()) a.image < b.image else a.bytes() > b.bytes();
+    }
+};
+
+/// Decodes what the scene's drawn materials use; all memory is the result's and comes from `gpa`,
+/// which threads share.
+pub fn load(
+    gpa: Allocator,
+    from: *const scene.Scene,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error!TextureSet {
+    assert(settings.side_max >= 1);
+    var work: Work = .{ .gpa = gpa, .from = from, .side_max = settings.side_max };
+    defer work.deinit();
+    errdefer work.dropPyramids();
+    try work.collect();
+    const byte_count = try work.plan(diagnostic);
+    const at_once = @max(decode_bytes_max, byte_count / 2);
+    var rest: []const Task = work.tasks.items;
+    while (rest.len > 0) {
+        const count = batchCount(rest, at_once);
+        if (!try work.runBatch(settings.pool, rest[0..count])) {
+            // There may be memory for one at a time.
+            for (0..count) |index| {
+                if (!try work.runBatch(settings.pool, rest[index..][0..1]))
+                    return error.OutOfMemory;
+            }
+        }
+        rest = rest[count..];
+    }
+    work.warn(diagnostic);
+    return work.finish();
+}
+
+/// How many of the tasks, in this order, are decoded at once: they need no more than `bytes_max`,
+/// or it is one.
+fn batchCount(tasks: []const Task, bytes_max: u64) usize {
+    var total: u64 = 0;
+    for (tasks, 0..) |*task, index| {
+        total += task.bytes();
+        if (total > bytes_max and index > 0) return index;
+    }
+    return tasks.len;
+}
+
+/// Shared by the threads.
+const Work = struct {
+    gpa: Allocator,
+    from: *const scene.Scene,
+    side_max: u32,
+    is_drawn: []bool = &.{},
+    vertex_alpha: []AlphaRange = &.{},
+    requests: std.ArrayList(Request) = .empty,
+    /// By image and use (light, numbers): index of the request or `scene.none`.
+    request_of: [][2]u32 = &.{},
+    tasks: std.ArrayList(Task) = .empty,
+    /// By image: why there is none.
+    reasons: []?decode.Reason = &.{},
+    batch: []const Task = &.{},
+    exhausted: std.atomic.Value(bool) = .init(false),
+
+    fn deinit(work: *Work) void {
+        work.gpa.free(work.is_drawn);
+        work.gpa.free(work.vertex_alpha);
+        work.requests.deinit(work.gpa);
+        work.gpa.free(work.request_of);
+        work.tasks.deinit(work.gpa);
+        work.gpa.free(work.reasons);
+    }
+
+    fn dropPyramids(work: *Work) void {
+        for (work.requests.items) |*request| {
+            if (request.pyramid) |*pyramid| pyramid.deinit(work.gpa);
+        }
+    }
+
+    /// Which materials are drawn, what of which images they want.
+    fn collect(work: *Work) error{OutOfMemory}!void {
+        const from = work.from;
+        work.is_drawn = try work.gpa.alloc(bool, from.materials.len);
+        @memset(work.is_drawn, false);
+        work.vertex_alpha = try work.gpa.alloc(AlphaRange, from.materials.len);
+        try work.lookAtMeshes();
+        work.request_of = try work.gpa.alloc([2]u32, from.images.len);
+        @memset(work.request_of, @splat(scene.none));
+        work.reasons = try work.gpa.alloc(?decode.Reason, from.images.len);
+        @memset(work.reasons, null);
+        for (from.materials, work.is_drawn) |*material, is_drawn| {
+            if (!is_drawn) continue;
+            for (std.enums.values(world.Slot)) |slot| try work.want(material, slot);
+        }
+    }
+
+    /// Vertices may be shared by many instances, and are looked at once.
+    fn lookAtMeshes(work: *Work) error{OutOfMemory}!void {
+        const from = work.from;
+        const is_mesh_drawn = try work.gpa.alloc(bool, from.meshes.len);
+        defer work.gpa.free(is_mesh_drawn);
+        @memset(is_mesh_drawn, false);
+        for (from.instances) |instance| is_mesh_drawn[instance.mesh] = true;
+        for (from.meshes, is_mesh_drawn) |*mesh, is_drawn| {
+            if (!is_drawn or mesh.triangles.len == 0) continue;
+            var range: AlphaRange = .{};
+            const matters = from.materials[mesh.material].alpha_mode != .@"opaque";
+            if (matters) if (mesh.colors) |colors| {
+                range = .{ .least = std.math.inf(f32), .largest = 0 };
+                for (colors) |color| range = join(range, exactly(color[3]));
+            };
+            const all = &work.vertex_alpha[mesh.material];
+            all.* = if (work.is_drawn[mesh.material]) join(all.*, range) else range;
+            work.is_drawn[mesh.material] = true;
+        }
+    }
+
+    fn want(
+        work: *Work,
+        material: *const scene.Material,
+        slot: world.Slot,
+    ) error{OutOfMemory}!void {
+        const view = viewOf(material, slot) orelse return;
+        const image = work.from.textures[view.texture].image;
+        const is_srgb = isLight(slot);
+        const index = &work.request_of[image][@intFromBool(!is_srgb)];
+        if (index.* == scene.none) {
+            index.* = @intCast(work.requests.items.len);
+            try work.requests.append(work.gpa, .{ .image = image, .is_srgb = is_srgb });
+        }
+        const request = &work.requests.items[index.*];
+        for (channelsOf(material, slot)) |channel| {
+            if (channel != missing) request.wanted[channel] = true;
+        }
+        if (slot == .base_color and material.alpha_mode == .mask and request.cutoff == null) {
+            request.cutoff = material.alpha_cutoff / material.base_color[3];
+        }
+    }
+
+    /// Reads the headers: what is broken is left out, what is too large refused. Returns the bytes
+    /// that all textures take at most.
+    fn plan(work: *Work, diagnostic: *Diagnostic) Error!u64 {
+        var total: u64 = 0;
+        for (work.request_of, 0..) |requests, image| {
+            if (requests[0] == scene.none and requests[1] == scene.none) continue;
+            var reason: decode.Reason = .{};
+            const info = decode.info(work.from.images[image].bytes, &reason) catch {
+                work.reasons[image] = reason;
+                continue;
+            };
+            const size = pyramid_file.sizeWithin(info.width, info.height, work.side_max);
+            for (requests) |index| {
+                if (index == scene.none) continue;
+                const wanted = work.requests.items[index].wanted;
+                const count = storedChannels(info.channel_count, wanted, true).count;
+                total += pyramid_file.byteCount(size[0], size[1], count);
+            }
+            try work.tasks.append(work.gpa, .{
+                .image = @intCast(image),
+                .info = info,
+                .requests = requests,
+            });
+        }
+        if (total > @min(texture_bytes_max, std.math.maxInt(usize))) return diagnostic.fail(
+            error.SceneTooLarge,
+            "its textures take {d} MiB, more than {d}; --max-texture-size makes them smaller",
+            .{ total >> 20, texture_bytes_max >> 20 },
+        );
+        std.mem.sortUnstable(Task, work.tasks.items, {}, Task.isLarger);
+        return total;
+    }
+
+    /// Whether there was memory for all of the tasks; what is done already is not done again.
+    fn runBatch(
+        work: *Work,
+        pool: *parallel.Pool,
+        batch: []const Task,
+    ) parallel.Error!bool {
+        work.batch = batch;
+        work.exhausted.store(false, .monotonic);
+        try pool.forEach(batch.len, work, run);
+        return !work.exhausted.load(.monotonic);
+    }
+
+    fn run(work: *Work, index: usize, _: usize) void {
+        const task = &work.batch[index];
+        if (work.exhausted.load(.monotonic)) return;
+        var reason: decode.Reason = .{};
+        work.make(task, &reason) catch |err| switch (err) {
+            error.InvalidImage => work.reasons[task.image] = reason,
+            error.OutOfMemory => work.exhausted.store(true, .monotonic),
+        };
+    }
+
+    fn make(work: *Work, task: *const Task, reason: *decode.Reason) decode.Error!void {
+        if (work.isDone(task)) return;
+        var texels: ?Texels =
+            try decode.decode(work.gpa, work.from.images[task.image].bytes, reason);
+        defer if (texels) |*left| left.deinit(work.gpa);
+        const both = task.requests[0] != scene.none and task.requests[1] != scene.none;
+        for (task.requests, 0..) |index, use| {
+            if (index == scene.none) continue;
+            const request = &work.requests.items[index];
+            if (request.pyramid != null) continue;
+            // The last to come may take the texels over.
+            const image = try store(work.gpa, &texels, request, !both or use == 1);
+            request.pyramid = try pyramid_file.build(
+                work.gpa,
+                image,
+                work.side_max,
+                cutoffCode(request.cutoff),
+            );
+        }
+    }
+
+    fn isDone(work: *const Work, task: *const Task) bool {
+        for (task.requests) |index| {
+            if (index != scene.none and work.requests.items[index].pyramid == null) return false;
+        }
+        return true;
+    }
+
+    /// In the order of the images.
+    fn warn(work: *const Work, diagnostic: *Diagnostic) void {
+        for (work.reasons, work.from.images) |*failure, *image| {
+            if (failure.*) |*reason| diagnostic.warn("{f}: {s}, left out", .{
+                printable(image.name), reason.text(),
+            });
+        }
+    }
+
+    fn finish(work: *Work) error{OutOfMemory}!TextureSet {
+        var arena_state: std.heap.ArenaAllocator = .init(work.gpa);
+        errdefer arena_state.deinit();
+        const arena = arena_state.allocator();
+        var pyramids: std.ArrayList(Pyramid) = try .initCapacity(arena, work.requests.items.len);
+        for (work.requests.items) |*request| {
+            if (request.pyramid == null) continue;
+            request.texture = @intCast(pyramids.items.len);
+            pyramids.appendAssumeCapacity(request.pyramid.?);
+        }
+        const textures = try arena.alloc(world.Texture, pyramids.items.len);
+        var byte_count: u64 = 0;
+        for (work.requests.items) |*request| if (request.pyramid != null) {
+            const levels = pyramids.items[request.texture].levels();
+            for (levels) |level| byte_count += level.texels.len;
+            textures[request.texture] = .{
+                .levels = levels,
+                .channel_count = request.channel_count,
+                .is_srgb = request.is_srgb,
+            };
+        };
+        var lookups: std.ArrayList(world.Lookup) = .empty;
+        const materials = try arena.alloc(MaterialUse, work.from.materials.len);
+        for (materials, 0..) |*use, index| use.* = try work.useOf(arena, index, &lookups);
+        return .{
+            .arena = arena_state,
+            .pyramids = pyramids.items,
+            .textures = .{ .all = textures },
+            .lookups = lookups.items,
+            .materials = materials,
+            .byte_count = byte_count,
+        };
+    }
+
+    fn useOf(
+        work: *const Work,
+        arena: Allocator,
+        index: usize,
+        lookups: *std.ArrayList(world.Lookup),
+    ) error{OutOfMemory}!MaterialUse {
+        const first = lookups.items.len;
+        const material = &work.from.materials[index];
+        if (!work.is_drawn[index]) return .{};
+        var alpha = product(work.vertex_alpha[index], material.base_color[3]);
+        for (std.enums.values(world.Slot)) |slot| {
+            const view = viewOf(material, slot) orelse continue;
+            const texture = &work.from.textures[view.texture];
+            const request_index = work.request_of[texture.image][@intFromBool(!isLight(slot))];
+            const request = &work.requests.items[request_index];
+            if (request.pyramid == null) continue;
+            const lookup = lookupOf(material, slot, texture, request);
+            if (slot == .base_color and lookup.channels[3] != missing) alpha = .{
+                .least = alpha.least * request.alpha.least,
+                .largest = alpha.largest * request.alpha.largest,
+            };
+            try lookups.append(arena, lookup);
+        }
+        return .{
+            .first_lookup = @intCast(first),
+            .lookup_count = @intCast(lookups.items.len - first),
+            .alpha = alpha,
+        };
+    }
+};
+
+fn exactly(alpha: f32) AlphaRange {
+    return .{ .least = alpha, .largest = alpha };
+}
+
+fn join(a: AlphaRange, b: AlphaRange) AlphaRange {
+    return .{
+        .least = if (a.least < b.least) a.least else b.least,
+        .largest = if (a.largest > b.largest) a.largest else b.largest,
+    };
+}
+
+fn product(range: AlphaRange, factor: f32) AlphaRange {
+    return .{ .least = range.least * factor, .largest = range.largest * factor };
+}
+
+/// The texture of a slot, null where there is none or it has no say.
+fn viewOf(material: *const scene.Material, slot: world.Slot) ?scene.TextureView {
+    if (material.unlit and slot != .base_color) return null;
+    return switch (slot) {
+        .base_color => material.base_color_texture,
+        .metallic_roughness => material.metallic_roughness_texture,
+        .normal => if (material.normal_scale == 0) null else material.normal_texture,
+        .occlusion => if (material.occlusion_strength == 0) null else material.occlusion_texture,
+        .emissive => if (std.mem.eql(f32, &material.emissive, &.{ 0, 0, 0 }))
+            null
+        else
+            material.emissive_texture,
+    };
+}
+
+/// Whether a slot's colours are light, by the sRGB curve.
+fn isLight(slot: world.Slot) bool {
+    return slot == .base_color or slot == .emissive;
+}
+
+/// Which channels of an image are the first, second, ... of a slot (glTF 2.0, section 3.9).
+fn channelsOf(material: *const scene.Material, slot: world.Slot) [4]u8 {
+    const has_alpha = material.alpha_mode != .@"opaque";
+    return switch (slot) {
+        .base_color => .{ 0, 1, 2, if (has_alpha) 3 else missing },
+        .metallic_roughness => .{ 1, 2, missing, missing },
+        .normal, .emissive => .{ 0, 1, 2, missing },
+        .occlusion => .{ 0, missing, missing, missing },
+    };
+}
+
+fn lookupOf(
+    material: *const scene.Material,
+    slot: world.Slot,
+    texture: *const scene.Texture,
+    request: *const Request,
+) world.Lookup {
+    const view = viewOf(material, slot).?;
+    var channels = channelsOf(material, slot);
+    for (&channels) |*channel| {
+        if (channel.* != missing) channel.* = request.stored[channel.*];
+    }
+    return .{
+        .slot = slot,
+        .texture = request.texture,
+        .wrap = .{ wrapOf(texture.wrap[0]), wrapOf(texture.wrap[1]) },
+        .magnify_linear = texture.magnify == .linear,
+        .minify_linear = texture.minify == .linear,
+        .has_mips = texture.mip != .none,
+        .mip_linear = texture.mip == .linear,
+        .texcoord_set = @intCast(view.texcoord_set),
+        .transform = view.transform,
+        .channels = channels,
+    };
+}
+
+fn wrapOf(wrap: scene.Wrap) world.Wrap {
+    return switch (wrap) {
+        .repeat => .repeat,
+        .mirrored_repeat => .mirrored_repeat,
+        .clamp_to_edge => .clamp_to_edge,
+    };
+}
+
+/// The least code of alpha that is no hole; null where there are none, or nothing else.
+fn cutoffCode(cutoff: ?f32) ?u8 {
+    const least = (cutoff orelse return null) * 255;
+    if (!(least > 0 and least <= 255)) return null;
+    return @intFromFloat(@ceil(least));
+}
+
+/// What is stored of an image.
+const Stored = struct {
+    count: u8 = 0,
+    /// Of the image, ascending but for gray that stands for three colours.
+    sources: [4]u8 = undefined,
+    /// Where each of red, green, blue and alpha is, or `missing`.
+    at: [4]u8 = @splat(missing),
+};
+
+/// Gray is red, green and blue in one, but beside alpha, whose place is the fourth.
+fn storedChannels(channel_count: u8, wanted: [4]bool, has_alpha: bool) Stored {
+    var stored: Stored = .{};
+    const is_gray = channel_count <= 2;
+    const keeps_alpha = wanted[3] and has_alpha and channel_count % 2 == 0;
+    for (0..3) |channel| {
+        if (!wanted[channel]) continue;
+        if (is_gray and !keeps_alpha) {
+            stored.at[channel] = 0;
+            stored.sources[0] = 0;
+            stored.count = 1;
+        } else {
+            stored.at[channel] = stored.count;
+            stored.sources[stored.count] = if (is_gray) 0 else @intCast(channel);
+            stored.count += 1;
+        }
+    }
+    if (keeps_alpha) {
+        assert(stored.count == 3); // Only base colours have alpha, and they have all.
+        stored.at[3] = 3;
+        stored.sources[3] = channel_count - 1;
+        stored.count = 4;
+    }
+    return stored;
+}
+
+/// The channels of decoded texels that are wanted, as the finest level. Takes the texels over where
+/// they are just that and the caller allows it.
+fn store(
+    gpa: Allocator,
+    texels: *?Texels,
+    request: *Request,
+    may_take: bool,
+) error{OutOfMemory}!pyramid_file.Image {
+    const from = &texels.*.?;
+    const alpha = alphaRange(from);
+    const stored = storedChannels(from.channel_count, request.wanted, alpha.least < 1);
+    request.stored = stored.at;
+    request.channel_count = stored.count;
+    if (stored.at[3] != missing) request.alpha = alpha;
+    var image: pyramid_file.Image = .{
+        .width = from.width,
+        .height = from.height,
+        .channel_count = stored.count,
+        .encoding = if (!request.is_srgb) .linear else if (stored.at[3] == missing)
+            .srgb
+        else
+            .srgb_alpha,
+        .texels = undefined,
+        .memory = undefined,
+    };
+    const bytes = @as(usize, from.width) * from.height * stored.count;
+    // Texels of 16 bits leave a block that is twice as large.
+    const is_whole = from.data == .bytes and stored.count == from.channel_count and
+        from.memory.len < bytes + bytes / 4 + 4096;
+    if (may_take and is_whole) {
+        image.texels = from.data.bytes;
+        image.memory = from.memory;
+        texels.* = null;
+        return image;
+    }
+    image.memory = try huge_pages.alloc(gpa, u8, bytes);
+    image.texels = image.memory;
+    switch (from.data) {
+        .bytes => |all| pick(u8, from.channel_count, all, &stored, image.texels),
+        .floats => |all| {
+            pickFloats(from.channel_count, all, &stored, request.is_srgb, image.texels);
+        },
+    }
+    return image;
+}
+
+/// Copies the stored channels of all texels.
+fn pick(comptime T: type, channel_count: u8, from: []const T, stored: *const Stored, to: []T) void {
+    switch (channel_count) {
+        inline 1...4 => |in| switch (stored.count) {
+            inline 1...4 => |out| {
+                const sources = stored.sources;
+                for (0..to.len / out) |texel| {
+                    inline for (0..out) |channel| {
+                        to[out * texel + channel] = from[in * texel + sources[channel]];
+                    }
+                }
+            },
+            else => unreachable,
+        },
+        else => unreachable,
+    }
+}
+
+/// The same of linear floats, as the nearest codes.
+fn pickFloats(
+    channel_count: u8,
+    from: []const f32,
+    stored: *const Stored,
+    is_srgb: bool,
+    to: []u8,
+) void {
+    for (0..to.len / stored.count) |texel| {
+        for (0..stored.count, stored.sources[0..stored.count]) |channel, source| {
+            const value = from[channel_count * texel + source];
+            const within = if (value < 1) value else 1;
+            to[stored.count * texel + channel] = if (is_srgb and channel < 3)
+                math.srgb.encode(within)
+            else
+                @intFromFloat(within * 255 + 0.5);
+        }
+    }
+}
+
+/// Of the texels' alpha; 1 without any.
+fn alphaRange(texels: *const Texels) AlphaRange {
+    if (texels.channel_count % 2 != 0) return .{};
+    var range: AlphaRange = .{ .least = 1, .largest = 0 };
+    var at: usize = texels.channel_count - 1;
+    switch (texels.data) {
+        .bytes => |all| {
+            var least: u8 = 255;
+            var largest: u8 = 0;
+            while (at < all.len) : (at += texels.channel_count) {
+                least = @min(least, all[at]);
+                largest = @max(largest, all[at]);
+            }
+            range = .{
+                .least = @as(f32, @floatFromInt(least)) / 255,
+                .largest = @as(f32, @floatFromInt(largest)) / 255,
+            };
+        },
+        .floats => |all| while (at < all.len) : (at += texels.channel_count) {
+            const value = if (all[at] < 1) all[at] else 1;
+            range = join(range, exactly(value));
+        },
+    }
+    return range;
+}
+
+const testing = std.testing;
+
+/// Images for tests.
+pub const TestImage = struct {
+    /// A PNG file of 8 bits a channel with texels stored as they are; it comes from `arena`.
+    pub fn png(
+        arena: Allocator,
+        width: u32,
+        height: u32,
+        channel_count: u8,
+        texels: []const u8,
+    ) ![]const u8 {
+        assert(texels.len == width * height * channel_count);
+        var raw: std.ArrayList(u8) = .empty;
+        for (0..height) |y| {
+            try raw.append(arena, 0); // No filter.
+            const stride = width * channel_count;
+            try raw.appendSlice(arena, texels[y * stride ..][0..stride]);
+        }
+        var header: [13]u8 = undefined;
+        std.mem.writeInt(u32, header[0..4], width, .big);
+        std.mem.writeInt(u32, header[4..8], height, .big);
+        const colours = [_]u8{ 0, 4, 2, 6 };
+        header[8..13].* = .{ 8, colours[channel_count - 1], 0, 0, 0 };
+        var body: std.ArrayList(u8) = .empty;
+        try body.appendSlice(arena, &.{ 0x78, 0x01 });
+        var rest: []const u8 = raw.items;
+        while (true) {
+            const length: u16 = @intCast(@min(rest.len, 0xffff));
+            try body.append(arena, @intFromBool(length == rest.len));
+            try appendInt(arena, &body, u16, length, .little);
+            try appendInt(arena, &body, u16, ~length, .little);
+            try body.appendSlice(arena, rest[0..length]);
+            rest = rest[length..];
+            if (rest.len == 0) break;
+        }
+        try appendInt(arena, &body, u32, std.hash.Adler32.hash(raw.items), .big);
+        var file: std.ArrayList(u8) = .empty;
+        try file.appendSlice(arena, "\x89PNG\r\n\x1a\n");
+        try appendChunk(arena, &file, "IHDR", &header);
+        try appendChunk(arena, &file, "IDAT", body.items);
+        try appendChunk(arena, &file, "IEND", "");
+        return file.items;
+    }
+
+    fn appendChunk(
+        arena: Allocator,
+        file: *std.ArrayList(u8),
+        name: *const [4]u8,
+        data: []const u8,
+    ) !void {
+        try appendInt(arena, file, u32, @intCast(data.len), .big);
+        const start = file.items.len;
+        try file.appendSlice(arena, name);
+        try file.appendSlice(arena, data);
+        try appendInt(arena, file, u32, std.hash.Crc32.hash(file.items[start..]), .big);
+    }
+
+    fn appendInt(
+        arena: Allocator,
+        bytes: *std.ArrayList(u8),
+        comptime Int: type,
+        value: Int,
+        endian: std.lang.Endian,
+    ) !void {
+        var encoded: [@sizeOf(Int)]u8 = undefined;
+        std.mem.writeInt(Int, &encoded, value, endian);
+        try bytes.appendSlice(arena, &encoded);
+    }
+};
+
+/// A scene of one triangle by material, every image in a texture of its own.
+fn testScene(
+    gpa: Allocator,
+    files: []const []const u8,
+    materials: []const scene.Material,
+) !scene.Scene {
+    var from: scene.Scene = .init(gpa);
+    errdefer from.deinit();
+    const arena = from.arena.allocator();
+    const images = try arena.alloc(scene.Image, files.len);
+    const textures = try arena.alloc(scene.Texture, files.len);
+    for (images, textures, files, 0..) |*image, *texture, file, index| {
+        image.* = .{
+            .name = try arena.print("image {d}", .{index}),
+            .bytes = try arena.dupe(u8, file),
+        };
+        texture.* = .{ .image = @intCast(index) };
+    }
+    const meshes = try arena.alloc(scene.Mesh, materials.len);
+    const instances = try arena.alloc(scene.Instance, materials.len);
+    for (meshes, instances, 0..) |*mesh, *instance, index| {
+        mesh.* = .{
+            .positions = &.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } },
+            .triangles = &.{.{ 0, 1, 2 }},
+            .material = @intCast(index),
+        };
+        instance.* = .{ .mesh = @intCast(index), .node = 0 };
+    }
+    from.nodes = try arena.dupe(scene.Node, &.{.{ .parent = scene.none, .local = .identity }});
+    from.materials = try arena.dupe(scene.Material, materials);
+    from.images = images;
+    from.textures = textures;
+    from.meshes = meshes;
+    from.instances = instances;
+    from.check();
+    return from;
+}
+
+fn testLoad(from: *const scene.Scene, side_max: u32, diagnostic: *Diagnostic) !TextureSet {
+    var pool: parallel.Pool = .init(2);
+    defer pool.deinit();
+    return load(testing.allocator, from, .{ .pool = &pool, .side_max = side_max }, diagnostic);
+}
+
+test "channels that no material uses are not kept" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const file = try TestImage.png(files.allocator(), 1, 1, 4, &.{ 10, 20, 30, 40 });
+    const Case = struct { scene.Material, world.Slot, []const u8, [4]u8 };
+    const view: scene.TextureView = .{ .texture = 0 };
+    for ([_]Case{
+        .{ .{ .base_color_texture = view }, .base_color, &.{ 10, 20, 30 }, .{ 0, 1, 2, missing } },
+        .{
+            .{ .base_color_texture = view, .alpha_mode = .blend },
+            .base_color,
+            &.{ 10, 20, 30, 40 },
+            .{ 0, 1, 2, 3 },
+        },
+        .{
+            .{ .metallic_roughness_texture = view },
+            .metallic_roughness,
+            &.{ 20, 30 },
+            .{ 0, 1, missing, missing },
+        },
+        .{ .{ .normal_texture = view }, .normal, &.{ 10, 20, 30 }, .{ 0, 1, 2, missing } },
+        .{
+            .{ .occlusion_texture = view },
+            .occlusion,
+            &.{10},
+            .{ 0, missing, missing, missing },
+        },
+        .{
+            .{ .emissive_texture = view, .emissive = .{ 1, 0, 0 } },
+            .emissive,
+            &.{ 10, 20, 30 },
+            .{ 0, 1, 2, missing },
+        },
+    }) |case| {
+        var from = try testScene(testing.allocator, &.{file}, &.{case[0]});
+        defer from.deinit();
+        var diagnostic: Diagnostic = .{};
+        var set = try testLoad(&from, 1, &diagnostic);
+        defer set.deinit();
+        try testing.expectEqual(0, diagnostic.warning_count);
+        try testing.expectEqual(1, set.lookups.len);
+        try testing.expectEqual(case[1], set.lookups[0].slot);
+        try testing.expectEqual(case[3], set.lookups[0].channels);
+        try testing.expectEqual(MaterialUse{
+            .first_lookup = 0,
+            .lookup_count = 1,
+            .alpha = if (case[0].alpha_mode == .blend)
+                .{ .least = 40.0 / 255.0, .largest = 40.0 / 255.0 }
+            else
+                .{},
+        }, set.materials[0]);
+        const texture = &set.textures.all[0];
+        try testing.expectEqualSlices(u8, case[2], texture.levels[0].texels);
+        try testing.expectEqual(case[2].len, texture.channel_count);
+        try testing.expectEqual(isLight(case[1]), texture.is_srgb);
+        try testing.expectEqual(case[2].len, set.byte_count);
+    }
+}
+
+test "uses of an image share a texture, but light and numbers do not" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const file = try TestImage.png(files.allocator(), 1, 1, 3, &.{ 10, 20, 30 });
+    const unused = try TestImage.png(files.allocator(), 1, 1, 3, &.{ 1, 2, 3 });
+    const view: scene.TextureView = .{ .texture = 0, .texcoord_set = 2 };
+    var from = try testScene(testing.allocator, &.{ file, unused }, &.{
+        .{ .metallic_roughness_texture = view, .occlusion_texture = view },
+        .{ .base_color_texture = view, .unlit = true, .normal_texture = view },
+        .{ .base_color_texture = .{ .texture = 1 } },
+    });
+    defer from.deinit();
+    from.instances = from.instances[0..2]; // The third is not drawn.
+    var diagnostic: Diagnostic = .{};
+    var set = try testLoad(&from, 64, &diagnostic);
+    defer set.deinit();
+    try testing.expectEqual(2, set.textures.all.len);
+    try testing.expectEqual(3, set.lookups.len);
+    const numbers = &set.textures.all[set.lookups[0].texture];
+    try testing.expectEqual(set.lookups[0].texture, set.lookups[1].texture);
+    try testing.expectEqualSlices(u8, &.{ 10, 20, 30 }, numbers.levels[0].texels);
+    try testing.expectEqual([4]u8{ 1, 2, missing, missing }, set.lookups[0].channels);
+    try testing.expectEqual([4]u8{ 0, missing, missing, missing }, set.lookups[1].channels);
+    try testing.expectEqual(2, set.lookups[1].texcoord_set);
+    try testing.expect(set.textures.all[set.lookups[2].texture].is_srgb);
+    try testing.expectEqual(0, set.materials[2].lookup_count);
+}
+
+test "gray images are kept as gray, beside alpha as colours" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const arena = files.allocator();
+    const Case = struct { u8, []const u8, scene.AlphaMode, []const u8, [4]u8 };
+    for ([_]Case{
+        .{ 1, &.{50}, .blend, &.{50}, .{ 0, 0, 0, missing } },
+        .{ 2, &.{ 50, 60 }, .@"opaque", &.{50}, .{ 0, 0, 0, missing } },
+        .{ 2, &.{ 50, 60 }, .mask, &.{ 50, 50, 50, 60 }, .{ 0, 1, 2, 3 } },
+        .{ 2, &.{ 50, 255 }, .mask, &.{50}, .{ 0, 0, 0, missing } },
+        .{ 4, &.{ 50, 60, 70, 255 }, .mask, &.{ 50, 60, 70 }, .{ 0, 1, 2, missing } },
+    }) |case| {
+        const file = try TestImage.png(arena, 1, 1, case[0], case[1]);
+        var from = try testScene(testing.allocator, &.{file}, &.{.{
+            .base_color_texture = .{ .texture = 0 },
+            .alpha_mode = case[2],
+        }});
+        defer from.deinit();
+        var diagnostic: Diagnostic = .{};
+        var set = try testLoad(&from, 1, &diagnostic);
+        defer set.deinit();
+        try testing.expectEqualSlices(u8, case[3], set.textures.all[0].levels[0].texels);
+        try testing.expectEqual(case[4], set.lookups[0].channels);
+    }
+}
+
+test "a broken image costs a warning, the others are there" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const good = try TestImage.png(files.allocator(), 3, 5, 3, &@as([45]u8, @splat(9)));
+    const cut = good[0 .. good.len - 30];
+    const view: scene.TextureView = .{ .texture = 2 };
+    var from = try testScene(testing.allocator, &.{ cut, "GIF89a", good }, &.{.{
+        .base_color_texture = .{ .texture = 0 },
+        .normal_texture = .{ .texture = 1 },
+        .occlusion_texture = view,
+    }});
+    defer from.deinit();
+    var diagnostic: Diagnostic = .{};
+    var set = try testLoad(&from, 4, &diagnostic);
+    defer set.deinit();
+    try testing.expectEqual(2, diagnostic.warning_count);
+    for (diagnostic.warnings[0..2], 0..) |*warning, index| {
+        var start: [32]u8 = undefined;
+        const expected = try std.fmt.bufPrint(&start, "image {d}: ", .{index});
+        try testing.expect(std.mem.startsWith(u8, warning.text(), expected));
+        try testing.expectStringEndsWith(warning.text(), ", left out");
+        try testing.expect(warning.text().len > expected.len + ", left out".len);
+    }
+    try testing.expectEqual(1, set.lookups.len);
+    try testing.expectEqual(.occlusion, set.lookups[0].slot);
+    // Halved until no side is longer than 4: 1x2 and 1x1 are left.
+    const levels = set.textures.all[0].levels;
+    try testing.expectEqual(2, levels.len);
+    try testing.expectEqual([2]u32{ 1, 2 }, .{ levels[0].width, levels[0].height });
+    try testing.expectEqualSlices(u8, &.{ 9, 9 }, levels[0].texels);
+}
+
+test "alpha of factor, texture and vertices together" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const texels = [_]u8{ 1, 2, 3, 51, 1, 2, 3, 204 };
+    const file = try TestImage.png(files.allocator(), 2, 1, 4, &texels);
+    var from = try testScene(testing.allocator, &.{file}, &.{ .{
+        .base_color_texture = .{ .texture = 0 },
+        .base_color = .{ 1, 1, 1, 0.5 },
+        .alpha_mode = .mask,
+    }, .{} });
+    defer from.deinit();
+    const meshes = try from.arena.allocator().dupe(scene.Mesh, from.meshes);
+    meshes[0].colors = &.{ .{ 1, 1, 1, 0.25 }, .{ 1, 1, 1, 1 }, .{ 1, 1, 1, 0.5 } };
+    from.meshes = meshes;
+    var diagnostic: Diagnostic = .{};
+    var set = try testLoad(&from, 64, &diagnostic);
+    defer set.deinit();
+    const alpha = set.materials[0].alpha;
+    try testing.expectApproxEqRel(@as(f32, 0.25 * 0.5 * 0.2), alpha.least, 1e-6);
+    try testing.expectApproxEqRel(@as(f32, 0.5 * 0.8), alpha.largest, 1e-6);
+    try testing.expectEqual(AlphaRange{}, set.materials[1].alpha);
+    try testing.expectEqual(128, cutoffCode(0.5));
+    try testing.expectEqual(1, cutoffCode(1e-9));
+    try testing.expectEqual(255, cutoffCode(1));
+    for ([_]?f32{ null, 0, -1, 1.01, std.math.inf(f32), std.math.nan(f32) }) |none_kept| {
+        try testing.expectEqual(null, cutoffCode(none_kept));
+    }
+}
+
+test "threads change nothing, batches neither" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const arena = files.allocator();
+    var random_state: std.Random.DefaultPrng = .init(29);
+    var list: [7][]const u8 = undefined;
+    var materials: [7]scene.Material = undefined;
+    for (&list, &materials, 0..) |*file, *material, index| {
+        const side: u32 = @intCast(5 + 11 * index);
+        const texels = try arena.alloc(u8, side * side * 4);
+        random_state.random().bytes(texels);
+        file.* = try TestImage.png(arena, side, side, 4, texels);
+        const view: scene.TextureView = .{ .texture = @intCast(index) };
+        material.* = .{
+            .base_color_texture = view,
+            .alpha_mode = .mask,
+            .metallic_roughness_texture = view,
+        };
+    }
+    var from = try testScene(testing.allocator, &list, &materials);
+    defer from.deinit();
+    var diagnostic: Diagnostic = .{};
+    var sets: [2]TextureSet = undefined;
+    for (&sets, [_]usize{ 1, 4 }) |*set, thread_count| {
+        var pool: parallel.Pool = .init(thread_count);
+        defer pool.deinit();
+        set.* = try load(testing.allocator, &from, .{ .pool = &pool }, &diagnostic);
+    }
+    defer for (&sets) |*set| set.deinit();
+    try testing.expectEqual(14, sets[0].textures.all.len);
+    for (sets[0].textures.all, sets[1].textures.all) |a, b| {
+        try testing.expectEqual(a.levels.len, b.levels.len);
+        for (a.levels, b.levels) |x, y| try testing.expectEqualSlices(u8, x.texels, y.texels);
+    }
+    const large: Task = .{
+        .image = 0,
+        .info = .{
+            .format = .png,
+            .width = 4096,
+            .height = 4096,
+            .channel_count = 1,
+            .is_float = false,
+        },
+        .requests = @splat(scene.none),
+    };
+    try testing.expectEqual(2, batchCount(&.{ large, large, large }, decode_bytes_max));
+    var huge = large;
+    huge.info.is_float = true;
+    try testing.expectEqual(1, batchCount(&.{ huge, large }, decode_bytes_max));
+}
+
+test "floats become the nearest codes" {
+    const stored = storedChannels(3, .{ true, true, true, false }, false);
+    var codes: [3]u8 = undefined;
+    pickFloats(3, &.{ 0.5, 2, 0 }, &stored, true, &codes);
+    try testing.expectEqual([3]u8{ 188, 255, 0 }, codes);
+    pickFloats(3, &.{ 0.5, 2, 0 }, &stored, false, &codes);
+    try testing.expectEqual([3]u8{ 128, 255, 0 }, codes);
+}
+
+/// Refuses one request and no other.
+const RefusesOne = struct {
+    countdown: usize,
+    has_refused: bool = false,
+
+    fn allocator(refuses: *RefusesOne) Allocator {
+        return .{ .ptr = refuses, .vtable = &.{
+            .alloc = alloc,
+            .resize = Allocator.noResize,
+            .remap = Allocator.noRemap,
+            .free = free,
+        } };
+    }
+
+    fn alloc(context: *anyopaque, len: usize, alignment: std.mem.Alignment, at: usize) ?[*]u8 {
+        const refuses: *RefusesOne = @ptrCast(@alignCast(context));
+        refuses.countdown -|= 1;
+        if (refuses.countdown > 0 or refuses.has_refused)
+            return testing.allocator.rawAlloc(len, alignment, at);
+        refuses.has_refused = true;
+        return null;
+    }
+
+    fn free(_: *anyopaque, memory: []u8, alignment: std.mem.Alignment, at: usize) void {
+        testing.allocator.rawFree(memory, alignment, at);
+    }
+};
+
+test "where memory is too short for several images, one comes after the other" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const file = try TestImage.png(files.allocator(), 2, 2, 4, &@as([16]u8, @splat(77)));
+    const other = try TestImage.png(files.allocator(), 1, 2, 3, &@as([6]u8, @splat(88)));
+    var from = try testScene(testing.allocator, &.{ file, other }, &.{.{
+        .base_color_texture = .{ .texture = 0 },
+        .alpha_mode = .blend,
+        .occlusion_texture = .{ .texture = 0 },
+        .normal_texture = .{ .texture = 1 },
+    }});
+    defer from.deinit();
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    var done_count: usize = 0;
+    for (1..100) |refused| {
+        var refuses: RefusesOne = .{ .countdown = refused };
+        var diagnostic: Diagnostic = .{};
+        var set = load(refuses.allocator(), &from, .{ .pool = &pool }, &diagnostic) catch |err| {
+            try testing.expectEqual(error.OutOfMemory, err); // Before or after the decoding.
+            continue;
+        };
+        defer set.deinit();
+        if (refuses.has_refused) done_count += 1;
+        try testing.expectEqual(3, set.lookups.len);
+        for (set.lookups, [_]u8{ 77, 88, 77 }) |lookup, texel| {
+            for (set.textures.all[lookup.texture].levels) |level| {
+                for (level.texels) |found| try testing.expectEqual(texel, found);
+            }
+        }
+    }
+    // One refused while images were decoded did no harm: texels, what is kept of them, the levels.
+    try testing.expect(done_count >= 6);
+}
+
+test "texels are the same on every machine" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    var random_state: std.Random.DefaultPrng = .init(41);
+    var texels: [61 * 38 * 4]u8 = undefined;
+    random_state.random().bytes(&texels);
+    const file = try TestImage.png(files.allocator(), 61, 38, 4, &texels);
+    const view: scene.TextureView = .{ .texture = 0 };
+    var hash: std.hash.XxHash64 = .init(0);
+    for ([_]scene.AlphaMode{ .@"opaque", .mask }) |mode| {
+        var from = try testScene(testing.allocator, &.{file}, &.{.{
+            .base_color_texture = view,
+            .alpha_mode = mode,
+            .normal_texture = view,
+        }});
+        defer from.deinit();
+        var diagnostic: Diagnostic = .{};
+        var set = try testLoad(&from, 32, &diagnostic);
+        defer set.deinit();
+        for (set.textures.all) |texture| for (texture.levels) |level| hash.update(level.texels);
+    }
+    try testing.expectEqual(9264281432180316260, hash.final());
+}
+
+test "memory that runs out leaks nothing" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const arena = files.allocator();
+    const file = try TestImage.png(arena, 9, 6, 4, &@as([216]u8, @splat(100)));
+    const view: scene.TextureView = .{ .texture = 0 };
+    var from = try testScene(testing.allocator, &.{file}, &.{.{
+        .base_color_texture = view,
+        .alpha_mode = .mask,
+        .normal_texture = view,
+    }});
+    defer from.deinit();
+    const one = struct {
+        fn one(failing: Allocator, scene_from: *const scene.Scene) !void {
+            var pool: parallel.Pool = .init(1);
+            defer pool.deinit();
+            var diagnostic: Diagnostic = .{};
+            const settings: Settings = .{ .pool = &pool, .side_max = 8 };
+            var set = try load(failing, scene_from, settings, &diagnostic);
+            set.deinit();
+        }
+    }.one;
+    try testing.checkAllAllocationFailures(testing.allocator, one, .{&from});
+}

@@ -1,0 +1,295 @@
+//! The environment's light at the vertices of paths, and how much of it arrives there.
+//!
+//! In: an environment, vertices. Out: what they make of its light, added to the radiance of their
+//! samples. The light that would arrive is a smooth integral, looked up; shadow rays of a few
+//! directional lights, others in each sample, say what share of it does: for the diffuse part each
+//! light weighs what it adds to the irradiance at this normal, for the glossy part what it adds to
+//! the lobe, which is widened so that some lights are in it. The mean over all samples is that of
+//! all lights: a sample's share may be below 0, and a surface that sees all of the sky has the
+//! smooth integral without noise. Light that is kept away comes from surfaces in turn, which are
+//! lit themselves: some of it, in the surface's own colour, is taken to arrive.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const bundle_file = @import("../traverse/bundle.zig");
+const dispatch = @import("../traverse/dispatch.zig");
+const bsdf_file = @import("../shade/bsdf.zig");
+const environment_file = @import("../shade/environment.zig");
+const lights_file = @import("environment_lights.zig");
+const path_file = @import("path.zig");
+const visibility_file = @import("visibility.zig");
+const EnvironmentLight = lights_file.EnvironmentLight;
+const EnvironmentLights = lights_file.EnvironmentLights;
+
+/// Radiance of what hides the sky, as a share of the mean radiance.
+const bounce_linear = 0.4;
+const bounce_partly = 0;
+
+/// Square of GGX's alpha of the narrowest lobe that lights are weighed by.
+const lobe_alpha_squared_min = 0.1;
+
+/// How a bundle's vertices are lit.
+pub fn Vertices(comptime Kernel: type) type {
+    return struct {
+        path: *const path_file.PathState(Kernel),
+        all: *const [Kernel.group_count]path_file.Vertex(Kernel.Rays),
+        /// Lanes whose reflection is traced: only the diffuse part is missing.
+        traced: [Kernel.group_count]Kernel.Rays.Mask,
+        /// No rays go on from here.
+        is_end: bool,
+    };
+}
+
+/// What rays of a group see that leave the scene, in the lanes asked for.
+pub fn seenBy(
+    comptime Kernel: type,
+    environment: *const world_file.Environment,
+    path: *const path_file.PathState(Kernel),
+    group: usize,
+    asked: Kernel.Rays.Mask,
+) Kernel.Rays.Vec3 {
+    const has_cones = environment.map != null;
+    return environment_file.radiance(
+        Kernel.Rays,
+        environment,
+        path.bundle.groups[group].line.direction,
+        path.roughness[group],
+        if (has_cones) path.cone_spread[group].abs() else .zero(),
+        asked,
+    );
+}
+
+/// Adds the light of the environment. Vertices of coherent rays are near to each other. Returns how
+/// many shadow rays it took.
+pub fn addLight(
+    comptime Kernel: type,
+    visibility: *visibility_file.Visibility(Kernel),
+    lights: *const EnvironmentLights,
+    sample: u32,
+    vertices: *const Vertices(Kernel),
+    coherence: dispatch.Coherence,
+    radiance: *[Kernel.group_count]Kernel.Rays.Vec3,
+) u64 {
+    const Receiver = ReceiverOf(Kernel.Rays);
+    const all = lights.all();
+    var receivers: [Kernel.group_count]Receiver = undefined;
+    for (&receivers, vertices.all) |*receiver, *vertex| {
+        receiver.lit = .splat(false);
+        if (vertex.seen.none()) continue;
+        receiver.find(vertex, all);
+    }
+    var ray_count: u64 = 0;
+    for (lights.ofSample(sample)) |part| for (part) |*light| {
+        ray_count += addShadow(Kernel, visibility, light, vertices, coherence, &receivers);
+    };
+    const environment = visibility.frame.environment;
+    for (&receivers, vertices.all, vertices.traced, radiance) |*receiver, *vertex, traced, *sum| {
+        if (receiver.lit.none()) continue;
+        const is_end = vertices.is_end;
+        const scattered = receiver.scatter(environment, lights.mean, vertex, traced, is_end);
+        const none: Kernel.Rays.Vec3 = .splat(.{ 0, 0, 0 });
+        const seen = vertex.throughput.mul(scattered);
+        sum.* = sum.add(.select(receiver.lit, seen, none));
+    }
+    return ray_count;
+}
+
+/// Takes away what does not arrive of one light.
+fn addShadow(
+    comptime Kernel: type,
+    visibility: *visibility_file.Visibility(Kernel),
+    light: *const EnvironmentLight,
+    vertices: *const Vertices(Kernel),
+    coherence: dispatch.Coherence,
+    receivers: *[Kernel.group_count]ReceiverOf(Kernel.Rays),
+) u64 {
+    const Rays = Kernel.Rays;
+    var bundle: bundle_file.Bundle(Kernel) = undefined;
+    var active: [Kernel.group_count]Rays.Mask = undefined;
+    var ray_count: u64 = 0;
+    for (&bundle.groups, &active, receivers, 0..) |*ray, *facing, *receiver, group| {
+        facing.* = .splat(false);
+        ray.active = facing.*;
+        if (receiver.lit.none()) continue;
+        const point = &vertices.all[group].point;
+        facing.* = receiver.lit.bitAnd(isFacing(Rays, point, .splat(light.to_light)));
+        if (facing.none()) continue;
+        const primitive = vertices.path.bundle.groups[group].closest.primitive;
+        const end = point.offsetOrigin(point.normal_geometric, .zero());
+        ray.* = visibility_file.shadowRay(Rays, &light.source, end, primitive, facing.*);
+        ray_count += facing.popCount();
+    }
+    if (ray_count == 0) return 0;
+    var transmittances: [Kernel.group_count]Rays.Vec3 = undefined;
+    visibility.transmittance(&bundle, &light.source, vertices.all, coherence, &transmittances);
+    for (active, transmittances, receivers, 0..) |facing, transmittance, *receiver, group| {
+        if (facing.none()) continue;
+        const none: Rays.Vec3 = .splat(.{ 0, 0, 0 });
+        const white: Rays.Vec3 = .splat(.{ 1, 1, 1 });
+        const hidden: Rays.Vec3 = .select(facing, white.sub(transmittance), none);
+        const counted = hidden.scale(.splat(light.weight));
+        receiver.addLight(&receiver.hidden, &vertices.all[group].point, light, counted);
+    }
+    return ray_count;
+}
+
+/// Points that light from a direction can reach from in front.
+inline fn isFacing(comptime Lanes: type, point: anytype, to_light: Lanes.Vec3) Lanes.Mask {
+    const zero: Lanes.F32 = .zero();
+    return point.normal.dot(to_light).gt(zero)
+        .bitAnd(point.normal_geometric.dot(to_light).gt(zero));
+}
+
+/// What the points of a group get of the lights.
+fn ReceiverOf(comptime Lanes: type) type {
+    const F32 = Lanes.F32;
+    const Vec3 = Lanes.Vec3;
+    return struct {
+        lit: Lanes.Mask,
+        /// Unit direction that the lobe is around.
+        lobe: Vec3,
+        /// Square of GGX's alpha of the lobe less 1.
+        alpha_term: F32,
+        /// Of all lights, and of those that are hidden.
+        whole: Sums,
+        hidden: Sums,
+
+        const Self = @This();
+
+        /// Weighted by what lights add to the diffuse part, and by what to the glossy one.
+        const Sums = struct {
+            diffuse: Vec3,
+            glossy: Vec3,
+            /// As if the sky were as bright everywhere.
+            diffuse_sky: F32,
+            glossy_sky: F32,
+
+            const zero: Sums = .{
+                .diffuse = .splat(.{ 0, 0, 0 }),
+                .glossy = .splat(.{ 0, 0, 0 }),
+                .diffuse_sky = .zero(),
+                .glossy_sky = .zero(),
+            };
+        };
+
+        /// Points, and what all lights would give them.
+        fn find(
+            receiver: *Self,
+            vertex: *const path_file.Vertex(Lanes),
+            all: []const EnvironmentLight,
+        ) void {
+            const point = &vertex.point;
+            receiver.lit = vertex.seen.andNot(point.material.unlit);
+            const alpha = point.material.roughness.mul(point.material.roughness);
+            receiver.lobe = dominant(point, alpha);
+            const squared = alpha.mul(alpha).max(.splat(lobe_alpha_squared_min));
+            receiver.alpha_term = squared.sub(.splat(1));
+            receiver.whole = .zero;
+            receiver.hidden = .zero;
+            const white: Vec3 = .splat(.{ 1, 1, 1 });
+            for (all) |*light| {
+                const facing = isFacing(Lanes, point, .splat(light.to_light));
+                const share: Vec3 = .select(facing, white, .splat(.{ 0, 0, 0 }));
+                receiver.addLight(&receiver.whole, point, light, share);
+            }
+        }
+
+        /// Where light that a rough surface sends to the view mostly comes from: rather from above
+        /// than where a mirror would have it from (Lagarde and de Rousiers 2014, Moving Frostbite
+        /// to Physically Based Rendering, section 4.9.3).
+        fn dominant(point: anytype, alpha: F32) Vec3 {
+            const one: F32 = .splat(1);
+            const mirrored = bsdf_file.reflect(Lanes, point);
+            const smoothness = one.sub(alpha).max(.zero());
+            const share = smoothness.mul(smoothness.sqrt().add(alpha));
+            return point.normal.add(mirrored.sub(point.normal).scale(share)).normalize();
+        }
+
+        /// Adds some of what a light gives.
+        inline fn addLight(
+            receiver: *const Self,
+            sums: *Sums,
+            point: anytype,
+            light: *const EnvironmentLight,
+            share: Vec3,
+        ) void {
+            const to_light: Vec3 = .splat(light.to_light);
+            const solid_angle: F32 = .splat(light.solid_angle);
+            const cosine = receiver.lobe.dot(to_light).max(.splat(-1)).min(.splat(1));
+            const half = cosine.add(.splat(1)).mul(.splat(0.5));
+            const slope = half.mul(receiver.alpha_term).add(.splat(1));
+            const diffuse = point.normal.dot(to_light);
+            const glossy = F32.splat(1).div(slope.mul(slope));
+            const irradiance = share.mul(.splat(light.irradiance));
+            const sky = share.y.mul(solid_angle);
+            sums.diffuse = sums.diffuse.add(irradiance.scale(diffuse));
+            sums.glossy = sums.glossy.add(irradiance.scale(glossy));
+            sums.diffuse_sky = sums.diffuse_sky.add(sky.mul(diffuse));
+            sums.glossy_sky = sums.glossy_sky.add(sky.mul(glossy));
+        }
+
+        /// Radiance towards the view for the light that arrives.
+        fn scatter(
+            receiver: *const Self,
+            environment: *const world_file.Environment,
+            mean: [3]f32,
+            vertex: *const path_file.Vertex(Lanes),
+            traced: Lanes.Mask,
+            is_end: bool,
+        ) Vec3 {
+            const point = &vertex.point;
+            const bsdf = &vertex.bsdf;
+            const white: Vec3 = .splat(.{ 1, 1, 1 });
+            const roughness = point.material.roughness;
+            const whole = &receiver.whole;
+            const hidden = &receiver.hidden;
+            const around = point.material.base_color.min(white);
+            const bounced = around.mul(.splat(mean));
+            const irradiance = environment_file
+                .irradiance(Lanes, environment, point.normal, receiver.lit)
+                .mul(openness(whole.diffuse, hidden.diffuse))
+                .add(bounced.mul(bounce(around, hidden.diffuse_sky, whole.diffuse_sky)));
+            var sum = bsdf.diffuse_albedo.mul(irradiance);
+            const untraced = receiver.lit.andNot(traced);
+            if (untraced.any()) {
+                const lobe = environment_file
+                    .radiance(Lanes, environment, receiver.lobe, roughness, .zero(), untraced)
+                    .mul(openness(whole.glossy, hidden.glossy))
+                    .add(bounced.mul(bounce(around, hidden.glossy_sky, whole.glossy_sky)));
+                const seen = bsdf.specular_albedo.mul(lobe);
+                sum = sum.add(.select(untraced, seen, .splat(.{ 0, 0, 0 })));
+            }
+            if (!is_end) return sum;
+            const refraction = bsdf.mirror.refraction;
+            const through = environment_file
+                .radiance(Lanes, environment, refraction, roughness, .zero(), receiver.lit);
+            return sum.add(bsdf.mirror.transmitted.mul(through));
+        }
+
+        /// Of the light that would arrive, the share that does; all of it where no light tells.
+        inline fn openness(whole: Vec3, hidden: Vec3) Vec3 {
+            const one: F32 = .splat(1);
+            return .{
+                .x = one.sub(shareOf(hidden.x, whole.x)),
+                .y = one.sub(shareOf(hidden.y, whole.y)),
+                .z = one.sub(shareOf(hidden.z, whole.z)),
+            };
+        }
+
+        inline fn shareOf(hidden: F32, whole: F32) F32 {
+            const known = whole.gt(.splat(1e-12));
+            const share = hidden.div(F32.select(known, whole, .splat(1)));
+            return F32.select(known, share, .zero());
+        }
+
+        /// Radiance of what hides the sky, as a share of the mean, where it is white.
+        inline fn bounce(around: Vec3, hidden: F32, whole: F32) Vec3 {
+            const one: F32 = .splat(1);
+            const white: Vec3 = .splat(.{ 1, 1, 1 });
+            const closed = shareOf(hidden, whole).max(.zero()).min(one);
+            const partly = closed.mul(one.sub(closed)).mul(.splat(bounce_partly));
+            const linear = closed.mul(.splat(bounce_linear));
+            return white.scale(linear).add(white.add(around).scale(partly));
+        }
+    };
+}

@@ -1,0 +1,250 @@
+//! Light from all around: pictures that follow from a formula, and directions.
+//!
+//! In: images of radiance, written as Radiance files. Out: what surfaces, mirrors and eyes make of
+//! them, by every variant.
+
+const std = @import("std");
+const fixture = @import("fixture.zig");
+const raylane = @import("raylane");
+const Builder = fixture.Builder;
+const Image = raylane.image.Image;
+const expect = std.testing.expect;
+const gpa = std.testing.allocator;
+
+/// An equirectangular image in a file of its own.
+const Sky = struct {
+    folder: std.testing.TmpDir,
+    path: []u8,
+
+    const width = 64;
+    const height = 32;
+    const Texels = [width * height][3]f32;
+
+    fn init(texels: *const Texels) !Sky {
+        var sky: Sky = .{ .folder = std.testing.tmpDir(.{}), .path = undefined };
+        errdefer sky.folder.cleanup();
+        const io = std.testing.io;
+        var bytes: std.Io.Writer.Allocating = .init(gpa);
+        defer bytes.deinit();
+        const writer = &bytes.writer;
+        try writer.writeAll("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n");
+        try writer.print("-Y {d} +X {d}\n", .{ height, width });
+        for (texels) |texel| {
+            const largest = @max(texel[0], texel[1], texel[2]);
+            if (largest < 1e-30) {
+                try writer.writeAll(&.{ 0, 0, 0, 0 });
+                continue;
+            }
+            const exponent = std.math.frexp(largest).exponent;
+            for (texel) |channel| {
+                try writer.writeByte(@intFromFloat(std.math.ldexp(channel, 8 - exponent)));
+            }
+            try writer.writeByte(@intCast(exponent + 128));
+        }
+        try sky.folder.dir.writeFile(io, .{ .sub_path = "sky.hdr", .data = bytes.written() });
+        var buffer: [std.fs.max_path_bytes]u8 = undefined;
+        const folder_path = buffer[0..try sky.folder.dir.realPath(io, &buffer)];
+        sky.path = try std.fs.path.join(gpa, &.{ folder_path, "sky.hdr" });
+        return sky;
+    }
+
+    fn deinit(sky: *Sky) void {
+        gpa.free(sky.path);
+        sky.folder.cleanup();
+    }
+
+    fn plain(color: [3]f32) Texels {
+        return @splat(color);
+    }
+
+    fn around(sky: *const Sky) raylane.settings.Environment {
+        return .{ .source = .{ .file = sky.path } };
+    }
+};
+
+fn sphere(material: raylane.scene.Material) !raylane.scene.Scene {
+    var builder: Builder = try .init();
+    try builder.addSphere(material, .{ 0, 0, -5 }, 2, 16);
+    try builder.addCamera(.{ 0, 0, 0 }, 0.5);
+    return builder.finish();
+}
+
+test "furnace: in a white environment what absorbs nothing cannot be seen" {
+    var sky: Sky = try .init(&Sky.plain(@splat(1)));
+    defer sky.deinit();
+    var matte = fixture.matte(.{ 1, 1, 1 });
+    for (0..7) |step| for ([_]u32{ 0, 4 }) |shadow_count| {
+        if (step > 0) {
+            matte.metallic = 1;
+            matte.roughness = 0.2 * @as(f32, @floatFromInt(step - 1));
+        }
+        var scene = try sphere(matte);
+        defer scene.deinit();
+        var environment = sky.around();
+        environment.shadow_count = shadow_count;
+        var image = try fixture.render(&scene, .{
+            .environment = environment,
+            .see_environment = true,
+            .sample_count = 4,
+        });
+        defer image.deinit(gpa);
+        for (image.pixels) |pixel| {
+            const tolerance: f32 = if (step == 0) 0.01 else 0.02;
+            for (pixel) |channel| try std.testing.expectApproxEqAbs(1, channel, tolerance);
+        }
+    };
+}
+
+/// The picture of nothing but the sky along -z, by a wide angle.
+fn look(environment: raylane.settings.Environment) !Image {
+    var builder: Builder = try .init();
+    try builder.addQuad(fixture.matte(.{ 0, 0, 0 }), .{ 0, 0, 5 }, .{ 1, 0, 0 }, .{ 0, 1, 0 });
+    try builder.addCamera(.{ 0, 0, 0 }, 1);
+    var scene = try builder.finish();
+    defer scene.deinit();
+    return fixture.render(&scene, .{
+        .width = 64,
+        .height = 64,
+        .environment = environment,
+        .see_environment = true,
+    });
+}
+
+/// Where the picture is brightest, in -1..1.
+fn brightest(image: *const Image) [2]f32 {
+    var best: f32 = 0;
+    var place: [2]f32 = undefined;
+    for (0..image.height) |y| for (0..image.width) |x| {
+        const value = image.at(@intCast(x), @intCast(y)).*[1];
+        if (value <= best) continue;
+        best = value;
+        place = .{
+            (@as(f32, @floatFromInt(x)) + 0.5) / @as(f32, @floatFromInt(image.width)) * 2 - 1,
+            1 - (@as(f32, @floatFromInt(y)) + 0.5) / @as(f32, @floatFromInt(image.height)) * 2,
+        };
+    };
+    return place;
+}
+
+test "a texel is seen where u and v say, and turns counter-clockwise from above" {
+    const column = 20;
+    const row = 11;
+    var texels = Sky.plain(@splat(0));
+    texels[row * Sky.width + column] = .{ 4, 8, 2 };
+    var sky: Sky = try .init(&texels);
+    defer sky.deinit();
+    const u = (column + 0.5) / @as(f32, Sky.width);
+    const v = (row + 0.5) / @as(f32, Sky.height);
+    for ([_]f32{ 0, 30, -12 }) |turn_deg| {
+        // u = atan2(z, x) / 2 pi + 0.5; counter-clockwise from above takes x to -z.
+        const longitude = (u - 0.5) * 2 * std.math.pi - turn_deg * std.math.pi / 180.0;
+        const colatitude = v * std.math.pi;
+        const depth = -@sin(colatitude) * @sin(longitude);
+        const expected = [2]f32{
+            @sin(colatitude) * @cos(longitude) / depth,
+            @cos(colatitude) / depth,
+        };
+        try expect(@abs(expected[0]) < 0.9 and @abs(expected[1]) < 0.9);
+        var environment = sky.around();
+        environment.rotation_deg = turn_deg;
+        environment.intensity = 2;
+        var image = try look(environment);
+        defer image.deinit(gpa);
+        const found = brightest(&image);
+        for (expected, found) |wanted, seen| {
+            try std.testing.expectApproxEqAbs(wanted, seen, 0.07);
+        }
+        const at_x: u32 = @intFromFloat((found[0] + 1) * 32);
+        const at_y: u32 = @intFromFloat((1 - found[1]) * 32);
+        const pixel = image.at(at_x, at_y).*;
+        try expect(pixel[1] > 10 and pixel[1] <= 16);
+        try std.testing.expectApproxEqRel(pixel[1] / 2, pixel[0], 0.01);
+        try std.testing.expectApproxEqRel(pixel[1] / 4, pixel[2], 0.01);
+    }
+}
+
+test "primary rays leave alpha, mirrors see the sky" {
+    var sky: Sky = try .init(&Sky.plain(.{ 1, 0.5, 0.25 }));
+    defer sky.deinit();
+    var mirror = fixture.matte(.{ 1, 1, 1 });
+    mirror.metallic = 1;
+    mirror.roughness = 0;
+    var scene = try sphere(mirror);
+    defer scene.deinit();
+    var image = try fixture.render(&scene, .{
+        .environment = sky.around(),
+        .background = .{ 0, 0, 1 },
+    });
+    defer image.deinit(gpa);
+    const middle = image.at(16, 16).*;
+    for ([_]f32{ 1, 0.5, 0.25 }, middle[0..3]) |wanted, seen| {
+        try std.testing.expectApproxEqAbs(wanted, seen, 0.01);
+    }
+    try std.testing.expectEqual([4]f32{ 0, 0, 1, 1 }, image.at(0, 0).*);
+}
+
+/// A plane under a box, lit by a sky with a sun, seen from the side.
+fn boxScene() !raylane.scene.Scene {
+    const white = fixture.matte(.{ 0.8, 0.8, 0.8 });
+    var builder: Builder = try .init();
+    try builder.addQuad(white, .{ 0, -1, -5 }, .{ 20, 0, 0 }, .{ 0, 0, -20 });
+    try builder.addQuad(white, .{ 0, -0.5, -5 }, .{ 1.2, 0, 0 }, .{ 0, 0, -1.2 });
+    try builder.addQuad(white, .{ 0, -0.4, -5 }, .{ 1.2, 0, 0 }, .{ 0, 0, -1.2 });
+    try builder.addSphere(fixture.matte(.{ 1, 0.2, 0.2 }), .{ 0, 0.3, -5 }, 0.6, 12);
+    try builder.addCamera(.{ 0, 0, 0 }, 0.7);
+    return builder.finish();
+}
+
+test "it is darker below a box than beside it, and every variant says so alike" {
+    var texels = Sky.plain(.{ 0.5, 0.6, 0.9 });
+    texels[4 * Sky.width + 40] = .{ 300, 280, 200 };
+    var sky: Sky = try .init(&texels);
+    defer sky.deinit();
+    var scene = try boxScene();
+    defer scene.deinit();
+    var hash: ?u64 = null;
+    for (0..raylane.variant.compiled.len) |variant| for ([_]usize{ 1, 3 }) |thread_count| {
+        var image = try fixture.render(&scene, .{
+            .width = 64,
+            .height = 48,
+            .sample_count = 4,
+            .environment = sky.around(),
+            .variant = variant,
+            .thread_count = thread_count,
+        });
+        defer image.deinit(gpa);
+        try std.testing.expectEqual(hash orelse image.hash(), image.hash());
+        hash = image.hash();
+        const below = image.at(32, 31).*;
+        const beside = image.at(4, 31).*;
+        for (below[0..3], beside[0..3]) |dark, bright| try expect(dark < 0.45 * bright);
+    };
+    var image = try fixture.render(&scene, .{
+        .width = 64,
+        .height = 48,
+        .environment = .{ .source = .{ .file = sky.path }, .shadow_count = 0 },
+    });
+    defer image.deinit(gpa);
+    try std.testing.expectApproxEqRel(image.at(4, 31).*[1], image.at(32, 31).*[1], 0.01);
+}
+
+test "a file that is no image or not there is an error in one line" {
+    var scene = try boxScene();
+    defer scene.deinit();
+    const Expected = struct { path: []const u8, err: anyerror, text: []const u8 };
+    for ([_]Expected{
+        .{ .path = "no such.hdr", .err = error.InputOutput, .text = "does not exist" },
+        .{ .path = "build.zig", .err = error.InvalidInput, .text = "no image format" },
+    }) |expected| {
+        var diagnostic: raylane.diagnostic.Diagnostic = .{};
+        var session: raylane.session.Session = .init(gpa, std.testing.io, 1, &diagnostic);
+        defer session.deinit();
+        const result = fixture.view(&session, &scene, raylane.variant.compiled[0].lanes, .{
+            .environment = .{ .source = .{ .file = expected.path } },
+        });
+        try std.testing.expectError(expected.err, result);
+        try std.testing.expectEqualStrings(expected.path, diagnostic.place.text());
+        const text = diagnostic.message.text();
+        try expect(std.mem.find(u8, text, expected.text) != null);
+    }
+}
