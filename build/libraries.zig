@@ -224,7 +224,11 @@ pub const openexr: Library = .{
         "openexr/src/lib/OpenEXRCore/validation.c",
         "openexr/src/lib/OpenEXRCore/write_header.c",
     },
-    .shims = &.{ "src/decode/openexr.c", "src/decode/openexr/left_out.c" },
+    .shims = &.{
+        "src/decode/openexr.c",
+        "src/decode/openexr/left_out.c",
+        "src/output/openexr.c",
+    },
     .includes = &.{ "libdeflate", "openexr/src/lib/OpenEXRCore" },
     .own_headers = "src/decode/openexr",
     .flags = &.{ "-D_GNU_SOURCE", "-w" },

@@ -361,6 +361,40 @@ test "sizes that cannot be true are refused before memory is asked for" {
     }
 }
 
+const Decoding = struct {
+    files: [names.len][]u8,
+    hashes: [names.len]?u64,
+    failure: std.atomic.Value(bool) = .init(false),
+
+    fn all(decoding: *Decoding, first: usize) void {
+        for (0..4 * names.len) |step| {
+            const index = (first + step) % names.len;
+            const hash = outcome(decoding.files[index]) catch null;
+            if (hash != decoding.hashes[index]) decoding.failure.store(true, .monotonic);
+        }
+    }
+};
+
+test "threads decode at once, on the stacks that they have" {
+    var decoding: Decoding = .{ .files = undefined, .hashes = undefined };
+    var count: usize = 0;
+    defer for (decoding.files[0..count]) |file| testing.allocator.free(file);
+    for (names, 0..) |name, index| {
+        decoding.files[index] = try imageFile(name);
+        count += 1;
+        decoding.hashes[index] = try outcome(decoding.files[index]);
+        try testing.expect(decoding.hashes[index] != null);
+    }
+    var threads: [4]std.Thread = undefined;
+    for (&threads, 0..) |*thread, index| thread.* = try std.Thread.spawn(
+        .{ .stack_size = raylane.parallel.stack_bytes },
+        Decoding.all,
+        .{ &decoding, index * 7 },
+    );
+    for (threads) |thread| thread.join();
+    try testing.expect(!decoding.failure.load(.monotonic));
+}
+
 test "memory that runs out is an error, whenever it does" {
     for (names) |name| {
         const file = try imageFile(name);
