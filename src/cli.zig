@@ -97,7 +97,7 @@ pub fn outputName(gpa: std.mem.Allocator, options: *const Options) error{OutOfMe
 const sections: []const Section = &.{
     .{ .title = "Image", .options = &.{
         .{ .usage = "-o, --output FILE", .help = "name ending in a format; - is standard output" },
-        .{ .usage = "--format FORMAT", .help = "png, jpg, tga, bmp or ppm, or linear: hdr or pfm" },
+        .{ .usage = "--format FORMAT", .help = "png, jpg, tga, bmp or ppm, or linear: hdr, pfm or exr" },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
         .{
             .usage = "-r, --resolution WxH|N",
@@ -774,7 +774,7 @@ test "numbers keep to their ranges" {
         .{ .flag = "--bvh", .good = &.{ "fast", "default", "high" }, .bad = &.{ "High", "" } },
         .{
             .flag = "--format",
-            .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr" },
+            .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },
             .bad = &.{ "tiff", "" },
         },
         .{ .flag = "--jpeg-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "", "x" } },
@@ -926,6 +926,7 @@ test "the format follows the name, unless said otherwise" {
         .{ .jpg, &.{"-oa.JPEG"} },
         .{ .jpg, &.{ "-oa.jpeg", "--format=jpg" } },
         .{ .hdr, &.{"-oa.b.hdr"} },
+        .{ .exr, &.{"-oa.exr"} },
     }) |case| {
         try std.testing.expectEqual(case[0], (try optionsForTest(case[1])).write.format);
     }

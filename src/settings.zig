@@ -78,6 +78,8 @@ pub const Format = enum {
     ppm,
     /// Its relative for floats, linear: the picture itself, bit for bit, without alpha.
     pfm,
+    /// OpenEXR: linear, halves, with alpha where the background is transparent.
+    exr,
 };
 
 /// Care taken over the tree of the scene: time to build it against time to trace rays through it.
