@@ -430,3 +430,226 @@ const Bounds = struct {
         return 2;
     }
 };
+
+const testing = std.testing;
+
+fn testLookup(wrap: world.Wrap) world.Lookup {
+    return .{
+        .slot = .base_color,
+        .texture = 0,
+        .wrap = @splat(wrap),
+        .magnify_linear = true,
+        .minify_linear = true,
+        .has_mips = true,
+        .mip_linear = true,
+        .texcoord_set = 1,
+        .transform = .{ .{ 1, 0, 0 }, .{ 0, 1, 0 } },
+        .channels = .{ 0, 1, 2, 3 },
+    };
+}
+
+fn testMesh(coordinates: *const [3][2]f32) Mesh {
+    return .{
+        .positions = &.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } },
+        .texcoords = .{ null, coordinates, null, null },
+        .triangles = &.{.{ 0, 1, 2 }},
+        .material = 0,
+    };
+}
+
+fn testTexels(width: u32, height: u32, alpha: []const u8, texels: []u8) world.TextureLevel {
+    for (alpha, 0..) |code, texel| texels[4 * texel ..][0..4].* = .{ 1, 2, 3, code };
+    return .{ .width = width, .height = height, .texels = texels[0 .. 4 * alpha.len] };
+}
+
+test "left there is nothing, right there is all, by every wrap" {
+    const side = 64;
+    var alpha: [side * side]u8 = undefined;
+    for (&alpha, 0..) |*code, texel| code.* = if (texel % side < side / 2) 0 else 255;
+    var texels: [4 * alpha.len]u8 = undefined;
+    const level = testTexels(side, side, &alpha, &texels);
+    const bounds: Bounds = try .init(testing.allocator, &level);
+    defer bounds.deinit(testing.allocator);
+    const limits: Limits = .{ .whole = 128, .seen = 128 };
+    const Case = struct { world.Wrap, [2]f32, Share };
+    for ([_]Case{
+        .{ .repeat, .{ 0.1, 0.4 }, .nothing },
+        .{ .repeat, .{ 0.6, 0.9 }, .whole },
+        .{ .repeat, .{ 0.6, 0.99 }, .some }, // The next image begins with nothing.
+        .{ .repeat, .{ 0.4, 0.6 }, .some },
+        .{ .repeat, .{ 7.1, 7.4 }, .nothing },
+        .{ .repeat, .{ -2.4, -2.1 }, .whole },
+        .{ .repeat, .{ -2.1, -1.9 }, .some },
+        .{ .repeat, .{ 0.6, 1.9 }, .some },
+        .{ .repeat, .{ 0.1, 2000 }, .some },
+        .{ .clamp_to_edge, .{ 0.6, 50 }, .whole },
+        .{ .clamp_to_edge, .{ -50, 0.4 }, .nothing },
+        .{ .clamp_to_edge, .{ -3, -2 }, .nothing },
+        .{ .mirrored_repeat, .{ 0.6, 0.9 }, .whole },
+        .{ .mirrored_repeat, .{ 1.1, 1.4 }, .whole },
+        .{ .mirrored_repeat, .{ 1.6, 1.9 }, .nothing },
+        .{ .mirrored_repeat, .{ -0.4, -0.1 }, .nothing },
+        .{ .mirrored_repeat, .{ 0.9, 1.1 }, .some },
+        .{ .repeat, .{ std.math.nan(f32), 0.4 }, .some },
+    }) |case| {
+        const u = case[1];
+        const coordinates = [3][2]f32{ .{ u[0], 0.2 }, .{ u[1], 0.3 }, .{ u[0], 0.7 } };
+        const mesh = testMesh(&coordinates);
+        const lookup = testLookup(case[0]);
+        const share = bounds.classify(&lookup, &mesh, .{ 0, 1, 2 }, limits);
+        try testing.expectEqual(case[2], share);
+    }
+}
+
+test "no texel that a lookup mixes is overlooked, and small triangles are told exactly" {
+    var random_state: std.Random.DefaultPrng = .init(23);
+    const random = random_state.random();
+    var alpha: [53 * 37]u8 = undefined;
+    var texels: [4 * alpha.len]u8 = undefined;
+    var counts: std.enums.EnumArray(Share, u32) = .initFill(0);
+    for (0..3000) |round| {
+        const width = random.intRangeAtMost(u32, 1, 53);
+        const height = random.intRangeAtMost(u32, 1, 37);
+        // Mostly one value, at some places another.
+        const usual: u8 = if (round % 2 == 0) 255 else 0;
+        const used = alpha[0 .. width * height];
+        for (used) |*code| code.* = if (random.uintLessThan(u32, 400) == 0) 255 - usual else usual;
+        const level = testTexels(width, height, used, &texels);
+        const bounds: Bounds = try .init(testing.allocator, &level);
+        defer bounds.deinit(testing.allocator);
+        const size: f32 = if (round % 3 == 0) 1 else 0.2;
+        var coordinates: [3][2]f32 = undefined;
+        const middle = [2]f32{ 3 * random.float(f32) - 1, 3 * random.float(f32) - 1 };
+        for (&coordinates) |*at| {
+            for (at, middle) |*value, around| value.* = around + size * random.float(f32);
+        }
+        const mesh = testMesh(&coordinates);
+        const lookup = testLookup(random.enumValue(world.Wrap));
+        const limits: Limits = .{ .whole = 200, .seen = 100 };
+        const share = bounds.classify(&lookup, &mesh, .{ 0, 1, 2 }, limits);
+        counts.getPtr(share).* += 1;
+        if (share == .some) continue;
+        const expected: u8 = if (share == .whole) 255 else 0;
+        for (0..50) |_| {
+            var weights: [3]f32 = undefined;
+            for (&weights) |*weight| weight.* = random.float(f32);
+            const sum = weights[0] + weights[1] + weights[2];
+            var at: [2]f32 = .{ 0, 0 };
+            for (coordinates, weights) |corner, weight| {
+                for (&at, corner) |*to, value| to.* += value * weight / sum;
+            }
+            const x = firstMixed(at[0], width);
+            const y = firstMixed(at[1], height);
+            for ([_]i64{ x, x + 1 }) |column_at| for ([_]i64{ y, y + 1 }) |row_at| {
+                const column = wrapped(column_at, width, lookup.wrap[0]);
+                const row = wrapped(row_at, height, lookup.wrap[1]);
+                try testing.expectEqual(expected, used[row * width + column]);
+            };
+        }
+    }
+    for (std.enums.values(Share)) |share| try testing.expect(counts.get(share) > 300);
+}
+
+fn firstMixed(coordinate: f32, size: u32) i64 {
+    return @intFromFloat(@floor(coordinate * @as(f32, @floatFromInt(size)) - 0.5));
+}
+
+fn wrapped(at: i64, size: u32, wrap: world.Wrap) usize {
+    const length: i64 = size;
+    return @intCast(switch (wrap) {
+        .clamp_to_edge => std.math.clamp(at, 0, length - 1),
+        .repeat => @mod(at, length),
+        .mirrored_repeat => mirrored: {
+            const within = @mod(at, 2 * length);
+            break :mirrored if (within < length) within else 2 * length - 1 - within;
+        },
+    });
+}
+
+test "limits follow from cutoff, factor and vertices" {
+    const mask: scene.Material = .{ .alpha_mode = .mask, .base_color = .{ 1, 1, 1, 0.8 } };
+    const half = Limits.of(&mask, .{ .least = 0.5, .largest = 1 });
+    try testing.expectEqual(Limits{ .whole = 256, .seen = 160 }, half);
+    var blend = mask;
+    blend.alpha_mode = .blend;
+    try testing.expectEqual(Limits{ .whole = 256, .seen = 1 }, Limits.of(&blend, .{}));
+    blend.base_color[3] = 1;
+    try testing.expectEqual(Limits{ .whole = 255, .seen = 1 }, Limits.of(&blend, .{}));
+    var all = mask;
+    all.alpha_cutoff = 0;
+    try testing.expectEqual(Limits{ .whole = 0, .seen = 0 }, Limits.of(&all, .{}));
+}
+
+/// A triangle at nothing, one over the edge, one in the middle of what is whole, of one mesh.
+fn loadAndSplit(gpa: Allocator, file: []const u8) !void {
+    const view: scene.TextureView = .{ .texture = 0 };
+    var from: scene.Scene = .init(gpa);
+    defer from.deinit();
+    const set: [9][2]f32 = .{
+        .{ 0.1, 0.1 }, .{ 0.3, 0.1 }, .{ 0.1, 0.3 }, .{ 0.1, 0.1 }, .{ 0.8, 0.1 },
+        .{ 0.1, 0.3 }, .{ 0.7, 0.7 }, .{ 0.9, 0.7 }, .{ 0.9, 0.9 },
+    };
+    const positions: [9][3]f32 = @splat(.{ 0, 0, 0 });
+    from.images = &.{.{ .name = "a", .bytes = file }};
+    from.textures = &.{.{ .image = 0 }};
+    from.materials = &.{
+        .{}, .{ .base_color_texture = view, .alpha_mode = .mask, .occlusion_texture = view },
+    };
+    from.meshes = &.{ .{
+        .positions = &positions,
+        .texcoords = .{ &set, null, null, null },
+        .triangles = &.{ .{ 6, 7, 8 }, .{ 0, 1, 2 }, .{ 3, 4, 5 } },
+        .material = 1,
+    }, .{
+        .positions = &positions,
+        .triangles = &.{.{ 0, 1, 2 }},
+        .material = 0,
+    } };
+    from.nodes = &.{.{ .parent = scene.none, .local = .identity }};
+    from.instances = &.{ .{ .mesh = 0, .node = 0 }, .{ .mesh = 1, .node = 0 } };
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    var diagnostic: @import("../diagnostic.zig").Diagnostic = .{};
+    var textures = try texture.load(gpa, &from, .{ .pool = &pool }, &diagnostic);
+    defer textures.deinit();
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    defer arena.deinit();
+    const parts = try split(
+        gpa,
+        arena.allocator(),
+        from.materials,
+        from.meshes,
+        from.instances,
+        &textures,
+        &pool,
+    );
+    try testing.expectEqualSlices(u32, &.{ 0, 1, 1 }, parts.sources);
+    try testing.expectEqual(.@"opaque", parts.materials[2].alpha_mode);
+    try testing.expectEqual(3, parts.instances.len);
+    const drawn = [_]u32{ 0, 2, 1 };
+    for (parts.instances, drawn) |instance, mesh| try testing.expectEqual(mesh, instance.mesh);
+    const expected = [_][3]u32{ .{ 3, 4, 5 }, .{ 0, 1, 2 }, .{ 6, 7, 8 } };
+    for (parts.meshes, expected, [_]u32{ 1, 0, 2 }) |mesh, triangle, material| {
+        try testing.expectEqualSlices([3]u32, &.{triangle}, mesh.triangles);
+        try testing.expectEqual(material, mesh.material);
+    }
+    const before = textures.lookupsOf(1);
+    const after = textures.lookupsOf(2);
+    try testing.expectEqual(2, after.len);
+    try testing.expectEqual(3, before[0].channels[3]);
+    try testing.expectEqual(texture.missing, after[0].channels[3]);
+    try testing.expectEqual(before[0].texture, after[0].texture);
+    try testing.expectEqual(before[1], after[1]);
+}
+
+test "a mesh becomes what is seen whole and what is seen in part" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const side = 32;
+    var texels: [4 * side * side]u8 = undefined;
+    for (0..side * side) |texel| {
+        texels[4 * texel ..][0..4].* = .{ 1, 2, 3, if (texel % side < side / 2) 0 else 255 };
+    }
+    const file = try texture.TestImage.png(files.allocator(), side, side, 4, &texels);
+    try testing.checkAllAllocationFailures(testing.allocator, loadAndSplit, .{file});
+}
