@@ -215,21 +215,18 @@ fn ReceiverOf(comptime Lanes: type) type {
         ) Vec3 {
             const point = &vertex.point;
             const bsdf = &vertex.bsdf;
-            const white: Vec3 = .splat(.{ 1, 1, 1 });
             const roughness = point.material.roughness;
-            const diffuse_albedo = bsdf.diffuse.mul(white.sub(bsdf.mirror.reflected));
-            const specular_albedo = bsdf.mirror.reflected;
             const irradiance = environment_file
                 .irradiance(Lanes, environment, point.normal, receiver.lit);
             const diffuse_share =
-                share(receiver.whole_diffuse, receiver.hidden_diffuse, bsdf.diffuse);
-            var sum = diffuse_albedo.mul(irradiance).mul(diffuse_share);
+                share(receiver.whole_diffuse, receiver.hidden_diffuse, bsdf.diffuse_albedo);
+            var sum = bsdf.diffuse_albedo.mul(irradiance).mul(diffuse_share);
             const untraced = receiver.lit.andNot(traced);
             if (untraced.any()) {
                 const lobe = environment_file
                     .radiance(Lanes, environment, receiver.reflected, roughness, .zero(), untraced);
                 const lobe_share = share(receiver.whole_glossy, receiver.hidden_glossy, bsdf.f0);
-                sum = sum.add(specular_albedo.mul(lobe).mul(lobe_share));
+                sum = sum.add(bsdf.specular_albedo.mul(lobe).mul(lobe_share));
             }
             if (is_end) {
                 const through = environment_file.radiance(
