@@ -209,3 +209,28 @@ test "a constant offset, and nothing at all" {
     defer gpa.free(bytes);
     for (bytes) |byte| try std.testing.expectEqual(0, byte);
 }
+
+test "a pattern, by the figures of the authors' own FLIP and of SSIM's definition in f64" {
+    const gpa = std.testing.allocator;
+    const header = "P6 32 24 255\n";
+    var files: [2][header.len + 32 * 24 * 3]u8 = undefined;
+    for (&files, 0..) |*file, other| {
+        file[0..header.len].* = header.*;
+        for (0..24) |y| for (0..32) |x| {
+            const red = x * 8 + y * 3 * other;
+            const blue = x * y * (1 + 6 * other) + 40 * other;
+            const pixel: [3]u8 = .{ @truncate(red), @truncate(y * 10), @truncate(blue) };
+            file[header.len + (y * 32 + x) * 3 ..][0..3].* = pixel;
+        };
+    }
+    var pictures: [2]Picture = undefined;
+    for (&pictures, &files) |*picture, *file| {
+        var reason: @import("diagnostic.zig").Message = .{};
+        picture.* = try .of(gpa, file, 1, &reason);
+    }
+    defer for (&pictures) |*picture| picture.deinit(gpa);
+    var comparison: Comparison = try .of(gpa, &pictures[0], &pictures[1]);
+    defer comparison.deinit(gpa);
+    try std.testing.expectApproxEqAbs(0.51309, comparison.metrics.flip, 2e-5);
+    try std.testing.expectApproxEqAbs(0.785597, comparison.metrics.ssim, 2e-6);
+}

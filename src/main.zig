@@ -170,12 +170,13 @@ fn printBench(
 /// Compares two images, prints how far they are apart, and says which thresholds they pass.
 fn compare(gpa: Allocator, io: Io, options: *const cli.Compare, diagnostic: *Diagnostic) ExitCode {
     var account: Account = .init(gpa, null);
+    const allocator = account.allocator();
     var pictures: [2]raylane.compare.Picture = undefined;
     var count: usize = 0;
-    defer for (pictures[0..count]) |*picture| picture.deinit(account.allocator());
+    defer for (pictures[0..count]) |*picture| picture.deinit(allocator);
     for (&pictures, options.images) |*picture, name| {
         const ev = options.exposure_ev;
-        picture.* = raylane.compare.read(account.allocator(), io, name, ev, diagnostic) catch |err| {
+        picture.* = raylane.compare.read(allocator, io, name, ev, diagnostic) catch |err| {
             if (err == error.OutOfMemory) account.explain(&diagnostic.message);
             say(io, "raylane: {f}: {s}\n", .{ printable(name), diagnostic.message.text() });
             return exitCodeOf(err);
@@ -191,7 +192,7 @@ fn compare(gpa: Allocator, io: Io, options: *const cli.Compare, diagnostic: *Dia
         });
         return .invalid;
     }
-    return printComparison(account.allocator(), io, options, .{ first, second }, diagnostic) catch
+    return printComparison(allocator, io, options, .{ first, second }, diagnostic) catch
         outOfMemory(io);
 }
 

@@ -84,7 +84,12 @@ pub fn Filter(comptime Value: type) type {
             for (0..filter.height) |y| filter.filterColumns(along_columns, target, y);
         }
 
-        fn filterRow(filter: *const Self, kernel: *const Kernel, source: []const Value, y: usize) void {
+        fn filterRow(
+            filter: *const Self,
+            kernel: *const Kernel,
+            source: []const Value,
+            y: usize,
+        ) void {
             const width = filter.width;
             const radius = kernel.radius;
             const row = source[y * width ..][0..width];
@@ -100,7 +105,12 @@ pub fn Filter(comptime Value: type) type {
             }
         }
 
-        fn filterColumns(filter: *const Self, kernel: *const Kernel, plane: []Value, y: usize) void {
+        fn filterColumns(
+            filter: *const Self,
+            kernel: *const Kernel,
+            plane: []Value,
+            y: usize,
+        ) void {
             const width = filter.width;
             const target = plane[y * width ..][0..width];
             @memset(target, 0);

@@ -49,7 +49,8 @@ pub fn mean(gpa: Allocator, first: *const Picture, second: *const Picture) error
 
 fn lumaAt(picture: *const Picture, index: usize) f64 {
     var luma: f64 = 0;
-    for (picture.encoded, [3]f64{ 0.2126, 0.7152, 0.0722 }) |plane, weight| luma += weight * plane[index];
+    const weights = [3]f64{ 0.2126, 0.7152, 0.0722 };
+    for (picture.encoded, weights) |plane, weight| luma += weight * plane[index];
     return luma;
 }
 
