@@ -21,7 +21,7 @@ pub const Compare = struct {
     /// Null: text, but nothing where the picture goes to standard output.
     stats: ?cli.Stats = null,
     /// Worst values that count as the same.
-    thresholds: std.EnumArray(Metric, ?f64) = .initFill(null),
+    thresholds: std.EnumArray(Metric, ?f32) = .initFill(null),
 };
 
 const sections: []const Section = &.{
