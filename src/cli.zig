@@ -6,6 +6,7 @@
 
 const std = @import("std");
 const bench = @import("cli/bench.zig");
+const compare = @import("cli/compare.zig");
 const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
@@ -32,12 +33,18 @@ pub const Command = union(enum) {
     render: Options,
     bench: Bench,
     bench_help,
+    compare: Compare,
+    compare_help,
 };
 
 /// What `raylane bench` is to do.
 pub const Bench = bench.Bench;
 /// What `raylane bench --help` prints.
 pub const bench_help = bench.help;
+/// What `raylane compare` is to do.
+pub const Compare = compare.Compare;
+/// What `raylane compare --help` prints.
+pub const compare_help = compare.help;
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -255,6 +262,7 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\
     \\usage: raylane [render] SCENE [options]
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
+    \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
     \\
     \\SCENE is a glTF 2.0 file (.gltf, .glb), a PBRT scene (.pbrt) or builtin:NAME,
     \\NAME being cornell, atrium, nave or handles. The image is written to the
@@ -279,13 +287,15 @@ pub fn parse(
 ) Error!Command {
     assert(variant_names.len >= 1);
     const is_bench = arguments.len > 0 and std.mem.eql(u8, arguments[0], "bench");
+    const is_compare = arguments.len > 0 and std.mem.eql(u8, arguments[0], "compare");
     // Help wins over everything, for it is what somebody asks for who got the rest wrong.
     for (arguments) |argument| {
         if (std.mem.eql(u8, argument, "--")) break;
         if (std.mem.eql(u8, argument, "-h") or std.mem.eql(u8, argument, "--help"))
-            return if (is_bench) .bench_help else .help;
+            return if (is_bench) .bench_help else if (is_compare) .compare_help else .help;
     }
     if (is_bench) return .{ .bench = try bench.parse(arguments[1..], diagnostic) };
+    if (is_compare) return .{ .compare = try compare.parse(arguments[1..], diagnostic) };
     var parser: Parser = .{
         .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
         .variant_names = variant_names,
@@ -522,7 +532,7 @@ fn bytesOf(text: []const u8) ?u64 {
 }
 
 /// A finite decimal number; a denormal one is zero, as everywhere in the renderer.
-fn number(text: []const u8) ?f32 {
+pub fn numberOf(text: []const u8) ?f32 {
     for (text) |byte| switch (byte) {
         '0'...'9', '+', '-', '.', 'e', 'E' => {},
         else => return null, // The parser knows "nan", "inf", "0x" and "_" besides.
@@ -533,7 +543,7 @@ fn number(text: []const u8) ?f32 {
 }
 
 fn radiance(text: []const u8) ?f32 {
-    const value = number(text) orelse return null;
+    const value = numberOf(text) orelse return null;
     return if (value >= 0) value else null;
 }
 
@@ -550,7 +560,7 @@ pub fn resolutionOf(text: []const u8) ?[2]u32 {
 fn vectorOf(text: []const u8) ?[3]f32 {
     var vector: [3]f32 = undefined;
     var parts = std.mem.splitScalar(u8, text, ',');
-    for (&vector) |*component| component.* = number(parts.next() orelse return null) orelse
+    for (&vector) |*component| component.* = numberOf(parts.next() orelse return null) orelse
         return null;
     return if (parts.next() == null) vector else null;
 }
@@ -565,22 +575,22 @@ fn directionOf(text: []const u8) ?[3]f32 {
 fn orbitOf(text: []const u8) ?settings.Orbit {
     var parts = std.mem.splitScalar(u8, text, ',');
     var orbit: settings.Orbit = .{
-        .theta_degrees = number(parts.next().?) orelse return null,
-        .phi_degrees = number(parts.next() orelse return null) orelse return null,
+        .theta_degrees = numberOf(parts.next().?) orelse return null,
+        .phi_degrees = numberOf(parts.next() orelse return null) orelse return null,
     };
     if (!(orbit.phi_degrees >= 0 and orbit.phi_degrees <= 180)) return null;
     const radius = parts.next() orelse return orbit;
     if (parts.next() != null) return null;
     if (std.mem.cutSuffix(u8, radius, "%")) |percent| {
-        orbit.radius = .{ .share = (number(percent) orelse return null) / 100 };
-    } else orbit.radius = .{ .metres = number(radius) orelse return null };
+        orbit.radius = .{ .share = (numberOf(percent) orelse return null) / 100 };
+    } else orbit.radius = .{ .metres = numberOf(radius) orelse return null };
     return switch (orbit.radius) {
         inline else => |value| if (value > 0) orbit else null,
     };
 }
 
 fn fovOf(text: []const u8) ?f32 {
-    const degrees = number(text) orelse return null;
+    const degrees = numberOf(text) orelse return null;
     const range = settings.fov_degrees;
     return if (degrees >= range.min and degrees <= range.max) degrees else null;
 }
@@ -627,13 +637,13 @@ fn environmentOf(text: []const u8) ?settings.Environment.Source {
 }
 
 fn rotationOf(text: []const u8) ?f32 {
-    const value = number(text) orelse return null;
+    const value = numberOf(text) orelse return null;
     return if (@abs(value) <= 3600) value else null;
 }
 
 fn exposureOf(text: []const u8) ?settings.Exposure {
     if (std.mem.eql(u8, text, "auto")) return .auto;
-    const ev = number(text) orelse return null;
+    const ev = numberOf(text) orelse return null;
     return if (@abs(ev) <= settings.exposure_ev_max) .{ .ev = ev } else null;
 }
 
@@ -974,6 +984,7 @@ test "the help fits a screen and says what flags take and may be" {
 
 test {
     _ = bench;
+    _ = compare;
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");

@@ -60,6 +60,8 @@ pub const exposure_ev_max = 64;
 pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4 };
 /// Largest that automatic exposure chooses.
 pub const exposure_auto_ev_max = 10;
+/// Measures of how far two pictures are from each other.
+pub const Metric = enum { max, rmse, psnr, ssim, flip };
 /// Radiance from everywhere in scenes without lights.
 pub const ambient_default: f32 = 0.35;
 
