@@ -99,6 +99,66 @@ test "threads, tiles and samples: the hash depends on the samples alone" {
     }
 }
 
+test "samples beyond the edges of small pictures are the same by every variant" {
+    var scene = try parse("builtin:handles");
+    defer scene.deinit();
+    for ([_][2]u32{ .{ 1, 1 }, .{ 5, 1 }, .{ 2, 19 } }) |size| for ([_]u32{ 4, 8, 25 }) |count| {
+        const options: fixture.Options = .{
+            .width = size[0],
+            .height = size[1],
+            .sample_count = count,
+        };
+        var first = try fixture.render(&scene, options);
+        defer first.deinit(gpa);
+        try expectAllVariants(&scene, options, first.hash());
+    };
+}
+
+test "colours of the display are the same by every variant, and apart from radiance" {
+    var builder: fixture.Builder = try .init();
+    var veil = fixture.flat(.{ 0.2, 0.4, 0.8 });
+    veil.alpha_mode = .blend;
+    veil.base_color[3] = 0.25;
+    var mirror = fixture.matte(.{ 1, 1, 1 });
+    mirror.metallic = 1;
+    mirror.roughness = 0;
+    try builder.addQuad(mirror, .{ -1, 0, -3 }, .{ 1, 0, 0 }, .{ 0, 2, 0 });
+    try builder.addQuad(fixture.flat(.{ 1, 0.5, 0 }), .{ 1, 0, -3 }, .{ 1, 0, 0 }, .{ 0, 2, 0 });
+    try builder.addQuad(fixture.flat(.{ 1, 1, 1 }), .{ 0, 0, 3 }, .{ 9, 0, 0 }, .{ 0, 9, 0 });
+    try builder.addQuad(veil, .{ 0, 0, -2 }, .{ 0.3, 0, 0 }, .{ 0, 0.3, 0 });
+    try builder.addCamera(.{ 0, 0, 0 }, 0.5);
+    var scene = try builder.finish();
+    defer scene.deinit();
+    const options: fixture.Options = .{
+        .width = 21,
+        .height = 14,
+        .transparent = true,
+        .display_referred = true,
+    };
+    var diagnostic: raylane.diagnostic.Diagnostic = .{};
+    var first: ?u64 = null;
+    for (raylane.variant.compiled, 0..) |variant, index| {
+        var session: raylane.session.Session = .init(gpa, std.testing.io, 1, &diagnostic);
+        defer session.deinit();
+        try fixture.view(&session, &scene, variant.lanes, options);
+        try session.render(.{ .variant = index, .sample_count = 4 });
+        const film = &session.film.?;
+        try std.testing.expectEqual(first orelse film.hash(), film.hash());
+        first = film.hash();
+        // What is painted is apart; in the mirror it is radiance.
+        const painted = film.display.?.at(17, 2).*;
+        try std.testing.expectEqual([4]f32{ 1, 0.5, 0, 1 }, painted);
+        try std.testing.expectEqual([4]f32{ 0, 0, 0, 1 }, film.image.at(17, 2).*);
+        try std.testing.expectEqual([4]f32{ 0, 0, 0, 0 }, film.display.?.at(3, 2).*);
+        try std.testing.expect(film.image.at(3, 2)[1] > 0.5);
+        // The veil is before both: a quarter of it, and of what is behind the rest.
+        const veiled = film.display.?.at(11, 7).*;
+        try std.testing.expectEqual([4]f32{ 0.8, 0.475, 0.2, 1 }, veiled);
+        const before_mirror = film.display.?.at(9, 7).*;
+        try std.testing.expectEqual([4]f32{ 0.05, 0.1, 0.2, 0.25 }, before_mirror);
+    }
+}
+
 test "the quality of the tree changes nothing in the picture, by any variant" {
     for ([_][]const u8{ "builtin:cornell", "builtin:handles" }) |name| {
         var scene = try parse(name);

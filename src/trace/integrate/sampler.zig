@@ -2,7 +2,7 @@
 //! are.
 //!
 //! In: the number of samples. Out: the place of each, the same for every pixel, variant and
-//! integrator. Points of low discrepancy are spread as the reconstruction filter weighs: a sample
+//! integrator. Points in a lattice are spread as the reconstruction filter weighs: a sample
 //! then counts in full in its own pixel and in no other, though it may lie beyond the pixel's edge.
 //! The filter is the 4-term window of Blackman and Harris (Harris 1978), which is nowhere negative.
 
@@ -11,7 +11,7 @@ const elementary = @import("../../math.zig").elementary;
 const assert = std.debug.assert;
 
 /// Half the filter's width, in pixels.
-pub const filter_radius = 1.5;
+const filter_radius = 1.5;
 
 /// A sample's place, in pixels from the upper left corner of its pixel.
 pub const Offset = struct { x: f32, y: f32 };
@@ -23,35 +23,42 @@ pub fn place(offsets: []Offset) void {
         offsets[0] = .{ .x = 0.5, .y = 0.5 };
         return;
     }
-    const count: f64 = @floatFromInt(offsets.len);
-    for (offsets, 0..) |*offset, number| {
-        const index: f64 = @floatFromInt(number);
-        offset.* = .{
-            .x = @floatCast(0.5 + warp((index + 0.5) / count)),
-            .y = @floatCast(0.5 + warp(rowOf(number, offsets.len))),
-        };
-    }
+    const step = stepOf(offsets.len);
+    for (offsets, 0..) |*offset, column| offset.* = .{
+        .x = strataPlace(column, offsets.len),
+        .y = strataPlace(rowOf(column, offsets.len, step), offsets.len),
+    };
 }
 
-/// Rows of 4 and 8 points in the order of their columns. Each way of cutting the square into as
-/// many equal boxes with sides of powers of 2 has one in each; they are their own image in the
-/// middle, and edges in any direction come out the nearest to the filter's own.
-const rows_of_4 = [4]f64{ 2, 0, 3, 1 };
-const rows_of_8 = [8]f64{ 2, 7, 4, 1, 6, 3, 0, 5 };
+/// Where the middle of one of so many equal shares of the filter is.
+fn strataPlace(stratum: usize, count: usize) f32 {
+    const middle = @as(f64, @floatFromInt(stratum)) + 0.5;
+    return @floatCast(0.5 + warp(middle / @as(f64, @floatFromInt(count))));
+}
 
-/// The second coordinate of a point of so many, 0..1; the first is in equal strata.
-fn rowOf(number: usize, count: usize) f64 {
-    switch (count) {
-        inline 4, 8 => |few| {
-            const rows = if (few == 4) rows_of_4 else rows_of_8;
-            return (rows[number] + 0.5) / few;
-        },
-        else => {
-            // Kronecker's sequence of the golden ratio.
-            const turns = @as(f64, @floatFromInt(number)) * 0.6180339887498949 + 0.5;
-            return turns - @floor(turns);
-        },
+/// Rows of 4 points, the rotated grid: of all orders the nearest to the filter's own on edges in
+/// any direction.
+const rows_of_4 = [4]usize{ 2, 0, 3, 1 };
+
+/// The row of the point in a column: each has one. Other numbers than 4 make a lattice of rank 1,
+/// shifted so that it is its own image in the middle.
+fn rowOf(column: usize, count: usize, step: usize) usize {
+    if (count == 4) return rows_of_4[column];
+    const turned = if (step % 2 == 1) step - 1 else step - 1 + count;
+    return (column * step + turned / 2) % count;
+}
+
+/// The step of a lattice: without a common divisor with its points' number, the nearest to the
+/// golden section of it.
+fn stepOf(count: usize) usize {
+    const golden = @as(f64, @floatFromInt(count)) * 0.6180339887498949;
+    var best: usize = 1;
+    for (1..count) |step| {
+        if (std.math.gcd(step, count) != 1) continue;
+        const distance = @abs(@as(f64, @floatFromInt(step)) - golden);
+        if (distance < @abs(@as(f64, @floatFromInt(best)) - golden)) best = step;
     }
+    return best;
 }
 
 /// Coefficients of the window, so that its integral over the width is 1.
@@ -79,34 +86,38 @@ fn warp(fraction: f64) f64 {
     return filter_radius * (low + high) / 2;
 }
 
-test "one sample is in the middle, few are their own image in it" {
+test "one sample is in the middle, more are their own image in it and fill rows and columns" {
     var one: [1]Offset = undefined;
     place(&one);
     try std.testing.expectEqual(Offset{ .x = 0.5, .y = 0.5 }, one[0]);
-    inline for (.{ 4, 8 }) |count| {
-        var offsets: [count]Offset = undefined;
-        place(&offsets);
-        for (offsets, 0..) |offset, number| {
-            const other = offsets[count - 1 - number];
+    for (2..100) |count| {
+        var all: [100]Offset = undefined;
+        const offsets = all[0..count];
+        place(offsets);
+        var filled: [100]bool = @splat(false);
+        const step = stepOf(count);
+        for (offsets, 0..) |offset, column| {
+            filled[rowOf(column, count, step)] = true;
+            const other = offsets[count - 1 - column];
             try std.testing.expectApproxEqAbs(1, offset.x + other.x, 1e-6);
             try std.testing.expectApproxEqAbs(1, offset.y + other.y, 1e-6);
+            if (column > 0) try std.testing.expect(offset.x > offsets[column - 1].x);
         }
+        for (filled[0..count]) |is_filled| try std.testing.expect(is_filled);
     }
 }
 
-test "few points fill every box of each way to cut the square" {
-    inline for (.{ 4, 8 }) |count| {
-        for (0..std.math.log2_int(usize, count) + 1) |cuts| {
-            const columns = @as(usize, 1) << @intCast(cuts);
+test "4 and 8 points fill every box of each way to cut the square" {
+    for ([_]usize{ 4, 8 }) |count| {
+        var columns: usize = 1;
+        while (columns <= count) : (columns *= 2) {
             const rows = count / columns;
-            var filled: [count]bool = @splat(false);
-            for (0..count) |number| {
-                const column = number * columns / count;
-                const box: usize = @intFromFloat(rowOf(number, count) * count);
-                const row = box * rows / count;
-                filled[column * rows + row] = true;
+            var filled: [8]bool = @splat(false);
+            for (0..count) |column| {
+                const row = rowOf(column, count, stepOf(count));
+                filled[column * columns / count * rows + row * rows / count] = true;
             }
-            for (filled) |is_filled| try std.testing.expect(is_filled);
+            for (filled[0..count]) |is_filled| try std.testing.expect(is_filled);
         }
     }
 }

@@ -1,9 +1,10 @@
 //! Directional albedo of GGX (the split sum of Karis 2013) as rational functions of the cosine.
 //!
 //! In: roughness, then cosines, in lanes. Out: how much of uniform white light a surface of
-//! microfacets sends to a view after one reflection, for any reflectance f0 at normal incidence:
+//! microfacets sends to a view after one reflection, for any reflectance f0 at normal incidence and
+//! f90 at grazing incidence:
 //!
-//!     E(cosine, alpha) * (f0 + (1 - f0) * (1 - m(cosine, alpha))^5)
+//!     E(cosine, alpha) * (f0 + (f90 - f0) * (1 - m(cosine, alpha))^5)
 //!
 //! E is the share that leaves where nothing is absorbed, m the cosine for which Schlick's weight is
 //! its mean over the lobe. Both are polynomials of the cosine over each other, whose coefficients
@@ -113,10 +114,13 @@ pub fn Directional(comptime Lanes: type) type {
         schlick: Lanes.F32,
 
         /// Albedo after one reflection.
-        pub inline fn single(directional: *const @This(), f0: Lanes.F32) Lanes.F32 {
-            const one: Lanes.F32 = .splat(1);
-            const mean = f0.add(one.sub(f0).mul(directional.schlick));
-            return mean.mul(one.sub(directional.missing));
+        pub inline fn single(
+            directional: *const @This(),
+            f0: Lanes.F32,
+            f90: Lanes.F32,
+        ) Lanes.F32 {
+            const mean = f0.add(f90.sub(f0).mul(directional.schlick));
+            return mean.mul(Lanes.F32.splat(1).sub(directional.missing));
         }
     };
 }
@@ -129,7 +133,7 @@ fn expectAlbedo(cosine: f32, roughness: f32) !void {
     const exact = integrate(cosine, roughness * roughness);
     for ([_]f32{ 0.04, 0.2, 0.6, 1 }) |f0| {
         const wanted = f0 * (exact[0] - exact[1]) + exact[1];
-        const found = directional.single(.splat(f0)).lane(0);
+        const found = directional.single(.splat(f0), .splat(1)).lane(0);
         errdefer std.debug.print("cosine {d}, roughness {d}, f0 {d}\n", .{ cosine, roughness, f0 });
         try std.testing.expectApproxEqRel(wanted, found, 0.01);
     }

@@ -20,6 +20,11 @@ const Interaction = @import("interaction.zig").Interaction;
 /// pixel grid can show. Albedos and mirror images have the true roughness.
 pub const highlight_roughness_least = 0.05;
 
+/// At grazing angles a boundary reflects all light (f90 = 1), unless it reflects less than 2 % of it
+/// at normal incidence, as no material does: down to an index of 1, which is no boundary, f90 falls
+/// to 0 (Lagarde and de Rousiers 2014, "Moving Frostbite to Physically Based Rendering").
+const f90_per_f0 = 50;
+
 /// Up to this roughness reflections are traced; rougher surfaces see the ambient term instead.
 pub const mirror_roughness_max = 0.25;
 
@@ -36,6 +41,8 @@ pub fn Bsdf(comptime Lanes: type) type {
         diffuse_albedo: Vec3,
         /// Reflectance at normal incidence.
         f0: Vec3,
+        /// Reflectance at grazing incidence.
+        f90: F32,
         /// GGX's alpha, for highlights.
         alpha: F32,
         /// Cosine between normal and view, > 0.
@@ -64,17 +71,19 @@ pub fn Bsdf(comptime Lanes: type) type {
             const dielectric = one.sub(material.metallic);
             const base = material.base_color.min(white);
             const base_f0 = material.dielectric_f0;
+            const base_f90 = grazingOf(base_f0);
             const f0 = splat3(Lanes, base_f0.mul(dielectric)).add(base.scale(material.metallic));
+            const f90 = base_f90.mul(dielectric).add(material.metallic);
             const cos_view = point.normal.dot(point.view).max(.splat(1e-4)).min(one);
             const boundary: Boundary(Lanes) = .of(point, cos_view);
             const roughness = material.roughness;
             const albedo: albedo_file.Albedo(Lanes) = .of(roughness.mul(roughness));
             const directional = albedo.at(boundary.cos_fresnel);
-            const scatter = multipleOf(&albedo, f0);
-            const specular = f0.add(white.sub(f0).scale(directional.schlick))
+            const scatter = multipleOf(&albedo, f0, f90);
+            const specular = schlickOf(f0, f90, directional.schlick)
                 .scale(one.sub(directional.missing)).add(scatter.scale(directional.missing));
-            const scatter_base = multipleOf(&albedo, splat3(Lanes, base_f0)).x;
-            const below = one.sub(directional.single(base_f0))
+            const scatter_base = multipleOf(&albedo, splat3(Lanes, base_f0), base_f90).x;
+            const below = one.sub(directional.single(base_f0, base_f90))
                 .sub(scatter_base.mul(directional.missing)).max(.zero());
             const open = F32.select(boundary.total, .zero(), below.mul(dielectric));
             const passing = open.mul(material.transmission);
@@ -85,6 +94,7 @@ pub fn Bsdf(comptime Lanes: type) type {
                 .specular_albedo = .select(boundary.total, white, specular),
                 .diffuse_albedo = diffuse_albedo,
                 .f0 = f0,
+                .f90 = f90,
                 .alpha = alpha,
                 .cos_view = cos_view,
                 .smith_view = microfacet.smith(Lanes, cos_view, alpha.mul(alpha)),
@@ -92,7 +102,7 @@ pub fn Bsdf(comptime Lanes: type) type {
                 .multiple = scatter
                     .scale(directional.missing.div(albedo.missing_mean).mul(inverse_pi)),
                 .diffuse = diffuse_albedo
-                    .scale(inverse_pi.div(belowMean(&albedo, base_f0, scatter_base))),
+                    .scale(inverse_pi.div(belowMean(&albedo, base_f0, base_f90, scatter_base))),
                 .multiple_base = scatter_base,
                 .mirror = .{
                     .reflected = .select(boundary.total, white, specular),
@@ -131,11 +141,11 @@ pub fn Bsdf(comptime Lanes: type) type {
             const visibility = F32.splat(0.5).div(view_term.add(light_term).max(.splat(1e-12)));
             const density = microfacet.distribution(Lanes, cos_half, a).mul(visibility);
             const schlick = microfacet.power5(Lanes, one.sub(cos_view_half));
-            const white: Vec3 = .splat(.{ 1, 1, 1 });
-            const single = bsdf.f0.add(white.sub(bsdf.f0).scale(schlick)).scale(density);
+            const single = schlickOf(bsdf.f0, bsdf.f90, schlick).scale(density);
             const way_in = bsdf.albedo.at(cos_light);
             const multiple = bsdf.multiple.scale(way_in.missing);
-            const below = one.sub(way_in.single(point.material.dielectric_f0))
+            const base_f0 = point.material.dielectric_f0;
+            const below = one.sub(way_in.single(base_f0, grazingOf(base_f0)))
                 .sub(bsdf.multiple_base.mul(way_in.missing)).max(.zero());
             return .{
                 .diffuse = bsdf.diffuse.scale(below.mul(cos_light)),
@@ -191,12 +201,25 @@ pub fn Bsdf(comptime Lanes: type) type {
             return specular.div(specular.add(bsdf.diffuse_albedo.dot(ones)).max(.splat(1e-12)));
         }
 
+        /// Reflectance for Schlick's weight (1 - cosine)^5.
+        inline fn schlickOf(f0: Vec3, f90: F32, weight: F32) Vec3 {
+            return f0.add(splat3(Lanes, f90).sub(f0).scale(weight));
+        }
+
+        inline fn grazingOf(f0: F32) F32 {
+            return f0.mul(.splat(f90_per_f0)).min(.splat(1));
+        }
+
         /// Light that microfacets send on more than once, as a share of what has not left after the
         /// first time (Kulla and Conty 2017, with the loss at each of the reflections).
-        inline fn multipleOf(albedo: *const albedo_file.Albedo(Lanes), f0: Vec3) Vec3 {
+        inline fn multipleOf(
+            albedo: *const albedo_file.Albedo(Lanes),
+            f0: Vec3,
+            f90: F32,
+        ) Vec3 {
             const white: Vec3 = .splat(.{ 1, 1, 1 });
             // The mean of Schlick's approximation over the hemisphere.
-            const mean = f0.add(white.sub(f0).scale(.splat(1.0 / 21.0)));
+            const mean = schlickOf(f0, f90, .splat(1.0 / 21.0));
             const lost = white.sub(mean.scale(albedo.missing_mean));
             const leaving = F32.splat(1).sub(albedo.missing_mean);
             return .{
@@ -211,10 +234,11 @@ pub fn Bsdf(comptime Lanes: type) type {
         inline fn belowMean(
             albedo: *const albedo_file.Albedo(Lanes),
             f0: F32,
+            f90: F32,
             scatter: F32,
         ) F32 {
             const one: F32 = .splat(1);
-            const mean = f0.add(one.sub(f0).mul(albedo.schlick_mean));
+            const mean = f0.add(f90.sub(f0).mul(albedo.schlick_mean));
             const single = mean.mul(one.sub(albedo.missing_mean));
             return one.sub(single).sub(scatter.mul(albedo.missing_mean)).max(.splat(1e-3));
         }
@@ -563,6 +587,19 @@ test "no energy is made: reflected, transmitted and diffuse shares sum to 1 at m
                 }
             }
         };
+    };
+}
+
+test "an index of 1 is no boundary: all light is the base's" {
+    for (roughnesses) |roughness| for (cosines) |cosine| {
+        var point = testPoint(viewAt(cosine).lane(0));
+        setRough(&point, 0, roughness);
+        point.material.dielectric_f0 = .splat(0);
+        const bsdf: Bsdf(Single) = .of(&point);
+        try std.testing.expectEqual(0, bsdf.specular_albedo.x.lane(0));
+        try std.testing.expectEqual(1, bsdf.diffuse_albedo.x.lane(0));
+        const response = bsdf.eval(&point, .splat(.{ 0, 0.8, 0.6 })).x.lane(0);
+        try std.testing.expectApproxEqRel(0.8 / std.math.pi, response, 1e-6);
     };
 }
 
