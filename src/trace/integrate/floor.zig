@@ -121,11 +121,11 @@ fn Floor(comptime Kernel: type) type {
             var bundle: bundle_file.Bundle(Kernel) = undefined;
             var active: [Kernel.group_count]Rays.Mask = undefined;
             var count: u64 = 0;
-            for (&bundle.groups, &active, floor.points, floor.weights) |*ray, *lit, *point, weight| {
+            for (&bundle.groups, &active, floor.points, 0..) |*ray, *lit, *point, group| {
                 lit.* = .splat(false);
                 ray.active = lit.*;
                 if (point.seen.none()) continue;
-                lit.* = point.seen.bitAnd(weight.gt(.zero()));
+                lit.* = point.seen.bitAnd(floor.weights[group].gt(.zero()));
                 const none: Rays.I32 = .splat(ray_file.no_primitive);
                 const position = point.point.position;
                 ray.* = visibility_file.shadowRay(Rays, light, position, none, lit.*);
