@@ -169,6 +169,10 @@ const sections: []const Section = &.{
                 }),
         },
         .{
+            .usage = "--floor WHAT",
+            .help = "shadow: what is seen of a floor is the shadow on it;\nor none (default)",
+        },
+        .{
             .usage = "--ambient L",
             .help = comptimePrint("radiance from all sides (default: {d} for scenes\n" ++
                 "without lights, otherwise 0)", .{settings.ambient_default}),
@@ -375,6 +379,7 @@ const Parser = struct {
             .background => options.view.background = backgroundOf(given.value) orelse
                 return reader.bad(given, "env, studio, transparent, a colour or R,G,B"),
             .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
+            .floor => options.view.floor = try reader.choice(given, settings.Floor),
             .ambient => options.view.ambient = radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
             .exposure => options.write.exposure = exposureOf(given.value) orelse

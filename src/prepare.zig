@@ -77,6 +77,7 @@ pub const ViewSettings = struct {
     /// Linear RGB.
     background: ?math.Vec3 = null,
     environment: light.EnvironmentSettings = .{},
+    floor: choices.Floor = .none,
 };
 
 /// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
@@ -299,6 +300,7 @@ noinline fn chooseView(
         settings.background orelse from.background,
     );
     light.addMap(&seen.environment, &settings.environment, &seen.view.camera);
+    if (settings.floor == .shadow) seen.environment.floor_height = light.floorOf(&seen.geometry);
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
     seen.facts.environment_is_default = settings.environment.is_default;

@@ -171,6 +171,13 @@ pub const Background = union(enum) {
     linear: [3]f32,
 };
 
+/// What the scene stands on.
+pub const Floor = enum {
+    none,
+    /// A plane below all that there is, of which nothing is seen but the shadow on it.
+    shadow,
+};
+
 /// Light from all around.
 pub const Environment = struct {
     source: Source = .default,
@@ -261,6 +268,7 @@ pub const View = struct {
     /// Radiance from everywhere, finite and >= 0; null: as the lights have it.
     ambient: ?f32 = null,
     environment: Environment = .{},
+    floor: Floor = .none,
     background: Background = .default,
     /// Colours of unlit surfaces and of the background are the display's, neither exposed nor tone
     /// mapped; without it, as in the thesis, they are radiance, and the background's default comes
