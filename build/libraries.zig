@@ -45,8 +45,10 @@ pub const Library = struct {
     shims: []const []const u8 = &.{},
     /// One in C++ that includes the library's own files.
     cpp_shim: ?[]const u8 = null,
-    /// A folder below that one, from where its own files include each other.
-    include: ?[]const u8 = null,
+    /// Folders below that one from where its own files are included.
+    includes: []const []const u8 = &.{},
+    /// A folder of ours with headers that it would otherwise have from elsewhere.
+    own_headers: ?[]const u8 = null,
     /// Definitions, and what else a library needs the compiler to be told.
     flags: []const []const u8 = &.{},
 
@@ -57,7 +59,8 @@ pub const Library = struct {
             &.{ "-std=c11", "-ffp-contract=off", "-fno-sanitize=undefined" }, library.flags,
         }) catch @panic("OOM");
         module.addIncludePath(headers);
-        if (library.include) |folder| module.addIncludePath(headers.path(b, folder));
+        for (library.includes) |folder| module.addIncludePath(headers.path(b, folder));
+        if (library.own_headers) |folder| module.addIncludePath(b.path(folder));
         module.addCSourceFiles(.{
             .root = headers,
             .files = library.files,
@@ -89,6 +92,7 @@ pub const Library = struct {
             root.addIncludePath(LazyPath.zig_lib.path(b, folder));
         }
         root.addIncludePath(headers);
+        if (library.own_headers) |folder| root.addIncludePath(b.path(folder));
         const flags = std.mem.concat(b.allocator, []const u8, &.{
             cpp_flags, library.flags,
         }) catch @panic("OOM");
@@ -101,15 +105,23 @@ pub const Library = struct {
 pub const basisu: Library = .{
     .name = "basisu",
     .cpp_shim = "src/decode/basisu.cpp",
+    .own_headers = "src/decode/basisu",
     .flags = &.{
-        "-Isrc/decode/basisu",            "-fno-strict-aliasing",
-        "-DBASISD_SUPPORT_KTX2=0",        "-DBASISD_SUPPORT_KTX2_ZSTD=0",
-        "-DBASISD_SUPPORT_DXT1=0",        "-DBASISD_SUPPORT_DXT5A=0",
-        "-DBASISD_SUPPORT_BC7=0",         "-DBASISD_SUPPORT_BC7_MODE5=0",
-        "-DBASISD_SUPPORT_PVRTC1=0",      "-DBASISD_SUPPORT_PVRTC2=0",
-        "-DBASISD_SUPPORT_ETC2_EAC_A8=0", "-DBASISD_SUPPORT_ETC2_EAC_RG11=0",
-        "-DBASISD_SUPPORT_ASTC=0",        "-DBASISD_SUPPORT_XUASTC=0",
-        "-DBASISD_SUPPORT_ATC=0",         "-DBASISD_SUPPORT_FXT1=0",
+        "-fno-strict-aliasing",
+        "-DBASISD_SUPPORT_KTX2=0",
+        "-DBASISD_SUPPORT_KTX2_ZSTD=0",
+        "-DBASISD_SUPPORT_DXT1=0",
+        "-DBASISD_SUPPORT_DXT5A=0",
+        "-DBASISD_SUPPORT_BC7=0",
+        "-DBASISD_SUPPORT_BC7_MODE5=0",
+        "-DBASISD_SUPPORT_PVRTC1=0",
+        "-DBASISD_SUPPORT_PVRTC2=0",
+        "-DBASISD_SUPPORT_ETC2_EAC_A8=0",
+        "-DBASISD_SUPPORT_ETC2_EAC_RG11=0",
+        "-DBASISD_SUPPORT_ASTC=0",
+        "-DBASISD_SUPPORT_XUASTC=0",
+        "-DBASISD_SUPPORT_ATC=0",
+        "-DBASISD_SUPPORT_FXT1=0",
         "-DBASISD_SUPPORT_UASTC_HDR=0",
     },
 };
@@ -163,7 +175,7 @@ pub const libwebp: Library = .{
         "libwebp/src/utils/utils.c",
     },
     .shims = &.{"src/decode/webp.c"},
-    .include = "libwebp",
+    .includes = &.{"libwebp"},
     .flags = &.{
         "-DWEBP_USE_THREAD",       "-U__SSE2__",              "-U__SSE4_1__",
         "-U__AVX2__",              "-U__ARM_NEON__",          "-U__aarch64__",
@@ -175,6 +187,51 @@ pub const mikktspace: Library = .{
     .name = "mikktspace",
     .shims = &.{"src/prepare/mikktspace.c"},
     .flags = &.{"-fno-math-errno"},
+};
+
+/// Scan lines, and the compressions that lose nothing, and PXR24.
+pub const openexr: Library = .{
+    .name = "openexr",
+    .files = &.{
+        "openexr/src/lib/OpenEXRCore/attributes.c",
+        "openexr/src/lib/OpenEXRCore/base.c",
+        "openexr/src/lib/OpenEXRCore/bytes.c",
+        "openexr/src/lib/OpenEXRCore/channel_list.c",
+        "openexr/src/lib/OpenEXRCore/chunk.c",
+        "openexr/src/lib/OpenEXRCore/coding.c",
+        "openexr/src/lib/OpenEXRCore/compression.c",
+        "openexr/src/lib/OpenEXRCore/context.c",
+        "openexr/src/lib/OpenEXRCore/decoding.c",
+        "openexr/src/lib/OpenEXRCore/encoding.c",
+        "openexr/src/lib/OpenEXRCore/float_vector.c",
+        "openexr/src/lib/OpenEXRCore/internal_huf.c",
+        "openexr/src/lib/OpenEXRCore/internal_piz.c",
+        "openexr/src/lib/OpenEXRCore/internal_pxr24.c",
+        "openexr/src/lib/OpenEXRCore/internal_rle.c",
+        "openexr/src/lib/OpenEXRCore/internal_structs.c",
+        "openexr/src/lib/OpenEXRCore/internal_zip.c",
+        "openexr/src/lib/OpenEXRCore/memory.c",
+        "openexr/src/lib/OpenEXRCore/opaque.c",
+        "openexr/src/lib/OpenEXRCore/pack.c",
+        "openexr/src/lib/OpenEXRCore/parse_header.c",
+        "openexr/src/lib/OpenEXRCore/part.c",
+        "openexr/src/lib/OpenEXRCore/part_attr.c",
+        "openexr/src/lib/OpenEXRCore/preview.c",
+        "openexr/src/lib/OpenEXRCore/std_attr.c",
+        "openexr/src/lib/OpenEXRCore/string.c",
+        "openexr/src/lib/OpenEXRCore/string_vector.c",
+        "openexr/src/lib/OpenEXRCore/unpack.c",
+        "openexr/src/lib/OpenEXRCore/validation.c",
+        "openexr/src/lib/OpenEXRCore/write_header.c",
+    },
+    .shims = &.{
+        "src/decode/openexr.c",
+        "src/decode/openexr/left_out.c",
+        "src/output/openexr.c",
+    },
+    .includes = &.{ "libdeflate", "openexr/src/lib/OpenEXRCore" },
+    .own_headers = "src/decode/openexr",
+    .flags = &.{ "-D_GNU_SOURCE", "-w" },
 };
 
 /// Inflates by libdeflate. A palette that is shorter than its indices is on the stack.
@@ -209,7 +266,8 @@ pub const zstd: Library = .{
 
 /// What the program holds.
 pub const program = [_]Library{
-    basisu, cgltf, libdeflate, libwebp, mikktspace, stb_image, stb_image_write, zstd,
+    basisu,  cgltf,     libdeflate,      libwebp, mikktspace,
+    openexr, stb_image, stb_image_write, zstd,
 };
 
 /// A module with `text`: the project's licence, and the notices of what a program is made of.

@@ -9,6 +9,7 @@ const std = @import("std");
 const Allocator = std.mem.Allocator;
 const jpeg = @import("decode/jpeg.zig");
 const ktx2 = @import("decode/ktx2.zig");
+const openexr = @import("decode/openexr.zig");
 const png = @import("decode/png.zig");
 const stb_image = @import("decode/stb_image.zig");
 const texels = @import("decode/texels.zig");
@@ -26,6 +27,7 @@ pub fn formatOf(file: []const u8) ?Format {
     if (std.mem.startsWith(u8, file, jpeg.signature)) return .jpeg;
     if (webp.isWebp(file)) return .webp;
     if (std.mem.startsWith(u8, file, ktx2.signature)) return .ktx2;
+    if (std.mem.startsWith(u8, file, openexr.signature)) return .exr;
     for (stb_image.hdr_signatures) |signature| {
         if (std.mem.startsWith(u8, file, signature)) return .hdr;
     }
@@ -40,6 +42,7 @@ pub fn info(file: []const u8, reason: *Reason) error{InvalidImage}!Info {
         .webp => webp.info(file, reason),
         .ktx2 => ktx2.info(file, reason),
         .hdr => stb_image.info(.hdr, file, reason),
+        .exr => openexr.info(file, reason),
     };
 }
 
@@ -51,6 +54,7 @@ pub fn decode(gpa: Allocator, file: []const u8, reason: *Reason) Error!Texels {
         .webp => webp.decode(gpa, file, reason),
         .ktx2 => ktx2.decode(gpa, file, reason),
         .hdr => stb_image.decode(gpa, .hdr, file, reason),
+        .exr => openexr.decode(gpa, file, reason),
     };
 }
 
@@ -66,6 +70,7 @@ fn formatWithin(file: []const u8, reason: *Reason) error{InvalidImage}!Format {
 test {
     _ = jpeg;
     _ = ktx2;
+    _ = openexr;
     _ = png;
     _ = stb_image;
     _ = texels;

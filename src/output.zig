@@ -1,6 +1,6 @@
 //! Stage 4: `Image` -> file.
 //!
-//! In: a finished picture. Out: a file in one of seven formats, whole and in its place, or nothing
+//! In: a finished picture. Out: a file in one of eight formats, whole and in its place, or nothing
 //! at all. Colours are made by all threads; the bytes depend on the picture and the settings alone.
 
 const std = @import("std");
@@ -10,6 +10,7 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Image = @import("image.zig").Image;
 const huge_pages = @import("huge_pages.zig");
 const parallel = @import("parallel.zig");
+const openexr = @import("output/openexr.zig");
 const stb_image_write = @import("output/stb_image_write.zig");
 const target_file = @import("output/target.zig");
 const encode_file = @import("output/encode.zig");
@@ -34,6 +35,7 @@ pub const TemporaryFiles = @import("output/temporary.zig").TemporaryFiles;
 fn sideMax(format: choices.Format) u32 {
     return switch (format) {
         .jpg, .tga => 65_535,
+        .exr => openexr.width_max,
         else => std.math.maxInt(u31),
     };
 }
@@ -44,6 +46,7 @@ fn formOf(format: choices.Format, transparent: bool) encode_file.Form {
         .jpg, .bmp, .ppm => .rgb,
         .hdr => .radiance,
         .pfm => .linear,
+        .exr => if (transparent) .half_alpha else .half,
     };
 }
 
@@ -64,6 +67,23 @@ pub const Settings = struct {
 /// The diagnostic says why, unless the pool's work was cancelled.
 pub const Error = error{ OutOfMemory, InputOutput } || parallel.Error;
 
+/// A PNG file of RGB bytes, rows from the top; the caller frees it. Asserts that it is not larger
+/// than `check` allows.
+pub fn encodePng(
+    gpa: Allocator,
+    width: u32,
+    height: u32,
+    pixels: []align(4) const u8,
+) error{OutOfMemory}![]u8 {
+    return stb_image_write.encode(gpa, .png, .{
+        .width = width,
+        .height = height,
+        .channel_count = 3,
+        .pixels = pixels,
+        .quality = choices.jpeg_quality.default,
+    });
+}
+
 /// Refuses a picture that the format cannot hold; best asked before it is rendered.
 pub fn check(
     format: choices.Format,
@@ -77,7 +97,7 @@ pub fn check(
         "a {t} file has {d} pixels on a side at most",
         .{ format, sideMax(format) },
     );
-    const channel_count: u64 = if (formOf(format, transparent) == .rgba) 4 else 3;
+    const channel_count: u64 = channelCount(formOf(format, transparent));
     const by_library = format != .ppm and format != .pfm;
     const value_count = (width * channel_count + 1) * height;
     if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
@@ -87,10 +107,17 @@ pub fn check(
     );
 }
 
+fn channelCount(form: encode_file.Form) u8 {
+    return switch (form) {
+        .rgba, .half_alpha => 4,
+        .rgb, .linear, .radiance, .half => 3,
+    };
+}
+
 /// Whether a format keeps radiance as it is, without exposure and tone mapping.
 pub fn isLinear(format: choices.Format) bool {
     return switch (formOf(format, false)) {
-        .linear, .radiance => true,
+        .linear, .radiance, .half, .half_alpha => true,
         .rgb, .rgba => false,
     };
 }
@@ -140,9 +167,19 @@ pub fn write(
             ), .{
                 .width = image.width,
                 .height = image.height,
-                .channel_count = if (form == .rgba) 4 else 3,
+                .channel_count = channelCount(form),
                 .pixels = pixels,
                 .quality = settings.jpeg_quality,
+            });
+            defer gpa.free(file);
+            try target.finish(&.{file}, diagnostic);
+        },
+        .exr => {
+            const file = try openexr.encode(gpa, .{
+                .width = image.width,
+                .height = image.height,
+                .channel_count = channelCount(form),
+                .pixels = pixels,
             });
             defer gpa.free(file);
             try target.finish(&.{file}, diagnostic);
@@ -182,6 +219,7 @@ const Work = struct {
 };
 
 test {
+    _ = openexr;
     _ = stb_image_write;
     _ = target_file;
     _ = @import("output/temporary.zig");

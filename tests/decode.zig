@@ -184,8 +184,51 @@ test "Radiance HDR comes as floats, exactly" {
     }
 }
 
+test "OpenEXR comes as floats, exactly" {
+    for ([_]struct { []const u8, u8 }{
+        .{ "rgb.exr", 3 },     .{ "rgba.exr", 4 }, .{ "rgba-piz.exr", 4 },
+        .{ "rgb-piz.exr", 3 }, .{ "gray.exr", 1 }, .{ "gray-alpha.exr", 2 },
+    }) |case| {
+        const file = try imageFile(case[0]);
+        defer testing.allocator.free(file);
+        var reason: decode.Reason = .{};
+        errdefer std.debug.print("{s}: {s}\n", .{ case[0], reason.text() });
+        const info = try decode.info(file, &reason);
+        var texels = try decode.decode(testing.allocator, file, &reason);
+        defer texels.deinit(testing.allocator);
+        try testing.expectEqual(decode.Info{
+            .format = .exr,
+            .width = width,
+            .height = height,
+            .channel_count = case[1],
+            .is_float = true,
+        }, info);
+        for (texels.data.floats, 0..) |found, index| {
+            const x = index / case[1] % width;
+            const y = index / case[1] / width;
+            const expected: f32 = @floatFromInt(colourOf(x, y, case[1])[index % case[1]]);
+            try testing.expectEqual(expected, found);
+        }
+    }
+}
+
+test "what is no radiance in OpenEXR becomes one" {
+    const file = try imageFile("wild.exr");
+    defer testing.allocator.free(file);
+    var reason: decode.Reason = .{};
+    var texels = try decode.decode(testing.allocator, file, &reason);
+    defer texels.deinit(testing.allocator);
+    for (texels.data.floats, 0..) |found, index| {
+        const expected = [_]f32{ 0, 65_504, 0, 1 };
+        try testing.expectEqual(expected[index % width % 4], found);
+    }
+}
+
 const names = blk: {
-    var list: []const []const u8 = &.{ "rle.hdr", "flat.hdr", "narrow.hdr" };
+    var list: []const []const u8 = &.{
+        "rle.hdr",     "flat.hdr", "narrow.hdr",     "rgb.exr",  "rgba.exr", "rgba-piz.exr",
+        "rgb-piz.exr", "gray.exr", "gray-alpha.exr", "wild.exr",
+    };
     for (cases) |case| list = list ++ .{case.name};
     break :blk list;
 };
@@ -316,6 +359,40 @@ test "sizes that cannot be true are refused before memory is asked for" {
         const result = decode.decode(testing.failing_allocator, file, &reason);
         try testing.expectError(error.InvalidImage, result);
     }
+}
+
+const Decoding = struct {
+    files: [names.len][]u8,
+    hashes: [names.len]?u64,
+    failure: std.atomic.Value(bool) = .init(false),
+
+    fn all(decoding: *Decoding, first: usize) void {
+        for (0..4 * names.len) |step| {
+            const index = (first + step) % names.len;
+            const hash = outcome(decoding.files[index]) catch null;
+            if (hash != decoding.hashes[index]) decoding.failure.store(true, .monotonic);
+        }
+    }
+};
+
+test "threads decode at once, on the stacks that they have" {
+    var decoding: Decoding = .{ .files = undefined, .hashes = undefined };
+    var count: usize = 0;
+    defer for (decoding.files[0..count]) |file| testing.allocator.free(file);
+    for (names, 0..) |name, index| {
+        decoding.files[index] = try imageFile(name);
+        count += 1;
+        decoding.hashes[index] = try outcome(decoding.files[index]);
+        try testing.expect(decoding.hashes[index] != null);
+    }
+    var threads: [4]std.Thread = undefined;
+    for (&threads, 0..) |*thread, index| thread.* = try std.Thread.spawn(
+        .{ .stack_size = raylane.parallel.stack_bytes },
+        Decoding.all,
+        .{ &decoding, index * 7 },
+    );
+    for (threads) |thread| thread.join();
+    try testing.expect(!decoding.failure.load(.monotonic));
 }
 
 test "memory that runs out is an error, whenever it does" {

@@ -217,6 +217,37 @@ test "PFM holds every bit, rows from the bottom" {
     };
 }
 
+test "OpenEXR holds radiance to its eleven bits, with alpha where there is no background" {
+    for (odd_sizes) |size| for ([_]bool{ false, true }) |transparent| {
+        errdefer std.debug.print("{d}x{d}\n", .{ size[0], size[1] });
+        var image = try testImage(testing.allocator, size[0], size[1]);
+        defer image.deinit(testing.allocator);
+        image.pixels[0] = .{ 1e30, 0.5, 65_504, 1 };
+        const file = try written(&image, .{
+            .format = .exr,
+            .exposure_ev = 3,
+            .transparent = transparent,
+            .background = if (transparent) .none else .{ .srgb = .{ 255, 0, 0 } },
+        });
+        defer testing.allocator.free(file);
+        var reason: raylane.decode.Reason = .{};
+        var texels = try raylane.decode.decode(testing.allocator, file, &reason);
+        defer texels.deinit(testing.allocator);
+        const channel_count: usize = if (transparent) 4 else 3;
+        try testing.expectEqual([3]usize{ size[0], size[1], channel_count }, [3]usize{
+            texels.width, texels.height, texels.channel_count,
+        });
+        for (image.pixels, 0..) |pixel, index| {
+            const found = texels.data.floats[index * channel_count ..][0..channel_count];
+            for (found, 0..) |value, channel| {
+                const behind: f32 = if (!transparent and channel == 0) 1 - pixel[3] else 0;
+                const wanted = @min(pixel[channel] + behind, 65_504);
+                try testing.expectApproxEqAbs(wanted, value, wanted / 2048 + 1e-7);
+            }
+        }
+    };
+}
+
 /// Colours and alpha of integers alone: no random numbers, no rounding.
 fn checkers(gpa: std.mem.Allocator) !Image {
     const image: Image = try .init(gpa, 61, 47);
@@ -239,7 +270,7 @@ test "every format has the same bytes on every machine" {
         .{ .png, 0xd9aa232445eb57fd }, .{ .jpg, 0xf6f4e06efab8dc20 },
         .{ .tga, 0x27a4b70272305b9a }, .{ .bmp, 0xc0a9f1c2ed9ec202 },
         .{ .hdr, 0x7e1e5a338bf0dcc9 }, .{ .ppm, 0x90c7a2393d5f932d },
-        .{ .pfm, 0x1434cae8ac8e82c3 },
+        .{ .pfm, 0x1434cae8ac8e82c3 }, .{ .exr, 0x44df47690cac64bf },
     };
     for (expected) |case| for ([_]usize{ 1, 3 }) |thread_count| {
         const file = try written(&image, .{

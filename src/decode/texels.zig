@@ -10,7 +10,7 @@ const huge_pages = @import("../huge_pages.zig");
 /// Why an image cannot be used, in one line without its name.
 pub const Reason = @import("../diagnostic.zig").Message;
 
-pub const Format = enum { png, jpeg, webp, ktx2, hdr };
+pub const Format = enum { png, jpeg, webp, ktx2, hdr, exr };
 
 /// The reason is set where it is `InvalidImage`.
 pub const Error = error{ InvalidImage, OutOfMemory };

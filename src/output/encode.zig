@@ -23,19 +23,25 @@ pub const Form = enum {
     linear,
     /// Floats that a pixel of Radiance HDR can hold: none below 0, none that has no exponent there.
     radiance,
+    /// Floats that a half can hold, over the background.
+    half,
+    /// Floats that a half can hold, multiplied by alpha, and alpha.
+    half_alpha,
 
     /// Bytes of a pixel.
     pub fn pixelBytes(form: Form) u8 {
         return switch (form) {
             .rgb => 3,
             .rgba => 4,
-            .linear, .radiance => @sizeOf([3]f32),
+            .linear, .radiance, .half => @sizeOf([3]f32),
+            .half_alpha => @sizeOf([4]f32),
         };
     }
 };
 
 /// The largest mantissa and exponent of RGBE.
 const radiance_max: f32 = 0x1.fep126;
+const half_max = @import("openexr.zig").value_max;
 
 /// A finished picture.
 pub const Picture = struct {
@@ -98,13 +104,17 @@ pub const Rows = struct {
             inline else => |mapping| switch (rows.form) {
                 .rgb => return row.encode(mapping, 3, std.mem.bytesAsSlice([3]u8, bytes)),
                 .rgba => return row.encode(mapping, 4, std.mem.bytesAsSlice([4]u8, bytes)),
-                .linear, .radiance => {},
+                .linear, .radiance, .half, .half_alpha => {},
             },
         }
-        const floats = std.mem.bytesAsSlice([3]f32, bytes);
-        row.copy(floats);
-        if (rows.form == .radiance) for (floats) |*pixel| for (pixel) |*value| {
-            value.* = if (value.* > 0) @min(value.*, radiance_max) else 0;
+        if (rows.form == .half_alpha)
+            row.copy(4, std.mem.bytesAsSlice([4]f32, bytes))
+        else
+            row.copy(3, std.mem.bytesAsSlice([3]f32, bytes));
+        for (std.mem.bytesAsSlice(f32, bytes)) |*value| value.* = switch (rows.form) {
+            .radiance => if (value.* > 0) @min(value.*, radiance_max) else 0,
+            .half, .half_alpha => std.math.clamp(value.*, -half_max, half_max),
+            else => break,
         };
         return .{};
     }
@@ -197,13 +207,13 @@ const Row = struct {
     }
 
     /// Radiance as it is, with all else as if it were radiance.
-    fn copy(row: Row, floats: []align(1) [3]f32) void {
+    fn copy(row: Row, comptime channel_count: usize, floats: []align(1) [channel_count]f32) void {
         for (row.lit, floats, 0..) |pixel, *out, x| {
-            out.* = pixel[0..3].*;
-            if (row.display) |display| for (out, display[x][0..3]) |*value, own| {
+            out.* = pixel[0..channel_count].*;
+            if (row.display) |display| for (out[0..3], display[x][0..3]) |*value, own| {
                 value.* += own;
             };
-            if (pixel[3] < 1) for (out, row.behind) |*value, behind| {
+            if (channel_count == 3 and pixel[3] < 1) for (out, row.behind) |*value, behind| {
                 if (behind > 0) value.* += (1 - pixel[3]) * behind;
             };
         }

@@ -25,7 +25,7 @@ pub const Mesh = struct {
 /// The library numbers corners in C's int, with four to a triangle.
 const triangle_count_max = 1 << 28;
 /// Corners at one place.
-const corner_count_max = 4096;
+const corner_count_max = 2048;
 /// Beyond it, what the library computes of positions and texture coordinates overflows.
 const magnitude_max = 1e9;
 

@@ -40,7 +40,7 @@ const texture_bytes_max: u64 = 4 << 30;
 const decode_bytes_max: u64 = 64 << 20;
 
 /// Channel of a lookup that there is not: it counts as 1.
-const missing: u8 = 255;
+pub const missing: u8 = 255;
 
 /// The least and the largest that alpha is on a surface.
 pub const AlphaRange = struct {
@@ -55,6 +55,8 @@ pub const MaterialUse = struct {
     lookup_count: u32 = 0,
     /// Of factor, texture and vertices together, wherever the material is drawn.
     alpha: AlphaRange = .{},
+    /// Of the vertices alone; 1 where alpha does not count.
+    vertex_alpha: AlphaRange = .{},
 };
 
 /// All textures of a scene, and who uses them.
@@ -406,6 +408,7 @@ const Work = struct {
             .first_lookup = @intCast(first),
             .lookup_count = @intCast(lookups.items.len - first),
             .alpha = alpha,
+            .vertex_alpha = work.vertex_alpha[index],
         };
     }
 };

@@ -3,8 +3,9 @@
 
     tests/images/make.py
 
-PNG and HDR are written here, byte by byte; JPEG and WebP need Pillow, KTX 2 the encoder
-`basisu` beside it. All show the same picture of 29 by 17 pixels, of integers alone.
+PNG and HDR are written here, byte by byte; JPEG and WebP need Pillow, OpenEXR its Python package,
+KTX 2 the encoder `basisu` beside it. All show the same picture of 29 by 17 pixels, of integers
+alone.
 """
 import pathlib
 import struct
@@ -128,10 +129,36 @@ def ktx2s():
                         "-output_file", FOLDER / f"{name}.ktx2"], check=True)
 
 
+def exrs():
+    import numpy
+    import OpenEXR
+
+    def write(name, channels, kind, compression):
+        header = {"compression": compression, "type": OpenEXR.scanlineimage}
+        data = {channel: numpy.array([[sample(x, y) for x in range(WIDTH)] for y in range(HEIGHT)],
+                                     kind) for channel, sample in channels.items()}
+        OpenEXR.File(header, data).write(str(FOLDER / name))
+
+    def colour(channel):
+        return lambda x, y: value(x, y, channel)
+
+    rgb = {"R": colour(0), "G": colour(1), "B": colour(2)}
+    rgba = {**rgb, "A": colour(3)}
+    write("rgb.exr", rgb, "float16", OpenEXR.ZIP_COMPRESSION)
+    write("rgba.exr", {**rgba, "Z": colour(0)}, "float32", OpenEXR.ZIPS_COMPRESSION)
+    write("rgba-piz.exr", rgba, "float16", OpenEXR.PIZ_COMPRESSION)
+    write("rgb-piz.exr", rgb, "float32", OpenEXR.PIZ_COMPRESSION)
+    write("gray.exr", {"Y": colour(0)}, "float16", OpenEXR.RLE_COMPRESSION)
+    write("gray-alpha.exr", {"Y": colour(0), "A": colour(3)}, "float32", OpenEXR.PXR24_COMPRESSION)
+    wild = [float("nan"), float("inf"), -1, 1]
+    write("wild.exr", {"Y": lambda x, y: wild[x % 4]}, "float32", OpenEXR.NO_COMPRESSION)
+
+
 pngs()
 webps()
 jpegs()
 ktx2s()
+exrs()
 hdr("rle.hdr", WIDTH, True)
 hdr("flat.hdr", WIDTH, False)
 hdr("narrow.hdr", 5, False)

@@ -1,0 +1,121 @@
+/* OpenEXRCore's writer, and the one call of it that we make.
+ *
+ * In: rows of floats. Out: a file of halves, in pieces with their places to a sink. The library
+ * allocates by the hooks; its allocator has no place for a context, so the call in progress is
+ * thread-local. When memory runs out it is left by longjmp; what it holds then is freed with the
+ * heap behind the hooks.
+ */
+#include <setjmp.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "../memory_account.h"
+#include "openexr.h"
+
+/* In the order of openexr.zig. */
+typedef struct rl_exr_picture {
+    int width, height, channels;
+    const float *pixels;
+    /* False: no memory. */
+    bool (*sink)(void *user, const void *bytes, size_t length, size_t offset);
+    void *user;
+} rl_exr_picture;
+
+typedef struct rl_call {
+    const rl_memory *memory;
+    jmp_buf exhausted;
+} rl_call;
+
+static _Thread_local rl_call *rl_now;
+
+static void *rl_allocate(size_t size) {
+    void *memory = rl_now->memory->allocate(rl_now->memory->user, size);
+    if (memory == NULL) longjmp(rl_now->exhausted, 1);
+    return memory;
+}
+
+static void rl_release(void *memory) {
+    rl_now->memory->release(rl_now->memory->user, memory);
+}
+
+static void rl_report(exr_const_context_t context, exr_result_t code, const char *message) {
+    (void)context, (void)code, (void)message;
+}
+
+static int64_t rl_write(exr_const_context_t context, void *user, const void *bytes, uint64_t size,
+                        uint64_t offset, exr_stream_error_func_ptr_t report) {
+    const rl_exr_picture *picture = user;
+    (void)context, (void)report;
+    if (!picture->sink(picture->user, bytes, (size_t)size, (size_t)offset))
+        longjmp(rl_now->exhausted, 1);
+    return (int64_t)size;
+}
+
+static exr_result_t rl_write_header(exr_context_t context, const rl_exr_picture *picture) {
+    /* In the order of the alphabet, as the format wants them. */
+    static const char *const names[] = {"A", "B", "G", "R"};
+    exr_result_t result = exr_add_part(context, "", EXR_STORAGE_SCANLINE, NULL);
+    if (result == EXR_ERR_SUCCESS)
+        result = exr_initialize_required_attr_simple(context, 0, picture->width, picture->height,
+                                                     EXR_COMPRESSION_ZIP);
+    for (int name = 4 - picture->channels; name < 4 && result == EXR_ERR_SUCCESS; name++)
+        result = exr_add_channel(context, 0, names[name], EXR_PIXEL_HALF,
+                                 EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
+    return result == EXR_ERR_SUCCESS ? exr_write_header(context) : result;
+}
+
+/* Tells the pipeline where its channels, A to R, come from. */
+static void rl_place(exr_encode_pipeline_t *pipeline, const rl_exr_picture *picture,
+                     const float *row) {
+    for (int channel = 0; channel < pipeline->channel_count; channel++) {
+        exr_coding_channel_info_t *info = &pipeline->channels[channel];
+        info->encode_from_ptr = (const uint8_t *)(row + pipeline->channel_count - 1 - channel);
+        info->user_data_type = EXR_PIXEL_FLOAT;
+        info->user_bytes_per_element = sizeof(float);
+        info->user_pixel_stride = picture->channels * (int)sizeof(float);
+        info->user_line_stride = picture->width * info->user_pixel_stride;
+    }
+}
+
+static exr_result_t rl_write_chunks(exr_context_t context, exr_encode_pipeline_t *pipeline,
+                                    const rl_exr_picture *picture) {
+    const size_t row_values = (size_t)picture->width * (size_t)picture->channels;
+    int32_t lines;
+    exr_result_t result = exr_get_scanlines_per_chunk(context, 0, &lines);
+    for (int y = 0; y < picture->height && result == EXR_ERR_SUCCESS; y += lines) {
+        exr_chunk_info_t chunk;
+        result = exr_write_scanline_chunk_info(context, 0, y, &chunk);
+        if (result != EXR_ERR_SUCCESS) return result;
+        result = y == 0 ? exr_encoding_initialize(context, 0, &chunk, pipeline)
+                        : exr_encoding_update(context, 0, &chunk, pipeline);
+        if (result != EXR_ERR_SUCCESS) return result;
+        rl_place(pipeline, picture, picture->pixels + (size_t)y * row_values);
+        if (y == 0) result = exr_encoding_choose_default_routines(context, 0, pipeline);
+        if (result == EXR_ERR_SUCCESS) result = exr_encoding_run(context, 0, pipeline);
+    }
+    return result;
+}
+
+enum { rl_done, rl_exhausted, rl_broken };
+
+/* Encodes a picture. */
+int rl_exr_encode(const rl_memory *memory, const rl_exr_picture *picture) {
+    exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
+    exr_encode_pipeline_t pipeline = EXR_ENCODE_PIPELINE_INITIALIZER;
+    exr_context_t context = NULL;
+    setup.error_handler_fn = rl_report;
+    setup.alloc_fn = rl_allocate;
+    setup.free_fn = rl_release;
+    setup.user_data = (void *)picture;
+    setup.write_fn = rl_write;
+    rl_call call = {.memory = memory};
+    rl_now = &call;
+    if (setjmp(call.exhausted) != 0) return rl_exhausted;
+    exr_result_t result =
+        exr_start_write(&context, "memory", EXR_WRITE_FILE_DIRECTLY, &setup);
+    if (result == EXR_ERR_SUCCESS) result = rl_write_header(context, picture);
+    if (result == EXR_ERR_SUCCESS) result = rl_write_chunks(context, &pipeline, picture);
+    exr_encoding_destroy(context, &pipeline);
+    const exr_result_t finished = exr_finish(&context);
+    return result == EXR_ERR_SUCCESS && finished == EXR_ERR_SUCCESS ? rl_done : rl_broken;
+}
