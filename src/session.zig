@@ -215,6 +215,8 @@ pub const Session = struct {
     pub fn view(session: *Session, choices: settings.View) Error!void {
         if (session.pool.cancelled.load(.monotonic)) return error.Canceled;
         session.seen = choices;
+        session.seen.background = session.backgroundOf(&choices);
+        const background = session.seen.background;
         // Until it is chosen anew.
         session.world.?.environment.map = null;
         const start = Io.Clock.awake.now(session.io);
@@ -227,7 +229,7 @@ pub const Session = struct {
             session.output,
             session.diagnostic,
         );
-        environment.is_seen = choices.background == .env or choices.background == .studio;
+        environment.is_seen = background == .env or background == .studio;
         session.times.prepare_ns += session.since(start);
         try prepare.view(&session.world.?, session.io, &session.scene.?, .{
             .camera = choices.camera,
@@ -235,7 +237,7 @@ pub const Session = struct {
             .resolution = choices.resolution,
             .long_side = choices.long_side,
             .ambient = choices.ambient,
-            .background = radianceOf(choices.background),
+            .background = radianceOf(background),
             .environment = environment,
             .floor = choices.floor,
         }, session.diagnostic, &session.times);
@@ -454,6 +456,15 @@ pub const Session = struct {
             .progress = session.progress,
             .cancel = &session.pool.cancelled,
         };
+    }
+
+    /// The background that is chosen: the scene's own environment where that is to be seen and
+    /// nothing else is asked for.
+    fn backgroundOf(session: *const Session, choices: *const settings.View) settings.Background {
+        const is_own = choices.environment.source == .default;
+        const is_seen = if (session.scene.?.environment) |*map| map.is_seen else false;
+        const shows_own = choices.background == .default and is_own and is_seen;
+        return if (shows_own) .env else choices.background;
     }
 
     /// What the film keeps: alpha where the background is no radiance, and colours of the display
