@@ -396,9 +396,7 @@ test "a scene with an image-based light is surrounded by its finest cube" {
         .{ .{ "[[0,1,2,1,4,0],[3,3,3,3,3,3]]", "[]" }, "has no cube of six images" },
         .{ .{ "[0,1,0,0]", "[0,0,0,0]" }, "has a rotation that is none" },
         .{ .{ "\"intensity\":2.5", "\"intensity\":-1" }, "is not bright" },
-        .{ .{ "\"light\":0", "\"light\":99999999999" }, "has no light" },
     }) |case| {
-        if (@sizeOf(usize) == 4 and std.mem.find(u8, case[0].@"1", "99999") != null) continue;
         var wrong: Diagnostic = .{};
         var dark = try folder.read(&.{ surrounded, case[0] }, &wrong);
         defer dark.deinit();
@@ -421,6 +419,8 @@ test "what is wrong in the document itself is an error" {
     const cases = [_]struct { Replacement, []const u8 }{
         .{ .{ "{\"source\":2,", "{\"source\":5," }, "textures[2].source: 5 of 5" },
         .{ .{ "\"sampler\":1}", "\"sampler\":3}" }, "textures[2].sampler: 3 of 3" },
+        .{ .{ "{\"source\":2,", "{\"source\":4294967295," }, "textures[2].source: 4294967295 " ++
+            "names nothing, lists have 4194304 elements at most" },
         .{ .{ "{\"index\":2,", "{\"index\":5," }, "materials[0].occlusionTexture.index: 5 of 5" },
         .{ .{ "\"texCoord\":3", "\"texCoord\":-1" }, "materials[0].occlusionTexture.texCoord: " ++
             "-1 is not a whole number from 0 to 2^53 - 1" },
