@@ -6,6 +6,7 @@
 
 const std = @import("std");
 const bench = @import("cli/bench.zig");
+const compare = @import("cli/compare.zig");
 const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
@@ -32,12 +33,18 @@ pub const Command = union(enum) {
     render: Options,
     bench: Bench,
     bench_help,
+    compare: Compare,
+    compare_help,
 };
 
 /// What `raylane bench` is to do.
 pub const Bench = bench.Bench;
 /// What `raylane bench --help` prints.
 pub const bench_help = bench.help;
+/// What `raylane compare` is to do.
+pub const Compare = compare.Compare;
+/// What `raylane compare --help` prints.
+pub const compare_help = compare.help;
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -119,30 +126,8 @@ const sections: []const Section = &.{
                 "or radiance R,G,B (default: a grey gradient)",
         },
     } },
-    .{ .title = "Scene", .options = &.{
+    .{ .title = "Camera", .options = &.{
         .{ .usage = "--camera WHICH", .help = "name or index of a camera, or auto: all in view" },
-        .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
-        .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
-        .{
-            .usage = "--env FILE",
-            .help = "light from all around: an equirectangular image of\n" ++
-                "radiance (hdr, png, jpg), studio or none (default: the\n" ++
-                "scene's, or studio for scenes without light)",
-        },
-        .{ .usage = "--env-intensity X", .help = "multiplies its radiance (default: 1)" },
-        .{
-            .usage = "--env-rotation DEG",
-            .help = "turn it about y, counter-clockwise from above (the\n" ++
-                "studio otherwise turns with the camera)",
-        },
-        .{
-            .usage = "--env-shadows N",
-            .help = "directional lights a sample that stand for it, to find\n" ++
-                "how much of it arrives, " ++ settings.environment_shadow_count.text() ++
-                comptimePrint("\n(default: {d}; 0: all of it everywhere)", .{
-                    settings.environment_shadow_count.default,
-                }),
-        },
         .{
             .usage = "--eye X,Y,Z",
             .help = "where the camera stands, in place of the file's",
@@ -153,12 +138,40 @@ const sections: []const Section = &.{
         },
         .{ .usage = "--up X,Y,Z", .help = "what is upwards in the picture (default: 0,1,0)" },
         .{
-            .usage = "--orbit THETA,PHI[,R]",
+            .usage = "--orbit THETA,PHI,R",
             .help = "stand about the target, degrees from +z and from\n" ++
                 "above, R metres or percent (default: 100%, all seen)",
         },
         .{ .usage = "--fov DEG", .help = "vertical angle of view, in place of the camera's" },
         .{ .usage = "--ortho", .help = "no perspective" },
+    } },
+    .{ .title = "Scene", .options = &.{
+        .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
+        .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
+        .{
+            .usage = "--env FILE",
+            .help = "light from all around: an equirectangular image of\n" ++
+                "radiance (hdr, png, jpg), studio or none (default:\n" ++
+                "the scene's, or studio for scenes without light)",
+        },
+        .{ .usage = "--env-intensity X", .help = "multiplies its radiance (default: 1)" },
+        .{
+            .usage = "--env-rotation DEG",
+            .help = "turn it about y, counter-clockwise from above (the\n" ++
+                "studio otherwise turns with the camera)",
+        },
+        .{
+            .usage = "--env-shadows N",
+            .help = "directional lights a sample that stand for it, to\n" ++
+                "find how much of it arrives, " ++ settings.environment_shadow_count.text() ++
+                comptimePrint("\n(default: {d}; 0: all of it everywhere)", .{
+                    settings.environment_shadow_count.default,
+                }),
+        },
+        .{
+            .usage = "--floor WHAT",
+            .help = "shadow: what is seen of a floor is the shadow on it;\nor none (default)",
+        },
         .{
             .usage = "--ambient L",
             .help = comptimePrint("radiance from all sides (default: {d} for scenes\n" ++
@@ -253,6 +266,7 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\
     \\usage: raylane [render] SCENE [options]
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
+    \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
     \\
     \\SCENE is a glTF 2.0 file (.gltf, .glb), a PBRT scene (.pbrt) or builtin:NAME,
     \\NAME being cornell, atrium, nave or handles. The image is written to the
@@ -277,13 +291,15 @@ pub fn parse(
 ) Error!Command {
     assert(variant_names.len >= 1);
     const is_bench = arguments.len > 0 and std.mem.eql(u8, arguments[0], "bench");
+    const is_compare = arguments.len > 0 and std.mem.eql(u8, arguments[0], "compare");
     // Help wins over everything, for it is what somebody asks for who got the rest wrong.
     for (arguments) |argument| {
         if (std.mem.eql(u8, argument, "--")) break;
         if (std.mem.eql(u8, argument, "-h") or std.mem.eql(u8, argument, "--help"))
-            return if (is_bench) .bench_help else .help;
+            return if (is_bench) .bench_help else if (is_compare) .compare_help else .help;
     }
     if (is_bench) return .{ .bench = try bench.parse(arguments[1..], diagnostic) };
+    if (is_compare) return .{ .compare = try compare.parse(arguments[1..], diagnostic) };
     var parser: Parser = .{
         .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
         .variant_names = variant_names,
@@ -363,6 +379,7 @@ const Parser = struct {
             .background => options.view.background = backgroundOf(given.value) orelse
                 return reader.bad(given, "env, studio, transparent, a colour or R,G,B"),
             .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
+            .floor => options.view.floor = try reader.choice(given, settings.Floor),
             .ambient => options.view.ambient = radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
             .exposure => options.write.exposure = exposureOf(given.value) orelse
@@ -373,18 +390,7 @@ const Parser = struct {
                 options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
             },
             .stats => options.stats = try reader.choice(given, Stats),
-            .thesis => {
-                options.view.resolution = settings.thesis.resolution;
-                options.view.long_side = null;
-                options.render.sample_count = settings.thesis.sample_count;
-                options.render.depth = settings.thesis.depth;
-                options.thread_count = null;
-                options.view.environment.source = .none;
-                options.view.background = .default;
-                options.view.display_referred = false;
-                options.write.exposure = settings.thesis.exposure;
-                options.write.tone_mapping = settings.thesis.tone_mapping;
-            },
+            .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .variant => options.render.variant = try parser.variantOf(given.value),
             .count_tests => options.count_tests = true,
@@ -402,6 +408,20 @@ const Parser = struct {
             .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
         }
+    }
+
+    fn setThesis(parser: *Parser) void {
+        const options = &parser.options;
+        options.view.resolution = settings.thesis.resolution;
+        options.view.long_side = null;
+        options.render.sample_count = settings.thesis.sample_count;
+        options.render.depth = settings.thesis.depth;
+        options.thread_count = null;
+        options.view.environment.source = .none;
+        options.view.background = .default;
+        options.view.display_referred = false;
+        options.write.exposure = settings.thesis.exposure;
+        options.write.tone_mapping = settings.thesis.tone_mapping;
     }
 
     fn setViewpoint(parser: *Parser, given: Reader.Given) Error!void {
@@ -517,7 +537,7 @@ fn bytesOf(text: []const u8) ?u64 {
 }
 
 /// A finite decimal number; a denormal one is zero, as everywhere in the renderer.
-fn number(text: []const u8) ?f32 {
+pub fn numberOf(text: []const u8) ?f32 {
     for (text) |byte| switch (byte) {
         '0'...'9', '+', '-', '.', 'e', 'E' => {},
         else => return null, // The parser knows "nan", "inf", "0x" and "_" besides.
@@ -528,7 +548,7 @@ fn number(text: []const u8) ?f32 {
 }
 
 fn radiance(text: []const u8) ?f32 {
-    const value = number(text) orelse return null;
+    const value = numberOf(text) orelse return null;
     return if (value >= 0) value else null;
 }
 
@@ -545,7 +565,7 @@ pub fn resolutionOf(text: []const u8) ?[2]u32 {
 fn vectorOf(text: []const u8) ?[3]f32 {
     var vector: [3]f32 = undefined;
     var parts = std.mem.splitScalar(u8, text, ',');
-    for (&vector) |*component| component.* = number(parts.next() orelse return null) orelse
+    for (&vector) |*component| component.* = numberOf(parts.next() orelse return null) orelse
         return null;
     return if (parts.next() == null) vector else null;
 }
@@ -560,22 +580,22 @@ fn directionOf(text: []const u8) ?[3]f32 {
 fn orbitOf(text: []const u8) ?settings.Orbit {
     var parts = std.mem.splitScalar(u8, text, ',');
     var orbit: settings.Orbit = .{
-        .theta_degrees = number(parts.next().?) orelse return null,
-        .phi_degrees = number(parts.next() orelse return null) orelse return null,
+        .theta_degrees = numberOf(parts.next().?) orelse return null,
+        .phi_degrees = numberOf(parts.next() orelse return null) orelse return null,
     };
     if (!(orbit.phi_degrees >= 0 and orbit.phi_degrees <= 180)) return null;
     const radius = parts.next() orelse return orbit;
     if (parts.next() != null) return null;
     if (std.mem.cutSuffix(u8, radius, "%")) |percent| {
-        orbit.radius = .{ .share = (number(percent) orelse return null) / 100 };
-    } else orbit.radius = .{ .metres = number(radius) orelse return null };
+        orbit.radius = .{ .share = (numberOf(percent) orelse return null) / 100 };
+    } else orbit.radius = .{ .metres = numberOf(radius) orelse return null };
     return switch (orbit.radius) {
         inline else => |value| if (value > 0) orbit else null,
     };
 }
 
 fn fovOf(text: []const u8) ?f32 {
-    const degrees = number(text) orelse return null;
+    const degrees = numberOf(text) orelse return null;
     const range = settings.fov_degrees;
     return if (degrees >= range.min and degrees <= range.max) degrees else null;
 }
@@ -622,13 +642,13 @@ fn environmentOf(text: []const u8) ?settings.Environment.Source {
 }
 
 fn rotationOf(text: []const u8) ?f32 {
-    const value = number(text) orelse return null;
+    const value = numberOf(text) orelse return null;
     return if (@abs(value) <= 3600) value else null;
 }
 
 fn exposureOf(text: []const u8) ?settings.Exposure {
     if (std.mem.eql(u8, text, "auto")) return .auto;
-    const ev = number(text) orelse return null;
+    const ev = numberOf(text) orelse return null;
     return if (@abs(ev) <= settings.exposure_ev_max) .{ .ev = ev } else null;
 }
 
@@ -969,6 +989,7 @@ test "the help fits a screen and says what flags take and may be" {
 
 test {
     _ = bench;
+    _ = compare;
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");

@@ -1,20 +1,44 @@
 //! How far two pictures are from each other, by the field's measures.
 //!
-//! In: two image files in memory. Out: the largest difference, RMSE, PSNR, SSIM and FLIP, as text
+//! In: two image files. Out: the largest difference, RMSE, PSNR, SSIM and FLIP, as text
 //! and JSON, and a picture of where they differ. Everything is about sRGB values in 0..1, as a
 //! display shows them (`compare/picture.zig`), and the same on every target.
 
 const std = @import("std");
 const flip = @import("compare/flip.zig");
 const heat = @import("compare/heat.zig");
+const elementary = @import("math/elementary.zig");
+const parse_resource = @import("parse/resource.zig");
 const picture_file = @import("compare/picture.zig");
 const settings = @import("settings.zig");
 const ssim = @import("compare/ssim.zig");
 const Allocator = std.mem.Allocator;
+const Diagnostic = @import("diagnostic.zig").Diagnostic;
+
+/// `InputOutput`: the file cannot be read; `InvalidInput`: it is no image.
+pub const Error = parse_resource.Error;
 
 pub const Picture = picture_file.Picture;
 /// Linear light behind what is transparent.
 pub const grey = picture_file.grey;
+
+/// The image at a path, of radiance made brighter by `exposure_ev` stops.
+pub fn read(
+    gpa: Allocator,
+    io: std.Io,
+    path: []const u8,
+    exposure_ev: f32,
+    diagnostic: *Diagnostic,
+) Error!Picture {
+    var opened = try parse_resource.open(gpa, io, path, .{}, diagnostic);
+    defer opened.close();
+    const scale: f32 = @floatCast(elementary.exp(exposure_ev * std.math.ln2));
+    const file = opened.main.bytes;
+    return Picture.of(gpa, file, scale, &diagnostic.message) catch |err| switch (err) {
+        error.InvalidImage => error.InvalidInput,
+        error.OutOfMemory => error.OutOfMemory,
+    };
+}
 
 /// Of all pixels together.
 pub const Metrics = struct {
@@ -136,7 +160,7 @@ fn differences(first: *const Picture, second: *const Picture) Metrics {
     return .{
         .max = largest,
         .rmse = @sqrt(mean),
-        .psnr_db = -10 * std.math.log10(mean),
+        .psnr_db = -10.0 / std.math.ln10 * elementary.log(mean),
         .ssim = undefined,
         .flip = undefined,
     };
@@ -184,4 +208,29 @@ test "a constant offset, and nothing at all" {
     const bytes = try same.heatMap(gpa);
     defer gpa.free(bytes);
     for (bytes) |byte| try std.testing.expectEqual(0, byte);
+}
+
+test "a pattern, by the figures of the authors' own FLIP and of SSIM's definition in f64" {
+    const gpa = std.testing.allocator;
+    const header = "P6 32 24 255\n";
+    var files: [2][header.len + 32 * 24 * 3]u8 = undefined;
+    for (&files, 0..) |*file, other| {
+        file[0..header.len].* = header.*;
+        for (0..24) |y| for (0..32) |x| {
+            const red = x * 8 + y * 3 * other;
+            const blue = x * y * (1 + 6 * other) + 40 * other;
+            const pixel: [3]u8 = .{ @truncate(red), @truncate(y * 10), @truncate(blue) };
+            file[header.len + (y * 32 + x) * 3 ..][0..3].* = pixel;
+        };
+    }
+    var pictures: [2]Picture = undefined;
+    for (&pictures, &files) |*picture, *file| {
+        var reason: @import("diagnostic.zig").Message = .{};
+        picture.* = try .of(gpa, file, 1, &reason);
+    }
+    defer for (&pictures) |*picture| picture.deinit(gpa);
+    var comparison: Comparison = try .of(gpa, &pictures[0], &pictures[1]);
+    defer comparison.deinit(gpa);
+    try std.testing.expectApproxEqAbs(0.51309, comparison.metrics.flip, 2e-5);
+    try std.testing.expectApproxEqAbs(0.785597, comparison.metrics.ssim, 2e-6);
 }

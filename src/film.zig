@@ -88,11 +88,14 @@ pub const Film = struct {
     /// number; these are black.
     pub fn finish(film: *Film, rectangle: Rectangle, sample_count: u32) u64 {
         const count: V4 = @splat(@floatFromInt(sample_count));
+        const none: V4 = @splat(0);
         var non_finite_count: u64 = 0;
         for (rectangle.y0..rectangle.y1) |y| {
             const start = y * film.image.width;
             for (start + rectangle.x0..start + rectangle.x1) |at| {
-                var mean: [4]f32 = @as(V4, film.image.pixels[at]) / count;
+                const sums: V4 = film.image.pixels[at];
+                // A sample whose light is less than nothing makes up for another that has too much.
+                var mean: [4]f32 = @select(f32, sums < none, none, sums) / count;
                 const shown = 1 - mean[3];
                 mean[3] = if (!film.layers.contains(.alpha)) 1 else if (shown > 0) shown else 0;
                 film.image.pixels[at] = mean;

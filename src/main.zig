@@ -51,6 +51,7 @@ fn run(init: std.process.Init) ExitCode {
     switch (command) {
         .help => return print(io, cli.help),
         .bench_help => return print(io, cli.bench_help),
+        .compare_help => return print(io, cli.compare_help),
         .version => return print(io, "raylane " ++ cli.version ++ "\n"),
         .licenses => return print(io, raylane.licenses),
         .list_variants => return print(io, comptime list: {
@@ -63,6 +64,7 @@ fn run(init: std.process.Init) ExitCode {
             return renderAndReport(&account, io, options, &diagnostic);
         },
         .bench => |*options| return bench(init, options, &diagnostic),
+        .compare => |*options| return compare(init.gpa, io, options, &diagnostic),
     }
 }
 
@@ -163,6 +165,96 @@ fn printBench(
         };
     }
     return print(io, text.written());
+}
+
+/// Compares two images, prints how far they are apart, and says which thresholds they pass.
+fn compare(gpa: Allocator, io: Io, options: *const cli.Compare, diagnostic: *Diagnostic) ExitCode {
+    var account: Account = .init(gpa, null);
+    const allocator = account.allocator();
+    var pictures: [2]raylane.compare.Picture = undefined;
+    var count: usize = 0;
+    defer for (pictures[0..count]) |*picture| picture.deinit(allocator);
+    for (&pictures, options.images) |*picture, name| {
+        const ev = options.exposure_ev;
+        picture.* = raylane.compare.read(allocator, io, name, ev, diagnostic) catch |err| {
+            if (err == error.OutOfMemory) account.explain(&diagnostic.message);
+            say(io, "raylane: {f}: {s}\n", .{ printable(name), diagnostic.message.text() });
+            return exitCodeOf(err);
+        };
+        count += 1;
+    }
+    const first = &pictures[0];
+    const second = &pictures[1];
+    if (first.width != second.width or first.height != second.height) {
+        say(io, "raylane: {f}: {d}x{d} pixels, where {f} has {d}x{d}\n", .{
+            printable(options.images[1]), second.width, second.height,
+            printable(options.images[0]), first.width,  first.height,
+        });
+        return .invalid;
+    }
+    return printComparison(allocator, io, options, .{ first, second }, diagnostic) catch
+        outOfMemory(io);
+}
+
+fn printComparison(
+    gpa: Allocator,
+    io: Io,
+    options: *const cli.Compare,
+    pictures: [2]*const raylane.compare.Picture,
+    diagnostic: *Diagnostic,
+) error{ OutOfMemory, WriteFailed }!ExitCode {
+    var comparison: raylane.compare.Comparison = try .of(gpa, pictures[0], pictures[1]);
+    defer comparison.deinit(gpa);
+    if (options.output) |name| {
+        writeHeatMap(gpa, io, name, &comparison, diagnostic) catch |err| {
+            if (err == error.OutOfMemory) return error.OutOfMemory;
+            say(io, "raylane: {f}: {s}\n", .{ printable(name), diagnostic.message.text() });
+            return .failed;
+        };
+    }
+    var text: Io.Writer.Allocating = .init(gpa);
+    defer text.deinit();
+    const to_stdout = options.output == null or !cli.isStdout(options.output.?);
+    switch (options.stats orelse if (to_stdout) cli.Stats.text else .none) {
+        .none => {},
+        .text => try comparison.writeText(&text.writer),
+        .json => try comparison.writeJson(options.images, &text.writer),
+    }
+    if (!to_stdout) {
+        say(io, "{s}", .{text.written()});
+    } else if (text.written().len > 0 and print(io, text.written()) != .ok) return .failed;
+    var exit_code: ExitCode = .ok;
+    for (std.enums.values(raylane.settings.Metric)) |metric| {
+        const threshold = options.thresholds.get(metric) orelse continue;
+        if (!comparison.metrics.isBeyond(metric, threshold)) continue;
+        exit_code = .differ;
+        say(io, "raylane: {f}: {t} is {d:.5}, the threshold {d}\n", .{
+            printable(options.images[1]), metric, comparison.metrics.of(metric), threshold,
+        });
+    }
+    return exit_code;
+}
+
+fn writeHeatMap(
+    gpa: Allocator,
+    io: Io,
+    name: []const u8,
+    comparison: *const raylane.compare.Comparison,
+    diagnostic: *Diagnostic,
+) error{ OutOfMemory, InputOutput }!void {
+    var target = if (cli.isStdout(name))
+        Target.openStdout(io)
+    else
+        try Target.openFile(io, &signals.temporary_files, name, diagnostic);
+    defer target.abandon();
+    const pixels = try comparison.heatMap(gpa);
+    defer gpa.free(pixels);
+    const width = comparison.width;
+    const height = comparison.height;
+    try raylane.output.check(.png, false, width, height, diagnostic);
+    const file = try raylane.output.encodePng(gpa, width, height, pixels);
+    defer gpa.free(file);
+    return target.finish(&.{file}, diagnostic);
 }
 
 fn exitCodeOf(err: (Job.Error || raylane.bench.Error)) ExitCode {

@@ -67,6 +67,23 @@ pub const Settings = struct {
 /// The diagnostic says why, unless the pool's work was cancelled.
 pub const Error = error{ OutOfMemory, InputOutput } || parallel.Error;
 
+/// A PNG file of RGB bytes, rows from the top; the caller frees it. Asserts that it is not larger
+/// than `check` allows.
+pub fn encodePng(
+    gpa: Allocator,
+    width: u32,
+    height: u32,
+    pixels: []align(4) const u8,
+) error{OutOfMemory}![]u8 {
+    return stb_image_write.encode(gpa, .png, .{
+        .width = width,
+        .height = height,
+        .channel_count = 3,
+        .pixels = pixels,
+        .quality = choices.jpeg_quality.default,
+    });
+}
+
 /// Refuses a picture that the format cannot hold; best asked before it is rendered.
 pub fn check(
     format: choices.Format,

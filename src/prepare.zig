@@ -14,6 +14,7 @@ const simd = @import("simd.zig");
 const statistics = @import("statistics.zig");
 const world = @import("world.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const alpha = @import("prepare/alpha.zig");
 const bvh_input = @import("prepare/bvh/input.zig");
 const bvh_wide = @import("prepare/bvh/wide.zig");
 const check = @import("prepare/bvh/check.zig");
@@ -37,10 +38,9 @@ const World = world.World;
 pub const Loaded = struct {
     textures: texture.TextureSet,
     arena: std.heap.ArenaAllocator,
-    /// The scene's, with the tangents that textures need.
-    meshes: []const scene.Mesh,
-    /// What of the scene is drawn: instances whose material can be seen anywhere.
-    instances: []const scene.Instance,
+    /// What of the scene is drawn: meshes with the tangents that textures need, without what can
+    /// be seen nowhere.
+    parts: alpha.Parts,
 
     /// Frees everything.
     pub fn deinit(loaded: *Loaded) void {
@@ -77,6 +77,7 @@ pub const ViewSettings = struct {
     /// Linear RGB.
     background: ?math.Vec3 = null,
     environment: light.EnvironmentSettings = .{},
+    floor: choices.Floor = .none,
 };
 
 /// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
@@ -114,8 +115,17 @@ pub fn load(
         settings.pool,
         diagnostic,
     );
+    const parts = try alpha.split(
+        gpa,
+        arena.allocator(),
+        from.materials,
+        meshes,
+        instances,
+        &textures,
+        settings.pool,
+    );
     times.texture_ns = nanoseconds(start.durationTo(Clock.awake.now(io)));
-    return .{ .textures = textures, .arena = arena, .meshes = meshes, .instances = instances };
+    return .{ .textures = textures, .arena = arena, .parts = parts };
 }
 
 /// Those whose material is all holes, or all clear, are as good as not there.
@@ -180,8 +190,8 @@ pub fn pose(
     const soup = try flatten.flatten(
         gpa,
         arena.allocator(),
-        loaded.instances,
-        loaded.meshes,
+        loaded.parts.instances,
+        loaded.parts.meshes,
         attributesOf(&loaded.textures),
         place.maps,
         settings.pool,
@@ -202,8 +212,7 @@ pub fn pose(
     };
     const materials = try material.place(
         arena.allocator(),
-        from,
-        loaded.instances,
+        &loaded.parts,
         &loaded.textures,
         soup.triangles,
     );
@@ -257,9 +266,16 @@ noinline fn chooseView(
     seen.lights = &.{};
     _ = seen.view_arena.reset(.retain_capacity);
     const arena = seen.view_arena.allocator();
+    // The scene as triangles refer to it: with a material for each of the world's.
+    const sources = seen.materials.sources;
+    var shown = from.*;
+    const materials = try gpa.alloc(scene.Material, sources.len);
+    defer gpa.free(materials);
+    for (materials, sources) |*to, source| to.* = from.materials[source];
+    shown.materials = materials;
     const chosen = try view_file.choose(
         gpa,
-        from,
+        &shown,
         seen.node_maps,
         &seen.geometry,
         &.{
@@ -284,6 +300,7 @@ noinline fn chooseView(
         settings.background orelse from.background,
     );
     light.addMap(&seen.environment, &settings.environment, &seen.view.camera);
+    if (settings.floor == .shadow) seen.environment.floor_height = light.floorOf(&seen.geometry);
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
     seen.facts.environment_is_default = settings.environment.is_default;
@@ -745,7 +762,7 @@ test "loading that runs out of memory is an error that leaks nothing" {
                 try load(failing, io, scene_from, .{ .pool = &pool }, &diagnostic, &times);
             defer loaded.deinit();
             // Made, since the mesh has none: v grows downwards in textures, upwards here.
-            for (loaded.meshes[0].tangents.?) |tangent| {
+            for (loaded.parts.meshes[0].tangents.?) |tangent| {
                 try std.testing.expectEqual([4]f32{ 1, 0, 0, -1 }, tangent);
             }
         }
@@ -858,6 +875,7 @@ test "memory that runs out is an error that leaks nothing" {
 test {
     _ = environment;
     _ = bvh_wide;
+    _ = alpha;
     _ = check;
     _ = flatten;
     _ = light;

@@ -9,6 +9,7 @@ const std = @import("std");
 pub const bench = @import("bench.zig");
 pub const builtin = @import("builtin.zig");
 pub const cli = @import("cli.zig");
+pub const compare = @import("compare.zig");
 pub const decode = @import("decode.zig");
 pub const diagnostic = @import("diagnostic.zig");
 pub const energy = @import("energy.zig");

@@ -120,6 +120,8 @@ pub const Material = struct {
     attenuation_distance: f32 = std.math.inf(f32),
     /// Red, green, blue (sRGB) and alpha, multiplied with `base_color`.
     base_color_texture: ?TextureView = null,
+    /// Red: a number that alpha is multiplied with, as PBRT's shapes have it.
+    alpha_texture: ?TextureView = null,
     /// Green: roughness, blue: metallic, each multiplied with its factor.
     metallic_roughness_texture: ?TextureView = null,
     /// Tangent-space normals.
@@ -142,8 +144,8 @@ pub const Material = struct {
 
 /// The textures of a material.
 pub const texture_fields = [_][]const u8{
-    "base_color_texture", "metallic_roughness_texture", "normal_texture", "occlusion_texture",
-    "emissive_texture",
+    "base_color_texture", "alpha_texture",     "metallic_roughness_texture",
+    "normal_texture",     "occlusion_texture", "emissive_texture",
 };
 
 /// Light from all around, as an image by direction.

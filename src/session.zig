@@ -237,6 +237,7 @@ pub const Session = struct {
             .ambient = choices.ambient,
             .background = radianceOf(choices.background),
             .environment = environment,
+            .floor = choices.floor,
         }, session.diagnostic, &session.times);
     }
 

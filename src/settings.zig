@@ -60,6 +60,8 @@ pub const exposure_ev_max = 64;
 pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4 };
 /// Largest that automatic exposure chooses.
 pub const exposure_auto_ev_max = 10;
+/// Measures of how far two pictures are from each other.
+pub const Metric = enum { max, rmse, psnr, ssim, flip };
 /// Radiance from everywhere in scenes without lights.
 pub const ambient_default: f32 = 0.35;
 
@@ -169,6 +171,13 @@ pub const Background = union(enum) {
     linear: [3]f32,
 };
 
+/// What the scene stands on.
+pub const Floor = enum {
+    none,
+    /// A plane below all that there is, of which nothing is seen but the shadow on it.
+    shadow,
+};
+
 /// Light from all around.
 pub const Environment = struct {
     source: Source = .default,
@@ -259,6 +268,7 @@ pub const View = struct {
     /// Radiance from everywhere, finite and >= 0; null: as the lights have it.
     ambient: ?f32 = null,
     environment: Environment = .{},
+    floor: Floor = .none,
     background: Background = .default,
     /// Colours of unlit surfaces and of the background are the display's, neither exposed nor tone
     /// mapped; without it, as in the thesis, they are radiance, and the background's default comes

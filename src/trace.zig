@@ -124,6 +124,7 @@ test {
     _ = @import("trace/traverse/stack.zig");
     _ = bundle;
     _ = dispatch;
+    _ = @import("trace/integrate/environment_lights.zig");
     _ = @import("trace/integrate/path.zig");
     _ = tiles;
     _ = @import("trace/traverse/beam/budget.zig");

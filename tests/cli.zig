@@ -1372,3 +1372,49 @@ test "mistakes in what to measure are said before anything is measured" {
     const help = try sandbox.expectExit(0, &.{ "bench", "--help" });
     try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 60);
 }
+
+test "compare: figures, a map, thresholds, and images that cannot be compared" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("a.ppm", "P6 2 1 255 " ++ .{ 0, 100, 200, 7, 8, 9 });
+    try sandbox.write("b.ppm", "P6 2 1 255 " ++ .{ 0, 100, 251, 7, 8, 9 });
+    try sandbox.write("c.ppm", "P6 1 1 255 abc");
+    const same = try sandbox.expectExit(0, &.{ "compare", "a.ppm", "a.ppm", "--threshold=max=0" });
+    try testing.expectEqualStrings(
+        "max   0.0000\nRMSE  0.00000\nPSNR  inf dB\nSSIM  1.00000\nFLIP  0.00000\n",
+        same.stdout,
+    );
+    const far = try sandbox.expectExit(4, &.{
+        "compare", "a.ppm", "b.ppm", "--threshold=max=0.1", "--threshold=psnr=1", "--stats=json",
+        "-om.png",
+    });
+    const found = try std.json.parseFromSliceLeaky(
+        struct { format: []const u8, width: u32, max: f64, rmse: f64, flip: f64 },
+        sandbox.arena_state.allocator(),
+        far.stdout,
+        .{ .ignore_unknown_fields = true },
+    );
+    try testing.expectEqualStrings("raylane-compare-1", found.format);
+    try testing.expectApproxEqAbs(0.2, found.max, 1e-6);
+    try testing.expectApproxEqAbs(0.2 / @sqrt(6.0), found.rmse, 1e-6);
+    try testing.expect(found.flip > 0);
+    try testing.expectEqualStrings(
+        "raylane: b.ppm: max is 0.20000, the threshold 0.1\n",
+        far.stderr,
+    );
+    try testing.expectStringStartsWith(try sandbox.read("m.png"), "\x89PNG");
+    const sizes = try sandbox.expectExit(3, &.{ "compare", "a.ppm", "c.ppm" });
+    try testing.expectEqualStrings(
+        "raylane: c.ppm: 1x1 pixels, where a.ppm has 2x1\n",
+        sizes.stderr,
+    );
+    try sandbox.write("d.ppm", "P6 1 1 255 ab");
+    const broken = try sandbox.expectExit(3, &.{ "compare", "d.ppm", "c.ppm" });
+    try testing.expectStringStartsWith(broken.stderr, "raylane: d.ppm: ");
+    const absent = try sandbox.expectExit(1, &.{ "compare", "a.ppm", "absent.png" });
+    try testing.expectStringStartsWith(absent.stderr, "raylane: absent.png: ");
+    _ = try sandbox.expectExit(2, &.{ "compare", "a.ppm" });
+    const help = try sandbox.expectExit(0, &.{ "compare", "--help" });
+    try testing.expect(std.mem.find(u8, help.stdout, "--threshold") != null);
+    try sandbox.expectFiles(&.{ "a.ppm", "b.ppm", "c.ppm", "d.ppm", "m.png" });
+}

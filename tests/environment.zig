@@ -228,6 +228,43 @@ test "it is darker below a box than beside it, and every variant says so alike" 
     try std.testing.expectApproxEqRel(image.at(4, 31).*[1], image.at(32, 31).*[1], 0.01);
 }
 
+test "a floor shows the shadow on it alone" {
+    var texels = Sky.plain(.{ 0.5, 0.5, 0.5 });
+    texels[2 * Sky.width + 40] = .{ 200, 200, 200 };
+    var sky: Sky = try .init(&texels);
+    defer sky.deinit();
+    var builder: Builder = try .init();
+    try builder.addSphere(fixture.matte(.{ 0.8, 0.8, 0.8 }), .{ 0, -0.4, -5 }, 0.6, 12);
+    try builder.addCamera(.{ 0, 0, 0 }, 0.7);
+    var scene = try builder.finish();
+    defer scene.deinit();
+    var options: fixture.Options = .{
+        .width = 64,
+        .height = 48,
+        .sample_count = 4,
+        .transparent = true,
+        .environment = sky.around(),
+    };
+    var bare = try fixture.render(&scene, options);
+    defer bare.deinit(gpa);
+    options.floor = .shadow;
+    var hash: ?u64 = null;
+    for (0..raylane.variant.compiled.len) |variant| {
+        options.variant = variant;
+        var image = try fixture.render(&scene, options);
+        defer image.deinit(gpa);
+        try std.testing.expectEqual(hash orelse image.hash(), image.hash());
+        hash = image.hash();
+        // Below the sphere, far off, and above the horizon; the sphere itself is as before.
+        const below = image.at(32, 31).*;
+        try expect(below[3] > 0.4 and below[3] <= 1);
+        try std.testing.expectEqual([3]f32{ 0, 0, 0 }, below[0..3].*);
+        try expect(image.at(2, 40).*[3] < 0.1);
+        try std.testing.expectEqual(0, image.at(32, 2).*[3]);
+        try std.testing.expectEqual(bare.at(32, 26).*, image.at(32, 26).*);
+    }
+}
+
 test "a file that is no image or not there is an error in one line" {
     var scene = try boxScene();
     defer scene.deinit();

@@ -148,6 +148,7 @@ pub const Options = struct {
     environment: raylane.settings.Environment = .{ .source = .none },
     background: ?[3]f32 = null,
     transparent: bool = false,
+    floor: raylane.settings.Floor = .none,
     /// The background is the environment.
     see_environment: bool = false,
     /// Without it, all is radiance.
@@ -176,6 +177,7 @@ pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options)
         .resolution = .{ options.width, options.height },
         .ambient = options.ambient,
         .environment = options.environment,
+        .floor = options.floor,
         .display_referred = options.display_referred,
         .background = if (options.see_environment)
             .env

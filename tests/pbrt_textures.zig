@@ -245,6 +245,31 @@ test "a normal map and a shining picture" {
     try testing.expectEqual([3]f32{ 1.5, 1.5, 1.5 }, scene.lights[0].color);
 }
 
+test "a shape's alpha blends, or makes holes by a picture's red, in a material of its own" {
+    var folder: Folder = try .make();
+    defer folder.free();
+    const one = with_uv ++ " \"texture alpha\" \"t\" ";
+    const gone = with_uv ++ " \"float alpha\" 0 ";
+    const half = with_uv ++ " \"float alpha\" .5 ";
+    var scene = try folder.readClean(comptime world(picture ++ " Material \"matte\" " ++
+        "\"rgb Kd\" [.1 .2 .3] " ++ with_uv ++ one ++ one ++ half ++ gone));
+    defer scene.deinit();
+    try testing.expectEqual(4, scene.meshes.len);
+    const plain = &scene.materials[scene.meshes[0].material];
+    const holes = &scene.materials[scene.meshes[1].material];
+    const veil = &scene.materials[scene.meshes[3].material];
+    try testing.expectEqual(scene.meshes[1].material, scene.meshes[2].material);
+    try testing.expectEqual(.@"opaque", plain.alpha_mode);
+    try testing.expectEqual(null, plain.alpha_texture);
+    try testing.expectEqual(.mask, holes.alpha_mode);
+    try testing.expectEqual(0, scene.textures[holes.alpha_texture.?.texture].image);
+    try testing.expectEqual([4]f32{ 0.1, 0.2, 0.3, 1 }, holes.base_color);
+    try testing.expect(scene.meshes[0].texcoords[0] == null);
+    try testing.expect(scene.meshes[1].texcoords[0] != null);
+    try testing.expectEqual(.blend, veil.alpha_mode);
+    try testing.expectEqual(0.5, veil.base_color[3]);
+}
+
 /// A direction of the scene that is PBRT's with a plain camera, whose hand is the other one.
 fn fromPbrt(direction: Vec3d) Vec3d {
     return .{ direction[0], direction[1], -direction[2] };

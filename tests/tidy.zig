@@ -30,6 +30,7 @@ const directions = [_]Row{
     },
     .{ .part = "kernel", .may_import = &.{ "module:config", "trace", "variant" } },
     .{ .part = "bench", .may_import = &.{ "session", "variant", "energy" } },
+    .{ .part = "compare", .may_import = &.{ "decode", "parse" } },
     .{ .part = "variant", .may_import = &.{"module:config"} },
     .{ .part = "simd", .may_import = &.{"variant"} },
     .{ .part = "parallel", .may_import = &.{"simd"} },

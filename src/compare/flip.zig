@@ -1,16 +1,16 @@
 //! FLIP: how different two pictures look to somebody who flips between them, pixel by pixel.
 //!
-//! In: two pictures as a display shows them. Out: a map of differences, 0 (the same) to 1. Andersson
-//! et al. 2020, "FLIP: A Difference Evaluator for Alternating Images", with its constants: colours
-//! blurred by the eye's contrast sensitivity and compared in a perceptually even space, times
-//! edges and points that only one picture has; for a display 0.7 m wide with 3840 pixels across,
-//! seen from 0.7 m.
+//! In: two pictures as a display shows them. Out: a map of differences, 0 (the same) to 1.
+//! Andersson et al. 2020, "FLIP: A Difference Evaluator for Alternating Images", with its
+//! constants: colours blurred by the eye's contrast sensitivity and compared in a perceptually even
+//! space, more so where only one picture has an edge or a point; for a display 0.7 m wide with 3840
+//! pixels across, seen from 0.7 m.
 
 const std = @import("std");
 const elementary = @import("../math/elementary.zig");
 const filter_file = @import("filter.zig");
 const Allocator = std.mem.Allocator;
-const Filter = filter_file.Filter;
+const Filter = filter_file.Filter(f32);
 const Kernel = filter_file.Kernel;
 const Picture = @import("picture.zig").Picture;
 const assert = std.debug.assert;
@@ -164,23 +164,22 @@ fn sumOf(radius: usize, sigma: f64) f64 {
     return sum;
 }
 
-/// Linear Rec. 709 to CIE XYZ relative to its white, whose components are 1.
-fn xyzOf(rgb: [3]f32) [3]f32 {
-    const white = comptime .{ row(0)[0] + row(0)[1] + row(0)[2], row(2)[0] + row(2)[1] + row(2)[2] };
-    return .{
-        (row(0)[0] * rgb[0] + row(0)[1] * rgb[1] + row(0)[2] * rgb[2]) / white[0],
-        row(1)[0] * rgb[0] + row(1)[1] * rgb[1] + row(1)[2] * rgb[2],
-        (row(2)[0] * rgb[0] + row(2)[1] * rgb[1] + row(2)[2] * rgb[2]) / white[1],
-    };
-}
+/// From linear Rec. 709 to CIE XYZ, by its primaries and D65.
+const to_xyz = [3][3]f32{
+    .{ 0.41238656, 0.35759149, 0.18045049 },
+    .{ 0.21263682, 0.71518298, 0.07218020 },
+    .{ 0.01933062, 0.11919716, 0.95037259 },
+};
+/// XYZ of white.
+const white = [3]f32{ 0.95042854, 1, 1.08890037 };
 
-/// Rows of the matrix from the primaries of Rec. 709 and D65.
-fn row(comptime index: usize) [3]f32 {
-    return ([3][3]f32{
-        .{ 0.41238656, 0.35759149, 0.18045049 },
-        .{ 0.21263682, 0.71518298, 0.07218020 },
-        .{ 0.01933062, 0.11919716, 0.95037259 },
-    })[index];
+/// Linear Rec. 709 to CIE XYZ relative to white.
+fn xyzOf(rgb: [3]f32) [3]f32 {
+    var xyz: [3]f32 = undefined;
+    for (&xyz, to_xyz, white) |*value, row, whole| {
+        value.* = (row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2]) / whole;
+    }
+    return xyz;
 }
 
 /// Opponent colours YCxCz, in which the contrast sensitivities are known.
@@ -192,8 +191,8 @@ fn opponentOf(rgb: [3]f32) [3]f32 {
 /// Back to linear Rec. 709.
 fn linearOf(opponent: [3]f32) [3]f32 {
     const y = (opponent[0] + 16) / 116;
-    const x = (y + opponent[1] / 500) * comptime (row(0)[0] + row(0)[1] + row(0)[2]);
-    const z = (y - opponent[2] / 200) * comptime (row(2)[0] + row(2)[1] + row(2)[2]);
+    const x = (y + opponent[1] / 500) * white[0];
+    const z = (y - opponent[2] / 200) * white[2];
     return .{
         3.2410033 * x - 1.5373989 * y - 0.49861587 * z,
         -0.96922433 * x + 1.8759301 * y + 0.041554224 * z,
@@ -242,12 +241,12 @@ test "the same picture differs nowhere, black from white as much as colours of o
     const gpa = std.testing.allocator;
     var black: Picture = try .solid(gpa, 20, 12, .{ 0, 0, 0 });
     defer black.deinit(gpa);
-    var white: Picture = try .solid(gpa, 20, 12, .{ 1, 1, 1 });
-    defer white.deinit(gpa);
+    var bright: Picture = try .solid(gpa, 20, 12, .{ 1, 1, 1 });
+    defer bright.deinit(gpa);
     var map: [240]f32 = undefined;
-    try evaluate(gpa, &white, &white, &map);
+    try evaluate(gpa, &bright, &bright, &map);
     for (map) |value| try std.testing.expectEqual(0, value);
-    try evaluate(gpa, &black, &white, &map);
+    try evaluate(gpa, &black, &bright, &map);
     // HyAB 100 to the 0.7 is 25.12, that of green and blue 41.27: 0.95 + 0.05 * (25.12 - 16.51) /
     // 24.76. There are no edges.
     for (map) |value| try std.testing.expectApproxEqAbs(0.9674, value, 1e-3);
@@ -259,7 +258,7 @@ test "colours go to opponents and back" {
             try std.testing.expectApproxEqAbs(wanted, found, 1e-5);
         }
     }
-    const white = huntLab(.{ 1, 1, 1 });
-    try std.testing.expectApproxEqAbs(100, white[0], 1e-3);
-    try std.testing.expectApproxEqAbs(0, white[1], 1e-3);
+    const lab = huntLab(.{ 1, 1, 1 });
+    try std.testing.expectApproxEqAbs(100, lab[0], 1e-3);
+    try std.testing.expectApproxEqAbs(0, lab[1], 1e-3);
 }

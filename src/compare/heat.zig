@@ -39,7 +39,7 @@ fn colourOf(value: f32) [3]u8 {
 test "from black to nearly white, and red in between" {
     try std.testing.expectEqual([3]u8{ 0, 0, 0 }, colourOf(0));
     const white = colourOf(1);
-    try std.testing.expect(white[0] > 245 and white[1] > 245 and white[2] > 180);
+    try std.testing.expect(white[0] > 240 and white[1] > 240 and white[2] > 180);
     const middle = colourOf(0.5);
     try std.testing.expect(middle[0] > 170 and middle[1] < 70 and middle[2] > 110);
 }

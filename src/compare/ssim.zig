@@ -7,7 +7,7 @@
 const std = @import("std");
 const filter_file = @import("filter.zig");
 const Allocator = std.mem.Allocator;
-const Filter = filter_file.Filter;
+const Filter = filter_file.Filter(f64);
 const Kernel = filter_file.Kernel;
 const Picture = @import("picture.zig").Picture;
 const assert = std.debug.assert;
@@ -21,15 +21,15 @@ const c2 = 0.03 * 0.03;
 pub fn mean(gpa: Allocator, first: *const Picture, second: *const Picture) error{OutOfMemory}!f64 {
     const count = first.encoded[0].len;
     assert(first.width == second.width and second.encoded[0].len == count);
-    const memory = try gpa.alloc(f32, 5 * count);
+    const memory = try gpa.alloc(f64, 5 * count);
     defer gpa.free(memory);
     // a, b, a a, b b, a b.
-    var planes: [5][]f32 = undefined;
+    var planes: [5][]f64 = undefined;
     for (&planes, 0..) |*plane, index| plane.* = memory[index * count ..][0..count];
     for (0..count) |index| {
         const a = lumaAt(first, index);
         const b = lumaAt(second, index);
-        for (planes, [_]f32{ a, b, a * a, b * b, a * b }) |plane, value| plane[index] = value;
+        for (planes, [_]f64{ a, b, a * a, b * b, a * b }) |plane, value| plane[index] = value;
     }
     var filter: Filter = try .init(gpa, first.width, first.height);
     defer filter.deinit(gpa);
@@ -37,8 +37,8 @@ pub fn mean(gpa: Allocator, first: *const Picture, second: *const Picture) error
     for (planes) |plane| filter.apply(&kernel, &kernel, plane, plane);
     var sum: f64 = 0;
     for (0..count) |index| {
-        const a: f64 = planes[0][index];
-        const b: f64 = planes[1][index];
+        const a = planes[0][index];
+        const b = planes[1][index];
         const variances = planes[2][index] - a * a + (planes[3][index] - b * b);
         const covariance = planes[4][index] - a * b;
         const alike = (2 * a * b + c1) * (2 * covariance + c2);
@@ -47,9 +47,11 @@ pub fn mean(gpa: Allocator, first: *const Picture, second: *const Picture) error
     return sum / @as(f64, @floatFromInt(count));
 }
 
-fn lumaAt(picture: *const Picture, index: usize) f32 {
-    const encoded = &picture.encoded;
-    return 0.2126 * encoded[0][index] + 0.7152 * encoded[1][index] + 0.0722 * encoded[2][index];
+fn lumaAt(picture: *const Picture, index: usize) f64 {
+    var luma: f64 = 0;
+    const weights = [3]f64{ 0.2126, 0.7152, 0.0722 };
+    for (picture.encoded, weights) |plane, weight| luma += weight * plane[index];
+    return luma;
 }
 
 test "of constant pictures what the formula says, of the same ones 1" {

@@ -1,6 +1,6 @@
 //! Environment maps: from an image, or from the studio, to all that lookups need.
 //!
-//! In: an equirectangular image of radiance, or none. Out: an octahedral pyramid of radiance, what
+//! In: an image of radiance, or none. Out: an octahedral pyramid of radiance, what
 //! lobes of eight roughnesses and of the cosine make of it, and its light cut into parts. By all
 //! threads; the result does not depend on how many.
 
@@ -9,6 +9,7 @@ const decode = @import("../decode.zig");
 const math = @import("../math.zig");
 const parallel = @import("../parallel.zig");
 const simd = @import("../simd.zig");
+const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const filter = @import("environment/filter.zig");
 const parts_file = @import("environment/parts.zig");
@@ -32,8 +33,13 @@ pub const Error = error{OutOfMemory} || parallel.Error;
 /// Where the radiance comes from.
 pub const Source = union(enum) {
     studio,
-    /// A file of an equirectangular image.
-    image: []const u8,
+    image: Image,
+
+    /// A file, and how its image shows directions.
+    pub const Image = struct {
+        bytes: []const u8,
+        projection: scene.EnvironmentMap.Projection = .equirectangular,
+    };
 };
 
 /// A map and its memory.
@@ -59,16 +65,22 @@ pub fn make(
     defer simd.setFloatControl(mode);
     var sky: ?Sky = switch (source) {
         .studio => null,
-        .image => |bytes| try readSky(gpa, bytes, reason),
+        .image => |*image| try readSky(gpa, image, reason),
     };
     defer if (sky) |*image| image.deinit(gpa);
     return makeOf(gpa, if (sky) |*image| image else null, pool);
 }
 
-fn readSky(gpa: Allocator, bytes: []const u8, reason: *decode.Reason) decode.Error!Sky {
-    var texels = try decode.decode(gpa, bytes, reason);
+fn readSky(gpa: Allocator, image: *const Source.Image, reason: *decode.Reason) decode.Error!Sky {
+    var texels = try decode.decode(gpa, image.bytes, reason);
     defer texels.deinit(gpa);
-    return .init(gpa, &texels);
+    if (image.projection == .octahedral and texels.width != texels.height) {
+        reason.set("an equal-area map has to be a square, not {d} by {d}", .{
+            texels.width, texels.height,
+        });
+        return error.InvalidImage;
+    }
+    return .init(gpa, &texels, image.projection);
 }
 
 /// Of the studio, where there is no image; that is changed. Not inlined, so that no arithmetic

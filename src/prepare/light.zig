@@ -201,6 +201,16 @@ pub fn addMap(
     }
 }
 
+/// Height of a plane just below all that there is; null where that is nothing.
+pub fn floorOf(geometry: *const world.Geometry) ?f32 {
+    if (geometry.bounds.isEmpty()) return null;
+    return geometry.bounds.lower[1] - geometry.size * floor_gap;
+}
+
+/// Share of the scene's size: so near that no light is seen between the two, and yet so far that
+/// rounding puts no shadow on all of the plane.
+const floor_gap = 0x1p-12;
+
 /// Cosine and sine of the turn about y that a camera has which looked along -z; of one that looks
 /// straight up or down by its upper side.
 fn azimuth(camera: *const world.Camera) [2]f64 {

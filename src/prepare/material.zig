@@ -1,6 +1,6 @@
 //! Metallic-roughness materials (glTF 2.0, appendix B) as shading wants them.
 //!
-//! In: a scene's materials. Out: the world's, one for one, so that indices stay what they are.
+//! In: materials of what is drawn. Out: the world's, one for one.
 //! Further sources: the extensions KHR_materials_ior, _transmission and _volume.
 
 const std = @import("std");
@@ -11,33 +11,34 @@ const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const AlphaRange = @import("texture.zig").AlphaRange;
 const MaterialUse = @import("texture.zig").MaterialUse;
+const Parts = @import("alpha.zig").Parts;
 const TextureSet = @import("texture.zig").TextureSet;
 
 /// Darkest attenuation colour: a channel at 0 would absorb without bound.
 const attenuation_color_min = 1e-4;
 
-/// The world's materials in the order of the scene's; `triangles` are the world's, of `instances`.
+/// The world's materials in the order of the parts'; `triangles` are the world's.
 pub fn place(
     arena: Allocator,
-    from: *const scene.Scene,
-    instances: []const scene.Instance,
+    parts: *const Parts,
     textures: *const TextureSet,
     triangles: []const world.Triangle,
 ) error{OutOfMemory}!world.Materials {
-    const converted = try arena.alloc(world.Material, from.materials.len);
-    for (from.materials, textures.materials, converted) |*material, *use, *to| {
+    const converted = try arena.alloc(world.Material, parts.materials.len);
+    for (parts.materials, textures.materials, converted) |*material, *use, *to| {
         to.* = convert(material, use);
     }
     var has_transparency = false;
     var has_holes = false;
-    for (instances) |instance| {
-        const used = &converted[from.meshes[instance.mesh].material];
+    for (parts.instances) |instance| {
+        const used = &converted[parts.meshes[instance.mesh].material];
         has_transparency = has_transparency or isTransparent(used);
         has_holes = has_holes or used.alpha_cutoff >= 0;
     }
     const stops_all = !has_transparency and !has_holes;
     return .{
         .all = converted,
+        .sources = parts.sources,
         .lookups = textures.lookups,
         .has_transparency = has_transparency,
         .has_holes = has_holes,

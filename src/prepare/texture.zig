@@ -40,7 +40,7 @@ const texture_bytes_max: u64 = 4 << 30;
 const decode_bytes_max: u64 = 64 << 20;
 
 /// Channel of a lookup that there is not: it counts as 1.
-const missing: u8 = 255;
+pub const missing: u8 = 255;
 
 /// The least and the largest that alpha is on a surface.
 pub const AlphaRange = struct {
@@ -55,6 +55,8 @@ pub const MaterialUse = struct {
     lookup_count: u32 = 0,
     /// Of factor, texture and vertices together, wherever the material is drawn.
     alpha: AlphaRange = .{},
+    /// Of the vertices alone; 1 where alpha does not count.
+    vertex_alpha: AlphaRange = .{},
 };
 
 /// All textures of a scene, and who uses them.
@@ -205,7 +207,7 @@ const Work = struct {
         @memset(work.reasons, null);
         for (from.materials, work.is_drawn) |*material, is_drawn| {
             if (!is_drawn) continue;
-            for (std.enums.values(world.Slot)) |slot| try work.want(material, slot);
+            for (std.enums.values(Use)) |use| try work.want(material, use);
         }
     }
 
@@ -233,21 +235,21 @@ const Work = struct {
     fn want(
         work: *Work,
         material: *const scene.Material,
-        slot: world.Slot,
+        use: Use,
     ) error{OutOfMemory}!void {
-        const view = viewOf(material, slot) orelse return;
+        const view = viewOf(material, use) orelse return;
         const image = work.from.textures[view.texture].image;
-        const is_srgb = isLight(slot);
+        const is_srgb = use.isLight();
         const index = &work.request_of[image][@intFromBool(!is_srgb)];
         if (index.* == scene.none) {
             index.* = @intCast(work.requests.items.len);
             try work.requests.append(work.gpa, .{ .image = image, .is_srgb = is_srgb });
         }
         const request = &work.requests.items[index.*];
-        for (channelsOf(material, slot)) |channel| {
+        for (channelsOf(material, use)) |channel| {
             if (channel != missing) request.wanted[channel] = true;
         }
-        if (slot == .base_color and material.alpha_mode == .mask and request.cutoff == null) {
+        if (use == .base_color and material.alpha_mode == .mask and request.cutoff == null) {
             request.cutoff = material.alpha_cutoff / material.base_color[3];
         }
     }
@@ -388,14 +390,15 @@ const Work = struct {
         const material = &work.from.materials[index];
         if (!work.is_drawn[index]) return .{};
         var alpha = product(work.vertex_alpha[index], material.base_color[3]);
-        for (std.enums.values(world.Slot)) |slot| {
-            const view = viewOf(material, slot) orelse continue;
+        for (std.enums.values(Use)) |use| {
+            const view = viewOf(material, use) orelse continue;
             const texture = &work.from.textures[view.texture];
-            const request_index = work.request_of[texture.image][@intFromBool(!isLight(slot))];
+            const request_index = work.request_of[texture.image][@intFromBool(!use.isLight())];
             const request = &work.requests.items[request_index];
             if (request.pyramid == null) continue;
-            const lookup = lookupOf(material, slot, texture, request);
-            if (slot == .base_color and lookup.channels[3] != missing) alpha = .{
+            const lookup = lookupOf(material, use, texture, request);
+            if (use == .alpha) alpha.least = 0; // Nobody has looked at the red.
+            if (use == .base_color and lookup.channels[3] != missing) alpha = .{
                 .least = alpha.least * request.alpha.least,
                 .largest = alpha.largest * request.alpha.largest,
             };
@@ -405,6 +408,7 @@ const Work = struct {
             .first_lookup = @intCast(first),
             .lookup_count = @intCast(lookups.items.len - first),
             .alpha = alpha,
+            .vertex_alpha = work.vertex_alpha[index],
         };
     }
 };
@@ -424,11 +428,37 @@ fn product(range: AlphaRange, factor: f32) AlphaRange {
     return .{ .least = range.least * factor, .largest = range.largest * factor };
 }
 
-/// The texture of a slot, null where there is none or it has no say.
-fn viewOf(material: *const scene.Material, slot: world.Slot) ?scene.TextureView {
-    if (material.unlit and slot != .base_color) return null;
-    return switch (slot) {
+/// What a material has textures for.
+const Use = enum {
+    base_color,
+    alpha,
+    metallic_roughness,
+    normal,
+    occlusion,
+    emissive,
+
+    fn slot(use: Use) world.Slot {
+        return switch (use) {
+            .base_color, .alpha => .base_color,
+            .metallic_roughness => .metallic_roughness,
+            .normal => .normal,
+            .occlusion => .occlusion,
+            .emissive => .emissive,
+        };
+    }
+
+    /// Whether its colours are light, by the sRGB curve.
+    fn isLight(use: Use) bool {
+        return use == .base_color or use == .emissive;
+    }
+};
+
+/// The texture for a use, null where there is none or it has no say.
+fn viewOf(material: *const scene.Material, use: Use) ?scene.TextureView {
+    if (material.unlit and use.slot() != .base_color) return null;
+    return switch (use) {
         .base_color => material.base_color_texture,
+        .alpha => if (material.alpha_mode == .@"opaque") null else material.alpha_texture,
         .metallic_roughness => material.metallic_roughness_texture,
         .normal => if (material.normal_scale == 0) null else material.normal_texture,
         .occlusion => if (material.occlusion_strength == 0) null else material.occlusion_texture,
@@ -439,16 +469,12 @@ fn viewOf(material: *const scene.Material, slot: world.Slot) ?scene.TextureView 
     };
 }
 
-/// Whether a slot's colours are light, by the sRGB curve.
-fn isLight(slot: world.Slot) bool {
-    return slot == .base_color or slot == .emissive;
-}
-
 /// Which channels of an image are the first, second, ... of a slot (glTF 2.0, section 3.9).
-fn channelsOf(material: *const scene.Material, slot: world.Slot) [4]u8 {
+fn channelsOf(material: *const scene.Material, use: Use) [4]u8 {
     const has_alpha = material.alpha_mode != .@"opaque";
-    return switch (slot) {
+    return switch (use) {
         .base_color => .{ 0, 1, 2, if (has_alpha) 3 else missing },
+        .alpha => .{ missing, missing, missing, 0 },
         .metallic_roughness => .{ 1, 2, missing, missing },
         .normal, .emissive => .{ 0, 1, 2, missing },
         .occlusion => .{ 0, missing, missing, missing },
@@ -457,17 +483,17 @@ fn channelsOf(material: *const scene.Material, slot: world.Slot) [4]u8 {
 
 fn lookupOf(
     material: *const scene.Material,
-    slot: world.Slot,
+    use: Use,
     texture: *const scene.Texture,
     request: *const Request,
 ) world.Lookup {
-    const view = viewOf(material, slot).?;
-    var channels = channelsOf(material, slot);
+    const view = viewOf(material, use).?;
+    var channels = channelsOf(material, use);
     for (&channels) |*channel| {
         if (channel.* != missing) channel.* = request.stored[channel.*];
     }
     return .{
-        .slot = slot,
+        .slot = use.slot(),
         .texture = request.texture,
         .wrap = .{ wrapOf(texture.wrap[0]), wrapOf(texture.wrap[1]) },
         .magnify_linear = texture.magnify == .linear,
@@ -759,7 +785,7 @@ test "channels that no material uses are not kept" {
     var files: std.heap.ArenaAllocator = .init(testing.allocator);
     defer files.deinit();
     const file = try TestImage.png(files.allocator(), 1, 1, 4, &.{ 10, 20, 30, 40 });
-    const Case = struct { scene.Material, world.Slot, []const u8, [4]u8 };
+    const Case = struct { scene.Material, Use, []const u8, [4]u8 };
     const view: scene.TextureView = .{ .texture = 0 };
     for ([_]Case{
         .{ .{ .base_color_texture = view }, .base_color, &.{ 10, 20, 30 }, .{ 0, 1, 2, missing } },
@@ -774,6 +800,12 @@ test "channels that no material uses are not kept" {
             .metallic_roughness,
             &.{ 20, 30 },
             .{ 0, 1, missing, missing },
+        },
+        .{
+            .{ .alpha_texture = view, .alpha_mode = .mask },
+            .alpha,
+            &.{10},
+            .{ missing, missing, missing, 0 },
         },
         .{ .{ .normal_texture = view }, .normal, &.{ 10, 20, 30 }, .{ 0, 1, 2, missing } },
         .{
@@ -796,20 +828,21 @@ test "channels that no material uses are not kept" {
         defer set.deinit();
         try testing.expectEqual(0, diagnostic.warning_count);
         try testing.expectEqual(1, set.lookups.len);
-        try testing.expectEqual(case[1], set.lookups[0].slot);
+        try testing.expectEqual(case[1].slot(), set.lookups[0].slot);
         try testing.expectEqual(case[3], set.lookups[0].channels);
         try testing.expectEqual(MaterialUse{
             .first_lookup = 0,
             .lookup_count = 1,
-            .alpha = if (case[0].alpha_mode == .blend)
-                .{ .least = 40.0 / 255.0, .largest = 40.0 / 255.0 }
-            else
-                .{},
+            .alpha = switch (case[0].alpha_mode) {
+                .blend => .{ .least = 40.0 / 255.0, .largest = 40.0 / 255.0 },
+                .mask => .{ .least = 0 },
+                .@"opaque" => .{},
+            },
         }, set.materials[0]);
         const texture = &set.textures.all[0];
         try testing.expectEqualSlices(u8, case[2], texture.levels[0].texels);
         try testing.expectEqual(case[2].len, texture.channel_count);
-        try testing.expectEqual(isLight(case[1]), texture.is_srgb);
+        try testing.expectEqual(case[1].isLight(), texture.is_srgb);
         try testing.expectEqual(case[2].len, set.byte_count);
     }
 }

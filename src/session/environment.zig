@@ -103,7 +103,7 @@ fn fromFile(
     errdefer diagnostic.place.set("{s}", .{path});
     var opened = try parse_resource.open(gpa, io, path, .{ .output = output }, diagnostic);
     defer opened.close();
-    return make(gpa, pool, .{ .image = opened.main.bytes }, diagnostic);
+    return make(gpa, pool, .{ .image = .{ .bytes = opened.main.bytes } }, diagnostic);
 }
 
 /// Null where the scene's image is none.
@@ -113,9 +113,12 @@ fn ofScene(
     scene: *const Scene,
     diagnostic: *Diagnostic,
 ) Error!?prepare.OwnedEnvironmentMap {
-    const image = &scene.images[scene.environment.?.image];
+    const map = &scene.environment.?;
+    const image = &scene.images[map.image];
     var reason: Reason = .{};
-    return prepare.makeEnvironment(gpa, .{ .image = image.bytes }, pool, &reason) catch |err| {
+    const source: prepare.EnvironmentSource =
+        .{ .image = .{ .bytes = image.bytes, .projection = map.projection } };
+    return prepare.makeEnvironment(gpa, source, pool, &reason) catch |err| {
         if (err != error.InvalidImage) return @errorCast(err);
         diagnostic.warn("{s}: the environment is not shown: {s}", .{ image.name, reason.text() });
         return null;

@@ -25,6 +25,8 @@ pub const Environment = struct {
     /// Directional lights that stand for the map in each sample, to find how much of it arrives; 0:
     /// all of it does, everywhere.
     shadow_count: u32 = 0,
+    /// Of a plane that primary rays do not see but for the shadow on it; null: none.
+    floor_height: ?f32 = null,
 };
 
 /// Red, green, blue, and a fourth that is not used, so that a texel is loaded at once.

@@ -46,6 +46,8 @@ pub const Material = struct {
 pub const Materials = struct {
     /// `Triangle.material` counts these.
     all: []const Material,
+    /// By material: the scene's that it was made of.
+    sources: []const u32 = &.{},
     /// Of all materials, one after the other.
     lookups: []const Lookup = &.{},
     /// Some drawn material lets shadow rays through in part (blend or transmission).

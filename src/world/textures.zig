@@ -23,7 +23,7 @@ pub const Texture = struct {
 /// What of a material a lookup is for.
 pub const Slot = enum(u8) { base_color, metallic_roughness, normal, occlusion, emissive };
 
-/// A texture as one material uses it.
+/// A texture as one material uses it; several for one slot are multiplied.
 pub const Lookup = struct {
     slot: Slot,
     /// Index into `Textures.all`.

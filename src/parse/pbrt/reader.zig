@@ -91,6 +91,8 @@ named: std.StringHashMapUnmanaged(Material) = .empty,
 /// Meshes of curved shapes by all that they depend on.
 known_meshes: std.AutoHashMapUnmanaged(u64, u32) = .empty,
 default_material: u32 = scene_data.none,
+/// Materials of shapes with an alpha of their own.
+with_holes: std.AutoHashMapUnmanaged(Holes, u32) = .empty,
 
 /// Frees what is not the arena's.
 pub fn deinit(reader: *Reader) void {
@@ -560,14 +562,8 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
         "Shape {f} is not supported and left out",
         .{quote(name)},
     );
-    if (reader.parameters.find("alpha")) |alpha| {
-        const values = reader.parameters.floatsOf(alpha);
-        if (values.len > 0 and values[0] == 0) return;
-        if (alpha.type == .texture)
-            try input.warnHere("alpha", "Shape: textures of holes are not supported", .{});
-    }
     if (graphics.material) |material| if (material.is_boundary) return;
-    const material = try reader.materialIndex();
+    const material = try reader.shapeMaterial() orelse return;
     const surface = &reader.builder.scene.materials.items[material];
     const has_picture = if (graphics.area_light) |light| light.picture != null else false;
     reader.tessellator.wants_texcoords = surface.hasTextures() or has_picture;
@@ -580,6 +576,44 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
         try reader.builder.instantiate(mesh, &graphics.transform)
     else
         try reader.builder.addPart(mesh, &graphics.transform);
+}
+
+/// The material of the shape that the parameters tell, whose alpha is the shape's; null: there is
+/// nothing to see.
+fn shapeMaterial(reader: *Reader) Error!?u32 {
+    const plain = try reader.materialIndex();
+    const alpha = try reader.colors.texture(&reader.parameters, "alpha") orelse return plain;
+    const shown = if (alpha.picture) |*picture|
+        try reader.colors.textures.show(picture)
+    else
+        null;
+    const factor = if (shown) |picture| picture.factor[0] else alpha.mean[0];
+    if (alpha.picture != null and shown == null) return plain; // A warning has been said.
+    if (shown == null and factor >= 1) return plain;
+    if (!(factor > 0)) return null;
+    const key: Holes = .{
+        .material = plain,
+        .factor = @bitCast(factor),
+        .view = if (shown) |picture| viewKey(&picture.view) else @splat(0),
+    };
+    const entry = try reader.with_holes.getOrPut(reader.arena, key);
+    if (!entry.found_existing) {
+        errdefer _ = reader.with_holes.remove(key);
+        var surface = reader.builder.scene.materials.items[plain];
+        surface.alpha_mode = if (shown == null) .blend else .mask;
+        surface.base_color[3] *= @min(factor, 1);
+        if (shown) |picture| surface.alpha_texture = picture.view;
+        entry.value_ptr.* = try reader.builder.scene.addMaterial(surface);
+    }
+    return entry.value_ptr.*;
+}
+
+/// A material with a shape's alpha.
+const Holes = struct { material: u32, factor: u32, view: [7]u32 };
+
+fn viewKey(view: *const scene_data.TextureView) [7]u32 {
+    const rows: [6]u32 = @bitCast(view.transform);
+    return rows ++ [1]u32{view.texture + 1};
 }
 
 /// The mesh of the shape that the parameters tell; curved ones are made once.

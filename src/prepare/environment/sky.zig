@@ -1,8 +1,8 @@
-//! Equirectangular images as environment maps.
+//! Images of radiance as environment maps.
 //!
-//! In: an image of radiance whose texel at u, v is seen along d with u = atan2(d.z, d.x) / 2 pi +
-//! 0.5 and v = acos(d.y) / pi, v = 0 the top row. Out: rows of an octahedral level, four texels
-//! mixed. Arc tangents are a polynomial of + and * alone.
+//! In: an equirectangular image, whose texel at u, v is seen along d with u = atan2(d.z, d.x) /
+//! 2 pi + 0.5 and v = acos(d.y) / pi, v = 0 the top row; or the square of `math.equal_area`. Out:
+//! rows of an octahedral level, four texels mixed. Arc tangents are a polynomial of + and * alone.
 
 const std = @import("std");
 const decode = @import("../../decode.zig");
@@ -11,21 +11,30 @@ const math = @import("../../math.zig");
 const Texel = @import("../../world.zig").EnvironmentTexel;
 const assert = std.debug.assert;
 
+const Projection = @import("../../scene.zig").EnvironmentMap.Projection;
+
 const lane_count = 8;
 const Lanes = @Vector(lane_count, f32);
 
 /// Radiance of a texel at most.
 const radiance_max = 1e9;
 
-/// An equirectangular image, rows from the top.
+/// An image, rows from the top.
 pub const Sky = struct {
     width: u32,
     height: u32,
+    projection: Projection = .equirectangular,
     /// More of them where it has been shrunk.
     texels: []Texel,
 
-    /// Of decoded texels, whose bytes are codes of sRGB. Frees nothing.
-    pub fn init(gpa: std.mem.Allocator, from: *const decode.Texels) error{OutOfMemory}!Sky {
+    /// Of decoded texels, whose bytes are codes of sRGB. Frees nothing. An octahedral image has to
+    /// be a square.
+    pub fn init(
+        gpa: std.mem.Allocator,
+        from: *const decode.Texels,
+        projection: Projection,
+    ) error{OutOfMemory}!Sky {
+        assert(projection != .octahedral or from.width == from.height);
         const texels = try gpa.alloc(Texel, @as(usize, from.width) * from.height);
         const channel_count = from.channel_count;
         // Grey, perhaps with alpha, or colour.
@@ -41,7 +50,12 @@ pub const Sky = struct {
             }
             texel.* = .{ color[0], color[1], color[2], 0 };
         }
-        return .{ .width = from.width, .height = from.height, .texels = texels };
+        return .{
+            .width = from.width,
+            .height = from.height,
+            .projection = projection,
+            .texels = texels,
+        };
     }
 
     /// Frees everything.
@@ -52,8 +66,9 @@ pub const Sky = struct {
 
     /// Texels along the sides of an octahedral level whose texels are nowhere much wider.
     pub fn levelSize(sky: *const Sky, size_min: u32, size_max: u32) u32 {
+        const enough = if (sky.projection == .octahedral) sky.width else 2 * sky.width;
         var size = size_min;
-        while (size < size_max and size < 2 * sky.width) size *= 2;
+        while (size < size_max and size < enough) size *= 2;
         return size;
     }
 
@@ -76,6 +91,7 @@ pub const Sky = struct {
 
     /// Fills a row of a level.
     pub fn resampleRow(sky: *const Sky, level: Level, row: usize) void {
+        if (sky.projection == .octahedral) return sky.resampleRowOfSquare(level, row);
         assert(level.size % lane_count == 0);
         var column: usize = 0;
         while (column < level.size) : (column += lane_count) {
@@ -96,6 +112,48 @@ pub const Sky = struct {
                 level.at(column + lane, row).* = sky.at(across, down);
             }
         }
+    }
+
+    fn resampleRowOfSquare(sky: *const Sky, level: Level, row: usize) void {
+        for (0..level.size) |column| {
+            const point = level.pointAt(column, row);
+            const direction = math.vec3d.normalize(.{ point[0], point[1], point[2] }).?;
+            level.at(column, row).* = sky.atSquare(math.equal_area.toSquare(direction));
+        }
+    }
+
+    /// Four texels mixed, across the edges of the square.
+    fn atSquare(sky: *const Sky, place: [2]f64) Texel {
+        const side: f64 = @floatFromInt(sky.width);
+        const across = place[0] * side - 0.5;
+        const down = place[1] * side - 0.5;
+        const column: i64 = @intFromFloat(@floor(across));
+        const row: i64 = @intFromFloat(@floor(down));
+        const share_right: Texel = @splat(@floatCast(across - @floor(across)));
+        const share_below: Texel = @splat(@floatCast(down - @floor(down)));
+        var mixed: [2]Texel = undefined;
+        for (&mixed, [2]i64{ row, row + 1 }) |*to, at_row| {
+            const left = sky.texelOfSquare(column, at_row);
+            const right = sky.texelOfSquare(column + 1, at_row);
+            to.* = left + (right - left) * share_right;
+        }
+        return mixed[0] + (mixed[1] - mixed[0]) * share_below;
+    }
+
+    /// A texel of the square or of the ring around it: each edge goes on in its other half.
+    fn texelOfSquare(sky: *const Sky, column: i64, row: i64) Texel {
+        const last: i64 = sky.width - 1;
+        var x = column;
+        var y = row;
+        if (x < 0 or x > last) {
+            x = if (x < 0) 0 else last;
+            y = last - y;
+        }
+        if (y < 0 or y > last) {
+            y = if (y < 0) 0 else last;
+            x = last - x;
+        }
+        return sky.texels[@intCast(y * (last + 1) + x)];
     }
 
     /// Four texels mixed, around the image to the sides.
@@ -148,6 +206,38 @@ fn arcTangent(y: Lanes, x: Lanes) Lanes {
     const first = @select(f32, is_steep, steep, flat);
     const upper = @select(f32, x < zero, @as(Lanes, @splat(std.math.pi)) - first, first);
     return @select(f32, y < zero, -upper, upper);
+}
+
+test "a square is looked up without a seam" {
+    const gpa = std.testing.allocator;
+    const side = 64;
+    const texels = try gpa.alloc(Texel, side * side);
+    defer gpa.free(texels);
+    for (texels, 0..) |*texel, index| {
+        const direction = math.equal_area.fromSquare(.{
+            (@as(f64, @floatFromInt(index % side)) + 0.5) / side,
+            (@as(f64, @floatFromInt(index / side)) + 0.5) / side,
+        });
+        inline for (direction, 0..) |component, axis| texel[axis] = @floatCast(1 + component);
+        texel[3] = 0;
+    }
+    const sky: Sky = .{
+        .width = side,
+        .height = side,
+        .projection = .octahedral,
+        .texels = texels,
+    };
+    var random_state: std.Random.DefaultPrng = .init(11);
+    const random = random_state.random();
+    for (0..2000) |_| {
+        var point: math.Vec3d = undefined;
+        for (&point) |*component| component.* = random.float(f64) - 0.5;
+        const direction = math.vec3d.normalize(point) orelse continue;
+        const found = sky.atSquare(math.equal_area.toSquare(direction));
+        inline for (direction, 0..) |component, axis| {
+            try std.testing.expectApproxEqAbs(1 + component, found[axis], 0.03);
+        }
+    }
 }
 
 test "angles all around" {

@@ -128,7 +128,7 @@ fn addShadow(
         const white: Rays.Vec3 = .splat(.{ 1, 1, 1 });
         const hidden: Rays.Vec3 = .select(facing, white.sub(transmittance), none);
         const counted = hidden.scale(.splat(light.weight));
-        receiver.addLight(&receiver.hidden, &vertices.all[group].point, light, counted);
+        receiver.addLight(&receiver.hidden, &vertices.all[group], light, counted);
     }
     return ray_count;
 }
@@ -163,12 +163,19 @@ fn ReceiverOf(comptime Lanes: type) type {
             /// As if the sky were as bright everywhere.
             diffuse_sky: F32,
             glossy_sky: F32,
+            /// Radiance towards the view of what the smooth lobe leaves out: its tail, more than a
+            /// quarter turn off its middle.
+            tail: Vec3,
+            /// The same of a sky of radiance 1.
+            tail_sky: Vec3,
 
             const zero: Sums = .{
                 .diffuse = .splat(.{ 0, 0, 0 }),
                 .glossy = .splat(.{ 0, 0, 0 }),
                 .diffuse_sky = .zero(),
                 .glossy_sky = .zero(),
+                .tail = .splat(.{ 0, 0, 0 }),
+                .tail_sky = .splat(.{ 0, 0, 0 }),
             };
         };
 
@@ -190,7 +197,7 @@ fn ReceiverOf(comptime Lanes: type) type {
             for (all) |*light| {
                 const facing = isFacing(Lanes, point, .splat(light.to_light));
                 const share: Vec3 = .select(facing, white, .splat(.{ 0, 0, 0 }));
-                receiver.addLight(&receiver.whole, point, light, share);
+                receiver.addLight(&receiver.whole, vertex, light, share);
             }
         }
 
@@ -209,10 +216,11 @@ fn ReceiverOf(comptime Lanes: type) type {
         inline fn addLight(
             receiver: *const Self,
             sums: *Sums,
-            point: anytype,
+            vertex: *const path_file.Vertex(Lanes),
             light: *const EnvironmentLight,
             share: Vec3,
         ) void {
+            const point = &vertex.point;
             const to_light: Vec3 = .splat(light.to_light);
             const solid_angle: F32 = .splat(light.solid_angle);
             const cosine = receiver.lobe.dot(to_light).max(.splat(-1)).min(.splat(1));
@@ -226,6 +234,11 @@ fn ReceiverOf(comptime Lanes: type) type {
             sums.glossy = sums.glossy.add(irradiance.scale(glossy));
             sums.diffuse_sky = sums.diffuse_sky.add(sky.mul(diffuse));
             sums.glossy_sky = sums.glossy_sky.add(sky.mul(glossy));
+            const window = F32.splat(0.5).sub(cosine.add(cosine)).max(.zero()).min(.splat(1));
+            if (window.le(.zero()).all()) return;
+            const specular = vertex.bsdf.evalLobes(point, to_light).specular.scale(window);
+            sums.tail = sums.tail.add(specular.mul(irradiance).scale(.splat(std.math.pi)));
+            sums.tail_sky = sums.tail_sky.add(specular.scale(sky));
         }
 
         /// Radiance towards the view for the light that arrives.
@@ -252,11 +265,14 @@ fn ReceiverOf(comptime Lanes: type) type {
             var sum = bsdf.diffuse_albedo.mul(irradiance);
             const untraced = receiver.lit.andNot(traced);
             if (untraced.any()) {
-                const lobe = environment_file
-                    .radiance(Lanes, environment, receiver.lobe, roughness, .zero(), untraced)
-                    .mul(openness(whole.glossy, hidden.glossy))
+                const smooth = environment_file
+                    .radiance(Lanes, environment, receiver.lobe, roughness, .zero(), untraced);
+                const lobe = smooth.mul(openness(whole.glossy, hidden.glossy))
                     .add(bounced.mul(bounce(around, hidden.glossy_sky, whole.glossy_sky)));
-                const seen = bsdf.specular_albedo.mul(lobe);
+                const tail = whole.tail.sub(hidden.tail);
+                const counted = whole.tail_sky.min(bsdf.specular_albedo.scale(.splat(0.5)));
+                const seen = bsdf.specular_albedo.mul(lobe)
+                    .add(tail.sub(smooth.mul(counted)));
                 sum = sum.add(.select(untraced, seen, .splat(.{ 0, 0, 0 })));
             }
             if (!is_end) return sum;

@@ -58,8 +58,9 @@ pub const EnvironmentLights = struct {
         const map = environment.map orelse return lights;
         const shadow_count: usize = environment.shadow_count;
         if (shadow_count == 0) return lights;
-        lights.source_count = @min(map.sources.len, shadow_count - 1);
-        lights.set_size = shadow_count - lights.source_count;
+        // One at least for the rest.
+        lights.source_count = map.sources.len;
+        lights.set_size = @max(1, shadow_count -| map.sources.len);
         lights.set_count = @min(sample_count, set_count_max);
         while (lights.set_count * lights.set_size > choices.environment_shadow_count.max) {
             lights.set_count -= 1;
@@ -69,7 +70,6 @@ pub const EnvironmentLights = struct {
             lights.mean = vec3.add(lights.mean, lights.buffer[index].irradiance);
         }
         const piece_count = lights.set_count * lights.set_size;
-        // What is no light of its own belongs to the rest all the same.
         for (0..piece_count) |piece| {
             const set = piece % lights.set_count;
             const uses = (sample_count - set - 1) / lights.set_count + 1;
@@ -181,4 +181,52 @@ fn narrow(values: [3]f64) Vec3 {
     var result: Vec3 = undefined;
     for (&result, values) |*to, value| to.* = @floatCast(value);
     return result;
+}
+
+test "the lights of all sets have the light of the map, whatever their numbers" {
+    // Four parts around, of one colour each, and a source above.
+    var parts: [5]Part = undefined;
+    parts[0] = .{ .solid_angle = 0, .luminance = 0, .energy = @splat(0), .moment = @splat(0) };
+    const directions = [_]Vec3{ .{ 1, 0, 0 }, .{ 0, 0, 1 }, .{ -1, 0, 0 }, .{ 0, 0, -1 } };
+    for (parts[1..], parts[0..4], directions, 1..) |*part, before, direction, number| {
+        const luminance: f64 = @floatFromInt(number);
+        part.* = before;
+        part.solid_angle += 3;
+        part.luminance += luminance;
+        part.energy[number % 3] += luminance;
+        for (&part.moment, direction) |*to, component| to.* += luminance * component;
+    }
+    const map: Map = .{
+        .radiance = &.{},
+        .glossy = &.{},
+        .diffuse = .{ .size = 0, .texels = &.{} },
+        .parts = &parts,
+        .sources = &.{.{ .direction = .{ 0, 1, 0 }, .energy = .{ 5, 6, 7 } }},
+    };
+    for ([_]u32{ 1, 3, 4, 64 }) |shadow_count| for ([_]u32{ 1, 3, 4, 17, 100 }) |sample_count| {
+        const lights: EnvironmentLights = .init(&.{
+            .ambient = 0,
+            .background = @splat(0),
+            .map = &map,
+            .shadow_count = shadow_count,
+        }, sample_count);
+        var all: Vec3 = @splat(0);
+        for (lights.all()) |*light| all = vec3.add(all, light.irradiance);
+        var by_samples: [3]f64 = @splat(0);
+        for (0..sample_count) |sample| {
+            const chosen = lights.ofSample(@intCast(sample));
+            const count = @max(shadow_count, 2);
+            try std.testing.expectEqual(count, chosen[0].len + chosen[1].len);
+            for (chosen) |part| for (part) |*light| {
+                for (&by_samples, light.irradiance) |*sum, channel| sum.* += channel * light.weight;
+            };
+        }
+        var expected: [3]f64 = .{ 5, 6, 7 };
+        for (&expected, parts[4].energy) |*to, energy| to.* += energy;
+        for (expected, all, by_samples) |energy, whole, sum| {
+            try std.testing.expectApproxEqRel(energy / std.math.pi, whole, 1e-5);
+            const mean = sum / @as(f64, @floatFromInt(sample_count));
+            try std.testing.expectApproxEqRel(energy / std.math.pi, mean, 1e-5);
+        }
+    };
 }

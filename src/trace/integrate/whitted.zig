@@ -14,6 +14,7 @@ const bsdf_file = @import("../shade/bsdf.zig");
 const camera = @import("camera.zig");
 const direct = @import("direct.zig");
 const environment_light = @import("environment.zig");
+const floor = @import("floor.zig");
 const path_file = @import("path.zig");
 const tiles = @import("tiles.zig");
 const visibility_file = @import("visibility.zig");
@@ -57,6 +58,8 @@ pub fn Whitted(comptime Kernel: type) type {
         environment_lights: EnvironmentLights,
         /// Radiance of the sample under way.
         radiance: [group_count]Vec3,
+        /// Share of light on the floor where primary rays that left the scene meet it.
+        floor_light: [group_count]F32,
         /// Share of the sample's primary ray that left the scene.
         escaped: [group_count]F32,
         /// Colours of the display are kept apart from radiance.
@@ -152,6 +155,7 @@ pub fn Whitted(comptime Kernel: type) type {
             const grid = if (primary and whitted.grid != null) &whitted.grid.? else null;
             const beams = whitted.visibility.closest(&path.bundle, grid);
             const coherence: dispatch.Coherence = if (path.depth == 0) .all else beams;
+            if (path.depth == 0) whitted.lightFloor();
             var any_seen = false;
             for (&whitted.vertices, 0..) |*vertex, group| {
                 whitted.addEscaped(group);
@@ -178,6 +182,23 @@ pub fn Whitted(comptime Kernel: type) type {
             whitted.pushReflection();
         }
 
+        fn lightFloor(whitted: *Self) void {
+            const floor_height = whitted.frame.environment.floor_height orelse {
+                whitted.floor_light = @splat(.splat(1));
+                return;
+            };
+            whitted.rays.shadow += floor.lightShare(
+                Kernel,
+                &whitted.visibility,
+                &whitted.environment_lights,
+                whitted.sample,
+                floor_height,
+                &whitted.path,
+                &whitted.vertices,
+                &whitted.floor_light,
+            );
+        }
+
         /// Adds what rays see that left the scene.
         fn addEscaped(whitted: *Self, group: usize) void {
             const path = &whitted.path;
@@ -185,7 +206,8 @@ pub fn Whitted(comptime Kernel: type) type {
             const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
             const gone = ray.active.bitAnd(missed);
             if (gone.none()) return;
-            const throughput: Vec3 = .select(gone, path.throughput[group], .splat(.{ 0, 0, 0 }));
+            var throughput: Vec3 = .select(gone, path.throughput[group], .splat(.{ 0, 0, 0 }));
+            if (path.depth == 0) throughput = throughput.scale(whitted.floor_light[group]);
             const environment = whitted.frame.environment;
             if (path.depth > 0 or environment.is_seen) {
                 const seen = environment_light.seenBy(Kernel, environment, path, group, gone);

@@ -31,7 +31,7 @@ pub const Point = struct {
 /// Channels by slot, 0..1; 1 where there is no texture.
 pub const Values = [slot_count][4]f32;
 
-/// Puts what textures say at a point in the slots that have one.
+/// Multiplies the slots, which begin with 1, with what textures say at a point.
 pub fn sample(
     frame: *const Frame,
     lookups: []const Lookup,
@@ -52,7 +52,8 @@ pub fn sample(
         var texels: [slot_count]Texel = undefined;
         texture_file.sample(textures[0..count], &rest[0], &footprint, &texels);
         for (rest[0..count], texels[0..count]) |*lookup, texel| {
-            values[@backingInt(lookup.slot)] = channelsOf(lookup, texel);
+            const channels = channelsOf(lookup, texel);
+            for (&values[@backingInt(lookup.slot)], channels) |*value, channel| value.* *= channel;
         }
         rest = rest[count..];
     }

@@ -323,6 +323,13 @@ test "every slot multiplies its factor, its channels where the lookup says" {
     try std.testing.expectApproxEqRel(@as(f32, 0.6), material.occlusion.lane(0), 1e-6);
     try std.testing.expectApproxEqRel(@as(f32, 0.4), point.opacity.lane(0), 1e-6);
     try expectVector(.{ 0, 1, 0 }, point.normal, 0);
+    var holes = testLookup(.base_color, 2);
+    holes.channels = .{ 255, 255, 255, 0 };
+    var twice = at;
+    twice.lookups = &.{ alpha, holes };
+    const both = twice.find();
+    try expectVector(.{ 0.5, 0.2, 0 }, both.material.base_color, 1e-6);
+    try std.testing.expectApproxEqRel(@as(f32, 0.4 * 0.2), both.opacity.lane(0), 1e-6);
     at.material.blend = 0;
     try std.testing.expectEqual(1, at.find().opacity.lane(0));
     for ([_]f32{ 0.39, 0.41 }, [_]f32{ 1, 0 }) |cutoff, opacity| {
