@@ -14,6 +14,8 @@ pub const box3 = @import("math/box3.zig");
 pub const octahedral = @import("math/octahedral.zig");
 /// Sine, cosine, tangent, arc cosine, exponential, logarithm, power.
 pub const elementary = @import("math/elementary.zig");
+/// Directions on a square.
+pub const equal_area = @import("math/equal_area.zig");
 /// The sRGB transfer function.
 pub const srgb = @import("math/srgb.zig");
 
@@ -34,5 +36,6 @@ test {
     _ = box3;
     _ = octahedral;
     _ = elementary;
+    _ = equal_area;
     _ = srgb;
 }

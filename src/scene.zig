@@ -132,6 +132,12 @@ pub const Material = struct {
     occlusion_strength: f32 = 1,
     /// Red, green, blue (sRGB), multiplied with `emissive`.
     emissive_texture: ?TextureView = null,
+
+    /// Whether it has any.
+    pub fn hasTextures(material: *const Material) bool {
+        inline for (texture_fields) |field| if (@field(material, field) != null) return true;
+        return false;
+    }
 };
 
 /// The textures of a material.
@@ -142,12 +148,21 @@ pub const texture_fields = [_][]const u8{
 
 /// Light from all around, as an image by direction.
 pub const EnvironmentMap = struct {
-    /// Index into `Scene.images`; equirectangular, see docs/environment.md.
+    /// Index into `Scene.images`.
     image: u32,
+    projection: Projection = .equirectangular,
     /// Multiplies the image's radiance.
     scale: Vec3 = .{ 1, 1, 1 },
-    /// From the world's directions to those of the image.
+    /// From the world's directions to those of the image: a rotation, which may mirror.
     rotation: AffineD = .identity,
+
+    /// Where an image has a direction, (0, 0) its upper left corner and (1, 1) its lower right one.
+    pub const Projection = enum {
+        /// u = atan2(z, x) / 2 pi + 1/2, v = acos(y) / pi, see docs/environment.md.
+        equirectangular,
+        /// A square: `math.equal_area`.
+        octahedral,
+    };
 };
 
 /// A light source (KHR_lights_punctual); it shines from its node's origin along its node's -z.

@@ -132,7 +132,9 @@ test {
     _ = @import("trace/integrate/sampler.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/offset.zig");
+    _ = @import("trace/shade/albedo.zig");
     _ = @import("trace/shade/bsdf.zig");
+    _ = @import("trace/shade/microfacet.zig");
     _ = @import("trace/shade/unique.zig");
     _ = @import("trace/shade/texture.zig");
     _ = @import("trace/shade/ray_cone.zig");

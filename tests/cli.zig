@@ -205,6 +205,58 @@ fn triangleScene(arena: std.mem.Allocator) ![]const u8 {
     return file.written();
 }
 
+/// A cube from -1 to 1 whose faces shine in a colour each: 255 or 0 of red, green and blue by the
+/// bits of their number, one more than twice the axis and, towards its negative end, another one.
+fn coloredCube(sandbox: *Sandbox) !void {
+    var buffer: Io.Writer.Allocating = .init(sandbox.arena_state.allocator());
+    var json: Io.Writer.Allocating = .init(sandbox.arena_state.allocator());
+    const out = &json.writer;
+    try out.writeAll(
+        \\{"asset":{"version":"2.0"},"extensionsUsed":["KHR_materials_unlit"],"scene":0,
+        \\"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        \\"buffers":[{"uri":"cube.bin","byteLength":432}],
+        \\"bufferViews":[{"buffer":0,"byteLength":432}],"materials":[
+    );
+    for (1..7) |number| try out.print(
+        \\{s}{{"extensions":{{"KHR_materials_unlit":{{}}}},"pbrMetallicRoughness":
+        \\{{"baseColorFactor":[{d},{d},{d},1]}}}}
+    , .{ if (number > 1) "," else "", number & 1, number >> 1 & 1, number >> 2 });
+    try out.writeAll("],\"accessors\":[");
+    for (0..6) |face| try out.print(
+        \\{s}{{"bufferView":0,"byteOffset":{d},"count":6,"componentType":5126,"type":"VEC3",
+        \\"min":[-1,-1,-1],"max":[1,1,1]}}
+    , .{ if (face > 0) "," else "", 72 * face });
+    try out.writeAll("],\"meshes\":[{\"primitives\":[");
+    for (0..6) |face| {
+        try out.print("{s}{{\"attributes\":{{\"POSITION\":{d}}},\"material\":{d}}}", .{
+            if (face > 0) "," else "", face, face,
+        });
+        const side: f32 = if (face % 2 == 0) 1 else -1;
+        for ([6]u2{ 0, 1, 3, 3, 2, 0 }) |bits| {
+            const at = [2]f32{ if (bits & 1 != 0) 1 else -1, if (bits & 2 != 0) 1 else -1 };
+            var corner: [3]f32 = undefined;
+            corner[face / 2] = side;
+            corner[(face / 2 + 1) % 3] = at[0] * side;
+            corner[(face / 2 + 2) % 3] = at[1];
+            for (corner) |x| try buffer.writer.writeInt(u32, @bitCast(x), .little);
+        }
+    }
+    try out.writeAll("]}]}");
+    try sandbox.write("cube.gltf", json.written());
+    try sandbox.write("cube.bin", buffer.written());
+}
+
+/// A pixel of a picture, as the number of a face of the cube; 0 for what is black.
+fn faceAt(ppm: []const u8, width: usize, height: usize, x: usize, y: usize) !usize {
+    const pixels = ppm[ppm.len - 3 * width * height ..];
+    var number: usize = 0;
+    for (pixels[3 * (y * width + x) ..][0..3], 0..) |code, bit| {
+        try testing.expect(code == 0 or code == 255);
+        if (code == 255) number |= @as(usize, 1) << @intCast(bit);
+    }
+    return number;
+}
+
 /// Expects what every error must be: one line `raylane: ...`, ended, and nothing on stdout.
 fn expectOneErrorLine(ending: Ending) !void {
     try testing.expectStringStartsWith(ending.stderr, "raylane: ");
@@ -269,6 +321,17 @@ test "mistakes on the command line are usage errors in one line" {
         &.{ "builtin:cornell", "-r8x8", "--camera=99" },
         &.{ "builtin:cornell", "-r8x8", "--scene=1" },
         &.{ "builtin:cornell", "-r8x8", "--up-axis=x" },
+        &.{ "builtin:cornell", "-r16385" },
+        &.{ "builtin:cornell", "--eye=1,2,nan" },
+        &.{ "builtin:cornell", "--target=inf,2,3" },
+        &.{ "builtin:cornell", "--up=0,0,0" },
+        &.{ "builtin:cornell", "--fov=180" },
+        &.{ "builtin:cornell", "--orbit=0,181" },
+        &.{ "builtin:cornell", "--orbit=0,90,-1%" },
+        &.{ "builtin:cornell", "--ortho", "--fov=40" },
+        &.{ "builtin:cornell", "--eye=1,2,3", "--orbit=0,90" },
+        &.{ "builtin:cornell", "--eye=1,2,3", "--target=1,2,3" },
+        &.{ "builtin:cornell", "--camera=0", "--eye=1,2,3" },
     }) |arguments| {
         const ending = try sandbox.expectExit(2, arguments);
         try expectOneErrorLine(ending);
@@ -278,12 +341,72 @@ test "mistakes on the command line are usage errors in one line" {
     try testing.expect(std.mem.find(u8, near.stderr, "'--resolution'") != null);
 }
 
+test "the camera stands where the options say" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try coloredCube(&sandbox);
+    const Case = struct {
+        options: []const []const u8,
+        /// Faces in the middle, and at the left and the right.
+        middle: usize = 0,
+        left: usize = 0,
+        right: usize = 0,
+    };
+    // From 3 metres by 90 degrees, a face covers the middle half of the picture, and so it does in
+    // an orthographic picture 4 metres high.
+    const square = [_][]const u8{ "--fov=90", "--target=0,0,0" };
+    for ([_]Case{
+        .{ .options = &square ++ .{"--orbit=0,90,3"}, .middle = 5 },
+        .{ .options = &square ++ .{"--orbit=90,90,3"}, .middle = 1 },
+        .{ .options = &square ++ .{"--orbit=180,90,3"}, .middle = 6 },
+        .{ .options = &square ++ .{"--orbit=-90,90,3"}, .middle = 2 },
+        .{ .options = &square ++ .{"--orbit=0,0,3"}, .middle = 3 },
+        .{ .options = &square ++ .{"--orbit=0,180,3"}, .middle = 4 },
+        .{ .options = &square ++ .{"--eye=0,3,0"}, .middle = 3 },
+        .{ .options = &.{ "--ortho", "--orbit=0,90,5.494955" }, .middle = 5 },
+        .{ .options = &.{ "--ortho", "--eye=0,0,5.494955" }, .middle = 5 },
+    }) |case| {
+        errdefer for (case.options) |option| std.debug.print("{s} ", .{option});
+        const picture = try cubePicture(&sandbox, case.options);
+        for ([_]usize{ 2, 13, 18, 32, 45, 50, 61 }) |at| {
+            const face: usize = if (at > 16 and at < 48) case.middle else 0;
+            try testing.expectEqual(face, try faceAt(picture, 64, 64, at, 32));
+            try testing.expectEqual(face, try faceAt(picture, 64, 64, 32, at));
+        }
+    }
+    for ([_]Case{
+        .{ .options = &square ++ .{"--eye=3,0,3"}, .left = 5, .right = 1 },
+        .{ .options = &square ++ .{ "--eye=3,0,3", "--up=0,-1,0" }, .left = 1, .right = 5 },
+        .{ .options = &square ++ .{ "--orbit=45,90,4.3", "--up=0,-2,0" }, .left = 1, .right = 5 },
+        .{ .options = &.{"--orbit=45,90"}, .left = 5, .right = 1 },
+        .{ .options = &.{ "--orbit=45,90,100%", "--ortho" }, .left = 5, .right = 1 },
+    }) |case| {
+        errdefer for (case.options) |option| std.debug.print("{s} ", .{option});
+        const picture = try cubePicture(&sandbox, case.options);
+        try testing.expectEqual(case.left, try faceAt(picture, 64, 64, 26, 32));
+        try testing.expectEqual(case.right, try faceAt(picture, 64, 64, 37, 32));
+        for ([_]usize{ 0, 63 }) |at| {
+            try testing.expectEqual(0, try faceAt(picture, 64, 64, at, 32));
+        }
+    }
+    const wide = try sandbox.expectExit(0, &.{ "cube.gltf", "-r64", "-qo-", "--format=ppm" });
+    try testing.expectStringStartsWith(wide.stdout, "P6\n64 48\n");
+}
+
+fn cubePicture(sandbox: *Sandbox, options: []const []const u8) ![]const u8 {
+    const arguments = try std.mem.concat(sandbox.arena_state.allocator(), []const u8, &.{
+        &.{ "cube.gltf", "-r64x64", "-qo-", "--format=ppm", "--spp=1", "--background=#000000" },
+        options,
+    });
+    return (try sandbox.expectExit(0, arguments)).stdout;
+}
+
 test "help is for everybody, fits a screen and keeps its promises" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
     const help = try sandbox.expectExit(0, &.{"--help"});
     try testing.expectEqualStrings("", help.stderr);
-    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 64);
+    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 100);
     const again = try sandbox.expectExit(0, &.{ "absent.glb", "--no-such-flag", "-h" });
     try testing.expectEqualStrings(help.stdout, again.stdout);
     // The built-in scenes that the help names are those that there are.

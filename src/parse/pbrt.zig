@@ -43,7 +43,11 @@ pub fn read(
         .input = &input,
         .arena = names.allocator(),
         .builder = &builder,
-        .colors = .{ .arena = names.allocator(), .input = &input },
+        .colors = .{ .arena = names.allocator(), .input = &input, .textures = .{
+            .input = &input,
+            .files = .{ .resources = input.resources, .builder = &scene_builder },
+            .arena = names.allocator(),
+        } },
         .tessellator = .{ .input = &input, .arena = scene_builder.arena() },
     };
     defer reader.deinit();
@@ -62,6 +66,7 @@ test {
     _ = @import("pbrt/parameters.zig");
     _ = @import("pbrt/shapes.zig");
     _ = @import("pbrt/spectra.zig");
+    _ = @import("pbrt/textures.zig");
     _ = @import("pbrt/transform.zig");
     _ = @import("pbrt/view.zig");
     _ = SceneBuilder;

@@ -32,10 +32,17 @@ const aspect_max: f64 = 2;
 /// Rounds of centring at most; a round that moves nothing ends them, usually the third.
 const centering_round_max = 16;
 
+/// Rounds of fitting a camera to what it sees at most; a round that shows nothing new ends them.
+const facing_round_max = 6;
+
+/// Sine of the angle by which a face may be turned away and still counts as seen.
+const facing_sine_min = -1e-3;
+
 /// A direction to look from: degrees to the right of +z, degrees above the horizon.
 const Direction = struct { azimuth_degrees: f64, elevation_degrees: f64 };
 
 /// The views to choose from, best liked first: front before back, level before steep before below.
+/// For what lies flat on the ground the first two, rather level, are left out.
 const directions = [12]Direction{
     .{ .azimuth_degrees = 30, .elevation_degrees = 20 },
     .{ .azimuth_degrees = -30, .elevation_degrees = 20 },
@@ -50,6 +57,23 @@ const directions = [12]Direction{
     .{ .azimuth_degrees = 150, .elevation_degrees = -30 },
     .{ .azimuth_degrees = -150, .elevation_degrees = -30 },
 };
+
+/// The views of boards that stand upright, as signs and shelves do, to choose from: nearer to their
+/// fronts, so that what is on them can be read. For boards that face x, a quarter turn is added.
+const board_directions = [8]Direction{
+    .{ .azimuth_degrees = 15, .elevation_degrees = 10 },
+    .{ .azimuth_degrees = -15, .elevation_degrees = 10 },
+    .{ .azimuth_degrees = 165, .elevation_degrees = 10 },
+    .{ .azimuth_degrees = -165, .elevation_degrees = 10 },
+    .{ .azimuth_degrees = 15, .elevation_degrees = 45 },
+    .{ .azimuth_degrees = 165, .elevation_degrees = 45 },
+    .{ .azimuth_degrees = 15, .elevation_degrees = -45 },
+    .{ .azimuth_degrees = 165, .elevation_degrees = -45 },
+};
+
+/// The surface of a board is spread along its normal by at most that share of what it is along both
+/// other axes (standard deviations).
+const board_depth_max = 0.25;
 
 /// A view is good enough when it shows at least this share of what the best one shows.
 const visible_share_min = 0.5;
@@ -128,7 +152,7 @@ pub fn halfTangents(fov_degrees: ?f32, aspect: f64) [2]f64 {
 
 /// What is to be seen: the vertices of triangles that are not transparent everywhere.
 pub const Subject = struct {
-    geometry: *const world.Geometry,
+    shown: Shown,
     /// The vertices that count, at least one of them unless the scene is empty.
     used: std.DynamicBitSetUnmanaged,
     /// The middle of their box, and its longest side, > 0.
@@ -137,33 +161,29 @@ pub const Subject = struct {
     /// The axes of the camera that shows it best.
     basis: Basis,
 
-    /// Memory comes from `gpa`; the geometry must outlive the subject.
+    /// Memory comes from `gpa`; geometry and materials must outlive the subject.
     pub fn init(
         gpa: std.mem.Allocator,
         geometry: *const world.Geometry,
         materials: []const scene.Material,
     ) error{OutOfMemory}!Subject {
         var subject: Subject = .{
-            .geometry = geometry,
+            .shown = .{ .geometry = geometry, .materials = materials },
             .used = try .initEmpty(gpa, geometry.positions.len),
             .center = .{ 0, 0, 0 },
             .size = 1,
             .basis = .ofDirection(directions[0]),
         };
-        var shown: Shown = .{ .geometry = geometry, .materials = materials };
         for (geometry.triangles) |*triangle| {
-            if (!shown.holds(triangle)) continue;
-            for (triangle.corner) |vertex| subject.used.set(vertex);
+            if (subject.shown.holds(triangle)) mark(&subject.used, triangle);
         }
         if (subject.used.findFirstSet() == null) {
-            shown.all = true;
-            for (geometry.triangles) |triangle| {
-                for (triangle.corner) |vertex| subject.used.set(vertex);
-            }
+            subject.shown.all = true;
+            for (geometry.triangles) |*triangle| mark(&subject.used, triangle);
         }
         if (subject.used.findFirstSet() == null) return subject;
         const bounds = subject.measure();
-        subject.basis = chooseBasis(&shown, bounds);
+        subject.basis = chooseBasis(&subject.shown, bounds);
         return subject;
     }
 
@@ -178,7 +198,7 @@ pub const Subject = struct {
         var bounds: math.Box3 = .empty;
         var vertices = subject.used.iterator(.{});
         while (vertices.next()) |vertex| {
-            bounds = bounds.include(subject.geometry.positions[vertex]);
+            bounds = bounds.include(subject.shown.geometry.positions[vertex]);
         }
         subject.size = 0;
         for (&subject.center, bounds.lower, bounds.upper) |*middle, lower, upper| {
@@ -189,32 +209,79 @@ pub const Subject = struct {
         return bounds;
     }
 
-    /// A perspective camera along the axes of `basis` that sees all. `half` as of `halfTangents`.
+    /// A perspective camera along the axes of `basis` that sees all that faces it. `half` as of
+    /// `halfTangents`.
     pub fn fit(
         subject: *const Subject,
         gpa: std.mem.Allocator,
         basis: Basis,
         half: [2]f64,
     ) error{OutOfMemory}!world.Camera {
-        const points = try subject.along(gpa, basis);
-        defer gpa.free(points);
+        var facing: std.DynamicBitSetUnmanaged = try .initEmpty(gpa, subject.used.bit_length);
+        defer facing.deinit(gpa);
+        const outside = try subject.placeFor(gpa, &subject.used, basis, half);
+        var origin = outside;
+        // Nearer by, more may face it: what is seen once stays in view.
+        for (0..facing_round_max) |_| {
+            if (!subject.addFacing(&facing, origin)) break;
+            origin = try subject.placeFor(gpa, &facing, basis, half);
+        } else origin = outside;
         return .{
             .orthographic = false,
-            .origin = vec3d.toSingle(subject.toWorld(basis, nearestPlace(points, half))),
+            .origin = vec3d.toSingle(origin),
             .right = vec3d.toSingle(vec3d.scale(basis.right, half[0])),
             .up = vec3d.toSingle(vec3d.scale(basis.up, half[1])),
             .forward = vec3d.toSingle(basis.forward),
         };
     }
 
-    /// An orthographic camera along the axes of `basis` that sees all.
+    fn placeFor(
+        subject: *const Subject,
+        gpa: std.mem.Allocator,
+        vertices: *const std.DynamicBitSetUnmanaged,
+        basis: Basis,
+        half: [2]f64,
+    ) error{OutOfMemory}!Vec3d {
+        const points = try subject.along(gpa, vertices, basis);
+        defer gpa.free(points);
+        return subject.toWorld(basis, nearestPlace(points, half));
+    }
+
+    /// Adds the vertices of triangles that are not culled as seen from `eye`; whether there were
+    /// others than before.
+    fn addFacing(
+        subject: *const Subject,
+        facing: *std.DynamicBitSetUnmanaged,
+        eye: Vec3d,
+    ) bool {
+        const before = facing.count();
+        const shown = &subject.shown;
+        for (shown.geometry.triangles) |*triangle| {
+            if (!shown.holds(triangle)) continue;
+            if (!shown.materials[triangle.material].double_sided) {
+                const normal = areaNormal(shown.geometry, triangle);
+                const corner = shown.geometry.positions[triangle.corner[0]];
+                const toward = vec3d.neg(relativeTo(eye, corner));
+                const lengths = vec3d.length(normal) * vec3d.length(toward);
+                if (vec3d.dot(normal, toward) < facing_sine_min * lengths) continue;
+            }
+            mark(facing, triangle);
+        }
+        return facing.count() > before;
+    }
+
+    /// An orthographic camera along the axes of `basis` that sees all that faces it.
     pub fn fitOrthographic(
         subject: *const Subject,
         gpa: std.mem.Allocator,
         basis: Basis,
         aspect: f64,
     ) error{OutOfMemory}!world.Camera {
-        const points = try subject.along(gpa, basis);
+        var facing: std.DynamicBitSetUnmanaged = try .initEmpty(gpa, subject.used.bit_length);
+        defer facing.deinit(gpa);
+        const far = 1e6; // Sizes: rays from there are as good as parallel.
+        const some = subject.addFacing(&facing, subject.toWorld(basis, .{ 0, 0, -far }));
+        const points = try subject.along(gpa, if (some) &facing else &subject.used, basis);
         defer gpa.free(points);
         var lower = points[0];
         var upper = points[0];
@@ -264,7 +331,7 @@ pub const Subject = struct {
         var radius = 1e-6 * subject.size;
         var vertices = subject.used.iterator(.{});
         while (vertices.next()) |vertex| {
-            const p = relativeTo(target, subject.geometry.positions[vertex]);
+            const p = relativeTo(target, subject.shown.geometry.positions[vertex]);
             const r = @sqrt(p[0] * p[0] + p[2] * p[2]);
             const nearer = toward * p[1] * sin;
             const over = p[1] * cos / slope[1];
@@ -280,21 +347,26 @@ pub const Subject = struct {
         var distance: f64 = 0;
         var vertices = subject.used.iterator(.{});
         while (vertices.next()) |vertex| {
-            const p = relativeTo(target, subject.geometry.positions[vertex]);
+            const p = relativeTo(target, subject.shown.geometry.positions[vertex]);
             distance = larger(distance, vec3d.length(p));
         }
         return distance * (1 + margin);
     }
 
-    /// The vertices along the axes of a camera: relative to the middle, in units of the size,
+    /// Vertices along the axes of a camera: relative to the middle, in units of the size,
     /// right, up and forward. At least one.
-    fn along(subject: *const Subject, gpa: std.mem.Allocator, basis: Basis) ![]Vec3d {
-        const count = subject.used.count();
+    fn along(
+        subject: *const Subject,
+        gpa: std.mem.Allocator,
+        chosen: *const std.DynamicBitSetUnmanaged,
+        basis: Basis,
+    ) error{OutOfMemory}![]Vec3d {
+        const count = chosen.count();
         const points = try gpa.alloc(Vec3d, @max(count, 1));
         points[0] = .{ 0, 0, 0 };
-        var vertices = subject.used.iterator(.{});
+        var vertices = chosen.iterator(.{});
         for (points[0..count]) |*point| {
-            const position = subject.geometry.positions[vertices.next().?];
+            const position = subject.shown.geometry.positions[vertices.next().?];
             var relative = relativeTo(subject.center, position);
             for (&relative) |*component| component.* /= subject.size;
             point.* = .{
@@ -315,6 +387,10 @@ pub const Subject = struct {
         return result;
     }
 };
+
+fn mark(vertices: *std.DynamicBitSetUnmanaged, triangle: *const world.Triangle) void {
+    for (triangle.corner) |vertex| vertices.set(vertex);
+}
 
 fn relativeTo(middle: Vec3d, position: Vec3) Vec3d {
     return .{ position[0] - middle[0], position[1] - middle[1], position[2] - middle[2] };
@@ -353,7 +429,14 @@ fn areaNormal(geometry: *const world.Geometry, triangle: *const world.Triangle) 
 /// The axes to look along.
 fn chooseBasis(shown: *const Shown, bounds: math.Box3) Basis {
     if (flatFront(shown, bounds)) |front| return .look(vec3d.neg(front), .{ 0, 1, 0 });
-    return .ofDirection(directions[chooseDirection(shown)]);
+    const axis = boardAxis(shown, bounds) orelse
+        return .ofDirection(chooseDirection(shown, &directions));
+    if (axis == 1) return .ofDirection(chooseDirection(shown, directions[2..]));
+    var turned = board_directions;
+    if (axis == 0) for (&turned) |*direction| {
+        direction.azimuth_degrees += 90;
+    };
+    return .ofDirection(chooseDirection(shown, &turned));
 }
 
 /// The direction that the front of a flat model looks to, null for others. Where both sides show as
@@ -415,11 +498,40 @@ const Samples = struct {
     }
 };
 
-/// Index of the first direction that shows enough: the area of fronts (and backs, where they are
+/// The axis that a board faces; null for other models. By how the area is spread, so that
+/// a few things before or behind the board do not count much.
+fn boardAxis(shown: *const Shown, bounds: math.Box3) ?usize {
+    const middle: Vec3d = .{ bounds.lower[0], bounds.lower[1], bounds.lower[2] };
+    var all: f64 = 0;
+    var sum: Vec3d = .{ 0, 0, 0 };
+    var squares: Vec3d = .{ 0, 0, 0 };
+    var samples: Samples = .{ .shown = shown };
+    while (samples.next()) |triangle| {
+        const area = vec3d.length(areaNormal(shown.geometry, triangle)) / 3;
+        for (triangle.corner) |vertex| {
+            const at = relativeTo(middle, shown.geometry.positions[vertex]);
+            sum = vec3d.add(sum, vec3d.scale(at, area));
+            squares = vec3d.add(squares, vec3d.scale(vec3d.mul(at, at), area));
+            all += area;
+        }
+    }
+    var variance: Vec3d = undefined;
+    for (&variance, sum, squares) |*to, first, second| {
+        to.* = second / all - (first / all) * (first / all);
+    }
+    const share = board_depth_max * board_depth_max;
+    for (0..3) |axis| {
+        const others = .{ variance[(axis + 1) % 3], variance[(axis + 2) % 3] };
+        if (variance[axis] <= share * @min(others[0], others[1])) return axis;
+    }
+    return null;
+}
+
+/// The first direction that shows enough: the area of fronts (and backs, where they are
 /// seen too) projected along it. What stands in front of what is not looked at.
-fn chooseDirection(shown: *const Shown) usize {
+fn chooseDirection(shown: *const Shown, choices: []const Direction) Direction {
     var toward: [directions.len]Vec3d = undefined;
-    for (directions, &toward) |direction, *to| {
+    for (choices, toward[0..choices.len]) |direction, *to| {
         to.* = vec3d.neg(Basis.ofDirection(direction).forward);
     }
     var visible: [directions.len]f64 = @splat(0);
@@ -427,14 +539,14 @@ fn chooseDirection(shown: *const Shown) usize {
     while (samples.next()) |triangle| {
         const normal = areaNormal(shown.geometry, triangle);
         const back: f64 = if (shown.materials[triangle.material].double_sided) -1 else 0;
-        for (toward, &visible) |to, *sum| {
+        for (toward[0..choices.len], visible[0..choices.len]) |to, *sum| {
             const projected = vec3d.dot(normal, to);
             sum.* += if (projected > 0) projected else projected * back;
         }
     }
     var best: f64 = 0;
     for (visible) |sum| best = if (sum > best) sum else best;
-    for (visible, 0..) |sum, choice| {
+    for (choices, visible[0..choices.len]) |choice, sum| {
         if (sum >= best * visible_share_min) return choice;
     }
     unreachable; // The best one passes.
@@ -690,6 +802,67 @@ test "what alpha leaves nothing of does not count, unless there is nothing else"
     geometry.triangles = test_corner.triangles;
     const camera = try frameForTest(&geometry, &.{clear}, 1);
     try std.testing.expect(vec3.length(camera.origin) < 9);
+}
+
+test "boards are seen nearer to their front than other things" {
+    const Case = struct { depth: [3]f32, forward: [2]f32 };
+    for ([_]Case{
+        .{ .depth = .{ 1, 1, 0.05 }, .forward = .{ -0.254887, -0.951251 } },
+        .{ .depth = .{ 0.05, 1, 1 }, .forward = .{ -0.951251, 0.254887 } },
+        .{ .depth = .{ 1, 0.05, 1 }, .forward = .{ -0.353553, -0.612372 } },
+        .{ .depth = .{ 1, 1, 0.9 }, .forward = .{ -0.469846, -0.813798 } },
+    }) |case| {
+        var positions: [8]Vec3 = undefined;
+        for (&positions, 0..) |*position, bits| {
+            for (position, case.depth, 0..) |*to, depth, axis| {
+                to.* = if (bits >> @intCast(axis) & 1 != 0) depth else 0;
+            }
+        }
+        const quads = [6][4]u32{
+            .{ 0, 4, 6, 2 }, .{ 1, 3, 7, 5 }, .{ 0, 1, 5, 4 },
+            .{ 2, 6, 7, 3 }, .{ 0, 2, 3, 1 }, .{ 4, 5, 7, 6 },
+        };
+        var triangles: [12]world.Triangle = undefined;
+        for (&triangles, 0..) |*triangle, index| {
+            const quad = quads[index / 2];
+            const from = 2 * (index % 2);
+            const corner: [3]u32 = .{ quad[from], quad[from + 1], quad[(from + 2) % 4] };
+            triangle.* = .{ .corner = corner, .material = 0 };
+        }
+        const shape: TestShape = .{ .positions = &positions, .triangles = &triangles };
+        const camera = try frameForTest(&shape.geometry(), &.{.{}}, 1);
+        try std.testing.expectApproxEqAbs(case.forward[0], camera.forward[0], 1e-5);
+        try std.testing.expectApproxEqAbs(case.forward[1], camera.forward[2], 1e-5);
+    }
+}
+
+test "what faces away and is culled does not push the camera off" {
+    const gpa = std.testing.allocator;
+    const shape: TestShape = .{
+        .positions = &.{
+            .{ 4, 4, 0 },  .{ 5, 4, 0 },  .{ 4, 5, 0 },
+            .{ 0, 0, -9 }, .{ 9, 0, -9 }, .{ 0, 9, -9 },
+        },
+        .triangles = &.{
+            .{ .corner = .{ 0, 1, 2 }, .material = 0 },
+            .{ .corner = .{ 3, 5, 4 }, .material = 1 },
+        },
+    };
+    const geometry = shape.geometry();
+    const basis: Basis = .ofAngles(0, 0);
+    for ([_]bool{ false, true }) |double_sided| {
+        const materials = [_]scene.Material{ .{}, .{ .double_sided = double_sided } };
+        var subject: Subject = try .init(gpa, &geometry, &materials);
+        defer subject.deinit(gpa);
+        const camera = try subject.fit(gpa, basis, halfTangents(null, 1));
+        const flattened = try subject.fitOrthographic(gpa, basis, 1);
+        // Half of the side over the slope, or of the side of 9, from -9 on.
+        const slope: f64 = halfTangents(null, 1)[0] * extent_max;
+        const distance: f64 = if (double_sided) 4.5 / slope - 9 else 0.5 / slope;
+        const half: f64 = if (double_sided) 4.5 else 0.5;
+        try std.testing.expectApproxEqRel(distance, camera.origin[2], 1e-5);
+        try std.testing.expectApproxEqRel(half / extent_max, flattened.up[1], 1e-5);
+    }
 }
 
 test "an orthographic view has all within its margin" {

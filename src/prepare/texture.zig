@@ -36,7 +36,7 @@ pub const Error = error{ OutOfMemory, SceneTooLarge } || parallel.Error;
 const texture_bytes_max: u64 = 4 << 30;
 
 /// Bytes of images that are decoded at the same time, what the libraries need included; one image
-/// may be larger.
+/// may be larger. Where all textures take more than twice as much, it is half of that.
 const decode_bytes_max: u64 = 64 << 20;
 
 /// Channel of a lookup that there is not: it counts as 1.
@@ -132,24 +132,31 @@ pub fn load(
     defer work.deinit();
     errdefer work.dropPyramids();
     try work.collect();
-    try work.plan(diagnostic);
-    var first: usize = 0;
-    while (first < work.tasks.items.len) {
-        work.batch = work.tasks.items[first..][0..batchCount(work.tasks.items[first..])];
-        first += work.batch.len;
-        try settings.pool.forEach(work.batch.len, &work, Work.run);
-        if (work.exhausted.load(.monotonic)) return error.OutOfMemory;
+    const byte_count = try work.plan(diagnostic);
+    const at_once = @max(decode_bytes_max, byte_count / 2);
+    var rest: []const Task = work.tasks.items;
+    while (rest.len > 0) {
+        const count = batchCount(rest, at_once);
+        if (!try work.runBatch(settings.pool, rest[0..count])) {
+            // There may be memory for one at a time.
+            for (0..count) |index| {
+                if (!try work.runBatch(settings.pool, rest[index..][0..1]))
+                    return error.OutOfMemory;
+            }
+        }
+        rest = rest[count..];
     }
     work.warn(diagnostic);
     return work.finish();
 }
 
-/// How many of the tasks, in this order, are decoded at once.
-fn batchCount(tasks: []const Task) usize {
+/// How many of the tasks, in this order, are decoded at once: they need no more than `bytes_max`,
+/// or it is one.
+fn batchCount(tasks: []const Task, bytes_max: u64) usize {
     var total: u64 = 0;
     for (tasks, 0..) |*task, index| {
         total += task.bytes();
-        if (total > decode_bytes_max and index > 0) return index;
+        if (total > bytes_max and index > 0) return index;
     }
     return tasks.len;
 }
@@ -245,8 +252,9 @@ const Work = struct {
         }
     }
 
-    /// Reads the headers: what is broken is left out, what is too large refused.
-    fn plan(work: *Work, diagnostic: *Diagnostic) Error!void {
+    /// Reads the headers: what is broken is left out, what is too large refused. Returns the bytes
+    /// that all textures take at most.
+    fn plan(work: *Work, diagnostic: *Diagnostic) Error!u64 {
         var total: u64 = 0;
         for (work.request_of, 0..) |requests, image| {
             if (requests[0] == scene.none and requests[1] == scene.none) continue;
@@ -274,6 +282,19 @@ const Work = struct {
             .{ total >> 20, texture_bytes_max >> 20 },
         );
         std.mem.sortUnstable(Task, work.tasks.items, {}, Task.isLarger);
+        return total;
+    }
+
+    /// Whether there was memory for all of the tasks; what is done already is not done again.
+    fn runBatch(
+        work: *Work,
+        pool: *parallel.Pool,
+        batch: []const Task,
+    ) parallel.Error!bool {
+        work.batch = batch;
+        work.exhausted.store(false, .monotonic);
+        try pool.forEach(batch.len, work, run);
+        return !work.exhausted.load(.monotonic);
     }
 
     fn run(work: *Work, index: usize, _: usize) void {
@@ -287,6 +308,7 @@ const Work = struct {
     }
 
     fn make(work: *Work, task: *const Task, reason: *decode.Reason) decode.Error!void {
+        if (work.isDone(task)) return;
         var texels: ?Texels =
             try decode.decode(work.gpa, work.from.images[task.image].bytes, reason);
         defer if (texels) |*left| left.deinit(work.gpa);
@@ -294,6 +316,7 @@ const Work = struct {
         for (task.requests, 0..) |index, use| {
             if (index == scene.none) continue;
             const request = &work.requests.items[index];
+            if (request.pyramid != null) continue;
             // The last to come may take the texels over.
             const image = try store(work.gpa, &texels, request, !both or use == 1);
             request.pyramid = try pyramid_file.build(
@@ -303,6 +326,13 @@ const Work = struct {
                 cutoffCode(request.cutoff),
             );
         }
+    }
+
+    fn isDone(work: *const Work, task: *const Task) bool {
+        for (task.requests) |index| {
+            if (index != scene.none and work.requests.items[index].pyramid == null) return false;
+        }
+        return true;
     }
 
     /// In the order of the images.
@@ -944,10 +974,10 @@ test "threads change nothing, batches neither" {
         },
         .requests = @splat(scene.none),
     };
-    try testing.expectEqual(2, batchCount(&.{ large, large, large }));
+    try testing.expectEqual(2, batchCount(&.{ large, large, large }, decode_bytes_max));
     var huge = large;
     huge.info.is_float = true;
-    try testing.expectEqual(1, batchCount(&.{ huge, large }));
+    try testing.expectEqual(1, batchCount(&.{ huge, large }, decode_bytes_max));
 }
 
 test "floats become the nearest codes" {
@@ -957,6 +987,93 @@ test "floats become the nearest codes" {
     try testing.expectEqual([3]u8{ 188, 255, 0 }, codes);
     pickFloats(3, &.{ 0.5, 2, 0 }, &stored, false, &codes);
     try testing.expectEqual([3]u8{ 128, 255, 0 }, codes);
+}
+
+/// Refuses one request and no other.
+const RefusesOne = struct {
+    countdown: usize,
+    has_refused: bool = false,
+
+    fn allocator(refuses: *RefusesOne) Allocator {
+        return .{ .ptr = refuses, .vtable = &.{
+            .alloc = alloc,
+            .resize = Allocator.noResize,
+            .remap = Allocator.noRemap,
+            .free = free,
+        } };
+    }
+
+    fn alloc(context: *anyopaque, len: usize, alignment: std.mem.Alignment, at: usize) ?[*]u8 {
+        const refuses: *RefusesOne = @ptrCast(@alignCast(context));
+        refuses.countdown -|= 1;
+        if (refuses.countdown > 0 or refuses.has_refused)
+            return testing.allocator.rawAlloc(len, alignment, at);
+        refuses.has_refused = true;
+        return null;
+    }
+
+    fn free(_: *anyopaque, memory: []u8, alignment: std.mem.Alignment, at: usize) void {
+        testing.allocator.rawFree(memory, alignment, at);
+    }
+};
+
+test "where memory is too short for several images, one comes after the other" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const file = try TestImage.png(files.allocator(), 2, 2, 4, &@as([16]u8, @splat(77)));
+    const other = try TestImage.png(files.allocator(), 1, 2, 3, &@as([6]u8, @splat(88)));
+    var from = try testScene(testing.allocator, &.{ file, other }, &.{.{
+        .base_color_texture = .{ .texture = 0 },
+        .alpha_mode = .blend,
+        .occlusion_texture = .{ .texture = 0 },
+        .normal_texture = .{ .texture = 1 },
+    }});
+    defer from.deinit();
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    var done_count: usize = 0;
+    for (1..100) |refused| {
+        var refuses: RefusesOne = .{ .countdown = refused };
+        var diagnostic: Diagnostic = .{};
+        var set = load(refuses.allocator(), &from, .{ .pool = &pool }, &diagnostic) catch |err| {
+            try testing.expectEqual(error.OutOfMemory, err); // Before or after the decoding.
+            continue;
+        };
+        defer set.deinit();
+        if (refuses.has_refused) done_count += 1;
+        try testing.expectEqual(3, set.lookups.len);
+        for (set.lookups, [_]u8{ 77, 88, 77 }) |lookup, texel| {
+            for (set.textures.all[lookup.texture].levels) |level| {
+                for (level.texels) |found| try testing.expectEqual(texel, found);
+            }
+        }
+    }
+    // One refused while images were decoded did no harm: texels, what is kept of them, the levels.
+    try testing.expect(done_count >= 6);
+}
+
+test "texels are the same on every machine" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    var random_state: std.Random.DefaultPrng = .init(41);
+    var texels: [61 * 38 * 4]u8 = undefined;
+    random_state.random().bytes(&texels);
+    const file = try TestImage.png(files.allocator(), 61, 38, 4, &texels);
+    const view: scene.TextureView = .{ .texture = 0 };
+    var hash: std.hash.XxHash64 = .init(0);
+    for ([_]scene.AlphaMode{ .@"opaque", .mask }) |mode| {
+        var from = try testScene(testing.allocator, &.{file}, &.{.{
+            .base_color_texture = view,
+            .alpha_mode = mode,
+            .normal_texture = view,
+        }});
+        defer from.deinit();
+        var diagnostic: Diagnostic = .{};
+        var set = try testLoad(&from, 32, &diagnostic);
+        defer set.deinit();
+        for (set.textures.all) |texture| for (texture.levels) |level| hash.update(level.texels);
+    }
+    try testing.expectEqual(9264281432180316260, hash.final());
 }
 
 test "memory that runs out leaks nothing" {

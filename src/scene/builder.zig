@@ -24,6 +24,7 @@ lights: std.ArrayList(scene_data.Light) = .empty,
 cameras: std.ArrayList(scene_data.Camera) = .empty,
 images: std.ArrayList(scene_data.Image) = .empty,
 textures: std.ArrayList(scene_data.Texture) = .empty,
+texture_indices: std.AutoHashMapUnmanaged(scene_data.Texture, u32) = .empty,
 
 const list_names = [_][]const u8{
     "nodes",    "meshes", "instances", "materials", "lights", "cameras", "images",
@@ -44,6 +45,7 @@ pub fn deinit(builder: *Builder) void {
 
 fn freeLists(builder: *Builder) void {
     inline for (list_names) |name| @field(builder, name).deinit(builder.gpa());
+    builder.texture_indices.deinit(builder.gpa());
 }
 
 /// Where the lists grow.
@@ -107,10 +109,15 @@ pub fn addImage(builder: *Builder, image: scene_data.Image) Error!u32 {
     return builder.add("images", image);
 }
 
-/// Adds a texture of an image that exists and returns its index.
+/// Adds a texture of an image that exists, unless there is the same one, and returns its index.
 pub fn addTexture(builder: *Builder, texture: scene_data.Texture) Error!u32 {
     assert(texture.image < builder.images.items.len);
-    return builder.add("textures", texture);
+    const entry = try builder.texture_indices.getOrPut(builder.gpa(), texture);
+    if (!entry.found_existing) {
+        errdefer _ = builder.texture_indices.remove(texture);
+        entry.value_ptr.* = try builder.add("textures", texture);
+    }
+    return entry.value_ptr.*;
 }
 
 /// The scene, whose first camera is the default. The builder is empty afterwards and needs no

@@ -41,6 +41,7 @@ pub const EnvironmentLevel = struct {
 
 /// A small part of the sky in the order of `EnvironmentMap.parts`, with all that come before it.
 pub const EnvironmentPart = struct {
+    solid_angle: f64,
     /// Luminance times solid angle.
     luminance: f64,
     /// Radiance times solid angle, linear RGB.

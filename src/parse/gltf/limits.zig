@@ -6,8 +6,6 @@
 pub const json_bytes_max: u64 = 1 << 30;
 /// All buffers of a file together, in bytes.
 pub const buffer_bytes_max: u64 = 8 << 30;
-/// All image files of a scene together, in bytes.
-pub const image_bytes_max: u64 = 4 << 30;
 /// Elements of an accessor: 32-bit indices reach no further.
 pub const accessor_count_max: u64 = (1 << 31) - 1;
 /// Elements of an accessor without data, which stand in no relation to the file's size.

@@ -9,29 +9,23 @@ const std = @import("std");
 const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
 const escapes = @import("../json/escapes.zig");
-const limits = @import("limits.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const uri = @import("uri.zig");
 const Error = Source.Error;
-const Identity = @import("../../identity.zig").Identity;
+const ImageFiles = @import("../image_files.zig");
 const Resources = @import("../resource.zig");
 const Source = @import("source.zig");
 const Textures = @This();
 
 source: *Source,
-resources: *Resources,
+files: ImageFiles,
 /// The scene's texture for one of the file; null: it has no picture.
 known: std.AutoHashMapUnmanaged(u32, ?u32) = .empty,
-/// Textures with the same picture, wrapped and filtered alike, are one.
-unique: std.AutoHashMapUnmanaged(scene.Texture, u32) = .empty,
 /// The scene's image for one of the file, and for what images are made of.
 images: std.AutoHashMapUnmanaged(u32, ?u32) = .empty,
 ranges: std.AutoHashMapUnmanaged(Range, u32) = .empty,
 uris: std.StringHashMapUnmanaged(?u32) = .empty,
-files: std.AutoHashMapUnmanaged(Identity, u32) = .empty,
-/// Bytes of image files that may still be read.
-file_bytes_left: u64 = limits.image_bytes_max,
 /// Bytes of buffers that may still be copied: images do not overlap.
 view_bytes_left: u64,
 
@@ -44,15 +38,18 @@ pub fn init(source: *Source, resources: *Resources) Textures {
     for (source.buffers) |buffer| if (buffer) |bytes| {
         buffer_bytes += bytes.len;
     };
-    return .{ .source = source, .resources = resources, .view_bytes_left = buffer_bytes };
+    return .{
+        .source = source,
+        .files = .{ .resources = resources, .builder = source.builder },
+        .view_bytes_left = buffer_bytes,
+    };
 }
 
 /// Frees what is not the scene's.
 pub fn deinit(textures: *Textures) void {
     const gpa = textures.source.gpa;
-    inline for (.{ "known", "unique", "images", "ranges", "uris", "files" }) |name| {
-        @field(textures, name).deinit(gpa);
-    }
+    inline for (.{ "known", "images", "ranges", "uris" }) |name| @field(textures, name).deinit(gpa);
+    textures.files.deinit();
     textures.* = undefined;
 }
 
@@ -114,7 +111,6 @@ fn get(textures: *Textures, index: u32) Error!?u32 {
     const source = textures.source;
     if (textures.known.get(index)) |texture| return texture;
     const raw = Source.item(source.data.textures, index);
-    const sampler = textures.readSampler(raw);
     // What a file offers besides the image of the core is there to be preferred.
     var named = false;
     const image = for ([_][*c]c.cgltf_image{
@@ -126,21 +122,14 @@ fn get(textures: *Textures, index: u32) Error!?u32 {
         if (try textures.getImage(image_index)) |image| break image;
     } else null;
     if (!named) source.warn("texture {d}: has no image that can be read, left out", .{index});
-    const texture = if (image) |present| try textures.add(present, sampler) else null;
+    var texture: ?u32 = null;
+    if (image) |present| {
+        var complete = textures.readSampler(raw);
+        complete.image = present;
+        texture = try source.builder.addTexture(complete);
+    }
     try textures.known.put(source.gpa, index, texture);
     return texture;
-}
-
-fn add(textures: *Textures, image: u32, sampler: scene.Texture) Error!u32 {
-    const source = textures.source;
-    var texture = sampler;
-    texture.image = image;
-    const entry = try textures.unique.getOrPut(source.gpa, texture);
-    if (!entry.found_existing) {
-        errdefer _ = textures.unique.remove(texture);
-        entry.value_ptr.* = try source.builder.addTexture(texture);
-    }
-    return entry.value_ptr.*;
 }
 
 /// How a texture is looked up, without its image.
@@ -228,7 +217,7 @@ fn fromView(textures: *Textures, index: u32, raw: *const c.cgltf_buffer_view) Er
     textures.view_bytes_left -= range.size;
     // Whole views have been checked against their buffers.
     const bytes = try source.arena.dupe(u8, buffer[range.offset..][0..range.size]);
-    const image = try textures.addImage(index, "", bytes);
+    const image = try textures.addImage(index, bytes);
     try textures.ranges.put(source.gpa, range, image);
     return image;
 }
@@ -239,7 +228,7 @@ fn fromUri(textures: *Textures, index: u32, encoded: []const u8) Error!?u32 {
     var reason: diagnostic.Message = .{};
     const resolved = uri.resolve(source.gpa, source.arena, encoded, &reason);
     const image = if (resolved) |target| switch (target) {
-        .bytes => |bytes| try textures.addImage(index, "", bytes),
+        .bytes => |bytes| try textures.addImage(index, bytes),
         .path => |path| file: {
             defer source.gpa.free(path);
             break :file try textures.fromFile(index, path);
@@ -257,11 +246,12 @@ fn fromUri(textures: *Textures, index: u32, encoded: []const u8) Error!?u32 {
 
 fn fromFile(textures: *Textures, index: u32, path: []const u8) Error!?u32 {
     const source = textures.source;
-    const arena = source.arena;
+    var name: diagnostic.Message = .{};
+    name.set("image {d} {f}", .{ index, diagnostic.quote(path) });
     var reason: diagnostic.Message = .{};
-    const file = textures.resources.readOptional(arena, path, &reason) catch |err| switch (err) {
-        error.OutOfMemory => |failure| return failure,
-        error.Overwritten => return source.diagnostic.fail(
+    return textures.files.get(path, name.text(), &reason) catch |err| switch (err) {
+        error.OutOfMemory => |failure| failure,
+        error.Overwritten => source.diagnostic.fail(
             error.InputOutput,
             "image {d}: {f} {s}",
             .{ index, diagnostic.quote(path), reason.text() },
@@ -273,32 +263,14 @@ fn fromFile(textures: *Textures, index: u32, path: []const u8) Error!?u32 {
             return null;
         },
     };
-    const known = if (file.identity) |identity| textures.files.get(identity) else null;
-    if (known) |image| {
-        arena.free(file.bytes);
-        return image;
-    }
-    if (file.bytes.len > textures.file_bytes_left) {
-        arena.free(file.bytes);
-        source.warn("image {d}: all image files are over the limit of {d} bytes, left out", .{
-            index, limits.image_bytes_max,
-        });
-        return null;
-    }
-    textures.file_bytes_left -= file.bytes.len;
-    const image = try textures.addImage(index, path, file.bytes);
-    if (file.identity) |identity| try textures.files.put(source.gpa, identity, image);
-    return image;
 }
 
-/// Adds an image whose bytes are the scene's; `path` is empty where it comes from no file.
-fn addImage(textures: *Textures, index: u32, path: []const u8, bytes: []const u8) Error!u32 {
+/// Adds an image whose bytes are the scene's.
+fn addImage(textures: *Textures, index: u32, bytes: []const u8) Error!u32 {
     const source = textures.source;
     const raw = Source.item(source.data.images, index);
     var name: diagnostic.Message = .{};
-    if (path.len > 0) {
-        name.set("image {d} {f}", .{ index, diagnostic.quote(path) });
-    } else if (raw.name != null) {
+    if (raw.name != null) {
         const text = try escapes.decodeString(source.gpa, std.mem.span(raw.name));
         defer source.gpa.free(text);
         name.set("image {d} {f}", .{ index, diagnostic.quote(text) });

@@ -1,7 +1,7 @@
 //! Parameters that may be a colour, a spectrum or a texture: one linear RGB, or one number.
 //!
-//! Scenes have no textures yet, so that a texture is its mean. What stands for what is not read,
-//! image files above all, is said once a kind. docs/pbrt.md has the table.
+//! Where a constant is needed, a texture is its mean. What stands for what is not read is said once
+//! a kind. docs/pbrt.md has the table.
 
 const std = @import("std");
 const quote = @import("../../diagnostic.zig").quote;
@@ -9,18 +9,17 @@ const number = @import("number.zig");
 const spectra = @import("spectra.zig");
 const Input = @import("input.zig");
 const Parameters = @import("parameters.zig");
+const Textures = @import("textures.zig");
+const Texture = Textures.Texture;
 const Error = Input.Error;
 const Vec3 = @import("../../math.zig").Vec3;
 
 const Colors = @This();
 
-/// Mean of an image that is not read.
-const image_mean = 0.5;
-
 /// Lives as long as the scene is read.
 arena: std.mem.Allocator,
 input: *Input,
-textures: std.StringHashMapUnmanaged(Vec3) = .empty,
+textures: Textures,
 /// Spectra by the name of their file.
 files: std.StringHashMapUnmanaged(?Vec3) = .empty,
 
@@ -44,6 +43,35 @@ pub fn float(
 ) Error!f32 {
     const value = try colors.rgb(parameters, name, @splat(default));
     return (value[0] + value[1] + value[2]) / 3;
+}
+
+/// The texture of that name, constants included; null where it is absent or not there.
+pub fn texture(
+    colors: *Colors,
+    parameters: *const Parameters,
+    name: []const u8,
+) Error!?Texture {
+    const parameter = parameters.find(name) orelse return null;
+    if (parameter.type == .texture) return colors.textureOf(parameters, parameter);
+    return .{ .mean = try colors.valueOf(parameters, parameter) orelse return null };
+}
+
+fn textureOf(
+    colors: *Colors,
+    parameters: *const Parameters,
+    parameter: *const Parameters.Parameter,
+) Error!?Texture {
+    const strings = parameters.stringsOf(parameter);
+    if (strings.len == 0)
+        return colors.input.fail(parameter.offset, "{f} has no name", .{quote(parameter.name)});
+    if (colors.textures.named.get(strings[0])) |known| return known;
+    try colors.input.warn(
+        parameter.offset,
+        "texture that is not there",
+        "texture {f} is not defined: the default of {f} stands for it",
+        .{ quote(strings[0]), quote(parameter.name) },
+    );
+    return null;
 }
 
 fn valueOf(
@@ -78,15 +106,15 @@ fn valueOf(
                 .{},
             );
         },
-        .texture => if (strings.len >= 1) {
-            if (colors.textures.get(strings[0])) |value| return value;
-            try input.warn(
+        .texture => {
+            const known = try colors.textureOf(parameters, parameter) orelse return null;
+            if (known.picture != null) try input.warn(
                 parameter.offset,
-                "texture that is not there",
-                "texture {f} is not defined: the default of {f} stands for it",
-                .{ quote(strings[0]), quote(parameter.name) },
+                parameter.name,
+                "{f}: a picture counts as its mean, taken as {d}",
+                .{ quote(parameter.name), known.mean[0] },
             );
-            return null;
+            return known.mean;
         },
         else => {},
     }
@@ -137,67 +165,4 @@ fn parsePairs(colors: *Colors, bytes: [:0]const u8) Error!?Vec3 {
         const value = number.float(bytes, &cursor) catch return null;
         try pairs.append(gpa, value);
     }
-}
-
-/// The mean of a texture: `Texture "name" "type" "class" ...`.
-pub fn mean(colors: *Colors, class: []const u8, parameters: *const Parameters) Error!Vec3 {
-    const input = colors.input;
-    const white: Vec3 = @splat(1);
-    const Class = enum { constant, scale, mix, directionmix, checkerboard, dots, imagemap, bilerp };
-    const known = std.meta.stringToEnum(Class, class) orelse {
-        try input.warnHere(
-            class,
-            "Texture {f} is not supported: its mean is taken as {d}",
-            .{ quote(class), image_mean },
-        );
-        return @splat(image_mean);
-    };
-    switch (known) {
-        .constant, .scale, .mix => {},
-        .imagemap => try input.warnHere(
-            class,
-            "Texture {f}: images are not read, their mean is taken as {d}",
-            .{ quote(class), image_mean },
-        ),
-        else => try input.warnHere(class, "Texture {f} is shown as its mean", .{quote(class)}),
-    }
-    switch (known) {
-        .constant => return colors.rgb(parameters, "value", white),
-        .scale => {
-            const first_name = if (parameters.find("tex1") != null) "tex1" else "tex";
-            const second_name = if (parameters.find("tex2") != null) "tex2" else "scale";
-            const first = try colors.rgb(parameters, first_name, white);
-            const second = try colors.rgb(parameters, second_name, white);
-            return .{ first[0] * second[0], first[1] * second[1], first[2] * second[2] };
-        },
-        .mix, .directionmix, .checkerboard => {
-            const black: Vec3 = @splat(0);
-            const is_mix = known == .mix;
-            const first = try colors.rgb(parameters, "tex1", if (is_mix) black else white);
-            const second = try colors.rgb(parameters, "tex2", if (is_mix) white else black);
-            const amount = if (known == .mix) try colors.float(parameters, "amount", 0.5) else 0.5;
-            return blend(first, second, amount);
-        },
-        .dots => {
-            const inside = try colors.rgb(parameters, "inside", white);
-            const outside = try colors.rgb(parameters, "outside", @splat(0));
-            return blend(inside, outside, 0.5);
-        },
-        .bilerp => {
-            var sum: Vec3 = @splat(0);
-            const corners = [_][]const u8{ "v00", "v01", "v10", "v11" };
-            for (corners, 0..) |corner, index| {
-                const value = try colors.rgb(parameters, corner, @splat(@floatFromInt(index % 2)));
-                for (&sum, value) |*component, part| component.* += 0.25 * part;
-            }
-            return sum;
-        },
-        .imagemap => return @splat(image_mean * parameters.float("scale", 1)),
-    }
-}
-
-fn blend(first: Vec3, second: Vec3, amount: f32) Vec3 {
-    var result: Vec3 = undefined;
-    for (&result, first, second) |*to, a, b| to.* = (1 - amount) * a + amount * b;
-    return result;
 }

@@ -1,9 +1,10 @@
 //! Light sources, and shapes that shine as a number of points.
 //!
 //! In: the parameters of a LightSource; emitting shapes with their places. Out: point, spot and
-//! directional lights, and the radiance of the sky. An emitting shape becomes `points_per_shape`
-//! spots on its surface, in even shares of its area, the same ones each time: by the R2 sequence
-//! of Roberts ("The unreasonable effectiveness of quasirandom sequences", 2018) within triangles.
+//! directional lights, the radiance of the sky, or a map of it. An emitting shape becomes
+//! `points_per_shape` spots on its surface, in even shares of its area, the same ones each time: by
+//! the R2 sequence of Roberts ("The unreasonable effectiveness of quasirandom sequences", 2018)
+//! within triangles.
 //! Each shines as much as its share of the area. A Lambertian source falls off with the cosine;
 //! our spots fall off with the square of a ramp, here from cosine 0 to 0.75, which has the same
 //! flux: (1 - 0.75) + 0.75 / 3 = 1 / 2.
@@ -18,6 +19,7 @@ const SceneBuilder = @import("scene_builder.zig");
 const Colors = @import("colors.zig");
 const Input = @import("input.zig");
 const Parameters = @import("parameters.zig");
+const Tessellator = @import("shapes/tessellator.zig");
 const vec3d = math.vec3d;
 const Transform = math.AffineD;
 const Error = Input.Error;
@@ -34,6 +36,7 @@ pub const point_count_aim = 256;
 
 /// Radiance beyond which a sky is no brighter.
 const sky_max = 1e30;
+const emission_max = 1e30;
 
 /// Cosine from which the spots of emitters shine in full.
 const emitter_cosine = 0.75;
@@ -47,6 +50,28 @@ pub const Source = struct {
 
     fn color(source: *const Source, name: []const u8) Error!Vec3 {
         return scaledColor(source.colors, source.parameters, name, std.math.floatMax(f32));
+    }
+
+    /// The same, or as much as makes `quantity` what the text says, if it does: of a light of this
+    /// colour and luminance 1 it is `of_unit`.
+    fn colorBy(
+        source: *const Source,
+        name: []const u8,
+        quantity: []const u8,
+        of_unit: f64,
+    ) Error!Vec3 {
+        const rgb = try source.color(name);
+        const asked = source.parameters.float(quantity, 0);
+        if (!(asked > 0 and of_unit > 0)) return rgb;
+        const factor = try normalization(source.colors, source.parameters, name);
+        return scaled(rgb, factor * asked / of_unit);
+    }
+
+    fn noteOf(source: *const Source, kind: []const u8, quantity: []const u8) Error!void {
+        if (source.parameters.find(quantity) == null) return;
+        try source.colors.input.warnHere(quantity, "LightSource {f}: its {s} is not read", .{
+            quote(kind), quantity,
+        });
     }
 
     fn point(source: *const Source, name: []const u8, default: Vec3) Vector {
@@ -76,22 +101,44 @@ pub fn scaledColor(
     return result;
 }
 
+/// What makes the luminance of an emission 1: RGB tells its colour beside white, all else tells
+/// the emission itself.
+pub fn normalization(colors: *Colors, parameters: *const Parameters, name: []const u8) Error!f64 {
+    const parameter = parameters.find(name) orelse return 1;
+    if (parameter.type == .rgb) return 1;
+    const luminance = spectra.luminance(try colors.rgb(parameters, name, .{ 1, 1, 1 }));
+    return if (luminance > 0) 1 / @as(f64, luminance) else 1;
+}
+
+/// A colour times a factor, finite.
+pub fn scaled(color: Vec3, factor: f64) Vec3 {
+    var result: Vec3 = undefined;
+    for (&result, color) |*to, from| {
+        to.* = math.flushDenormal(@floatCast(std.math.clamp(from * factor, 0, emission_max)));
+    }
+    return result;
+}
+
 /// `LightSource "name" ...`.
 pub fn add(source: *const Source, name: []const u8) Error!void {
     const Kind = enum { point, spot, distant, goniometric, projection, infinite, exinfinite };
     const builder = source.builder;
     const kind = std.meta.stringToEnum(Kind, name) orelse
         return source.note(name, "is not supported and left out");
-    if (source.parameters.find("power") != null or source.parameters.find("illuminance") != null)
-        try source.note(name, "power and illuminance are not read");
     switch (kind) {
         .point, .goniometric => {
-            if (kind == .goniometric) try source.note(name, "shines evenly, its map is not read");
+            if (kind == .goniometric) {
+                try source.note(name, "shines evenly, its map is not read");
+                try source.noteOf(name, "power");
+            }
             const origin = source.point("from", .{ 0, 0, 0 });
             try builder.addLight(origin, .{ 0, 0, -1 }, .{
                 .kind = .point,
                 .node = undefined,
-                .color = try source.color("I"),
+                .color = if (kind == .point)
+                    try source.colorBy("I", "power", 4 * std.math.pi)
+                else
+                    try source.color("I"),
             });
         },
         .spot, .projection => try addSpot(source, name, kind == .projection),
@@ -104,23 +151,70 @@ pub fn add(source: *const Source, name: []const u8) Error!void {
             try builder.addLight(.{ 0, 0, 0 }, way, .{
                 .kind = .directional,
                 .node = undefined,
-                .color = try source.color("L"),
+                .color = try source.colorBy("L", "illuminance", 1),
             });
         },
-        .infinite, .exinfinite => {
-            if (source.parameters.find("mapname") != null or
-                source.parameters.find("filename") != null)
-            {
-                try source.note(name, "its map is not read, a grey sky stands for it");
-                builder.has_unknown_sky = true;
-                return;
-            }
-            const radiance = try source.color("L");
-            var sum = builder.sky orelse Vec3{ 0, 0, 0 };
-            for (&sum, radiance) |*to, part| to.* = @min(to.* + part, sky_max);
-            builder.sky = sum;
-        },
+        .infinite, .exinfinite => try addInfinite(source, name),
     }
+}
+
+/// Light from all around: an even sky, or a map of it.
+fn addInfinite(source: *const Source, name: []const u8) Error!void {
+    const builder = source.builder;
+    const parameters = source.parameters;
+    const is_older = parameters.find("mapname") != null;
+    const path = parameters.string(if (is_older) "mapname" else "filename") orelse {
+        const radiance = try source.colorBy("L", "illuminance", std.math.pi);
+        var sum = builder.sky orelse Vec3{ 0, 0, 0 };
+        for (&sum, radiance) |*to, part| to.* = @min(to.* + part, sky_max);
+        builder.sky = sum;
+        return;
+    };
+    if (builder.scene.scene.environment != null)
+        return source.note(name, "the first map is the only one");
+    try source.noteOf(name, "illuminance");
+    if (parameters.find("portal") != null)
+        try source.note(name, "shines from all around, its portal is not read");
+    const image = try source.colors.textures.imageOf(path) orelse {
+        try source.note(name, "without its map a grey sky stands for it");
+        builder.has_unknown_sky = true;
+        return;
+    };
+    const turn = rotationOf(source.place) orelse turn: {
+        try source.note(name, "its transformation is no rotation, and not read");
+        break :turn Transform.identity;
+    };
+    builder.scene.scene.environment = .{
+        .image = image,
+        .projection = if (is_older) .equirectangular else .octahedral,
+        .scale = try source.color("L"),
+        .rotation = if (is_older) to_equirectangular.compose(turn) else turn,
+    };
+}
+
+/// From PBRT's directions, z up and u = 0 along x, to those of our maps, y up and u = 0 along -x.
+const to_equirectangular: Transform = .{
+    .x = .{ -1, 0, 0 },
+    .y = .{ 0, 0, -1 },
+    .z = .{ 0, 1, 0 },
+    .translation = .{ 0, 0, 0 },
+};
+
+/// From the world's directions to the light's: the inverse of its place, which may mirror and
+/// scale, evenly; null where it does more.
+fn rotationOf(place: *const Transform) ?Transform {
+    const x = vec3d.normalize(place.x) orelse return null;
+    const y = vec3d.normalize(place.y) orelse return null;
+    const z = vec3d.normalize(place.z) orelse return null;
+    for ([_]f64{ vec3d.dot(x, y), vec3d.dot(y, z), vec3d.dot(z, x) }) |cosine| {
+        if (!(@abs(cosine) < 1e-4)) return null;
+    }
+    return .{
+        .x = .{ x[0], y[0], z[0] },
+        .y = .{ x[1], y[1], z[1] },
+        .z = .{ x[2], y[2], z[2] },
+        .translation = .{ 0, 0, 0 },
+    };
 }
 
 fn addSpot(source: *const Source, name: []const u8, is_projection: bool) Error!void {
@@ -138,6 +232,7 @@ fn addSpot(source: *const Source, name: []const u8, is_projection: bool) Error!v
     var inner_deg = outer_deg - parameters.float("conedeltaangle", 5);
     if (is_projection) {
         try source.note(name, "is shown as a spot, its map is not read");
+        try source.noteOf(name, "power");
         outer_deg = 0.5 * parameters.float("fov", 45);
         inner_deg = outer_deg - 1;
     }
@@ -146,10 +241,37 @@ fn addSpot(source: *const Source, name: []const u8, is_projection: bool) Error!v
     try source.builder.addLight(origin, way, .{
         .kind = .spot,
         .node = undefined,
-        .color = try source.color("I"),
+        .color = if (is_projection)
+            try source.color("I")
+        else
+            try source.colorBy("I", "power", spotPower(inner, outer)),
         .inner_cone_rad = @min(inner, 0.999 * outer),
         .outer_cone_rad = outer,
     });
+}
+
+/// The power of PBRT's spot of unit intensity, whose edge counts by half.
+fn spotPower(inner_rad: f64, outer_rad: f64) f64 {
+    const inner = math.elementary.cos(inner_rad);
+    const outer = math.elementary.cos(outer_rad);
+    return 2 * std.math.pi * ((1 - inner) + 0.5 * (inner - outer));
+}
+
+/// The area of triangles at their place in the world.
+pub fn areaOf(geometry: *const Tessellator.Geometry, place: *const Transform) f64 {
+    var area: f64 = 0;
+    for (geometry.triangles) |triangle| {
+        var corners: [3]Vector = undefined;
+        for (&corners, triangle) |*corner, vertex| {
+            const position = geometry.positions[vertex];
+            corner.* = place.point(.{ position[0], position[1], position[2] });
+        }
+        area += 0.5 * vec3d.length(vec3d.cross(
+            vec3d.sub(corners[1], corners[0]),
+            vec3d.sub(corners[2], corners[0]),
+        ));
+    }
+    return area;
 }
 
 /// Makes lights of all shapes that shine.

@@ -51,8 +51,9 @@ const Kind = enum {
 pub fn convert(colors: *Colors, name: []const u8, parameters: *const Parameters) Error!Material {
     if (name.len == 0 or std.mem.eql(u8, name, "none") or std.mem.eql(u8, name, "interface"))
         return .{ .surface = matte_default, .is_boundary = true };
-    if (parameters.find("bumpmap") != null or parameters.find("displacement") != null or
-        parameters.find("normalmap") != null) try colors.input.warnHere(
+    const has_bumps = parameters.find("bumpmap") != null or
+        parameters.find("displacement") != null;
+    if (has_bumps) try colors.input.warnHere(
         "bump map",
         "Material {f}: bumps are not supported, its surfaces are smooth",
         .{quote(name)},
@@ -65,60 +66,84 @@ pub fn convert(colors: *Colors, name: []const u8, parameters: *const Parameters)
         );
         return .{ .surface = matte_default };
     };
-    const reader: Reader = .{ .colors = colors, .parameters = parameters };
-    return .{ .surface = bounded(try reader.read(kind)) };
+    var reader: Reader = .{ .colors = colors, .parameters = parameters };
+    var surface = bounded(try reader.read(kind));
+    surface.base_color_texture = reader.base_texture;
+    surface.normal_texture = try reader.normalTexture();
+    return .{ .surface = surface };
 }
 
 /// Reads the parameters of each kind.
 const Reader = struct {
     colors: *Colors,
     parameters: *const Parameters,
+    /// Set by `baseColor`.
+    base_texture: ?scene.TextureView = null,
 
-    fn read(reader: Reader, kind: Kind) Error!scene.Material {
+    fn read(reader: *Reader, kind: Kind) Error!scene.Material {
         return switch (kind) {
-            .matte => matte(try reader.rgb("Kd", 0.5)),
-            .diffuse => matte(try reader.rgb("reflectance", 0.5)),
+            .matte => matte(try reader.baseColor("Kd", 0.5)),
+            .diffuse => matte(try reader.baseColor("reflectance", 0.5)),
             .plastic => reader.coated(
-                try reader.rgb("Kd", 0.25),
+                try reader.baseColor("Kd", 0.25),
                 0.04 * try reader.bright("Ks", 0.25),
             ),
-            .substrate => reader.coated(try reader.rgb("Kd", 0.5), try reader.bright("Ks", 0.5)),
-            .coateddiffuse => reader.polished(try reader.rgb("reflectance", 0.5), 1.5),
-            .mirror => metal(try reader.rgb("Kr", 0.9), 0),
-            .shinymetal => metal(try reader.rgb("Kr", 1), 0),
+            .substrate => reader.coated(
+                try reader.baseColor("Kd", 0.5),
+                try reader.bright("Ks", 0.5),
+            ),
+            .coateddiffuse => reader.polished(try reader.baseColor("reflectance", 0.5), 1.5),
+            .mirror => metal(try reader.baseColor("Kr", 0.9), 0),
+            .shinymetal => metal(try reader.baseColor("Kr", 1), 0),
             .metal, .conductor, .coatedconductor => reader.conductor(kind),
             .glass, .dielectric, .thindielectric => reader.glass(kind),
             .uber => reader.uber(),
             .translucent => reader.translucent(),
             .diffusetransmission => reader.diffuseTransmission(),
-            .kdsubsurface => reader.polished(try reader.rgb("Kd", 0.5), 1.3),
+            .kdsubsurface => reader.polished(try reader.baseColor("Kd", 0.5), 1.3),
             .subsurface => reader.subsurface(),
             .disney => reader.disney(),
         };
     }
 
-    fn rgb(reader: Reader, name: []const u8, default: f32) Error!Vec3 {
+    fn rgb(reader: *Reader, name: []const u8, default: f32) Error!Vec3 {
         return reader.spectrum(name, @splat(default));
     }
 
-    fn spectrum(reader: Reader, name: []const u8, default: Vec3) Error!Vec3 {
+    fn spectrum(reader: *Reader, name: []const u8, default: Vec3) Error!Vec3 {
         return reader.colors.rgb(reader.parameters, name, default);
     }
 
-    fn float(reader: Reader, name: []const u8, default: f32) Error!f32 {
+    /// The base colour: the factor of a picture, which becomes the base colour's texture.
+    fn baseColor(reader: *Reader, name: []const u8, default: f32) Error!Vec3 {
+        const texture = try reader.colors.texture(reader.parameters, name) orelse
+            return @splat(default);
+        const picture = if (texture.picture) |*picture| picture else return texture.mean;
+        const shown = try reader.colors.textures.show(picture) orelse return texture.mean;
+        reader.base_texture = shown.view;
+        return shown.factor;
+    }
+
+    fn normalTexture(reader: *Reader) Error!?scene.TextureView {
+        const path = reader.parameters.string("normalmap") orelse return null;
+        const shown = try reader.colors.textures.show(&.{ .path = path }) orelse return null;
+        return shown.view;
+    }
+
+    fn float(reader: *Reader, name: []const u8, default: f32) Error!f32 {
         return reader.colors.float(reader.parameters, name, default);
     }
 
-    fn bright(reader: Reader, name: []const u8, default: f32) Error!f32 {
+    fn bright(reader: *Reader, name: []const u8, default: f32) Error!f32 {
         return spectra.luminance(try reader.rgb(name, default));
     }
 
-    fn has(reader: Reader, name: []const u8) bool {
+    fn has(reader: *Reader, name: []const u8) bool {
         return reader.parameters.find(name) != null;
     }
 
     /// Index of refraction under either name.
-    fn index(reader: Reader, default: f32) Error!f32 {
+    fn index(reader: *Reader, default: f32) Error!f32 {
         return reader.float(if (reader.has("eta")) "eta" else "index", default);
     }
 
@@ -126,7 +151,7 @@ const Reader = struct {
     ///
     /// PBRT's is an inverse exponent of Blinn's, 1 / e, unless "remaproughness" says that it is
     /// alpha itself; alpha is sqrt(2 / (e + 2)) (Walter et al. 2007, section 5.1).
-    fn rough(reader: Reader, default: f32) Error!f32 {
+    fn rough(reader: *Reader, default: f32) Error!f32 {
         var value = try reader.float("roughness", default);
         if (reader.has("uroughness")) {
             const u = try reader.float("uroughness", default);
@@ -140,7 +165,7 @@ const Reader = struct {
     }
 
     /// A diffuse body under a coat with that reflectance at normal incidence.
-    fn coated(reader: Reader, base: Vec3, reflectance: f32) Error!scene.Material {
+    fn coated(reader: *Reader, base: Vec3, reflectance: f32) Error!scene.Material {
         var result = matte(base);
         result.ior = iorOf(reflectance);
         result.roughness = try reader.rough(0.1);
@@ -148,19 +173,20 @@ const Reader = struct {
     }
 
     /// A diffuse body under a coat of its own refraction.
-    fn polished(reader: Reader, base: Vec3, ior_default: f32) Error!scene.Material {
+    fn polished(reader: *Reader, base: Vec3, ior_default: f32) Error!scene.Material {
         var result = matte(base);
         result.ior = try reader.index(ior_default);
         result.roughness = try reader.rough(0);
         return result;
     }
 
-    fn conductor(reader: Reader, kind: Kind) Error!scene.Material {
+    fn conductor(reader: *Reader, kind: Kind) Error!scene.Material {
         const coated_prefix = kind == .coatedconductor and reader.has("conductor.eta");
         const eta_name = if (coated_prefix) "conductor.eta" else "eta";
         const k_name = if (coated_prefix) "conductor.k" else "k";
         const roughness = try reader.rough(if (kind == .metal) 0.01 else 0);
-        if (reader.has("reflectance")) return metal(try reader.rgb("reflectance", 1), roughness);
+        if (reader.has("reflectance"))
+            return metal(try reader.baseColor("reflectance", 1), roughness);
         // Copper, as in PBRT.
         const eta = try reader.spectrum(eta_name, spectra.fromName("metal-Cu-eta").?);
         const k = try reader.spectrum(k_name, spectra.fromName("metal-Cu-k").?);
@@ -174,9 +200,9 @@ const Reader = struct {
         return metal(color, roughness);
     }
 
-    fn glass(reader: Reader, kind: Kind) Error!scene.Material {
+    fn glass(reader: *Reader, kind: Kind) Error!scene.Material {
         return .{
-            .base_color = opaqueColor(try reader.rgb("Kt", 1)),
+            .base_color = opaqueColor(try reader.baseColor("Kt", 1)),
             .metallic = 0,
             .roughness = try reader.rough(0),
             .transmission = 1,
@@ -186,10 +212,14 @@ const Reader = struct {
         };
     }
 
-    fn uber(reader: Reader) Error!scene.Material {
-        const diffuse = try reader.rgb("Kd", 0.25);
+    fn uber(reader: *Reader) Error!scene.Material {
         const mirrored = try reader.bright("Kr", 0);
         const passing = try reader.rgb("Kt", 0);
+        // What passes is of another colour than a picture of what is reflected.
+        const diffuse = if (spectra.luminance(passing) > 0)
+            try reader.rgb("Kd", 0.25)
+        else
+            try reader.baseColor("Kd", 0.25);
         const opacity = try reader.bright("opacity", 1);
         var result = matte(diffuse);
         const ior = try reader.index(1.5);
@@ -213,8 +243,8 @@ const Reader = struct {
         return result;
     }
 
-    fn translucent(reader: Reader) Error!scene.Material {
-        const diffuse = try reader.rgb("Kd", 0.25);
+    fn translucent(reader: *Reader) Error!scene.Material {
+        const diffuse = try reader.baseColor("Kd", 0.25);
         const reflect = try reader.rgb("reflect", 0.5);
         const transmit = try reader.rgb("transmit", 0.5);
         var base: Vec3 = undefined;
@@ -222,7 +252,7 @@ const Reader = struct {
         return reader.coated(base, 0.04 * try reader.bright("Ks", 0.25));
     }
 
-    fn diffuseTransmission(reader: Reader) Error!scene.Material {
+    fn diffuseTransmission(reader: *Reader) Error!scene.Material {
         const reflect = try reader.rgb("reflectance", 0.25);
         const transmit = try reader.rgb("transmittance", 0.25);
         var base: Vec3 = undefined;
@@ -232,9 +262,9 @@ const Reader = struct {
 
     /// The diffuse reflectance that light makes of much scattering, the dipole's of Jensen et al.,
     /// "A practical model for subsurface light transport" (2001), section 2.4.
-    fn subsurface(reader: Reader) Error!scene.Material {
+    fn subsurface(reader: *Reader) Error!scene.Material {
         if (reader.has("Kd") or reader.has("reflectance")) return reader.polished(
-            try reader.rgb(if (reader.has("Kd")) "Kd" else "reflectance", 0.5),
+            try reader.baseColor(if (reader.has("Kd")) "Kd" else "reflectance", 0.5),
             1.33,
         );
         const scattered_name = if (reader.has("sigma_prime_s")) "sigma_prime_s" else "sigma_s";
@@ -254,8 +284,8 @@ const Reader = struct {
         return reader.polished(base, 1.3);
     }
 
-    fn disney(reader: Reader) Error!scene.Material {
-        var result = matte(try reader.rgb("color", 0.5));
+    fn disney(reader: *Reader) Error!scene.Material {
+        var result = matte(try reader.baseColor("color", 0.5));
         result.metallic = try reader.float("metallic", 0);
         result.roughness = try reader.float("roughness", 0.5);
         result.ior = try reader.index(1.5);
@@ -314,8 +344,11 @@ fn unit(value: f32) f32 {
 pub fn mix(first: scene.Material, second: scene.Material, amount: f32) scene.Material {
     const share = unit(amount);
     var result = if (share < 0.5) first else second;
-    for (&result.base_color, first.base_color, second.base_color) |*to, a, b| {
-        to.* = lerp(a, b, share);
+    // A picture stays what it is.
+    if (result.base_color_texture == null) {
+        for (&result.base_color, first.base_color, second.base_color) |*to, a, b| {
+            to.* = lerp(a, b, share);
+        }
     }
     result.metallic = lerp(first.metallic, second.metallic, share);
     result.roughness = lerp(first.roughness, second.roughness, share);

@@ -17,6 +17,7 @@ const SceneBuilder = @import("scene_builder.zig");
 const Colors = @import("colors.zig");
 const Input = @import("input.zig");
 const Tessellator = @import("shapes/tessellator.zig");
+const Textures = @import("textures.zig");
 const Parameters = @import("parameters.zig");
 const math = @import("../../math.zig");
 const transforms = @import("transform.zig");
@@ -42,7 +43,14 @@ const Graphics = struct {
 };
 
 /// What AreaLightSource says of the shapes after it.
-const AreaLight = struct { radiance: Vec3, two_sided: bool };
+const AreaLight = struct {
+    radiance: Vec3,
+    two_sided: bool,
+    /// What each shape emits in all, of luminance 1 in place of the radiance's; 0: as it is.
+    power: f32 = 0,
+    normalization: f64 = 1,
+    picture: ?scene_data.TextureView = null,
+};
 
 const Kept = struct {
     const Kind = enum { Attribute, Transform, Object };
@@ -88,6 +96,7 @@ default_material: u32 = scene_data.none,
 pub fn deinit(reader: *Reader) void {
     const gpa = reader.input.gpa;
     reader.parameters.deinit(gpa);
+    reader.colors.textures.deinit();
     reader.stack.deinit(gpa);
     reader.* = undefined;
 }
@@ -246,8 +255,9 @@ fn perform(reader: *Reader, directive: Directive) Error!void {
             _ = try reader.text(); // Its type: all of them are colours here.
             const class = try reader.text();
             try reader.parameters.read(reader.input);
-            const mean = try reader.colors.mean(class, &reader.parameters);
-            try reader.keep(Vec3, &reader.colors.textures, name, mean);
+            const textures = &reader.colors.textures;
+            const made = try textures.make(&reader.colors, class, &reader.parameters);
+            try reader.keep(Textures.Texture, &textures.named, name, made);
         },
         else => {
             const name = try reader.text();
@@ -520,10 +530,17 @@ fn materialNamed(reader: *Reader, name: []const u8) Error!Material {
 
 fn areaLightSource(reader: *Reader) Error!void {
     const parameters = &reader.parameters;
-    reader.graphics.area_light = .{
+    var area_light: AreaLight = .{
         .radiance = try lights.scaledColor(&reader.colors, parameters, "L", 1e30),
         .two_sided = parameters.boolean("twosided", false),
+        .power = parameters.float("power", 0),
+        .normalization = try lights.normalization(&reader.colors, parameters, "L"),
     };
+    if (parameters.string("filename")) |path| {
+        const shown = try reader.colors.textures.show(&.{ .path = path });
+        area_light.picture = if (shown) |picture| picture.view else null;
+    }
+    reader.graphics.area_light = area_light;
 }
 
 fn materialIndex(reader: *Reader) Allocator.Error!u32 {
@@ -551,6 +568,9 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
     }
     if (graphics.material) |material| if (material.is_boundary) return;
     const material = try reader.materialIndex();
+    const surface = &reader.builder.scene.materials.items[material];
+    const has_picture = if (graphics.area_light) |light| light.picture != null else false;
+    reader.tessellator.wants_texcoords = surface.hasTextures() or has_picture;
     if (graphics.area_light) |area_light| {
         if (reader.object == null) return reader.addAreaLight(kind, material, area_light);
         try input.warnHere("area light", "Shape: objects do not shine", .{});
@@ -588,7 +608,15 @@ fn addAreaLight(
     const place = &reader.graphics.transform;
     const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
     var bright = builder.scene.materials.items[material];
-    bright.emissive = area_light.radiance;
+    const radiance = if (area_light.power > 0) radiance: {
+        const sides: f64 = if (area_light.two_sided) 2 else 1;
+        const of_unit = sides * std.math.pi * lights.areaOf(&geometry, place);
+        if (!(of_unit > 0)) break :radiance area_light.radiance;
+        const factor = area_light.normalization * area_light.power / of_unit;
+        break :radiance lights.scaled(area_light.radiance, factor);
+    } else area_light.radiance;
+    bright.emissive = radiance;
+    bright.emissive_texture = area_light.picture;
     bright.double_sided = area_light.two_sided;
     const front = try builder.addMesh(geometry, try builder.scene.addMaterial(bright));
     try builder.instantiate(front, place);
@@ -607,7 +635,8 @@ fn addAreaLight(
     try builder.emitters.append(reader.input.gpa, .{
         .geometry = geometry,
         .place = place.*,
-        .radiance = area_light.radiance,
+        // The mean of a picture that nobody has looked at.
+        .radiance = if (area_light.picture != null) lights.scaled(radiance, 0.5) else radiance,
         .two_sided = area_light.two_sided,
     });
 }
@@ -636,7 +665,7 @@ pub fn finish(reader: *Reader) Error!void {
     if (builder.has_unknown_sky and builder.sky == null and builder.scene.lights.items.len > 0)
         builder.sky = @splat(lights.unknown_sky);
     if (builder.sky) |sky| {
-        scene.background = sky;
+        if (scene.environment == null) scene.background = sky;
         scene.ambient = spectra.luminance(sky);
     }
     try builder.finish(view.place.?, projection);

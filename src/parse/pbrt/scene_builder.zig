@@ -71,6 +71,7 @@ pub fn clear(builder: *SceneBuilder) void {
     builder.scene.lights.clearRetainingCapacity();
     builder.emitters.clearRetainingCapacity();
     builder.parts.clearRetainingCapacity();
+    builder.scene.scene.environment = null;
     builder.sky = null;
     builder.has_unknown_sky = false;
     builder.last_node = null;
@@ -81,6 +82,7 @@ pub fn addMesh(builder: *SceneBuilder, geometry: Geometry, material: u32) Alloca
     return builder.scene.addMesh(.{
         .positions = geometry.positions,
         .normals = geometry.normals,
+        .texcoords = .{ geometry.texcoords, null, null, null },
         .triangles = geometry.triangles,
         .material = material,
     });
@@ -163,6 +165,10 @@ pub fn finish(
     // Our cameras look along -z.
     const backward: Transform = .scale(.{ 1, 1, -1 });
     const node = try builder.scene.addNode(root, camera.compose(backward));
-    if (camera.determinant() > 0) builder.scene.nodes.items[root].local = backward;
+    if (camera.determinant() > 0) {
+        builder.scene.nodes.items[root].local = backward;
+        // It is its own inverse.
+        if (builder.scene.scene.environment) |*map| map.rotation = map.rotation.compose(backward);
+    }
     try builder.scene.addCamera(.{ .name = "", .node = node, .projection = projection });
 }

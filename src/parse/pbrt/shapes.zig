@@ -52,7 +52,11 @@ pub fn make(tessellator: *Tessellator, kind: Kind, reverse: bool) Error!Geometry
 pub fn turned(tessellator: *Tessellator, geometry: *const Geometry) Error!Geometry {
     const triangles = try tessellator.alloc([3]u32, geometry.triangles.len);
     for (geometry.triangles, triangles) |from, *to| to.* = .{ from[0], from[2], from[1] };
-    return .{ .positions = geometry.positions, .triangles = triangles };
+    return .{
+        .positions = geometry.positions,
+        .texcoords = geometry.texcoords,
+        .triangles = triangles,
+    };
 }
 
 /// A number for all that a curved shape depends on.

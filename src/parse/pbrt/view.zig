@@ -105,7 +105,7 @@ pub fn projection(view: *View, input: *Input) Error!scene.Camera.Projection {
     if (@abs(half_width / half_height / film - 1) > 0.01) try input.warn(
         0,
         "stretch",
-        "Camera: the screen is not as wide as the film, its height counts",
+        "Camera: the screen is not as wide as the film, which shows more than it",
         .{},
     );
     switch (view.kind) {

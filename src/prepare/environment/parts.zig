@@ -35,6 +35,7 @@ pub fn make(arena: std.mem.Allocator, nodes: []const Node) error{OutOfMemory}!Pa
     }
     const parts = try arena.alloc(world.EnvironmentPart, rest.len + 1);
     var sum: world.EnvironmentPart = .{
+        .solid_angle = 0,
         .luminance = 0,
         .energy = @splat(0),
         .moment = @splat(0),
@@ -44,6 +45,7 @@ pub fn make(arena: std.mem.Allocator, nodes: []const Node) error{OutOfMemory}!Pa
         const place = hilbert(size, index);
         const node = &rest[place[1] * size + place[0]];
         const luminance: f64 = filter.luminance(node.energy);
+        sum.solid_angle += node.solid_angle;
         sum.luminance += luminance;
         for (&sum.energy, node.energy) |*to, energy| to.* += energy;
         for (&sum.moment, node.direction) |*to, component| to.* += luminance * component;

@@ -95,6 +95,10 @@ inline fn generate(
         .{ .origin = origin, .direction = point };
 }
 
+/// Part of a sample's area that its footprint covers: lookups between texels and levels average
+/// over more than that. Of 1/4, 1/2, 1 and 2 it comes nearest to pictures of 256 samples.
+const footprint_share = 0.5;
+
 /// How wide primary rays are.
 pub const Footprint = struct {
     /// At the origin, in metres.
@@ -103,7 +107,7 @@ pub const Footprint = struct {
     slope: f32,
 };
 
-/// The part of a pixel that one of its samples stands for: a square of the same area.
+/// Of the part of a pixel that one of its samples stands for: a square of the same area.
 pub fn footprint(view: *const world_file.View, sample_count: u32) Footprint {
     const camera = &view.camera;
     const width: f32 = @floatFromInt(view.width);
@@ -111,7 +115,7 @@ pub fn footprint(view: *const world_file.View, sample_count: u32) Footprint {
     const across = vec3.length(camera.right) * (2 / width);
     const upward = vec3.length(camera.up) * (2 / height);
     const count: f32 = @floatFromInt(sample_count);
-    const side = @sqrt(across * upward / count);
+    const side = @sqrt(footprint_share * across * upward / count);
     return if (camera.orthographic)
         .{ .width = side, .slope = 0 }
     else

@@ -21,8 +21,9 @@ const visibility_file = @import("visibility.zig");
 const EnvironmentLight = lights_file.EnvironmentLight;
 const EnvironmentLights = lights_file.EnvironmentLights;
 
-/// Radiance of what hides the sky, as a share of what is hidden, where it is white.
-const bounce = 0.4;
+/// Radiance of what hides the sky, as a share of the mean radiance.
+const bounce_linear = 0.4;
+const bounce_partly = 0;
 
 /// Square of GGX's alpha of the narrowest lobe that lights are weighed by.
 const lobe_alpha_squared_min = 0.1;
@@ -72,10 +73,10 @@ pub fn addLight(
     const Receiver = ReceiverOf(Kernel.Rays);
     const all = lights.all();
     var receivers: [Kernel.group_count]Receiver = undefined;
-    for (&receivers, vertices.all, vertices.traced) |*receiver, *vertex, traced| {
+    for (&receivers, vertices.all) |*receiver, *vertex| {
         receiver.lit = .splat(false);
         if (vertex.seen.none()) continue;
-        receiver.find(vertex, traced, all);
+        receiver.find(vertex, all);
     }
     var ray_count: u64 = 0;
     for (lights.ofSample(sample)) |part| for (part) |*light| {
@@ -84,7 +85,8 @@ pub fn addLight(
     const environment = visibility.frame.environment;
     for (&receivers, vertices.all, vertices.traced, radiance) |*receiver, *vertex, traced, *sum| {
         if (receiver.lit.none()) continue;
-        const scattered = receiver.scatter(environment, vertex, traced, vertices.is_end);
+        const is_end = vertices.is_end;
+        const scattered = receiver.scatter(environment, lights.mean, vertex, traced, is_end);
         const none: Kernel.Rays.Vec3 = .splat(.{ 0, 0, 0 });
         const seen = vertex.throughput.mul(scattered);
         sum.* = sum.add(.select(receiver.lit, seen, none));
@@ -125,10 +127,8 @@ fn addShadow(
         const none: Rays.Vec3 = .splat(.{ 0, 0, 0 });
         const white: Rays.Vec3 = .splat(.{ 1, 1, 1 });
         const hidden: Rays.Vec3 = .select(facing, white.sub(transmittance), none);
-        const weighed = receiver.weigh(&vertices.all[group].point, light);
         const counted = hidden.scale(.splat(light.weight));
-        receiver.hidden_diffuse = receiver.hidden_diffuse.add(weighed.diffuse.mul(counted));
-        receiver.hidden_glossy = receiver.hidden_glossy.add(weighed.glossy.mul(counted));
+        receiver.addLight(&receiver.hidden, &vertices.all[group].point, light, counted);
     }
     return ray_count;
 }
@@ -146,69 +146,93 @@ fn ReceiverOf(comptime Lanes: type) type {
     const Vec3 = Lanes.Vec3;
     return struct {
         lit: Lanes.Mask,
-        /// Unit direction that lobes are around.
-        reflected: Vec3,
-        /// Square of GGX's alpha less 1 of the lobe.
+        /// Unit direction that the lobe is around.
+        lobe: Vec3,
+        /// Square of GGX's alpha of the lobe less 1.
         alpha_term: F32,
         /// Of all lights, and of those that are hidden.
-        whole_diffuse: Vec3,
-        whole_glossy: Vec3,
-        hidden_diffuse: Vec3,
-        hidden_glossy: Vec3,
+        whole: Sums,
+        hidden: Sums,
 
         const Self = @This();
-        const Weighed = struct { diffuse: Vec3, glossy: Vec3 };
+
+        /// Weighted by what lights add to the diffuse part, and by what to the glossy one.
+        const Sums = struct {
+            diffuse: Vec3,
+            glossy: Vec3,
+            /// As if the sky were as bright everywhere.
+            diffuse_sky: F32,
+            glossy_sky: F32,
+
+            const zero: Sums = .{
+                .diffuse = .splat(.{ 0, 0, 0 }),
+                .glossy = .splat(.{ 0, 0, 0 }),
+                .diffuse_sky = .zero(),
+                .glossy_sky = .zero(),
+            };
+        };
 
         /// Points, and what all lights would give them.
         fn find(
             receiver: *Self,
             vertex: *const path_file.Vertex(Lanes),
-            traced: Lanes.Mask,
             all: []const EnvironmentLight,
         ) void {
-            _ = traced;
-            const none: Vec3 = .splat(.{ 0, 0, 0 });
             const point = &vertex.point;
             receiver.lit = vertex.seen.andNot(point.material.unlit);
-            receiver.reflected = bsdf_file.reflect(Lanes, point);
             const alpha = point.material.roughness.mul(point.material.roughness);
+            receiver.lobe = dominant(point, alpha);
             const squared = alpha.mul(alpha).max(.splat(lobe_alpha_squared_min));
             receiver.alpha_term = squared.sub(.splat(1));
-            receiver.whole_diffuse = none;
-            receiver.whole_glossy = none;
-            receiver.hidden_diffuse = none;
-            receiver.hidden_glossy = none;
+            receiver.whole = .zero;
+            receiver.hidden = .zero;
+            const white: Vec3 = .splat(.{ 1, 1, 1 });
             for (all) |*light| {
                 const facing = isFacing(Lanes, point, .splat(light.to_light));
-                const weighed = receiver.weigh(point, light);
-                receiver.whole_diffuse = receiver.whole_diffuse
-                    .add(.select(facing, weighed.diffuse, none));
-                receiver.whole_glossy = receiver.whole_glossy
-                    .add(.select(facing, weighed.glossy, none));
+                const share: Vec3 = .select(facing, white, .splat(.{ 0, 0, 0 }));
+                receiver.addLight(&receiver.whole, point, light, share);
             }
         }
 
-        /// What a light adds to the irradiance and to the lobe.
-        inline fn weigh(
+        /// Where light that a rough surface sends to the view mostly comes from: rather from above
+        /// than where a mirror would have it from (Lagarde and de Rousiers 2014, Moving Frostbite
+        /// to Physically Based Rendering, section 4.9.3).
+        fn dominant(point: anytype, alpha: F32) Vec3 {
+            const one: F32 = .splat(1);
+            const mirrored = bsdf_file.reflect(Lanes, point);
+            const smoothness = one.sub(alpha).max(.zero());
+            const share = smoothness.mul(smoothness.sqrt().add(alpha));
+            return point.normal.add(mirrored.sub(point.normal).scale(share)).normalize();
+        }
+
+        /// Adds some of what a light gives.
+        inline fn addLight(
             receiver: *const Self,
+            sums: *Sums,
             point: anytype,
             light: *const EnvironmentLight,
-        ) Weighed {
+            share: Vec3,
+        ) void {
             const to_light: Vec3 = .splat(light.to_light);
-            const irradiance: Vec3 = .splat(light.irradiance);
-            const cosine = receiver.reflected.dot(to_light).max(.splat(-1)).min(.splat(1));
+            const solid_angle: F32 = .splat(light.solid_angle);
+            const cosine = receiver.lobe.dot(to_light).max(.splat(-1)).min(.splat(1));
             const half = cosine.add(.splat(1)).mul(.splat(0.5));
             const slope = half.mul(receiver.alpha_term).add(.splat(1));
-            return .{
-                .diffuse = irradiance.scale(point.normal.dot(to_light)),
-                .glossy = irradiance.scale(F32.splat(1).div(slope.mul(slope))),
-            };
+            const diffuse = point.normal.dot(to_light);
+            const glossy = F32.splat(1).div(slope.mul(slope));
+            const irradiance = share.mul(.splat(light.irradiance));
+            const sky = share.y.mul(solid_angle);
+            sums.diffuse = sums.diffuse.add(irradiance.scale(diffuse));
+            sums.glossy = sums.glossy.add(irradiance.scale(glossy));
+            sums.diffuse_sky = sums.diffuse_sky.add(sky.mul(diffuse));
+            sums.glossy_sky = sums.glossy_sky.add(sky.mul(glossy));
         }
 
         /// Radiance towards the view for the light that arrives.
         fn scatter(
             receiver: *const Self,
             environment: *const world_file.Environment,
+            mean: [3]f32,
             vertex: *const path_file.Vertex(Lanes),
             traced: Lanes.Mask,
             is_end: bool,
@@ -217,50 +241,55 @@ fn ReceiverOf(comptime Lanes: type) type {
             const bsdf = &vertex.bsdf;
             const white: Vec3 = .splat(.{ 1, 1, 1 });
             const roughness = point.material.roughness;
-            const diffuse_albedo = bsdf.diffuse.mul(white.sub(bsdf.mirror.reflected));
-            const specular_albedo = bsdf.mirror.reflected;
+            const whole = &receiver.whole;
+            const hidden = &receiver.hidden;
+            const around = point.material.base_color.min(white);
+            const bounced = around.mul(.splat(mean));
             const irradiance = environment_file
-                .irradiance(Lanes, environment, point.normal, receiver.lit);
-            const diffuse_share =
-                share(receiver.whole_diffuse, receiver.hidden_diffuse, bsdf.diffuse);
-            var sum = diffuse_albedo.mul(irradiance).mul(diffuse_share);
+                .irradiance(Lanes, environment, point.normal, receiver.lit)
+                .mul(openness(whole.diffuse, hidden.diffuse))
+                .add(bounced.mul(bounce(around, hidden.diffuse_sky, whole.diffuse_sky)));
+            var sum = bsdf.diffuse_albedo.mul(irradiance);
             const untraced = receiver.lit.andNot(traced);
             if (untraced.any()) {
                 const lobe = environment_file
-                    .radiance(Lanes, environment, receiver.reflected, roughness, .zero(), untraced);
-                const lobe_share = share(receiver.whole_glossy, receiver.hidden_glossy, bsdf.f0);
-                sum = sum.add(specular_albedo.mul(lobe).mul(lobe_share));
+                    .radiance(Lanes, environment, receiver.lobe, roughness, .zero(), untraced)
+                    .mul(openness(whole.glossy, hidden.glossy))
+                    .add(bounced.mul(bounce(around, hidden.glossy_sky, whole.glossy_sky)));
+                const seen = bsdf.specular_albedo.mul(lobe);
+                sum = sum.add(.select(untraced, seen, .splat(.{ 0, 0, 0 })));
             }
-            if (is_end) {
-                const through = environment_file.radiance(
-                    Lanes,
-                    environment,
-                    bsdf.mirror.refraction,
-                    roughness,
-                    .zero(),
-                    receiver.lit,
-                );
-                sum = sum.add(bsdf.mirror.transmitted.mul(through));
-            }
-            return sum;
+            if (!is_end) return sum;
+            const refraction = bsdf.mirror.refraction;
+            const through = environment_file
+                .radiance(Lanes, environment, refraction, roughness, .zero(), receiver.lit);
+            return sum.add(bsdf.mirror.transmitted.mul(through));
         }
 
-        /// Of the light that would arrive, what does, bounced off surfaces like this one included;
-        /// all of it where there is no light to tell.
-        inline fn share(whole: Vec3, hidden: Vec3, albedo: Vec3) Vec3 {
+        /// Of the light that would arrive, the share that does; all of it where no light tells.
+        inline fn openness(whole: Vec3, hidden: Vec3) Vec3 {
+            const one: F32 = .splat(1);
             return .{
-                .x = shareOf(whole.x, hidden.x, albedo.x),
-                .y = shareOf(whole.y, hidden.y, albedo.y),
-                .z = shareOf(whole.z, hidden.z, albedo.z),
+                .x = one.sub(shareOf(hidden.x, whole.x)),
+                .y = one.sub(shareOf(hidden.y, whole.y)),
+                .z = one.sub(shareOf(hidden.z, whole.z)),
             };
         }
 
-        inline fn shareOf(whole: F32, hidden: F32, albedo: F32) F32 {
-            const one: F32 = .splat(1);
+        inline fn shareOf(hidden: F32, whole: F32) F32 {
             const known = whole.gt(.splat(1e-12));
-            const dark = hidden.div(F32.select(known, whole, one));
-            const lost = dark.mul(one.sub(albedo.mul(.splat(bounce))));
-            return F32.select(known, one.sub(lost), one);
+            const share = hidden.div(F32.select(known, whole, .splat(1)));
+            return F32.select(known, share, .zero());
+        }
+
+        /// Radiance of what hides the sky, as a share of the mean, where it is white.
+        inline fn bounce(around: Vec3, hidden: F32, whole: F32) Vec3 {
+            const one: F32 = .splat(1);
+            const white: Vec3 = .splat(.{ 1, 1, 1 });
+            const closed = shareOf(hidden, whole).max(.zero()).min(one);
+            const partly = closed.mul(one.sub(closed)).mul(.splat(bounce_partly));
+            const linear = closed.mul(.splat(bounce_linear));
+            return white.scale(linear).add(white.add(around).scale(partly));
         }
     };
 }

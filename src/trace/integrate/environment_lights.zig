@@ -22,6 +22,8 @@ pub const EnvironmentLight = struct {
     to_light: Vec3,
     /// Irradiance over pi on a plane across its way: its share of all lights' light.
     irradiance: Vec3,
+    /// Of the part of the sky that it stands for; of small strong sources 0.
+    solid_angle: f32,
     /// How much more often the light would have to be taken for each sample to have it: its weight
     /// where it is one of a sample's.
     weight: f32,
@@ -35,6 +37,8 @@ pub const EnvironmentLights = struct {
     set_count: usize,
     /// Of one set, the sources aside.
     set_size: usize,
+    /// Mean radiance of the map.
+    mean: Vec3,
 
     const count_max = 2 * choices.environment_shadow_count.max;
     const set_count_max = 16;
@@ -45,6 +49,7 @@ pub const EnvironmentLights = struct {
         .source_count = 0,
         .set_count = 0,
         .set_size = 0,
+        .mean = .{ 0, 0, 0 },
     };
 
     /// For so many samples a pixel.
@@ -61,6 +66,7 @@ pub const EnvironmentLights = struct {
         }
         for (map.sources[0..lights.source_count], 0..) |*source, index| {
             lights.buffer[index] = lightOf(environment, source.direction, source.energy, 1);
+            lights.mean = vec3.add(lights.mean, lights.buffer[index].irradiance);
         }
         const piece_count = lights.set_count * lights.set_size;
         // What is no light of its own belongs to the rest all the same.
@@ -73,7 +79,11 @@ pub const EnvironmentLights = struct {
             if (vec3.normalize(narrow(cut.moment))) |unit| direction = unit;
             const at = lights.indexOf(set, piece / lights.set_count);
             lights.buffer[at] = lightOf(environment, direction, narrow(cut.energy), weight);
+            lights.buffer[at].solid_angle = @floatCast(cut.solid_angle);
+            lights.mean = vec3.add(lights.mean, lights.buffer[at].irradiance);
         }
+        // Over a sphere of 4 pi, not pi.
+        lights.mean = vec3.scale(lights.mean, 0.25);
         return lights;
     }
 
@@ -124,7 +134,8 @@ fn lightOf(
             .cone_offset = 1,
         },
         .to_light = unit,
-        .irradiance = vec3.scale(energy, 1.0 / std.math.pi),
+        .irradiance = vec3.mul(vec3.scale(energy, 1.0 / std.math.pi), environment.scale),
+        .solid_angle = 0,
         .weight = weight,
     };
 }
@@ -133,6 +144,7 @@ fn lightOf(
 fn cutOf(parts: []const Part, piece: usize, count: usize) Part {
     const start = sumTo(parts, piece, count);
     var cut = sumTo(parts, piece + 1, count);
+    cut.solid_angle -= start.solid_angle;
     cut.luminance -= start.luminance;
     for (&cut.energy, start.energy) |*to, before| to.* -= before;
     for (&cut.moment, start.moment) |*to, before| to.* -= before;
@@ -157,9 +169,11 @@ fn sumTo(parts: []const Part, numerator: usize, denominator: usize) Part {
     const before = &parts[high - 1];
     const width = after.luminance - before.luminance;
     const within = if (width > 0) (wanted - before.luminance) / width else 1;
-    var sum: Part = .{ .luminance = wanted, .energy = undefined, .moment = undefined };
-    for (&sum.energy, before.energy, after.energy) |*to, a, b| to.* = a + (b - a) * within;
-    for (&sum.moment, before.moment, after.moment) |*to, a, b| to.* = a + (b - a) * within;
+    var sum = before.*;
+    sum.solid_angle += (after.solid_angle - before.solid_angle) * within;
+    sum.luminance = wanted;
+    for (&sum.energy, after.energy) |*to, end| to.* += (end - to.*) * within;
+    for (&sum.moment, after.moment) |*to, end| to.* += (end - to.*) * within;
     return sum;
 }
 

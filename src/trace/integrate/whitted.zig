@@ -255,11 +255,10 @@ pub fn Whitted(comptime Kernel: type) type {
         fn scatterAmbient(whitted: *const Self, vertex: *const Vertex) Vec3 {
             const bsdf = &vertex.bsdf;
             const none: Vec3 = .splat(.{ 0, 0, 0 });
-            const white: Vec3 = .splat(.{ 1, 1, 1 });
-            const diffuse = bsdf.diffuse.mul(white.sub(bsdf.mirror.reflected))
-                .scale(vertex.point.material.occlusion);
+            const diffuse = bsdf.diffuse_albedo.scale(vertex.point.material.occlusion);
             const traced = whitted.reflects(vertex);
-            var scattered = diffuse.add(.select(traced, none, bsdf.mirror.reflected));
+            const specular: Vec3 = .select(traced, none, bsdf.specular_albedo);
+            var scattered = diffuse.add(specular);
             const ends = whitted.path.depth == whitted.settings.depth_max;
             if (ends) scattered = scattered.add(bsdf.mirror.transmitted);
             return scattered.scale(.splat(whitted.frame.environment.ambient));

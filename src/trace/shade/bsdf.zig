@@ -1,17 +1,29 @@
-//! The BSDF of glTF's metallic-roughness model in lanes: Lambert, GGX, Schlick's Fresnel, Snell.
+//! The BSDF of glTF's metallic-roughness model in lanes: GGX over Lambert, energy preserved, Snell.
 //!
-//! In: points on surfaces. Out: what they make of light from a direction, and what goes on by
-//! reflection and refraction. Formulas: glTF 2.0, appendix B (Burley 2012 for roughness squared,
-//! Schlick 1994 for Fresnel, Walter et al. 2007 and Heitz 2014 for GGX with its correlated
-//! shadowing). Everything is + - * / sqrt in a fixed order.
+//! In: points on surfaces. Out: what they make of light from a direction, shares for light from
+//! everywhere, directions to sample, and what goes on by reflection and refraction. Formulas: glTF
+//! 2.0, appendix B (`microfacet.zig`; Burley 2012 for roughness squared, Schlick 1994 for Fresnel),
+//! with f0 mixed by the metallic factor. Light that microfacets send to each other comes out as a
+//! second lobe, and the diffuse one gets what the specular one leaves, both in the reciprocal form
+//! of Kulla and Conty 2017 ("Revisiting Physically Based Shading at Imageworks"); by Kelemen and
+//! Szirmay-Kalos 2001. So a white surface is as bright as white light around it. Everything is
+//! + - * / sqrt in a fixed order.
 
 const std = @import("std");
 const simd = @import("../../simd.zig");
+const albedo_file = @import("albedo.zig");
+const microfacet = @import("microfacet.zig");
 const Interaction = @import("interaction.zig").Interaction;
 
-/// Least roughness for highlights of lights, which have no size: below it a highlight would be a
-/// spike that no pixel grid can show.
-const highlight_roughness_least = 0.05;
+/// Least roughness of the lobe that lights without size and samples see: below it a highlight would
+/// be a spike of some thousandths of a steradian and some ten thousand times the light, which no
+/// pixel grid can show. Albedos and mirror images have the true roughness.
+pub const highlight_roughness_least = 0.05;
+
+/// At grazing angles a boundary reflects all light (f90 = 1), unless it reflects less than 2 % of it
+/// at normal incidence, as no material does: down to an index of 1, which is no boundary, f90 falls
+/// to 0 (Lagarde and de Rousiers 2014, "Moving Frostbite to Physically Based Rendering").
+const f90_per_f0 = 50;
 
 /// Up to this roughness reflections are traced; rougher surfaces see the ambient term instead.
 pub const mirror_roughness_max = 0.25;
@@ -20,65 +32,215 @@ pub const mirror_roughness_max = 0.25;
 /// of a smooth boundary, which single rays follow.
 pub fn Bsdf(comptime Lanes: type) type {
     return struct {
-        /// Albedo of the diffuse part.
-        diffuse: Lanes.Vec3,
+        /// Share of white light from everywhere that the specular lobe sends to the view, light
+        /// scattered more than once included; Fresnel's reflectance where smooth, 1 where all
+        /// light is reflected inside.
+        specular_albedo: Vec3,
+        /// Share of it that the diffuse lobe sends. With what is transmitted the shares are at
+        /// most 1.
+        diffuse_albedo: Vec3,
         /// Reflectance at normal incidence.
-        f0: Lanes.Vec3,
-        /// Square of GGX's alpha, for highlights.
-        alpha_squared: Lanes.F32,
+        f0: Vec3,
+        /// Reflectance at grazing incidence.
+        f90: F32,
+        /// GGX's alpha, for highlights.
+        alpha: F32,
         /// Cosine between normal and view, > 0.
-        cos_view: Lanes.F32,
+        cos_view: F32,
+        /// See `microfacet.smith`.
+        smith_view: F32,
+        albedo: albedo_file.Albedo(Lanes),
+        /// The lobe of light scattered more than once, but for the share of its way in.
+        multiple: Vec3,
+        /// The diffuse lobe, but for the share of its way in.
+        diffuse: Vec3,
+        /// Share of light that the base below the specular lobe does not see even so.
+        multiple_base: F32,
         mirror: Mirror(Lanes),
 
+        const Self = @This();
         const F32 = Lanes.F32;
         const Vec3 = Lanes.Vec3;
+        const inverse_pi: F32 = .splat(1.0 / std.math.pi);
 
         /// That of the surface at these points.
-        pub fn of(point: *const Interaction(Lanes)) @This() {
+        pub fn of(point: *const Interaction(Lanes)) Self {
             const one: F32 = .splat(1);
+            const white: Vec3 = .splat(.{ 1, 1, 1 });
             const material = &point.material;
             const dielectric = one.sub(material.metallic);
-            const base = material.base_color;
-            const clear_f0 = splat3(Lanes, material.dielectric_f0.mul(dielectric));
-            const f0 = clear_f0.add(base.scale(material.metallic));
+            const base = material.base_color.min(white);
+            const base_f0 = material.dielectric_f0;
+            const base_f90 = grazingOf(base_f0);
+            const f0 = splat3(Lanes, base_f0.mul(dielectric)).add(base.scale(material.metallic));
+            const f90 = base_f90.mul(dielectric).add(material.metallic);
             const cos_view = point.normal.dot(point.view).max(.splat(1e-4)).min(one);
-            const rough = material.roughness.max(.splat(highlight_roughness_least));
+            const boundary: Boundary(Lanes) = .of(point, cos_view);
+            const roughness = material.roughness;
+            const albedo: albedo_file.Albedo(Lanes) = .of(roughness.mul(roughness));
+            const directional = albedo.at(boundary.cos_fresnel);
+            const scatter = multipleOf(&albedo, f0, f90);
+            const specular = schlickOf(f0, f90, directional.schlick)
+                .scale(one.sub(directional.missing)).add(scatter.scale(directional.missing));
+            const scatter_base = multipleOf(&albedo, splat3(Lanes, base_f0), base_f90).x;
+            const below = one.sub(directional.single(base_f0, base_f90))
+                .sub(scatter_base.mul(directional.missing)).max(.zero());
+            const open = F32.select(boundary.total, .zero(), below.mul(dielectric));
+            const passing = open.mul(material.transmission);
+            const diffuse_albedo = base.scale(open.sub(passing));
+            const rough = roughness.max(.splat(highlight_roughness_least));
             const alpha = rough.mul(rough);
             return .{
-                .diffuse = base.scale(dielectric.mul(one.sub(material.transmission))),
+                .specular_albedo = .select(boundary.total, white, specular),
+                .diffuse_albedo = diffuse_albedo,
                 .f0 = f0,
-                .alpha_squared = alpha.mul(alpha),
+                .f90 = f90,
+                .alpha = alpha,
                 .cos_view = cos_view,
-                .mirror = .of(point, f0, dielectric, cos_view),
+                .smith_view = microfacet.smith(Lanes, cos_view, alpha.mul(alpha)),
+                .albedo = albedo,
+                .multiple = scatter
+                    .scale(directional.missing.div(albedo.missing_mean).mul(inverse_pi)),
+                .diffuse = diffuse_albedo
+                    .scale(inverse_pi.div(belowMean(&albedo, base_f0, base_f90, scatter_base))),
+                .multiple_base = scatter_base,
+                .mirror = .{
+                    .reflected = .select(boundary.total, white, specular),
+                    .transmitted = base.scale(passing),
+                    .refraction = boundary.refraction,
+                    .total = boundary.total,
+                },
             };
         }
 
         /// BSDF times cosine: radiance towards the view for each unit of irradiance on a plane
-        /// across the light's way. `to_light` is a unit vector on the front side.
-        pub fn eval(
-            bsdf: *const @This(),
+        /// across the light's way. `to_light` is a unit vector; nothing comes from behind.
+        pub fn eval(bsdf: *const Self, point: *const Interaction(Lanes), to_light: Vec3) Vec3 {
+            const lobes = bsdf.evalLobes(point, to_light);
+            return lobes.diffuse.add(lobes.specular);
+        }
+
+        /// The two lobes of `eval`; diffuse is white light that has been inside the surface.
+        pub const Lobes = struct { diffuse: Vec3, specular: Vec3 };
+
+        /// `eval` lobe by lobe.
+        pub fn evalLobes(
+            bsdf: *const Self,
             point: *const Interaction(Lanes),
             to_light: Vec3,
-        ) Vec3 {
+        ) Lobes {
             const one: F32 = .splat(1);
             const half = point.view.add(to_light).normalize();
-            const cos_light = point.normal.dot(to_light).max(.zero());
+            const cos_light = point.normal.dot(to_light).max(.zero()).min(one);
             const cos_half = point.normal.dot(half).max(.zero()).min(one);
             const cos_view_half = point.view.dot(half).max(.zero()).min(one);
-            const a = bsdf.alpha_squared;
-            const slope = cos_half.mul(cos_half).mul(a.sub(one)).add(one);
-            const distribution = a.div(slope.mul(slope).mul(.splat(std.math.pi)));
-            const view_term = smith(Lanes, bsdf.cos_view, a).mul(cos_light);
-            const light_term = smith(Lanes, cos_light, a).mul(bsdf.cos_view);
+            const a = bsdf.alpha.mul(bsdf.alpha);
+            const view_term = bsdf.smith_view.mul(cos_light);
+            const light_term = microfacet.smith(Lanes, cos_light, a).mul(bsdf.cos_view);
             // Both terms vanish together only where the light grazes: cos_light is 0 as well.
             const visibility = F32.splat(0.5).div(view_term.add(light_term).max(.splat(1e-12)));
+            const density = microfacet.distribution(Lanes, cos_half, a).mul(visibility);
+            const schlick = microfacet.power5(Lanes, one.sub(cos_view_half));
+            const single = schlickOf(bsdf.f0, bsdf.f90, schlick).scale(density);
+            const way_in = bsdf.albedo.at(cos_light);
+            const multiple = bsdf.multiple.scale(way_in.missing);
+            const base_f0 = point.material.dielectric_f0;
+            const below = one.sub(way_in.single(base_f0, grazingOf(base_f0)))
+                .sub(bsdf.multiple_base.mul(way_in.missing)).max(.zero());
+            return .{
+                .diffuse = bsdf.diffuse.scale(below.mul(cos_light)),
+                .specular = single.add(multiple).scale(cos_light),
+            };
+        }
+
+        /// A unit vector towards light for three numbers in 0..1, with the density `pdf`: a visible
+        /// normal's mirror image of the view, or a direction by the cosine. Those below the surface
+        /// bring nothing.
+        pub fn sample(
+            bsdf: *const Self,
+            point: *const Interaction(Lanes),
+            numbers: [3]F32,
+        ) Vec3 {
+            const across = microfacet.tangents(Lanes, point.normal);
+            const local: Vec3 = .{
+                .x = across[0].dot(point.view),
+                .y = across[1].dot(point.view),
+                .z = bsdf.cos_view,
+            };
+            const view = local.normalize();
+            const disc = microfacet.disc(Lanes, .{ numbers[1], numbers[2] });
+            const half = microfacet.visibleNormal(Lanes, view, bsdf.alpha, disc);
+            const twice = view.dot(half).mul(.splat(2));
+            const mirrored = half.scale(twice).sub(view);
+            const height = F32.splat(1).sub(disc[0].mul(disc[0])).sub(disc[1].mul(disc[1]));
+            const cosine = height.max(.zero()).sqrt();
+            const scattered: Vec3 = .{ .x = disc[0], .y = disc[1], .z = cosine };
+            const is_specular = numbers[0].lt(bsdf.specularShare());
+            const chosen: Vec3 = .select(is_specular, mirrored, scattered);
+            return across[0].scale(chosen.x).add(across[1].scale(chosen.y))
+                .add(point.normal.scale(chosen.z)).normalize();
+        }
+
+        /// Density of `sample` by solid angle, per steradian, on the whole sphere.
+        pub fn pdf(bsdf: *const Self, point: *const Interaction(Lanes), to_light: Vec3) F32 {
+            const half = point.view.add(to_light).normalize();
+            const cos_half = point.normal.dot(half).min(.splat(1));
+            const a = bsdf.alpha.mul(bsdf.alpha);
+            const seen = bsdf.cos_view.add(bsdf.smith_view);
+            const visible = microfacet.distribution(Lanes, cos_half, a).div(seen.add(seen));
+            const specular = F32.select(cos_half.gt(.zero()), visible, .zero());
+            const diffuse = point.normal.dot(to_light).max(.zero()).mul(inverse_pi);
+            const share = bsdf.specularShare();
+            return specular.mul(share).add(diffuse.mul(F32.splat(1).sub(share)));
+        }
+
+        /// How many of the samples are of the specular lobe, 0..1.
+        inline fn specularShare(bsdf: *const Self) F32 {
+            const ones: Vec3 = .splat(.{ 1, 1, 1 });
+            const specular = bsdf.specular_albedo.dot(ones);
+            return specular.div(specular.add(bsdf.diffuse_albedo.dot(ones)).max(.splat(1e-12)));
+        }
+
+        /// Reflectance for Schlick's weight (1 - cosine)^5.
+        inline fn schlickOf(f0: Vec3, f90: F32, weight: F32) Vec3 {
+            return f0.add(splat3(Lanes, f90).sub(f0).scale(weight));
+        }
+
+        inline fn grazingOf(f0: F32) F32 {
+            return f0.mul(.splat(f90_per_f0)).min(.splat(1));
+        }
+
+        /// Light that microfacets send on more than once, as a share of what has not left after the
+        /// first time (Kulla and Conty 2017, with the loss at each of the reflections).
+        inline fn multipleOf(
+            albedo: *const albedo_file.Albedo(Lanes),
+            f0: Vec3,
+            f90: F32,
+        ) Vec3 {
             const white: Vec3 = .splat(.{ 1, 1, 1 });
-            const fresnel = bsdf.f0.add(
-                white.sub(bsdf.f0).scale(power5(Lanes, one.sub(cos_view_half))),
-            );
-            const diffuse = bsdf.diffuse.mul(white.sub(fresnel)).scale(.splat(1.0 / std.math.pi));
-            const specular = fresnel.scale(distribution.mul(visibility));
-            return diffuse.add(specular).scale(cos_light);
+            // The mean of Schlick's approximation over the hemisphere.
+            const mean = schlickOf(f0, f90, .splat(1.0 / 21.0));
+            const lost = white.sub(mean.scale(albedo.missing_mean));
+            const leaving = F32.splat(1).sub(albedo.missing_mean);
+            return .{
+                .x = mean.x.mul(mean.x).mul(leaving).div(lost.x),
+                .y = mean.y.mul(mean.y).mul(leaving).div(lost.y),
+                .z = mean.z.mul(mean.z).mul(leaving).div(lost.z),
+            };
+        }
+
+        /// Mean over the hemisphere, weighted by the cosine, of what the specular lobe leaves to
+        /// the base below it.
+        inline fn belowMean(
+            albedo: *const albedo_file.Albedo(Lanes),
+            f0: F32,
+            f90: F32,
+            scatter: F32,
+        ) F32 {
+            const one: F32 = .splat(1);
+            const mean = f0.add(f90.sub(f0).mul(albedo.schlick_mean));
+            const single = mean.mul(one.sub(albedo.missing_mean));
+            return one.sub(single).sub(scatter.mul(albedo.missing_mean)).max(.splat(1e-3));
         }
     };
 }
@@ -86,7 +248,8 @@ pub fn Bsdf(comptime Lanes: type) type {
 /// What a smooth boundary does to light: reflection and refraction, each in one direction.
 pub fn Mirror(comptime Lanes: type) type {
     return struct {
-        /// Share of light from the mirror direction that is reflected to the view.
+        /// Share of light from the mirror direction that is reflected to the view: the specular
+        /// albedo, so that a traced image is as bright as one blurred by roughness.
         reflected: Lanes.Vec3,
         /// Share of light from behind that comes through to the view.
         transmitted: Lanes.Vec3,
@@ -94,33 +257,6 @@ pub fn Mirror(comptime Lanes: type) type {
         refraction: Lanes.Vec3,
         /// Where the surface reflects all light because it cannot leave the volume.
         total: Lanes.Mask,
-
-        inline fn of(
-            point: *const Interaction(Lanes),
-            f0: Lanes.Vec3,
-            dielectric: Lanes.F32,
-            cos_view: Lanes.F32,
-        ) @This() {
-            const material = &point.material;
-            const boundary: Boundary(Lanes) = if (material.volume.any())
-                .of(point, cos_view)
-            else
-                .{
-                    .total = .splat(false),
-                    .cos_fresnel = cos_view,
-                    .refraction = point.view.neg(),
-                };
-            const white: Lanes.Vec3 = .splat(.{ 1, 1, 1 });
-            const fresnel = schlick(Lanes, f0, material.roughness, boundary.cos_fresnel);
-            const reflected: Lanes.Vec3 = .select(boundary.total, white, fresnel);
-            const passing = material.base_color.scale(dielectric.mul(material.transmission));
-            return .{
-                .reflected = reflected,
-                .transmitted = passing.mul(white.sub(reflected)),
-                .refraction = boundary.refraction,
-                .total = boundary.total,
-            };
-        }
     };
 }
 
@@ -139,6 +275,11 @@ fn Boundary(comptime Lanes: type) type {
             const F32 = Lanes.F32;
             const one: F32 = .splat(1);
             const material = &point.material;
+            if (material.volume.none()) return .{
+                .total = .splat(false),
+                .cos_fresnel = cos_view,
+                .refraction = point.view.neg(),
+            };
             const eta = F32.select(point.back, material.ior, one.div(material.ior));
             const sin_squared = one.sub(cos_view.mul(cos_view));
             const cos_squared = one.sub(eta.mul(eta).mul(sin_squared));
@@ -158,30 +299,8 @@ fn Boundary(comptime Lanes: type) type {
     };
 }
 
-/// Schlick's Fresnel reflectance; rough surfaces do not turn white at grazing angles.
-inline fn schlick(
-    comptime Lanes: type,
-    f0: Lanes.Vec3,
-    roughness: Lanes.F32,
-    cosine: Lanes.F32,
-) Lanes.Vec3 {
-    const one: Lanes.F32 = .splat(1);
-    const grazing = f0.max(splat3(Lanes, one.sub(roughness)));
-    return f0.add(grazing.sub(f0).scale(power5(Lanes, one.sub(cosine))));
-}
-
-inline fn power5(comptime Lanes: type, x: Lanes.F32) Lanes.F32 {
-    const squared = x.mul(x);
-    return squared.mul(squared).mul(x);
-}
-
 inline fn splat3(comptime Lanes: type, value: Lanes.F32) Lanes.Vec3 {
     return .{ .x = value, .y = value, .z = value };
-}
-
-/// Square root of Smith's shadowing term for GGX (Heitz 2014, equation 99).
-inline fn smith(comptime Lanes: type, cosine: Lanes.F32, a: Lanes.F32) Lanes.F32 {
-    return cosine.mul(cosine).mul(Lanes.F32.splat(1).sub(a)).add(a).sqrt();
 }
 
 /// Unit direction of the mirror reflection; never into the point.
@@ -230,31 +349,269 @@ fn testPoint(view: [3]f32) Interaction(Single) {
     };
 }
 
-test "light straight above a rough white dielectric: albedo over pi, less the reflected share" {
+/// A view in the plane of x and y, whose normal is y.
+fn viewAt(cosine: f32) Single.Vec3 {
+    return .splat(.{ @sqrt(1 - cosine * cosine), cosine, 0 });
+}
+
+fn setRough(point: *Interaction(Single), metallic: f32, roughness: f32) void {
+    point.material.metallic = .splat(metallic);
+    point.material.roughness = .splat(roughness);
+}
+
+/// What the lobes send to the view of white light from everywhere: `evalLobes` integrated over the
+/// directions that visible normals and the cosine give.
+fn integrate(point: *const Interaction(Single)) struct { diffuse: f64, specular: f64 } {
+    const bsdf: Bsdf(Single) = .of(point);
+    const view: Single.Vec3 = .{ .x = point.view.x, .y = .zero(), .z = point.view.y };
+    const steps = 48;
+    var diffuse: f64 = 0;
+    var specular: f64 = 0;
+    for (0..steps) |i| for (0..steps) |j| {
+        const angle = (@as(f32, @floatFromInt(i)) + 0.5) / steps * std.math.pi;
+        const v = (@as(f32, @floatFromInt(j)) + 0.5) / steps;
+        const radius = @sqrt(1 - (v * v) * (v * v));
+        const point_x: Single.F32 = .splat(radius * @cos(angle));
+        const disc = [2]Single.F32{ point_x, .splat(radius * @sin(angle)) };
+        const half = microfacet.visibleNormal(Single, view, bsdf.alpha, disc);
+        const reflected = half.scale(view.dot(half).mul(.splat(2))).sub(view);
+        const share = 4 * v * v * v / (steps * steps);
+        const to_light: Single.Vec3 = .{ .x = reflected.x, .y = reflected.z, .z = reflected.y };
+        const density = visibleDensity(&bsdf, point, to_light);
+        const height = @sqrt(@max(1 - radius * radius, 0));
+        const spread: Single.Vec3 = .{ .x = disc[0], .y = .splat(height), .z = disc[1] };
+        const cosine_density = @max(height, 1e-12) / std.math.pi;
+        const by_normal = bsdf.evalLobes(point, to_light);
+        const by_cosine = bsdf.evalLobes(point, spread);
+        diffuse += share * by_cosine.diffuse.x.lane(0) / cosine_density;
+        // Balance heuristic (Veach and Guibas 1995): the lobe is narrow and wide at once.
+        const other = @max(to_light.y.lane(0), 0) / std.math.pi;
+        const spread_density = visibleDensity(&bsdf, point, spread);
+        specular += share * (by_normal.specular.x.lane(0) / @max(density + other, 1e-20) +
+            by_cosine.specular.x.lane(0) / (spread_density + cosine_density));
+    };
+    return .{ .diffuse = diffuse, .specular = specular };
+}
+
+/// Density of mirror images about visible normals: `pdf` of a surface that is nothing else.
+fn visibleDensity(
+    bsdf: *const Bsdf(Single),
+    point: *const Interaction(Single),
+    way: Single.Vec3,
+) f32 {
+    var specular = bsdf.*;
+    specular.diffuse_albedo = .splat(.{ 0, 0, 0 });
+    specular.specular_albedo = .splat(.{ 1, 1, 1 });
+    return specular.pdf(point, way).lane(0);
+}
+
+const cosines = [_]f32{ 0.003, 0.03, 0.1, 0.3, 0.55, 0.8, 1 };
+const roughnesses = [_]f32{ 0.1, 0.2, 0.35, 0.5, 0.7, 0.85, 1 };
+const ways = [_][3]f32{ .{ 0, 1, 0 }, .{ -1, 0, 0 }, .{ 0, -1, 0 }, .{ 0.6, 1e-4, 0.8 } };
+
+test "light straight above a rough white dielectric: the lobe, and what it leaves over pi" {
     const point = testPoint(.{ 0, 1, 0 });
-    const bsdf: Bsdf(Single) = .of(&point);
-    const response = bsdf.eval(&point, .splat(.{ 0, 1, 0 }));
-    const specular = 0.04 / std.math.pi * 0.25; // D = 1 / pi, V = 1 / 4 at roughness 1.
-    try std.testing.expectApproxEqRel(0.96 / std.math.pi + specular, response.x.lane(0), 1e-5);
+    const lobes = Bsdf(Single).of(&point).evalLobes(&point, .splat(.{ 0, 1, 0 }));
+    // D = 1 / pi, V = 1 / 4 at roughness 1; the second lobe adds 0.1 % of what is lost at most.
+    const single = 0.04 / std.math.pi * 0.25;
+    try std.testing.expectApproxEqAbs(single, lobes.specular.x.lane(0), 1.5e-3);
+    // The whole lobe sends 1.5 % straight up, and 2.1 % in the mean over all ways.
+    const below = (1 - 0.015) * (1 - 0.015) / (1 - 0.021) / std.math.pi;
+    try std.testing.expectApproxEqRel(below, lobes.diffuse.x.lane(0), 3e-3);
+}
+
+test "white metal in white light is white: within 2 % at every cosine and roughness" {
+    for (roughnesses) |roughness| for (cosines) |cosine| {
+        var point = testPoint(viewAt(cosine).lane(0));
+        setRough(&point, 1, roughness);
+        errdefer std.debug.print("roughness {d}, cosine {d}\n", .{ roughness, cosine });
+        try std.testing.expectApproxEqAbs(1, integrate(&point).specular, 0.02);
+        const albedo = Bsdf(Single).of(&point).specular_albedo.x.lane(0);
+        try std.testing.expectApproxEqAbs(1, albedo, 0.02);
+    };
+}
+
+test "albedos are the integrals of their lobes, and a white dielectric is white" {
+    for (roughnesses) |roughness| for (cosines) |cosine| for ([_]f32{ 0, 0.5 }) |metallic| {
+        var point = testPoint(viewAt(cosine).lane(0));
+        setRough(&point, metallic, roughness);
+        const bsdf: Bsdf(Single) = .of(&point);
+        const sums = integrate(&point);
+        errdefer std.debug.print("roughness {d}, cosine {d}\n", .{ roughness, cosine });
+        const specular = bsdf.specular_albedo.x.lane(0);
+        const diffuse = bsdf.diffuse_albedo.x.lane(0);
+        try std.testing.expectApproxEqRel(sums.specular, specular, 0.015);
+        try std.testing.expectApproxEqRel(sums.diffuse, diffuse, 0.01);
+        if (metallic > 0) continue;
+        try std.testing.expectApproxEqAbs(1, sums.specular + sums.diffuse, 0.01);
+    };
+}
+
+test "reciprocity: light and view change places" {
+    var random = std.Random.DefaultPrng.init(7);
+    const numbers = random.random();
+    for (0..2000) |_| {
+        var point = testPoint(viewAt(numbers.float(f32) * 0.99 + 0.01).lane(0));
+        setRough(&point, numbers.float(f32), numbers.float(f32));
+        point.material.base_color = .splat(.{ numbers.float(f32), numbers.float(f32), 0.5 });
+        point.material.transmission = .splat(numbers.float(f32));
+        const disc = microfacet
+            .disc(Single, .{ .splat(numbers.float(f32)), .splat(numbers.float(f32)) });
+        const height = 1 - disc[0].lane(0) * disc[0].lane(0) - disc[1].lane(0) * disc[1].lane(0);
+        if (height < 1e-4) continue;
+        const light: Single.Vec3 = .{ .x = disc[0], .y = .splat(@sqrt(height)), .z = disc[1] };
+        const there = Bsdf(Single).of(&point).eval(&point, light).scale(point.view.y);
+        const view = point.view;
+        point.view = light;
+        const back = Bsdf(Single).of(&point).eval(&point, view).scale(light.y);
+        for (there.lane(0), back.lane(0)) |a, b| try std.testing.expectApproxEqRel(a, b, 1e-3);
+    }
+}
+
+test "samples: their density is pdf by chi-squared, their mean weight the albedo" {
+    for ([_][3]f32{ .{ 0, 0.5, 0.4 }, .{ 0.7, 0.8, 0.15 }, .{ 1, 0.3, 0.8 } }) |case| {
+        var point = testPoint(viewAt(case[2]).lane(0));
+        setRough(&point, case[0], case[1]);
+        // Off the axes, so that the frame of tangents is in it.
+        point.normal = Single.Vec3.splat(.{ 0.36, 0.48, -0.8 });
+        point.view = turn(point.view);
+        point.normal_geometric = point.normal;
+        try expectSampled(&point);
+    }
+}
+
+/// To a frame whose second axis is the normal of the test above.
+fn turn(vector: Single.Vec3) Single.Vec3 {
+    const axes = [3]Single.Vec3{
+        .splat(.{ 0.8, -0.6, 0 }),
+        .splat(.{ 0.36, 0.48, -0.8 }),
+        .splat(.{ 0.48, 0.64, 0.6 }),
+    };
+    return axes[0].scale(vector.x).add(axes[1].scale(vector.y)).add(axes[2].scale(vector.z));
+}
+
+fn expectSampled(point: *const Interaction(Single)) !void {
+    const rings = 12;
+    const sectors = 8;
+    const bsdf: Bsdf(Single) = .of(point);
+    var random = std.Random.DefaultPrng.init(3);
+    const numbers = random.random();
+    var counts: [rings * sectors]f64 = @splat(0);
+    var weight: f64 = 0;
+    const sample_count = 40_000;
+    for (0..sample_count) |_| {
+        const triple: [3]Single.F32 = .{
+            .splat(numbers.float(f32)), .splat(numbers.float(f32)), .splat(numbers.float(f32)),
+        };
+        const way = bsdf.sample(point, triple);
+        const height = point.normal.dot(way).lane(0);
+        const across = microfacet.tangents(Single, point.normal);
+        const angle = std.math.atan2(way.dot(across[1]).lane(0), way.dot(across[0]).lane(0));
+        const ring: usize = @intFromFloat(std.math.clamp((height + 1) / 2 * rings, 0, rings - 1));
+        const turns = (angle / std.math.pi + 1) / 2;
+        const sector: usize = @intFromFloat(std.math.clamp(turns * sectors, 0, sectors - 1));
+        counts[ring * sectors + sector] += 1;
+        const density = bsdf.pdf(point, way).lane(0);
+        try std.testing.expect(density > 0);
+        weight += bsdf.eval(point, way).x.lane(0) / density / sample_count;
+    }
+    const albedo = bsdf.specular_albedo.x.lane(0) + bsdf.diffuse_albedo.x.lane(0);
+    try std.testing.expectApproxEqRel(albedo, weight, 0.02);
+    var chi_squared: f64 = 0;
+    var whole: f64 = 0;
+    var freedom: f64 = 0;
+    for (counts, 0..) |count, cell| {
+        const share = cellShare(&bsdf, point, cell / sectors, cell % sectors, rings, sectors);
+        whole += share;
+        const expected = share * sample_count;
+        if (expected < 5) continue;
+        chi_squared += (count - expected) * (count - expected) / expected;
+        freedom += 1;
+    }
+    try std.testing.expectApproxEqAbs(1, whole, 5e-3);
+    // Five standard deviations of chi-squared.
+    try std.testing.expect(chi_squared < freedom + 5 * @sqrt(2 * freedom));
+}
+
+/// The density integrated over one cell of the sphere.
+fn cellShare(
+    bsdf: *const Bsdf(Single),
+    point: *const Interaction(Single),
+    ring: usize,
+    sector: usize,
+    rings: f64,
+    sectors: f64,
+) f64 {
+    const across = microfacet.tangents(Single, point.normal);
+    const steps = 24;
+    var sum: f64 = 0;
+    for (0..steps) |i| for (0..steps) |j| {
+        const up = @as(f64, @floatFromInt(ring)) + (@as(f64, @floatFromInt(i)) + 0.5) / steps;
+        const along = @as(f64, @floatFromInt(sector)) + (@as(f64, @floatFromInt(j)) + 0.5) / steps;
+        const height = up / rings * 2 - 1;
+        const angle = (along / sectors * 2 - 1) * std.math.pi;
+        const radius = @sqrt(1 - height * height);
+        const way = across[0].scale(.splat(@floatCast(radius * @cos(angle))))
+            .add(across[1].scale(.splat(@floatCast(radius * @sin(angle)))))
+            .add(point.normal.scale(.splat(@floatCast(height))));
+        sum += bsdf.pdf(point, way).lane(0);
+    };
+    return sum / (steps * steps) * 4 * std.math.pi / (rings * sectors);
 }
 
 test "no energy is made: reflected, transmitted and diffuse shares sum to 1 at most" {
     var point = testPoint(.{ 0, 1, 0 });
     for ([_]f32{ 0, 0.3, 1 }) |metallic| for ([_]f32{ 0, 0.5, 1 }) |transmission| {
-        for ([_]f32{ 1e-3, 0.1, 0.7, 1 }) |cosine| for ([_]bool{ false, true }) |back| {
-            const sine = @sqrt(1 - cosine * cosine);
-            point.view = .splat(.{ sine, cosine, 0 });
-            point.material.metallic = .splat(metallic);
-            point.material.transmission = .splat(transmission);
-            point.material.volume = .splat(true);
-            point.back = .splat(back);
-            point.material.roughness = .splat(0);
-            const bsdf: Bsdf(Single) = .of(&point);
-            const reflected = bsdf.mirror.reflected.x.lane(0);
-            const rest = bsdf.diffuse.x.lane(0) * (1 - reflected);
-            try std.testing.expect(reflected + bsdf.mirror.transmitted.x.lane(0) + rest <= 1.00001);
+        for ([_]f32{ 0, 1e-3, 0.1, 0.7, 1 }) |cosine| for ([_]bool{ false, true }) |back| {
+            for ([_]f32{ 0, 1e-3, 0.04, 0.3, 1 }) |roughness| {
+                setRough(&point, metallic, roughness);
+                point.view = viewAt(cosine);
+                point.material.transmission = .splat(transmission);
+                point.material.volume = .splat(transmission > 0);
+                point.back = .splat(back);
+                const bsdf: Bsdf(Single) = .of(&point);
+                const shares = [_]Single.Vec3{
+                    bsdf.specular_albedo, bsdf.diffuse_albedo, bsdf.mirror.transmitted,
+                };
+                var sum: f32 = 0;
+                for (shares) |share| {
+                    try std.testing.expect(share.x.lane(0) >= 0);
+                    sum += share.x.lane(0);
+                }
+                try std.testing.expect(sum <= 1.00001);
+                for (ways) |way| {
+                    const lobes = bsdf.evalLobes(&point, .splat(way));
+                    try std.testing.expect(lobes.diffuse.x.lane(0) >= 0);
+                    try std.testing.expect(lobes.specular.x.lane(0) >= 0);
+                    try std.testing.expect(std.math.isFinite(lobes.specular.x.lane(0)));
+                }
+            }
         };
     };
+}
+
+test "an index of 1 is no boundary: all light is the base's" {
+    for (roughnesses) |roughness| for (cosines) |cosine| {
+        var point = testPoint(viewAt(cosine).lane(0));
+        setRough(&point, 0, roughness);
+        point.material.dielectric_f0 = .splat(0);
+        const bsdf: Bsdf(Single) = .of(&point);
+        try std.testing.expectEqual(0, bsdf.specular_albedo.x.lane(0));
+        try std.testing.expectEqual(1, bsdf.diffuse_albedo.x.lane(0));
+        const response = bsdf.eval(&point, .splat(.{ 0, 0.8, 0.6 })).x.lane(0);
+        try std.testing.expectApproxEqRel(0.8 / std.math.pi, response, 1e-6);
+    };
+}
+
+test "a smooth surface reflects by Fresnel, exactly" {
+    for ([_]f32{ 0.1, 0.5, 1 }) |cosine| {
+        var point = testPoint(viewAt(cosine).lane(0));
+        setRough(&point, 0, 0);
+        const weight = microfacet.power5(Single, .splat(1 - cosine)).lane(0);
+        const bsdf: Bsdf(Single) = .of(&point);
+        const fresnel = 0.04 + (1 - @as(f32, 0.04)) * weight;
+        try std.testing.expectApproxEqRel(fresnel, bsdf.mirror.reflected.x.lane(0), 1e-6);
+    }
 }
 
 test "Snell's law, total internal reflection and the thin wall" {

@@ -16,7 +16,7 @@ pub fn points(floats: []const f32) []const Vec3 {
     return first[0 .. floats.len / 3];
 }
 
-/// `P`, `indices` and perhaps `N`. One triangle needs no indices.
+/// `P`, `indices` and perhaps `N` and `uv` or `st`. One triangle needs no indices.
 pub fn triangles(tessellator: *Tessellator) Error!Geometry {
     return faces(tessellator, 3, "triangles");
 }
@@ -44,9 +44,10 @@ fn faces(
     if (indices.len % corner_count != 0)
         return tessellator.fail("{d} indices make no whole " ++ what, .{indices.len});
     const face_count = indices.len / corner_count;
-    const result: Geometry = .{
+    var result: Geometry = .{
         .positions = try tessellator.alloc(Vec3, from.len),
         .normals = try normals(tessellator, from.len),
+        .texcoords = try texcoords(tessellator, from.len),
         .triangles = try tessellator.alloc([3]u32, face_count * (corner_count - 2)),
     };
     @memcpy(result.positions, from);
@@ -62,9 +63,20 @@ fn faces(
             Grid.cut(.{ corners[0], corners[1], corners[3], corners[2] });
         result.triangles[cut.len * face ..][0..cut.len].* = cut;
     }
+    if (tessellator.wants_texcoords and result.texcoords == null)
+        try tessellator.unshare(&result, if (corner_count == 3)
+            Tessellator.triangle_corners
+        else
+            patch_corners);
     Tessellator.orient(&result);
     return result;
 }
+
+/// Coordinates of the two triangles of a patch without any.
+const patch_corners: []const [3][2]f32 = &.{
+    .{ .{ 0, 0 }, .{ 1, 0 }, .{ 1, 1 } },
+    .{ .{ 0, 0 }, .{ 1, 1 }, .{ 0, 1 } },
+};
 
 /// `N`, one for each of `vertex_count`, or none.
 fn normals(tessellator: *Tessellator, vertex_count: usize) Error!?[]Vec3 {
@@ -73,6 +85,23 @@ fn normals(tessellator: *Tessellator, vertex_count: usize) Error!?[]Vec3 {
         return tessellator.fail("has {d} normals N for {d} points", .{ from.len, vertex_count });
     const result = try tessellator.alloc(Vec3, vertex_count);
     @memcpy(result, from);
+    return result;
+}
+
+/// `uv` or `st`, a pair for each of `vertex_count`, where they are needed and there.
+fn texcoords(tessellator: *Tessellator, vertex_count: usize) Error!?[][2]f32 {
+    if (!tessellator.wants_texcoords) return null;
+    const parameters = tessellator.parameters;
+    const from = parameters.floatsNamed("uv") orelse parameters.floatsNamed("st") orelse
+        return null;
+    if (from.len != 2 * @as(u64, vertex_count)) return tessellator.fail(
+        "has {d} numbers of coordinates uv for {d} points",
+        .{ from.len, vertex_count },
+    );
+    const result = try tessellator.alloc([2]f32, vertex_count);
+    for (result, 0..) |*to, index| {
+        to.* = Tessellator.texcoordOf(from[2 * index], from[2 * index + 1]);
+    }
     return result;
 }
 
@@ -102,12 +131,19 @@ pub fn heightfield(tessellator: *Tessellator) Error!Geometry {
     );
     const result: Geometry = .{
         .positions = try tessellator.alloc(Vec3, heights.len),
+        .texcoords = if (tessellator.wants_texcoords)
+            try tessellator.alloc([2]f32, heights.len)
+        else
+            null,
         .triangles = try tessellator.alloc([3]u32, 2 * @as(u64, wide - 1) * (high - 1)),
     };
     for (result.positions, heights, 0..) |*position, height, index| position.* = .{
         share(index % wide, wide - 1),
         share(index / wide, high - 1),
         height,
+    };
+    if (result.texcoords) |all| for (all, result.positions) |*to, position| {
+        to.* = Tessellator.texcoordOf(position[0], position[1]);
     };
     const grid: Grid = .{ .columns = wide - 1, .rows = high - 1 };
     for (0..grid.rows) |row| for (0..grid.columns) |column| {

@@ -102,8 +102,10 @@ const Surface = struct {
     steps: u32,
 
     fn sampleAt(surface: *const Surface, column: u32, row: u32) Sample {
-        const u = Basis.at(&surface.u, parameter(&surface.u, column, surface.steps));
-        const v = Basis.at(&surface.v, parameter(&surface.v, row, surface.steps));
+        const at_u = parameter(&surface.u, column, surface.steps);
+        const at_v = parameter(&surface.v, row, surface.steps);
+        const u = Basis.at(&surface.u, at_u);
+        const v = Basis.at(&surface.v, at_v);
         const whole = surface.sum(&u, &v, &u.values, &v.values);
         const by_u = surface.sum(&u, &v, &u.slopes, &v.values);
         const by_v = surface.sum(&u, &v, &u.values, &v.slopes);
@@ -111,7 +113,12 @@ const Surface = struct {
         const point: Vector = .{ whole[0] / w, whole[1] / w, whole[2] / w };
         const normal = vec3d.cross(slope(by_u, point), slope(by_v, point));
         if (!isFinite(point)) return .{ .point = .{ 0, 0, 0 }, .normal = .{ 0, 0, 0 } };
-        return .{ .point = point, .normal = vec3d.normalize(normal) orelse .{ 0, 0, 0 } };
+        return .{
+            .point = point,
+            .normal = vec3d.normalize(normal) orelse .{ 0, 0, 0 },
+            .u = at_u,
+            .v = at_v,
+        };
     }
 
     /// Derivative of a quotient, but for a factor above 0.

@@ -1,4 +1,5 @@
-//! PLY files: vertices with normals, triangles and polygons, as text or binary of either order.
+//! PLY files: vertices with normals and coordinates of textures, triangles and polygons, as text or
+//! binary of either order.
 //!
 //! In: the bytes of a file. Out: its mesh; polygons become fans. Nothing is allocated that the
 //! length of the file does not explain: a value takes a byte at least, or two as text. Other
@@ -44,7 +45,13 @@ const type_names: std.StaticStringMap(Type) = .initComptime(.{
 });
 
 /// What we make of a property.
-const Role = enum { x, y, z, nx, ny, nz, indices, other };
+const Role = enum { x, y, z, nx, ny, nz, u, v, indices, other };
+
+/// Other names of coordinates of textures.
+const coordinate_names: std.StaticStringMap(Role) = .initComptime(.{
+    .{ "s", .u },         .{ "t", .v },         .{ "texture_u", .u }, .{ "texture_v", .v },
+    .{ "texture_s", .u }, .{ "texture_t", .v },
+});
 
 const Property = struct {
     role: Role,
@@ -82,6 +89,7 @@ const Reader = struct {
     element_count: usize = 0,
     positions: []Vec3 = &.{},
     normals: ?[]Vec3 = null,
+    texcoords: ?[][2]f32 = null,
     triangles: std.ArrayList([3]u32) = .empty,
 
     fn fail(reader: *Reader, comptime format: []const u8, arguments: anytype) error{InvalidInput} {
@@ -148,7 +156,8 @@ const Reader = struct {
         const type_ = try reader.typeOf(type_name);
         const name = words.next() orelse "";
         const is_list = length_type != null;
-        var role = std.meta.stringToEnum(Role, name) orelse .other;
+        var role = std.meta.stringToEnum(Role, name) orelse
+            coordinate_names.get(name) orelse .other;
         if (role == .indices or is_list) role = .other;
         if (is_list and (std.mem.eql(u8, name, "vertex_indices") or
             std.mem.eql(u8, name, "vertex_index"))) role = .indices;
@@ -239,14 +248,17 @@ const Reader = struct {
         if (reader.positions.len > 0) return reader.fail("has vertices twice", .{});
         try reader.checkCount(element);
         var has_normals = false;
+        var has_texcoords = false;
         for (reader.propertiesOf(element)) |property| {
             if (property.role == .nx) has_normals = true;
+            if (property.role == .u) has_texcoords = reader.tessellator.wants_texcoords;
         }
         const count = element.count;
         reader.positions = try reader.tessellator.alloc(Vec3, count);
         if (has_normals) reader.normals = try reader.tessellator.alloc(Vec3, count);
+        if (has_texcoords) reader.texcoords = try reader.tessellator.alloc([2]f32, count);
         for (0..@intCast(count)) |index| {
-            var values: [6]f32 = @splat(0);
+            var values: [8]f32 = @splat(0);
             for (reader.propertiesOf(element)) |property| switch (property.role) {
                 .indices, .other => try reader.pass(property),
                 else => |role| {
@@ -256,6 +268,9 @@ const Reader = struct {
             };
             reader.positions[index] = values[0..3].*;
             if (reader.normals) |normals| normals[index] = values[3..6].*;
+            if (reader.texcoords) |texcoords| {
+                texcoords[index] = Tessellator.texcoordOf(values[6], values[7]);
+            }
         }
     }
 
@@ -314,11 +329,14 @@ pub fn read(tessellator: *Tessellator, name: []const u8, bytes: [:0]const u8) Er
     };
     const triangles = try tessellator.alloc([3]u32, reader.triangles.items.len);
     @memcpy(triangles, reader.triangles.items);
-    const result: Geometry = .{
+    var result: Geometry = .{
         .positions = reader.positions,
         .normals = reader.normals,
+        .texcoords = reader.texcoords,
         .triangles = triangles,
     };
+    if (tessellator.wants_texcoords and result.texcoords == null)
+        try tessellator.unshare(&result, Tessellator.triangle_corners);
     Tessellator.orient(&result);
     return result;
 }

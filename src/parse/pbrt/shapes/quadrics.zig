@@ -15,7 +15,14 @@ const Sample = Tessellator.Sample;
 const Vector = math.Vec3d;
 
 /// Where the turning curve is, and the normal there: distance from the axis and height each.
-const Outline = struct { radius: f64, height: f64, normal_out: f64, normal_up: f64 };
+const Outline = struct {
+    radius: f64,
+    height: f64,
+    normal_out: f64,
+    normal_up: f64,
+    /// See `Sample`.
+    v: ?f64 = null,
+};
 
 /// A curve and its turn.
 fn Revolution(comptime Curve: type) type {
@@ -32,6 +39,7 @@ fn Revolution(comptime Curve: type) type {
             return .{
                 .point = .{ at.radius * cosine, at.radius * sine, at.height },
                 .normal = .{ at.normal_out * cosine, at.normal_out * sine, at.normal_up },
+                .v = at.v,
             };
         }
     };
@@ -186,6 +194,7 @@ const ParaboloidCurve = struct {
             .height = root * root,
             .normal_out = slope / length,
             .normal_up = -1 / length,
+            .v = (root * root - curve.z[0]) / (curve.z[1] - curve.z[0]),
         };
     }
 };

@@ -69,6 +69,10 @@ const Ring = struct {
 
 /// Subdivides.
 pub fn loop(tessellator: *Tessellator) Error!Geometry {
+    // Faces share their vertices while they are divided.
+    const wants_texcoords = tessellator.wants_texcoords;
+    tessellator.wants_texcoords = false;
+    defer tessellator.wants_texcoords = wants_texcoords;
     var level: Geometry = try meshes.triangles(tessellator);
     level.normals = null;
     const asked = tessellator.parameters.integer("levels") orelse
@@ -90,6 +94,7 @@ pub fn loop(tessellator: *Tessellator) Error!Geometry {
         position.* = finite(ring.blend(position.*, ring.gamma(), 1.0 / 6.0));
     }
     try tessellator.smooth(&level);
+    if (wants_texcoords) try tessellator.unshare(&level, Tessellator.triangle_corners);
     return level;
 }
 

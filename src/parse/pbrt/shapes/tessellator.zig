@@ -23,6 +23,9 @@ pub const Geometry = struct {
     positions: []Vec3,
     /// Null: flat faces.
     normals: ?[]Vec3 = null,
+    /// The shape's u, and 1 less its v, so that it grows downwards as in pictures; null: nobody
+    /// needs them.
+    texcoords: ?[][2]f32 = null,
     /// Counter-clockwise seen from the side that PBRT's normal points to.
     triangles: [][3]u32,
 };
@@ -32,6 +35,8 @@ input: *Input,
 arena: std.mem.Allocator,
 /// Of the directive that is being read.
 parameters: *const Parameters = undefined,
+/// Whether the shape has textures, so that vertices need their coordinates.
+wants_texcoords: bool = false,
 /// What kind of shape it is, for messages.
 name: []const u8 = "",
 /// Bytes of all geometry so far.
@@ -85,7 +90,13 @@ pub fn steps(tessellator: *const Tessellator, angle: f64, least: u32) u32 {
 }
 
 /// A surface over rows and columns: point and normal of each crossing.
-pub const Sample = struct { point: Vector, normal: Vector };
+pub const Sample = struct {
+    point: Vector,
+    normal: Vector,
+    /// Coordinates of textures; null: the share of the columns, or of the rows.
+    u: ?f64 = null,
+    v: ?f64 = null,
+};
 
 /// A grid, and whether all points of its first or last row are one.
 pub const Surface = struct {
@@ -101,7 +112,9 @@ pub fn tessellate(
     context: anytype,
     comptime sampleAt: fn (@TypeOf(context), u32, u32) Sample,
 ) Error!Geometry {
-    const grid = surface.grid;
+    var grid = surface.grid;
+    // The points of a seam have two coordinates.
+    if (tessellator.wants_texcoords) grid.closed = false;
     assert(grid.columns >= 1 and grid.rows >= 1);
     const vertex_count = @as(u64, grid.stride()) * (grid.rows + 1);
     const points: u32 = @as(u32, @intFromBool(surface.first_row_is_point)) +
@@ -111,11 +124,19 @@ pub fn tessellate(
     const result: Geometry = .{
         .positions = try tessellator.alloc(Vec3, vertex_count),
         .normals = try tessellator.alloc(Vec3, vertex_count),
+        .texcoords = if (tessellator.wants_texcoords)
+            try tessellator.alloc([2]f32, vertex_count)
+        else
+            null,
         .triangles = try tessellator.alloc([3]u32, triangle_count),
     };
     for (0..grid.rows + 1) |row| for (0..grid.stride()) |column| {
-        const sample = sampleAt(context, @intCast(column), @intCast(row));
+        const sample = sampleAt(context, @intCast(column % surface.grid.stride()), @intCast(row));
         const index = row * grid.stride() + column;
+        if (result.texcoords) |texcoords| texcoords[index] = texcoordOf(
+            sample.u orelse share(column, grid.columns),
+            sample.v orelse share(row, grid.rows),
+        );
         result.positions[index] = vec3d.toSingle(sample.point);
         result.normals.?[index] = vec3d.toSingle(sample.normal);
     };
@@ -134,6 +155,51 @@ pub fn tessellate(
     assert(made == result.triangles.len);
     return result;
 }
+
+fn share(index: usize, count: usize) f64 {
+    return @as(f64, @floatFromInt(index)) / @as(f64, @floatFromInt(count));
+}
+
+/// Coordinates as scenes have them, of a shape's own; 0 where they are no numbers that fit.
+pub fn texcoordOf(u: f64, v: f64) [2]f32 {
+    var result: [2]f32 = .{ @floatCast(u), @floatCast(1 - v) };
+    for (&result) |*coordinate| coordinate.* = if (std.math.isFinite(coordinate.*))
+        math.flushDenormal(coordinate.*)
+    else
+        0;
+    return result;
+}
+
+/// Gives each triangle three vertices of its own, with u and v from `corners`, whose entries take
+/// turns: what PBRT does with meshes that have no coordinates.
+pub fn unshare(
+    tessellator: *Tessellator,
+    geometry: *Geometry,
+    corners: []const [3][2]f32,
+) Error!void {
+    const vertex_count = 3 * @as(u64, geometry.triangles.len);
+    if (vertex_count > std.math.maxInt(u32)) return tessellator.fail("has too many vertices", .{});
+    const positions = try tessellator.alloc(Vec3, vertex_count);
+    const normals = if (geometry.normals != null)
+        try tessellator.alloc(Vec3, vertex_count)
+    else
+        null;
+    const texcoords = try tessellator.alloc([2]f32, vertex_count);
+    for (geometry.triangles, 0..) |*triangle, index| for (triangle, 0..) |*vertex, corner| {
+        const to = 3 * index + corner;
+        positions[to] = geometry.positions[vertex.*];
+        if (normals) |all| all[to] = geometry.normals.?[vertex.*];
+        const u, const v = corners[index % corners.len][corner];
+        texcoords[to] = texcoordOf(u, v);
+        vertex.* = @intCast(to);
+    };
+    geometry.positions = positions;
+    geometry.normals = normals;
+    geometry.texcoords = texcoords;
+}
+
+/// Coordinates of the corners of a triangle without any.
+pub const triangle_corners: []const [3][2]f32 = &.{.{ .{ 0, 0 }, .{ 1, 0 }, .{ 1, 1 } }};
 
 /// The normal of a face, as long as twice its area.
 fn faceNormal(geometry: *const Geometry, corners: [3]u32) Vec3 {
