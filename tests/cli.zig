@@ -933,7 +933,9 @@ test "--max-memory is kept to in every stage, or is an error in one line" {
         .{ "builtin:atrium", "-r64x64", &.{ "1", "300K", "1M", "4M", "8M", "14M" }, "256M" },
         .{ "empty.gltf", "-r1024x1024", &.{ "1M", "16M", "18M", "21M", "23M" }, "64M" },
     }) |case| {
-        const arguments = [_][]const u8{ case[0], case[1], "-t2", "-q", "-o", "a.png" };
+        const arguments = [_][]const u8{
+            case[0], case[1], "--env=none", "-t2", "-q", "-o", "a.png",
+        };
         for (case[2]) |limit| {
             errdefer std.debug.print("{s} {s}\n", .{ case[0], limit });
             const ending = try sandbox.expectExit(1, &(arguments ++ .{ "--max-memory", limit }));
@@ -952,9 +954,10 @@ test "--max-memory is kept to in every stage, or is an error in one line" {
         try testing.expectEqualSlices(u8, try sandbox.read("a.png"), within);
         try sandbox.folder.dir.deleteFile(io, "a.png");
     }
-    const before = try sandbox.run(&.{ "empty.gltf", "-r1024x1024", "--max-memory=8M", "-q" });
+    const arguments = [_][]const u8{ "empty.gltf", "-r1024x1024", "--env=none", "-q" };
+    const before = try sandbox.run(&(arguments ++ .{"--max-memory=8M"}));
     try testing.expect(std.mem.find(u8, before.stderr, ", 16 MiB more asked for)") != null);
-    const after = try sandbox.run(&.{ "empty.gltf", "-r1024x1024", "--max-memory=18M", "-q" });
+    const after = try sandbox.run(&(arguments ++ .{"--max-memory=18900K"}));
     try testing.expect(std.mem.find(u8, after.stderr, ", 3 MiB more asked for)") != null);
 }
 
