@@ -710,6 +710,44 @@ test "an unlit surface comes out as it is painted, whatever the exposure and the
     try testing.expectEqualSlices(u8, &.{ 188, 92, 0 }, thesis.stdout["P6\n1 1\n255\n".len..]);
 }
 
+/// The same with a texture.
+const painted_scene =
+    \\{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],
+    \\"nodes":[{"mesh":0},{"camera":0,"translation":[0,0,1]}],
+    \\"cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1}}],
+    \\"extensionsUsed":["KHR_materials_unlit"],"images":[{"uri":"paint.png"}],
+    \\"textures":[{"source":0}],"materials":[{"extensions":{"KHR_materials_unlit":{}},
+    \\"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],
+    \\"meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},"material":0}]}],
+    \\"buffers":[{"byteLength":36,"uri":"t.bin"}],"bufferViews":[{"buffer":0,"byteLength":36}],
+    \\"accessors":[{"bufferView":0,"count":3,"componentType":5126,"type":"VEC3",
+    \\"min":[-9,-9,0],"max":[9,9,0]},
+    \\{"bufferView":0,"count":3,"componentType":5126,"type":"VEC2"}]}
+;
+
+test "a texture of an unlit surface comes out as it is painted" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("p.gltf", painted_scene);
+    try sandbox.write("empty.gltf", empty_scene);
+    try sandbox.write("t.bin", std.mem.sliceAsBytes(&unlit_corners));
+    for ([_][3]u8{ .{ 1, 2, 3 }, .{ 200, 99, 50 }, .{ 254, 128, 255 } }) |codes| {
+        const arena = sandbox.arena_state.allocator();
+        const color = try arena.print("--background=#{x:0>2}{x:0>2}{x:0>2}", .{
+            codes[0], codes[1], codes[2],
+        });
+        _ = try sandbox.expectExit(0, &.{ "empty.gltf", "-q", "-r4x4", color, "-opaint.png" });
+        const ending = try sandbox.expectExit(0, &.{
+            "p.gltf", "-q", "-r3x2", "-o-", "--format=ppm",
+        });
+        try testing.expectEqualStrings("", ending.stderr);
+        const pixels = ending.stdout["P6\n3 2\n255\n".len..];
+        for (0..6) |index| {
+            try testing.expectEqualSlices(u8, &codes, pixels[index * 3 ..][0..3]);
+        }
+    }
+}
+
 test "the exposure is metered by lights of the file alone, and the report says it" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
