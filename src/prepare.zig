@@ -77,6 +77,8 @@ pub const ViewSettings = struct {
     /// Linear RGB.
     background: ?math.Vec3 = null,
     environment: light.EnvironmentSettings = .{},
+    /// What primary rays see in its place.
+    backdrop: ?light.EnvironmentSettings = null,
 };
 
 /// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
@@ -284,6 +286,12 @@ noinline fn chooseView(
         settings.background orelse from.background,
     );
     light.addMap(&seen.environment, &settings.environment, &seen.view.camera);
+    if (settings.backdrop) |*chosen_backdrop| {
+        const backdrop = try arena.create(world.Environment);
+        backdrop.* = .{ .ambient = 0, .background = @splat(0) };
+        light.addMap(backdrop, chosen_backdrop, &seen.view.camera);
+        seen.environment.backdrop = backdrop;
+    }
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
     seen.facts.environment_is_default = settings.environment.is_default;

@@ -663,7 +663,14 @@ test "background, exposure and transparency reach the pixels" {
         }));
         try testing.expectEqualSlices(u8, &case.pixel, ending.stdout["P6\n1 1\n255\n".len..]);
     }
+    // The studio is seen whatever lights the scene.
+    const studio = try sandbox.expectExit(0, &(to_stdout ++ .{ "--background=env", "-r9x9" }));
+    const backdrop = try sandbox.expectExit(0, &(to_stdout ++ .{
+        "--env=none", "--background=studio", "-r9x9",
+    }));
+    try testing.expectEqualSlices(u8, studio.stdout, backdrop.stdout);
     const opaque_png = try sandbox.expectExit(0, &to_stdout);
+    try testing.expect(!std.mem.eql(u8, opaque_png.stdout, studio.stdout));
     const clear_png = try sandbox.expectExit(0, &(to_stdout ++ .{"--background=transparent"}));
     // The header's colour type: RGB and RGBA.
     try testing.expectEqual(2, opaque_png.stdout[25]);

@@ -186,7 +186,8 @@ pub fn Whitted(comptime Kernel: type) type {
             const gone = ray.active.bitAnd(missed);
             if (gone.none()) return;
             const throughput: Vec3 = .select(gone, path.throughput[group], .splat(.{ 0, 0, 0 }));
-            const environment = whitted.frame.environment;
+            const around = whitted.frame.environment;
+            const environment = if (path.depth == 0) around.backdrop orelse around else around;
             if (path.depth > 0 or environment.is_seen) {
                 const seen = environment_light.seenBy(Kernel, environment, path, group, gone);
                 return whitted.add(group, throughput.mul(seen));
