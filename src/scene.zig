@@ -153,6 +153,8 @@ pub const EnvironmentMap = struct {
     /// Index into `Scene.images`.
     image: u32,
     projection: Projection = .equirectangular,
+    /// Of a cube all images, in the order +x, -x, +y, -y, +z, -z; `image` is the first.
+    faces: [6]u32 = @splat(none),
     /// Multiplies the image's radiance.
     scale: Vec3 = .{ 1, 1, 1 },
     /// From the world's directions to those of the image: a rotation, which may mirror.
@@ -164,6 +166,9 @@ pub const EnvironmentMap = struct {
         equirectangular,
         /// A square: `math.equal_area`.
         octahedral,
+        /// Six images, each as it is seen from within, upwards y, in that of +y -z, in that of -y
+        /// +z. PNG files with alpha are RGBD: their colours are divided by alpha.
+        cube,
     };
 };
 
@@ -296,7 +301,11 @@ pub const Scene = struct {
                 assert(view.texcoord_set < texcoord_set_count);
             }
         };
-        if (scene.environment) |map| assert(map.image < scene.images.len);
+        if (scene.environment) |map| {
+            assert(map.image < scene.images.len);
+            const faces: []const u32 = if (map.projection == .cube) &map.faces else &.{};
+            for (faces) |face| assert(face < scene.images.len);
+        }
         for (scene.lights) |light| assert(light.node < scene.nodes.len);
         for (scene.cameras) |camera| assert(camera.node < scene.nodes.len);
         assert(scene.camera_default == none or scene.camera_default < scene.cameras.len);
