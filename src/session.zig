@@ -89,6 +89,8 @@ pub const Session = struct {
     seen: settings.View = .{},
     world: ?World = null,
     environment: Environment = .{},
+    /// The studio, where it is seen but something else lights the scene.
+    backdrop: Environment = .{},
     /// The file that the picture is to replace.
     output: ?Identity = null,
     film: ?Film = null,
@@ -132,6 +134,7 @@ pub const Session = struct {
         session.dropScene();
         if (session.film) |*film| film.deinit(session.gpa);
         session.environment.deinit();
+        session.backdrop.deinit();
         session.pool.deinit();
         session.* = undefined;
     }
@@ -219,17 +222,17 @@ pub const Session = struct {
         const background = session.seen.background;
         // Until it is chosen anew.
         session.world.?.environment.map = null;
+        session.world.?.environment.backdrop = null;
         const start = Io.Clock.awake.now(session.io);
-        var environment = try session.environment.choose(
-            session.gpa,
-            session.io,
-            &session.pool,
-            &session.scene.?,
-            &choices.environment,
-            session.output,
-            session.diagnostic,
-        );
+        var environment = try session.chooseFor(&session.environment, &choices.environment);
         environment.is_seen = background == .env or background == .studio;
+        var backdrop: ?prepare.EnvironmentSettings = null;
+        if (background == .studio and !environment.is_studio) {
+            var studio = choices.environment;
+            studio.source = .studio;
+            backdrop = try session.chooseFor(&session.backdrop, &studio);
+            backdrop.?.is_seen = true;
+        }
         session.times.prepare_ns += session.since(start);
         try prepare.view(&session.world.?, session.io, &session.scene.?, .{
             .camera = choices.camera,
@@ -240,7 +243,24 @@ pub const Session = struct {
             .background = radianceOf(background),
             .environment = environment,
             .floor = choices.floor,
+            .backdrop = backdrop,
         }, session.diagnostic, &session.times);
+    }
+
+    fn chooseFor(
+        session: *Session,
+        environment: *Environment,
+        chosen: *const settings.Environment,
+    ) Error!prepare.EnvironmentSettings {
+        return environment.choose(
+            session.gpa,
+            session.io,
+            &session.pool,
+            &session.scene.?,
+            chosen,
+            session.output,
+            session.diagnostic,
+        );
     }
 
     /// Traces the picture. Asserts that there is a view, and a tree of the variant's width.

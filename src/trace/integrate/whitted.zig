@@ -208,7 +208,8 @@ pub fn Whitted(comptime Kernel: type) type {
             if (gone.none()) return;
             var throughput: Vec3 = .select(gone, path.throughput[group], .splat(.{ 0, 0, 0 }));
             if (path.depth == 0) throughput = throughput.scale(whitted.floor_light[group]);
-            const environment = whitted.frame.environment;
+            const around = whitted.frame.environment;
+            const environment = if (path.depth == 0) around.backdrop orelse around else around;
             if (path.depth > 0 or environment.is_seen) {
                 const seen = environment_light.seenBy(Kernel, environment, path, group, gone);
                 return whitted.add(group, throughput.mul(seen));
