@@ -653,7 +653,10 @@ test "background, exposure and transparency reach the pixels" {
         .{ .arguments = &.{"--background=transparent"}, .pixel = .{ 0, 0, 0 } },
         // The middle of the gradient, and what surrounds a scene without lights.
         .{ .arguments = &.{}, .pixel = @splat(135) },
-        .{ .arguments = &.{ "--env=none", "--ambient=0.25", "--background=env" }, .pixel = @splat(126) },
+        .{
+            .arguments = &.{ "--env=none", "--ambient=0.25", "--background=env" },
+            .pixel = @splat(126),
+        },
         // By the thesis: without curve and gradient.
         .{ .arguments = &.{ "--thesis", "-r1x1" }, .pixel = @splat(160) },
     }) |case| {

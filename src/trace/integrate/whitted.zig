@@ -116,8 +116,10 @@ pub fn Whitted(comptime Kernel: type) type {
             for (first_sample..first_sample + sample_count) |sample| {
                 whitted.radiance = @splat(.splat(.{ 0, 0, 0 }));
                 whitted.escaped = @splat(.zero());
-                whitted.displayed = @splat(.splat(.{ 0, 0, 0 }));
-                whitted.display_share = @splat(.zero());
+                if (whitted.keeps_display) {
+                    whitted.displayed = @splat(.splat(.{ 0, 0, 0 }));
+                    whitted.display_share = @splat(.zero());
+                }
                 whitted.pushPrimary(rectangle, @intCast(sample));
                 while (whitted.stack.pop()) |path| {
                     // A copy: what the step pushes takes its place.
