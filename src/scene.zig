@@ -155,6 +155,8 @@ pub const EnvironmentMap = struct {
     projection: Projection = .equirectangular,
     /// Of a cube all images, in the order +x, -x, +y, -y, +z, -z; `image` is the first.
     faces: [6]u32 = @splat(none),
+    /// It is the background as well, unless the user chooses another one.
+    is_seen: bool = false,
     /// Multiplies the image's radiance.
     scale: Vec3 = .{ 1, 1, 1 },
     /// From the world's directions to those of the image: a rotation, which may mirror.

@@ -218,14 +218,16 @@ pub const Session = struct {
     pub fn view(session: *Session, choices: settings.View) Error!void {
         if (session.pool.cancelled.load(.monotonic)) return error.Canceled;
         session.seen = choices;
+        session.seen.background = session.backgroundOf(&choices);
+        const background = session.seen.background;
         // Until it is chosen anew.
         session.world.?.environment.map = null;
         session.world.?.environment.backdrop = null;
         const start = Io.Clock.awake.now(session.io);
         var environment = try session.chooseFor(&session.environment, &choices.environment);
-        environment.is_seen = choices.background == .env or choices.background == .studio;
+        environment.is_seen = background == .env or background == .studio;
         var backdrop: ?prepare.EnvironmentSettings = null;
-        if (choices.background == .studio and !environment.is_studio) {
+        if (background == .studio and !environment.is_studio) {
             var studio = choices.environment;
             studio.source = .studio;
             backdrop = try session.chooseFor(&session.backdrop, &studio);
@@ -238,7 +240,7 @@ pub const Session = struct {
             .resolution = choices.resolution,
             .long_side = choices.long_side,
             .ambient = choices.ambient,
-            .background = radianceOf(choices.background),
+            .background = radianceOf(background),
             .environment = environment,
             .floor = choices.floor,
             .backdrop = backdrop,
@@ -474,6 +476,15 @@ pub const Session = struct {
             .progress = session.progress,
             .cancel = &session.pool.cancelled,
         };
+    }
+
+    /// The background that is chosen: the scene's own environment where that is to be seen and
+    /// nothing else is asked for.
+    fn backgroundOf(session: *const Session, choices: *const settings.View) settings.Background {
+        const is_own = choices.environment.source == .default;
+        const is_seen = if (session.scene.?.environment) |*map| map.is_seen else false;
+        const shows_own = choices.background == .default and is_own and is_seen;
+        return if (shows_own) .env else choices.background;
     }
 
     /// What the film keeps: alpha where the background is no radiance, and colours of the display
