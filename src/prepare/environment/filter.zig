@@ -22,7 +22,7 @@ const lane_count = block_width * block_height;
 const Lanes = @Vector(lane_count, f32);
 
 /// How wide a node may be for the distance from the lobe's middle, squared.
-const opening_squared = 0.09;
+const opening_squared = 0.16;
 /// How wide a node may be for the cosine, squared; radians.
 const cosine_width_squared = 0.01;
 

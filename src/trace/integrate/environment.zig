@@ -22,7 +22,7 @@ const EnvironmentLight = lights_file.EnvironmentLight;
 const EnvironmentLights = lights_file.EnvironmentLights;
 
 /// See `bounce`.
-const bounce_share = 1.1;
+const bounce_share = 1.4;
 
 /// Square of GGX's alpha of the narrowest lobe that lights are weighed by.
 const lobe_alpha_squared_min = 0.2;
@@ -300,8 +300,8 @@ fn ReceiverOf(comptime Lanes: type) type {
             return F32.select(known, share, .zero());
         }
 
-        /// Radiance of what hides the sky, as a share of the mean, where it is white: it sees the sky
-        /// itself, unless that is hidden all over.
+        /// Radiance of what hides the sky, as a share of the mean, where it is white: it sees the
+        /// sky itself, unless that is hidden all over.
         inline fn bounce(hidden: F32, whole: F32) F32 {
             const one: F32 = .splat(1);
             const closed = shareOf(hidden, whole).max(.zero()).min(one);
