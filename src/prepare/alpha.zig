@@ -119,6 +119,7 @@ const Work = struct {
             is_listed[instance.mesh] = true;
             const mesh = &work.meshes[instance.mesh];
             const lookup = work.alphaLookup(mesh.material) orelse continue;
+            if (hasAlphaInMotion(mesh, lookup.texcoord_set)) continue;
             const bounds = &work.bounds[lookup.texture];
             if (bounds.* == null) {
                 bounds.* = try .init(gpa, &work.set.textures.all[lookup.texture].levels[0]);
@@ -204,8 +205,9 @@ const Work = struct {
                 try drawn.append(arena, instance);
             }
             if (whole_mesh[instance.mesh] == scene.none) continue;
-            const whole = whole_mesh[instance.mesh];
-            try drawn.append(arena, .{ .mesh = whole, .node = instance.node });
+            var whole_instance = instance;
+            whole_instance.mesh = whole_mesh[instance.mesh];
+            try drawn.append(arena, whole_instance);
         }
         work.set.materials = parts.uses.items;
         work.set.lookups = parts.lookups.items;
@@ -217,6 +219,14 @@ const Work = struct {
         };
     }
 };
+
+/// Whether morph targets may change what a vertex shows of its texture, or of its alpha.
+fn hasAlphaInMotion(mesh: *const Mesh, texcoord_set: u32) bool {
+    for (mesh.morph_targets) |*target| {
+        if (target.colors != null or target.texcoords[texcoord_set] != null) return true;
+    }
+    return false;
+}
 
 /// The parts while they become more.
 const Building = struct {

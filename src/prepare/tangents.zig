@@ -211,12 +211,35 @@ fn split(
         .triangles = triangles,
         .material = mesh.material,
     };
-    if (mesh.normals) |all| result.normals = try splitting.extended(arena, Vec3, all);
-    if (mesh.colors) |all| result.colors = try splitting.extended(arena, [4]f32, all);
-    for (&result.texcoords, mesh.texcoords) |*to, set| {
-        if (set) |all| to.* = try splitting.extended(arena, [2]f32, all);
+    try extendVertices(&splitting, arena, mesh, &result);
+    const targets = try arena.alloc(scene.MorphTarget, mesh.morph_targets.len);
+    for (targets, mesh.morph_targets) |*to, *target| {
+        to.* = .{};
+        if (target.positions) |all| to.positions = try splitting.extended(arena, Vec3, all);
+        try extendVertices(&splitting, arena, target, to);
     }
+    result.morph_targets = targets;
+    const sets = try arena.alloc(scene.JointSet, mesh.joint_sets.len);
+    for (sets, mesh.joint_sets) |*to, set| to.* = .{
+        .joints = try splitting.extended(arena, [4]u16, set.joints),
+        .weights = try splitting.extended(arena, [4]f32, set.weights),
+    };
+    result.joint_sets = sets;
     return result;
+}
+
+/// Gives a mesh, or a morph target, what vertices have besides their place and tangent.
+fn extendVertices(
+    splitting: *const Splitting,
+    arena: Allocator,
+    from: anytype,
+    to: anytype,
+) error{OutOfMemory}!void {
+    if (from.normals) |all| to.normals = try splitting.extended(arena, Vec3, all);
+    if (from.colors) |all| to.colors = try splitting.extended(arena, [4]f32, all);
+    for (&to.texcoords, from.texcoords) |*to_set, set| {
+        if (set) |all| to_set.* = try splitting.extended(arena, [2]f32, all);
+    }
 }
 
 /// First vertex of those that triangles use, and how many there are from there to the last.
