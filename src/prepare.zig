@@ -193,7 +193,7 @@ pub fn pose(
         loaded.parts.instances,
         loaded.parts.meshes,
         attributesOf(&loaded.textures),
-        place.maps,
+        &place,
         settings.pool,
         diagnostic,
     );
