@@ -609,6 +609,7 @@ fn loadAndSplit(gpa: Allocator, file: []const u8) !void {
         .positions = &positions,
         .texcoords = .{ &set, null, null, null },
         .triangles = &.{ .{ 6, 7, 8 }, .{ 0, 1, 2 }, .{ 3, 4, 5 } },
+        .morph_targets = &.{.{}},
         .material = 1,
     }, .{
         .positions = &positions,
@@ -616,7 +617,9 @@ fn loadAndSplit(gpa: Allocator, file: []const u8) !void {
         .material = 0,
     } };
     from.nodes = &.{.{ .parent = scene.none, .local = .identity }};
-    from.instances = &.{ .{ .mesh = 0, .node = 0 }, .{ .mesh = 1, .node = 0 } };
+    from.instances = &.{
+        .{ .mesh = 0, .node = 0, .morph_weights = &.{0.5} }, .{ .mesh = 1, .node = 0 },
+    };
     var pool: parallel.Pool = .init(1);
     defer pool.deinit();
     var diagnostic: @import("../diagnostic.zig").Diagnostic = .{};
@@ -638,6 +641,9 @@ fn loadAndSplit(gpa: Allocator, file: []const u8) !void {
     try testing.expectEqual(3, parts.instances.len);
     const drawn = [_]u32{ 0, 2, 1 };
     for (parts.instances, drawn) |instance, mesh| try testing.expectEqual(mesh, instance.mesh);
+    for (parts.instances, [_]usize{ 1, 1, 0 }) |instance, count| {
+        try testing.expectEqual(count, instance.morph_weights.len);
+    }
     const expected = [_][3]u32{ .{ 3, 4, 5 }, .{ 0, 1, 2 }, .{ 6, 7, 8 } };
     for (parts.meshes, expected, [_]u32{ 1, 0, 2 }) |mesh, triangle, material| {
         try testing.expectEqualSlices([3]u32, &.{triangle}, mesh.triangles);
@@ -650,6 +656,19 @@ fn loadAndSplit(gpa: Allocator, file: []const u8) !void {
     try testing.expectEqual(texture.missing, after[0].channels[3]);
     try testing.expectEqual(before[0].texture, after[0].texture);
     try testing.expectEqual(before[1], after[1]);
+}
+
+test hasAlphaInMotion {
+    var target: scene.MorphTarget = .{};
+    var mesh: Mesh = .{ .positions = &.{}, .triangles = &.{}, .material = 0 };
+    try testing.expect(!hasAlphaInMotion(&mesh, 1));
+    mesh.morph_targets = (&target)[0..1];
+    target.positions = &.{};
+    target.texcoords[0] = &.{};
+    try testing.expect(!hasAlphaInMotion(&mesh, 1));
+    try testing.expect(hasAlphaInMotion(&mesh, 0));
+    target.colors = &.{};
+    try testing.expect(hasAlphaInMotion(&mesh, 1));
 }
 
 test "a mesh becomes what is seen whole and what is seen in part" {

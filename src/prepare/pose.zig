@@ -119,6 +119,36 @@ fn testPose(nodes: []const scene.Node, positions: []const math.Vec3, node: u32) 
     return compose(gpa, &from);
 }
 
+test "the center is that of what joints move, and they move with it" {
+    const gpa = std.testing.allocator;
+    var from: scene.Scene = .init(gpa);
+    defer from.deinit();
+    from.nodes = &.{
+        .{ .parent = scene.none, .local = .identity },
+        .{ .parent = scene.none, .local = .translate(.{ 4_700_000.25, 0, 0 }) },
+    };
+    const corners = [_]math.Vec3{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 }, .{ 1, 1, 0 } };
+    const joints: [4][4]u16 = @splat(.{ 0, 0, 0, 0 });
+    const weights: [4][4]f32 = @splat(.{ 0.3, 0.1, 0, 0 });
+    from.meshes = &.{.{
+        .positions = &corners,
+        .joint_sets = &.{.{ .joints = &joints, .weights = &weights }},
+        .triangles = &.{},
+        .material = 0,
+    }};
+    from.skins = &.{.{ .joints = &.{1}, .inverse_bind_maps = &.{.translate(.{ 8, 0, 0 })} }};
+    from.instances = &.{.{ .mesh = 0, .node = 0, .skin = 0 }};
+    const pose = try compose(gpa, &from);
+    defer pose.deinit(gpa);
+    for (pose.center) |coordinate| try std.testing.expect(@abs(coordinate) <= 1);
+    const instance = &from.instances[0];
+    const at = deform.place(&from.meshes[0], instance, pose.maps, pose.joint_maps, 0);
+    try std.testing.expect(@abs(at[0]) <= 2);
+    try std.testing.expectEqual(0.25, at[0] - @floor(at[0]));
+    // The other node is left behind.
+    try std.testing.expect(pose.maps[0].translation[0] < -4e6);
+}
+
 test "a child moves with its parent" {
     const nodes = [_]scene.Node{
         .{ .parent = scene.none, .local = .fromTrs(.{ 1, 0, 0 }, .{ 0, 0, 0, 1 }, .{ 2, 2, 2 }) },

@@ -351,7 +351,16 @@ test "a vertex between mirrored halves becomes two at the same place" {
         .{ 0, 0, 0, 1 }, .{ 1, 0, 0, 1 }, .{ 2, 0, 0, 1 }, .{ 3, 0, 0, 1 }, .{ 4, 0, 0, 1 },
         .{ 5, 0, 0, 1 }, .{ 6, 0, 0, 1 },
     };
+    var deltas: [7]Vec3 = undefined;
+    var joints: [7][4]u16 = undefined;
+    for (&deltas, &joints, 0..) |*delta, *four, vertex| {
+        delta.* = @splat(@floatFromInt(vertex));
+        four.* = @splat(@intCast(vertex));
+    }
+    mesh.morph_targets = &.{ .{}, .{ .positions = &deltas, .normals = &deltas } };
+    mesh.joint_sets = &.{.{ .joints = &joints, .weights = mesh.colors.? }};
     const made = try withTangents(testing.allocator, arena.allocator(), &mesh, &identity_lookup);
+    try testing.expectEqual(null, made.morph_targets[0].positions);
     try testing.expectEqual(8, made.positions.len); // Six are used, two of them twice.
     try testing.expectEqual(4, made.material);
     for (made.triangles, mesh.triangles, 0..) |triangle, source, index| {
@@ -361,6 +370,11 @@ test "a vertex between mirrored halves becomes two at the same place" {
             try testing.expectEqual(mesh.normals.?[vertex], made.normals.?[corner]);
             try testing.expectEqual(mesh.colors.?[vertex], made.colors.?[corner]);
             try testing.expectEqual(mesh.texcoords[0].?[vertex], made.texcoords[0].?[corner]);
+            const target = &made.morph_targets[1];
+            try testing.expectEqual(deltas[vertex], target.positions.?[corner]);
+            try testing.expectEqual(deltas[vertex], target.normals.?[corner]);
+            try testing.expectEqual(joints[vertex], made.joint_sets[0].joints[corner]);
+            try testing.expectEqual(mesh.colors.?[vertex], made.joint_sets[0].weights[corner]);
             try testing.expectEqual([4]f32{ sign, 0, 0, sign }, made.tangents.?[corner]);
         }
     }
