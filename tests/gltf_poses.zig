@@ -189,9 +189,10 @@ test "eight joints a vertex, and weights that do not sum up to 1" {
     const more: Replacement = .{
         "\"WEIGHTS_0\":3", "\"WEIGHTS_0\":3,\"JOINTS_1\":5,\"WEIGHTS_1\":6",
     };
-    try expectPositions(&.{more}, .{
-        .{ 0.5, 0.5, 0 }, .{ 1, 1, 0 }, .{ 0, 1, 0 }, .{ 0.75, 1.25, 0 }, .{ -1, 1, 0 }, .{ -1, 2, 0 },
-    });
+    var expected = bent;
+    expected[0..2].* = .{ .{ 0.5, 0.5, 0 }, .{ 1, 1, 0 } };
+    expected[3] = .{ 0.75, 1.25, 0 };
+    try expectPositions(&.{more}, expected);
     var buffer = makeBuffer();
     for (0..6) |vertex| {
         const factor: f32 = @floatFromInt(vertex + 2);
@@ -297,8 +298,10 @@ test "broken skins: an error or a warning" {
     };
     const cases = [_]Case{
         .{ .replacement = .{ "[2,3]", "[2]" }, .message = "mesh 0: joint 1 of 1" },
-        .{ .replacement = .{ "[2,3]", "[2,3,1]" }, .message = "skin 0: 2 inverseBindMatrices for " ++
-            "3 joints" },
+        .{
+            .replacement = .{ "[2,3]", "[2,3,1]" },
+            .message = "skin 0: 2 inverseBindMatrices for 3 joints",
+        },
         .{ .replacement = .{ "[2,3]", "[2,9]" }, .message = "skins[0].joints[1]: 9 of 5" },
         .{
             .replacement = .{ "[2,3]", "[2,3]" },

@@ -107,7 +107,8 @@ pub fn morph(
 /// The map of a vertex: the mean of its joints' by weight. Asserts that the mesh has joints.
 pub fn blend(sets: []const scene.JointSet, joint_maps: []const AffineD, vertex: usize) AffineD {
     assert(sets.len > 0);
-    var map: AffineD = .{ .x = @splat(0), .y = @splat(0), .z = @splat(0), .translation = @splat(0) };
+    const zero: Vec3d = @splat(0);
+    var map: AffineD = .{ .x = zero, .y = zero, .z = zero, .translation = zero };
     var sum: f64 = 0;
     for (sets) |set| for (set.joints[vertex], set.weights[vertex]) |joint, weight| {
         if (weight == 0) continue;

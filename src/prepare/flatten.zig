@@ -101,8 +101,8 @@ const ChunkResult = struct {
     centroid_bounds: Box3 = .empty,
 };
 
-/// Flattens what is drawn: instances of `meshes`, where `pose` has their nodes and joints. The soup's
-/// arrays come from `arena`, what is needed meanwhile from `gpa`.
+/// Flattens what is drawn: instances of `meshes`, where `pose` has their nodes and joints. The
+/// soup's arrays come from `arena`, what is needed meanwhile from `gpa`.
 pub fn flatten(
     gpa: std.mem.Allocator,
     arena: std.mem.Allocator,

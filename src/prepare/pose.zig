@@ -3,7 +3,8 @@
 //! In: the nodes with their maps into the parent's space, parents first. Out: one map into world
 //! space each, one for each joint of a skin, and the center of what is drawn. Where all of it is
 //! far away for its size, as models on the globe are, the world's origin is moved near to it, so
-//! that single precision is enough from there on. A map may overflow to infinity or NaN; who uses it looks.
+//! that single precision is enough from there on. A map may overflow to infinity or NaN; who uses
+//! it looks.
 
 const std = @import("std");
 const math = @import("../math.zig");
