@@ -104,7 +104,10 @@ pub fn outputName(gpa: std.mem.Allocator, options: *const Options) error{OutOfMe
 const sections: []const Section = &.{
     .{ .title = "Image", .options = &.{
         .{ .usage = "-o, --output FILE", .help = "name ending in a format; - is standard output" },
-        .{ .usage = "--format FORMAT", .help = "png, jpg, tga, bmp or ppm, or linear: hdr, pfm or exr" },
+        .{
+            .usage = "--format FORMAT",
+            .help = "png, jpg, tga, bmp or ppm, or linear: hdr, pfm or exr",
+        },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
         .{
             .usage = "-r, --resolution WxH|N",

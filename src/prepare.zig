@@ -79,6 +79,8 @@ pub const ViewSettings = struct {
     background: ?math.Vec3 = null,
     environment: light.EnvironmentSettings = .{},
     floor: choices.Floor = .none,
+    /// What primary rays see in its place.
+    backdrop: ?light.EnvironmentSettings = null,
 };
 
 /// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
@@ -302,6 +304,12 @@ noinline fn chooseView(
     );
     light.addMap(&seen.environment, &settings.environment, &seen.view.camera);
     if (settings.floor == .shadow) seen.environment.floor_height = light.floorOf(&seen.geometry);
+    if (settings.backdrop) |*chosen_backdrop| {
+        const backdrop = try arena.create(world.Environment);
+        backdrop.* = .{ .ambient = 0, .background = @splat(0) };
+        light.addMap(backdrop, chosen_backdrop, &seen.view.camera);
+        seen.environment.backdrop = backdrop;
+    }
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
     seen.facts.environment_is_default = settings.environment.is_default;

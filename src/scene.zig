@@ -193,6 +193,10 @@ pub const EnvironmentMap = struct {
     /// Index into `Scene.images`.
     image: u32,
     projection: Projection = .equirectangular,
+    /// Of a cube all images, in the order +x, -x, +y, -y, +z, -z; `image` is the first.
+    faces: [6]u32 = @splat(none),
+    /// It is the background as well, unless the user chooses another one.
+    is_seen: bool = false,
     /// Multiplies the image's radiance.
     scale: Vec3 = .{ 1, 1, 1 },
     /// From the world's directions to those of the image: a rotation, which may mirror.
@@ -204,6 +208,9 @@ pub const EnvironmentMap = struct {
         equirectangular,
         /// A square: `math.equal_area`.
         octahedral,
+        /// Six images, each as it is seen from within, upwards y, in that of +y -z, in that of -y
+        /// +z. PNG files with alpha are RGBD: their colours are divided by alpha.
+        cube,
     };
 };
 
@@ -352,7 +359,11 @@ pub const Scene = struct {
                 assert(view.texcoord_set < texcoord_set_count);
             }
         };
-        if (scene.environment) |map| assert(map.image < scene.images.len);
+        if (scene.environment) |map| {
+            assert(map.image < scene.images.len);
+            const faces: []const u32 = if (map.projection == .cube) &map.faces else &.{};
+            for (faces) |face| assert(face < scene.images.len);
+        }
         for (scene.lights) |light| assert(light.node < scene.nodes.len);
         for (scene.cameras) |camera| assert(camera.node < scene.nodes.len);
         assert(scene.camera_default == none or scene.camera_default < scene.cameras.len);

@@ -89,6 +89,8 @@ pub const Session = struct {
     seen: settings.View = .{},
     world: ?World = null,
     environment: Environment = .{},
+    /// The studio, where it is seen but something else lights the scene.
+    backdrop: Environment = .{},
     /// The file that the picture is to replace.
     output: ?Identity = null,
     film: ?Film = null,
@@ -132,6 +134,7 @@ pub const Session = struct {
         session.dropScene();
         if (session.film) |*film| film.deinit(session.gpa);
         session.environment.deinit();
+        session.backdrop.deinit();
         session.pool.deinit();
         session.* = undefined;
     }
@@ -215,19 +218,21 @@ pub const Session = struct {
     pub fn view(session: *Session, choices: settings.View) Error!void {
         if (session.pool.cancelled.load(.monotonic)) return error.Canceled;
         session.seen = choices;
+        session.seen.background = session.backgroundOf(&choices);
+        const background = session.seen.background;
         // Until it is chosen anew.
         session.world.?.environment.map = null;
+        session.world.?.environment.backdrop = null;
         const start = Io.Clock.awake.now(session.io);
-        var environment = try session.environment.choose(
-            session.gpa,
-            session.io,
-            &session.pool,
-            &session.scene.?,
-            &choices.environment,
-            session.output,
-            session.diagnostic,
-        );
-        environment.is_seen = choices.background == .env or choices.background == .studio;
+        var environment = try session.chooseFor(&session.environment, &choices.environment);
+        environment.is_seen = background == .env or background == .studio;
+        var backdrop: ?prepare.EnvironmentSettings = null;
+        if (background == .studio and !environment.is_studio) {
+            var studio = choices.environment;
+            studio.source = .studio;
+            backdrop = try session.chooseFor(&session.backdrop, &studio);
+            backdrop.?.is_seen = true;
+        }
         session.times.prepare_ns += session.since(start);
         try prepare.view(&session.world.?, session.io, &session.scene.?, .{
             .camera = choices.camera,
@@ -235,10 +240,27 @@ pub const Session = struct {
             .resolution = choices.resolution,
             .long_side = choices.long_side,
             .ambient = choices.ambient,
-            .background = radianceOf(choices.background),
+            .background = radianceOf(background),
             .environment = environment,
             .floor = choices.floor,
+            .backdrop = backdrop,
         }, session.diagnostic, &session.times);
+    }
+
+    fn chooseFor(
+        session: *Session,
+        environment: *Environment,
+        chosen: *const settings.Environment,
+    ) Error!prepare.EnvironmentSettings {
+        return environment.choose(
+            session.gpa,
+            session.io,
+            &session.pool,
+            &session.scene.?,
+            chosen,
+            session.output,
+            session.diagnostic,
+        );
     }
 
     /// Traces the picture. Asserts that there is a view, and a tree of the variant's width.
@@ -454,6 +476,15 @@ pub const Session = struct {
             .progress = session.progress,
             .cancel = &session.pool.cancelled,
         };
+    }
+
+    /// The background that is chosen: the scene's own environment where that is to be seen and
+    /// nothing else is asked for.
+    fn backgroundOf(session: *const Session, choices: *const settings.View) settings.Background {
+        const is_own = choices.environment.source == .default;
+        const is_seen = if (session.scene.?.environment) |*map| map.is_seen else false;
+        const shows_own = choices.background == .default and is_own and is_seen;
+        return if (shows_own) .env else choices.background;
     }
 
     /// What the film keeps: alpha where the background is no radiance, and colours of the display

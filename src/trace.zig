@@ -125,6 +125,7 @@ test {
     _ = bundle;
     _ = dispatch;
     _ = @import("trace/integrate/environment_lights.zig");
+    _ = @import("trace/integrate/camera.zig");
     _ = @import("trace/integrate/path.zig");
     _ = tiles;
     _ = @import("trace/traverse/beam/budget.zig");

@@ -53,7 +53,8 @@ pub const Frame = struct {
 
     /// Whether what is seen depends on how wide rays are: they have cones then.
     pub inline fn needsFootprints(frame: *const Frame) bool {
-        return frame.hasTextures() or frame.environment.map != null;
+        const environment = frame.environment;
+        return frame.hasTextures() or environment.map != null or environment.backdrop != null;
     }
 
     /// Whether a material has any.

@@ -653,7 +653,10 @@ test "background, exposure and transparency reach the pixels" {
         .{ .arguments = &.{"--background=transparent"}, .pixel = .{ 0, 0, 0 } },
         // The middle of the gradient, and what surrounds a scene without lights.
         .{ .arguments = &.{}, .pixel = @splat(135) },
-        .{ .arguments = &.{ "--ambient=0.25", "--background=env" }, .pixel = @splat(126) },
+        .{
+            .arguments = &.{ "--env=none", "--ambient=0.25", "--background=env" },
+            .pixel = @splat(126),
+        },
         // By the thesis: without curve and gradient.
         .{ .arguments = &.{ "--thesis", "-r1x1" }, .pixel = @splat(160) },
     }) |case| {
@@ -663,7 +666,14 @@ test "background, exposure and transparency reach the pixels" {
         }));
         try testing.expectEqualSlices(u8, &case.pixel, ending.stdout["P6\n1 1\n255\n".len..]);
     }
+    // The studio is seen whatever lights the scene.
+    const studio = try sandbox.expectExit(0, &(to_stdout ++ .{ "--background=env", "-r9x9" }));
+    const backdrop = try sandbox.expectExit(0, &(to_stdout ++ .{
+        "--env=none", "--background=studio", "-r9x9",
+    }));
+    try testing.expectEqualSlices(u8, studio.stdout, backdrop.stdout);
     const opaque_png = try sandbox.expectExit(0, &to_stdout);
+    try testing.expect(!std.mem.eql(u8, opaque_png.stdout, studio.stdout));
     const clear_png = try sandbox.expectExit(0, &(to_stdout ++ .{"--background=transparent"}));
     // The header's colour type: RGB and RGBA.
     try testing.expectEqual(2, opaque_png.stdout[25]);
@@ -708,6 +718,44 @@ test "an unlit surface comes out as it is painted, whatever the exposure and the
         "u.gltf", "--thesis", "-r1x1", "--exposure=-1", "-q", "-o-", "--format=ppm",
     });
     try testing.expectEqualSlices(u8, &.{ 188, 92, 0 }, thesis.stdout["P6\n1 1\n255\n".len..]);
+}
+
+/// The same with a texture.
+const painted_scene =
+    \\{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],
+    \\"nodes":[{"mesh":0},{"camera":0,"translation":[0,0,1]}],
+    \\"cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1}}],
+    \\"extensionsUsed":["KHR_materials_unlit"],"images":[{"uri":"paint.png"}],
+    \\"textures":[{"source":0}],"materials":[{"extensions":{"KHR_materials_unlit":{}},
+    \\"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],
+    \\"meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},"material":0}]}],
+    \\"buffers":[{"byteLength":36,"uri":"t.bin"}],"bufferViews":[{"buffer":0,"byteLength":36}],
+    \\"accessors":[{"bufferView":0,"count":3,"componentType":5126,"type":"VEC3",
+    \\"min":[-9,-9,0],"max":[9,9,0]},
+    \\{"bufferView":0,"count":3,"componentType":5126,"type":"VEC2"}]}
+;
+
+test "a texture of an unlit surface comes out as it is painted" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("p.gltf", painted_scene);
+    try sandbox.write("empty.gltf", empty_scene);
+    try sandbox.write("t.bin", std.mem.sliceAsBytes(&unlit_corners));
+    for ([_][3]u8{ .{ 1, 2, 3 }, .{ 200, 99, 50 }, .{ 254, 128, 255 } }) |codes| {
+        const arena = sandbox.arena_state.allocator();
+        const color = try arena.print("--background=#{x:0>2}{x:0>2}{x:0>2}", .{
+            codes[0], codes[1], codes[2],
+        });
+        _ = try sandbox.expectExit(0, &.{ "empty.gltf", "-q", "-r4x4", color, "-opaint.png" });
+        const ending = try sandbox.expectExit(0, &.{
+            "p.gltf", "-q", "-r3x2", "-o-", "--format=ppm",
+        });
+        try testing.expectEqualStrings("", ending.stderr);
+        const pixels = ending.stdout["P6\n3 2\n255\n".len..];
+        for (0..6) |index| {
+            try testing.expectEqualSlices(u8, &codes, pixels[index * 3 ..][0..3]);
+        }
+    }
 }
 
 test "the exposure is metered by lights of the file alone, and the report says it" {
@@ -933,7 +981,9 @@ test "--max-memory is kept to in every stage, or is an error in one line" {
         .{ "builtin:atrium", "-r64x64", &.{ "1", "300K", "1M", "4M", "8M", "14M" }, "256M" },
         .{ "empty.gltf", "-r1024x1024", &.{ "1M", "16M", "18M", "21M", "23M" }, "64M" },
     }) |case| {
-        const arguments = [_][]const u8{ case[0], case[1], "-t2", "-q", "-o", "a.png" };
+        const arguments = [_][]const u8{
+            case[0], case[1], "--env=none", "-t2", "-q", "-o", "a.png",
+        };
         for (case[2]) |limit| {
             errdefer std.debug.print("{s} {s}\n", .{ case[0], limit });
             const ending = try sandbox.expectExit(1, &(arguments ++ .{ "--max-memory", limit }));
@@ -952,9 +1002,10 @@ test "--max-memory is kept to in every stage, or is an error in one line" {
         try testing.expectEqualSlices(u8, try sandbox.read("a.png"), within);
         try sandbox.folder.dir.deleteFile(io, "a.png");
     }
-    const before = try sandbox.run(&.{ "empty.gltf", "-r1024x1024", "--max-memory=8M", "-q" });
+    const arguments = [_][]const u8{ "empty.gltf", "-r1024x1024", "--env=none", "-q" };
+    const before = try sandbox.run(&(arguments ++ .{"--max-memory=8M"}));
     try testing.expect(std.mem.find(u8, before.stderr, ", 16 MiB more asked for)") != null);
-    const after = try sandbox.run(&.{ "empty.gltf", "-r1024x1024", "--max-memory=18M", "-q" });
+    const after = try sandbox.run(&(arguments ++ .{"--max-memory=18900K"}));
     try testing.expect(std.mem.find(u8, after.stderr, ", 3 MiB more asked for)") != null);
 }
 

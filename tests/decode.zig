@@ -337,6 +337,81 @@ test "random bytes behind a signature are no image" {
     };
 }
 
+fn expectReason(file: []const u8, expected: []const u8) !void {
+    var reason: decode.Reason = .{};
+    const result = decode.decode(testing.allocator, file, &reason);
+    if (result) |decoded| {
+        var texels = decoded;
+        texels.deinit(testing.allocator);
+        return error.Decoded;
+    } else |err| try testing.expectEqual(error.InvalidImage, err);
+    try testing.expectEqualStrings(expected, reason.text());
+}
+
+test "what the decoders do not look at is looked at" {
+    const png = try imageFile("rgb.png");
+    defer testing.allocator.free(png);
+    // Within IDAT, and behind it within the checksum of deflate's container.
+    png[60] +%= 1;
+    try expectReason(png, "wrong checksum");
+    repairSums(png);
+    try expectReason(png, "bad compressed data");
+    png[60] -%= 1;
+    png[png.len - 17] +%= 1;
+    repairSums(png);
+    try expectReason(png, "bad compressed data");
+
+    const jpeg = try imageFile("rgb-progressive.jpg");
+    defer testing.allocator.free(jpeg);
+    const scan = std.mem.findLast(u8, jpeg, "\xff\xda").?;
+    var many: std.ArrayList(u8) = .empty;
+    defer many.deinit(testing.allocator);
+    try many.appendSlice(testing.allocator, jpeg[0..scan]);
+    for (0..200) |_| try many.appendSlice(testing.allocator, jpeg[scan .. jpeg.len - 2]);
+    try many.appendSlice(testing.allocator, "\xff\xd9");
+    try expectReason(many.items, "more than 200 scans");
+    try expectReason(jpeg[0..scan], "cut short");
+}
+
+/// A KTX 2 file of 2x1 pixels without anything but its one level.
+fn ktx2(buffer: *[128]u8, vk_format: u32, layers: u32, compression: u32, level: []const u8) []u8 {
+    const start = 80 + 24;
+    @memset(buffer, 0);
+    @memcpy(buffer[0..12], "\xabKTX 20\xbb\r\n\x1a\n");
+    for ([_]u32{ vk_format, 1, 2, 1, 0, layers, 1, 1, compression }, 3..) |word, index| {
+        std.mem.writeInt(u32, buffer[index * 4 ..][0..4], word, .little);
+    }
+    for ([_]u64{ start, level.len, level.len }, 0..) |long, index| {
+        std.mem.writeInt(u64, buffer[80 + index * 8 ..][0..8], long, .little);
+    }
+    @memcpy(buffer[start..][0..level.len], level);
+    return buffer[0 .. start + level.len];
+}
+
+test "KTX 2 of plain bytes comes in the order of RGBA, and what is not supported has a reason" {
+    var buffer: [128]u8 = undefined;
+    for ([_]struct { u32, []const u8, []const u8 }{
+        .{ 9, "\x01\x02", "\x01\x02" },
+        .{ 22, "\x01\x02\x03\x04", "\x01\x02\x03\x04" },
+        .{ 30, "\x01\x02\x03\x04\x05\x06", "\x03\x02\x01\x06\x05\x04" },
+        .{ 44, "\x01\x02\x03\x04\x05\x06\x07\x08", "\x03\x02\x01\x04\x07\x06\x05\x08" },
+    }) |case| {
+        const file = ktx2(&buffer, case[0], 0, 0, case[1]);
+        var reason: decode.Reason = .{};
+        errdefer std.debug.print("{s}\n", .{reason.text()});
+        var texels = try decode.decode(testing.allocator, file, &reason);
+        defer texels.deinit(testing.allocator);
+        try testing.expectEqual(case[1].len / 2, texels.channel_count);
+        try testing.expectEqualSlices(u8, case[2], texels.data.bytes);
+    }
+    const none = "\x01\x02";
+    try expectReason(ktx2(&buffer, 145, 0, 0, none), "Vulkan format 145 is not supported");
+    try expectReason(ktx2(&buffer, 9, 2, 0, none), "arrays, cubes and volumes are not supported");
+    try expectReason(ktx2(&buffer, 9, 0, 3, none), "supercompression 3 is not supported");
+    try expectReason(ktx2(&buffer, 9, 0, 0, "\x01"), "its first level has the wrong size");
+    try expectReason(ktx2(&buffer, 9, 0, 2, none), "bad compressed data");
+}
+
 test "sizes that cannot be true are refused before memory is asked for" {
     var buffer: [200]u8 = undefined;
     const png = "\x89PNG\r\n\x1a\n\x00\x00\x00\x0dIHDR\x00\x00\x75\x30\x00\x00\x75\x30" ++

@@ -368,12 +368,62 @@ test "without its coordinates a normal texture bends nothing, others show their 
     try testing.expect(scene.materials[0].normal_texture != null);
 }
 
+const surrounded: Replacement = .{
+    "\"scenes\":[{\"nodes\":[0]}]",
+    "\"extensions\":{\"EXT_lights_image_based\":{\"lights\":[{\"intensity\":2.5," ++
+        "\"rotation\":[0,1,0,0],\"specularImageSize\":4,\"irradianceCoefficients\":[[0,0,0]]," ++
+        "\"specularImages\":[[0,1,2,1,4,0],[3,3,3,3,3,3]]}]}}," ++
+        "\"scenes\":[{\"nodes\":[0],\"extensions\":{\"EXT_lights_image_based\":{\"light\":0}}}]",
+};
+
+test "a scene with an image-based light is surrounded by its finest cube" {
+    var folder: Folder = try .make();
+    defer folder.free();
+    var said: Diagnostic = .{};
+    var scene = try folder.read(&.{surrounded}, &said);
+    defer scene.deinit();
+    try testing.expectEqual(0, said.warning_count);
+    const map = &scene.environment.?;
+    try testing.expectEqual(.cube, map.projection);
+    // Images 0 and 4 of the file are the same bytes, 3 is not read.
+    try testing.expectEqual([6]u32{ 0, 1, 2, 1, 0, 0 }, map.faces);
+    try testing.expectEqual([3]f32{ 2.5, 2.5, 2.5 }, map.scale);
+    // Half a turn about y.
+    for (map.rotation.direction(.{ 1, 2, 3 }), [3]f64{ -1, 2, -3 }) |value, wanted| {
+        try testing.expectApproxEqAbs(wanted, value, 1e-12);
+    }
+    for ([_]struct { Replacement, []const u8 }{
+        .{ .{ "\"light\":0", "\"light\":1" }, "names a light that is not there" },
+        .{ .{ "[[0,1,2,1,4,0]", "[[0,1,2,1,4]" }, "has no cube of six images" },
+        .{ .{ "[[0,1,2,1,4,0]", "[[0,1,2,1,5,0]" }, "names an image that is not there" },
+        .{ .{ "[[0,1,2,1,4,0],[3,3,3,3,3,3]]", "[]" }, "has no cube of six images" },
+        .{ .{ "[0,1,0,0]", "[0,0,0,0]" }, "has a rotation that is none" },
+        .{ .{ "\"intensity\":2.5", "\"intensity\":-1" }, "is not bright" },
+    }) |case| {
+        var wrong: Diagnostic = .{};
+        var dark = try folder.read(&.{ surrounded, case[0] }, &wrong);
+        defer dark.deinit();
+        try testing.expectEqual(null, dark.environment);
+        try testing.expectEqual(1, wrong.warning_count);
+        var line: Diagnostic = .{};
+        line.warn("EXT_lights_image_based {s}, left out", .{case[1]});
+        try testing.expectEqualStrings(line.warnings[0].text(), wrong.warnings[0].text());
+    }
+    var missing: Diagnostic = .{};
+    var dark = try folder.read(&.{ surrounded, .{ "[[0,1,2,1,4,0]", "[[0,1,2,1,3,0]" } }, &missing);
+    defer dark.deinit();
+    try testing.expectEqual(null, dark.environment);
+    try testing.expectEqual(2, missing.warning_count);
+}
+
 test "what is wrong in the document itself is an error" {
     var folder: Folder = try .make();
     defer folder.free();
     const cases = [_]struct { Replacement, []const u8 }{
         .{ .{ "{\"source\":2,", "{\"source\":5," }, "textures[2].source: 5 of 5" },
         .{ .{ "\"sampler\":1}", "\"sampler\":3}" }, "textures[2].sampler: 3 of 3" },
+        .{ .{ "{\"source\":2,", "{\"source\":4294967295," }, "textures[2].source: 4294967295 " ++
+            "names nothing, lists have 4194304 elements at most" },
         .{ .{ "{\"index\":2,", "{\"index\":5," }, "materials[0].occlusionTexture.index: 5 of 5" },
         .{ .{ "\"texCoord\":3", "\"texCoord\":-1" }, "materials[0].occlusionTexture.texCoord: " ++
             "-1 is not a whole number from 0 to 2^53 - 1" },
@@ -417,7 +467,7 @@ test "a texture that the output would overwrite is an error" {
 test "every allocation may fail" {
     var folder: Folder = try .make();
     defer folder.free();
-    const text = try makeText(&.{.{ "\"TEXCOORD_1\":4,", "" }});
+    const text = try makeText(&.{ .{ "\"TEXCOORD_1\":4,", "" }, surrounded });
     defer gpa.free(text);
     var fail_index: usize = 0;
     while (true) : (fail_index += 1) {

@@ -404,6 +404,10 @@ test "meshes, skins and weights" {
             "mesh 0, primitive 0: 4 vertices do not make whole triangles, the rest is left out",
         ) },
         .{ "\"material\":0", "\"material\":1", wrong("meshes[0].primitives[0].material: 1 of 1") },
+        .{ "\"material\":0", "\"material\":4294967295", wrong(
+            "meshes[0].primitives[0].material: 4294967295 names nothing, lists have 4194304 " ++
+                "elements at most",
+        ) },
         .{ "\"material\":0,", "", .fine },
         .{ "\"POSITION\":0", "\"POSITION\":3", wrong(
             "mesh 0, primitive 0: accessor 3 has no type for 'POSITION'",

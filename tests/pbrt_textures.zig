@@ -302,6 +302,7 @@ test "a map of the sky is looked up where PBRT does" {
         defer scene.deinit();
         const map = &scene.environment.?;
         try testing.expectEqual(.equirectangular, map.projection);
+        try testing.expect(map.is_seen);
         try testing.expectEqual([3]f32{ 2, 4, 6 }, map.scale);
         try testing.expectEqualStrings("first", scene.images[map.image].bytes);
         for (state[1]) |case| {

@@ -75,6 +75,8 @@ const Extras = [3]usize;
 /// What most structures end with: extras and extensions.
 const Tail = [5]usize;
 
+pub const cgltf_extension = extern struct { name: String, data: String };
+
 pub const cgltf_buffer = extern struct {
     name: String,
     size: usize,
@@ -342,7 +344,9 @@ pub const cgltf_scene = extern struct {
     name: String,
     nodes: [*c][*c]cgltf_node,
     nodes_count: usize,
-    extras: Tail,
+    extras: Extras,
+    extensions_count: usize,
+    extensions: [*c]cgltf_extension,
 };
 
 pub const cgltf_asset = extern struct {
@@ -384,7 +388,9 @@ pub const cgltf_data = extern struct {
     scene: [*c]cgltf_scene,
     animations: ?*anyopaque,
     animations_count: usize,
-    variants: [7]usize,
+    variants: [5]usize,
+    data_extensions_count: usize,
+    data_extensions: [*c]cgltf_extension,
     extensions_used: [*c]String,
     extensions_used_count: usize,
     extensions_required: [*c]String,

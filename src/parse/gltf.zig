@@ -10,6 +10,7 @@ const asset = @import("gltf/asset.zig");
 const c = @import("cgltf.zig");
 const container = @import("gltf/container.zig");
 const escapes = @import("json/escapes.zig");
+const image_based_light = @import("gltf/image_based_light.zig");
 const json = @import("json.zig");
 const limits = @import("gltf/limits.zig");
 const nodes = @import("gltf/nodes.zig");
@@ -96,7 +97,8 @@ fn parseDocument(
 /// Puts the parts of the document into the scene.
 fn fill(source: *Source, resources: *Resources) Error!void {
     const builder = source.builder;
-    const origins = try nodes.collect(source, resources.settings.scene);
+    const shown = try nodes.choose(source, resources.settings.scene);
+    const origins = try nodes.collect(source, shown);
     defer source.gpa.free(origins);
     var textures: Textures = .init(source, resources);
     defer textures.deinit();
@@ -120,6 +122,7 @@ fn fill(source: *Source, resources: *Resources) Error!void {
         }
     }
     try materials.finish();
+    if (shown) |one| try image_based_light.read(source, &textures, one);
 }
 
 /// Adds what a node draws.

@@ -360,7 +360,14 @@ const Scanner = struct {
         const whole = numbers.parseInteger(digits) orelse
             return scanner.wrong("{s} is not a whole number from 0 to 2^53 - 1", .{digits});
         if (whole > std.math.maxInt(usize)) return scanner.wrong("{d} is too large", .{whole});
-        if (rule.* == .reference) try scanner.resolve(rule.reference, whole);
+        if (rule.* == .reference) {
+            // To cgltf what its int does not hold is -1, which is no reference at all.
+            if (whole >= list_length_max) return scanner.wrong(
+                "{d} names nothing, lists have {d} elements at most",
+                .{ whole, list_length_max },
+            );
+            try scanner.resolve(rule.reference, whole);
+        }
     }
 
     /// Counts a number that is asked for in double precision, and keeps it the second time.

@@ -11,6 +11,7 @@ const parallel = @import("../parallel.zig");
 const simd = @import("../simd.zig");
 const scene = @import("../scene.zig");
 const world = @import("../world.zig");
+const cube = @import("environment/cube.zig");
 const filter = @import("environment/filter.zig");
 const parts_file = @import("environment/parts.zig");
 const studio = @import("environment/studio.zig");
@@ -39,6 +40,8 @@ pub const Source = union(enum) {
     pub const Image = struct {
         bytes: []const u8,
         projection: scene.EnvironmentMap.Projection = .equirectangular,
+        /// Of a cube all files, of which `bytes` is the first.
+        faces: [6][]const u8 = @splat(""),
     };
 };
 
@@ -72,6 +75,7 @@ pub fn make(
 }
 
 fn readSky(gpa: Allocator, image: *const Source.Image, reason: *decode.Reason) decode.Error!Sky {
+    if (image.projection == .cube) return cube.read(gpa, &image.faces, size_max, reason);
     var texels = try decode.decode(gpa, image.bytes, reason);
     defer texels.deinit(gpa);
     if (image.projection == .octahedral and texels.width != texels.height) {
@@ -326,6 +330,7 @@ test "the map does not depend on how many threads make it" {
 
 test {
     _ = @import("environment/levels.zig");
+    _ = cube;
     _ = @import("environment/sky.zig");
     _ = parts_file;
 }

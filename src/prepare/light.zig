@@ -178,9 +178,9 @@ pub fn addMap(
     chosen: *const EnvironmentSettings,
     camera: *const world.Camera,
 ) void {
+    to.is_seen = chosen.is_seen;
     to.map = chosen.map orelse return;
     to.scale = chosen.scale;
-    to.is_seen = chosen.is_seen;
     to.shadow_count = chosen.shadow_count;
     // Cosine and sine of the turn.
     const turn: [2]f64 = if (chosen.rotation_deg) |degrees| turn: {

@@ -4,7 +4,7 @@
 //! for each corner, the same bits on every target; corners that share a vertex may differ in it, so
 //! nothing may be averaged. Source: Mikkelsen, Simulation of Wrinkled Surfaces Revisited, 2008. The
 //! library recurses around a vertex and compares all corners at one place with each other, so that
-//! their number is bounded here; a million triangles take about a second.
+//! their number is bounded here; a million triangles take more than a second.
 
 const std = @import("std");
 const Allocator = std.mem.Allocator;

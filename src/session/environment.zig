@@ -116,8 +116,11 @@ fn ofScene(
     const map = &scene.environment.?;
     const image = &scene.images[map.image];
     var reason: Reason = .{};
-    const source: prepare.EnvironmentSource =
+    var source: prepare.EnvironmentSource =
         .{ .image = .{ .bytes = image.bytes, .projection = map.projection } };
+    if (map.projection == .cube) {
+        for (map.faces, &source.image.faces) |face, *bytes| bytes.* = scene.images[face].bytes;
+    }
     return prepare.makeEnvironment(gpa, source, pool, &reason) catch |err| {
         if (err != error.InvalidImage) return @errorCast(err);
         diagnostic.warn("{s}: the environment is not shown: {s}", .{ image.name, reason.text() });

@@ -22,6 +22,8 @@ pub const Environment = struct {
     scale: Vec3 = .{ 1, 1, 1 },
     /// Primary rays see the map in place of the background.
     is_seen: bool = false,
+    /// What primary rays see in place of all this, by which nothing is lit.
+    backdrop: ?*const Environment = null,
     /// Directional lights that stand for the map in each sample, to find how much of it arrives; 0:
     /// all of it does, everywhere.
     shadow_count: u32 = 0,

@@ -12,6 +12,7 @@ const Error = Source.Error;
 
 /// Extensions that are read.
 const read: []const []const u8 = &.{
+    "EXT_lights_image_based",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
@@ -29,7 +30,6 @@ const read: []const []const u8 = &.{
 const looks: []const []const u8 = &.{
     "ADOBE_materials_thin_transparency",
     "EXT_lights_ies",
-    "EXT_lights_image_based",
     "FB_materials_modmap",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",

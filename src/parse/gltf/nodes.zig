@@ -23,11 +23,9 @@ const assert = std.debug.assert;
 /// A node that waits for its turn.
 const Pending = struct { origin: u32, parent: u32 };
 
-/// Adds the nodes of the scene that is asked for, by default the one that the file shows: `scene`,
-/// else the first one, else every root. Returns the index of the glTF node of each, which the
-/// caller frees with the source's `gpa`.
-pub fn collect(source: *const Source, choice: Choice) (Error || error{SceneUnknown})![]const u32 {
-    const shown = try choose(source, choice);
+/// Adds the nodes of a scene, or every root where there is none. Returns the index of the glTF node
+/// of each, which the caller frees with the source's `gpa`.
+pub fn collect(source: *const Source, shown: ?*const c.cgltf_scene) Error![]const u32 {
     const gpa = source.gpa;
     const node_count = source.data.nodes_count;
     var in_tree = try findTrees(source);
@@ -84,8 +82,9 @@ pub fn reach(source: *const Source, places: []u32, origin: u32) Error!u32 {
     return parent;
 }
 
-/// The scene that is asked for; null: the file has none, and none is asked for.
-fn choose(
+/// The scene that is asked for, by default the one that the file shows: `scene`, else the first
+/// one; null: the file has none, and none is asked for.
+pub fn choose(
     source: *const Source,
     choice: Choice,
 ) error{ OutOfMemory, SceneUnknown }!?*const c.cgltf_scene {

@@ -15,6 +15,7 @@ pub const List = enum(u8) {
     buffers,
     buffer_views,
     cameras,
+    image_based_lights,
     images,
     lights,
     materials,
@@ -53,6 +54,9 @@ pub const document: Rule = object(&.{
     optional("extensionsUsed", many(&.string)),
     optional("extensionsRequired", many(&.string)),
     optional("extensions", extensions(&.{
+        optional("EXT_lights_image_based", object(&.{
+            required("lights", list(.image_based_lights, &image_based_light)),
+        })),
         optional("KHR_lights_punctual", object(&.{
             required("lights", list(.lights, &light)),
         })),
@@ -152,6 +156,14 @@ const image: Rule = named(&.{
     optional("bufferView", reference(.buffer_views)),
 });
 
+const image_based_light: Rule = named(&.{
+    optional("rotation", .{ .vector = 4 }),
+    optional("intensity", .number),
+    optional("irradianceCoefficients", many(&.{ .vector = 3 })),
+    required("specularImages", many(&many(&reference(.images)))),
+    optional("specularImageSize", .whole),
+});
+
 const light: Rule = named(&.{
     required("type", .string),
     optional("color", .{ .vector = 3 }),
@@ -221,11 +233,15 @@ const sampler: Rule = named(&.{
     optional("wrapT", .whole),
 });
 
-const scene: Rule = named(&.{
+const scene: Rule = namedWith(&.{
     optional("nodes", many(&.{ .reference = .{
         .list = @backingInt(List.nodes),
         .role = .root,
     } })),
+}, &.{
+    optional("EXT_lights_image_based", object(&.{
+        required("light", reference(.image_based_lights)),
+    })),
 });
 
 const skin: Rule = named(&.{

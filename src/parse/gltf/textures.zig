@@ -179,8 +179,8 @@ fn warnOfSampler(
     source.warn("texture {d}: its sampler's {s} {d} is not known, ignored", parts);
 }
 
-/// The scene's image for the file's with this index.
-fn getImage(textures: *Textures, index: u32) Error!?u32 {
+/// The scene's image for the file's with this index; null, with a warning, where it has none.
+pub fn getImage(textures: *Textures, index: u32) Error!?u32 {
     const source = textures.source;
     if (textures.images.get(index)) |image| return image;
     const raw = Source.item(source.data.images, index);

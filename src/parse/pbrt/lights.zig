@@ -187,6 +187,7 @@ fn addInfinite(source: *const Source, name: []const u8) Error!void {
     builder.scene.scene.environment = .{
         .image = image,
         .projection = if (is_older) .equirectangular else .octahedral,
+        .is_seen = true,
         .scale = try source.color("L"),
         .rotation = if (is_older) to_equirectangular.compose(turn) else turn,
     };

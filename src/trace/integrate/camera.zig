@@ -3,6 +3,7 @@
 //! In: the view, a bundle's place in the picture. Out: rays, affine in the place and not
 //! normalised, so that all pixels of a bundle can share work; samples on the film.
 
+const std = @import("std");
 const world_file = @import("../../world.zig");
 const vec3 = @import("../../math.zig").vec3;
 const bundle_file = @import("../traverse/bundle.zig");
@@ -150,4 +151,21 @@ pub fn grid(view: *const world_file.View, rectangle: Rectangle, offset: Offset) 
         // and steps of up to a tile are as many again.
         .deviation_ulps = 12 * extent,
     };
+}
+
+test "a cone is as wide as what a sample stands for, wherever it is cut" {
+    var view: world_file.View = .nowhere;
+    view.width = 40;
+    view.height = 20;
+    view.camera.right = .{ 2, 0, 0 };
+    view.camera.forward = .{ 0, 0, -4 };
+    // Pixels are 0.1 wide and high where the direction ends.
+    const expected: f32 = 0.1 * 0.70710678 / 2.0;
+    const perspective = footprint(&view, 4);
+    try std.testing.expectEqual(0, perspective.width);
+    try std.testing.expectApproxEqRel(expected, perspective.slope, 1e-6);
+    view.camera.orthographic = true;
+    const orthographic = footprint(&view, 4);
+    try std.testing.expectEqual(0, orthographic.slope);
+    try std.testing.expectApproxEqRel(expected, orthographic.width, 1e-6);
 }

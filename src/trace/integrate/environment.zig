@@ -21,12 +21,11 @@ const visibility_file = @import("visibility.zig");
 const EnvironmentLight = lights_file.EnvironmentLight;
 const EnvironmentLights = lights_file.EnvironmentLights;
 
-/// Radiance of what hides the sky, as a share of the mean radiance.
-const bounce_linear = 0.4;
-const bounce_partly = 0;
+/// See `bounce`.
+const bounce_share = 1.1;
 
 /// Square of GGX's alpha of the narrowest lobe that lights are weighed by.
-const lobe_alpha_squared_min = 0.1;
+const lobe_alpha_squared_min = 0.2;
 
 /// How a bundle's vertices are lit.
 pub fn Vertices(comptime Kernel: type) type {
@@ -250,6 +249,7 @@ fn ReceiverOf(comptime Lanes: type) type {
             traced: Lanes.Mask,
             is_end: bool,
         ) Vec3 {
+            const has_lights = environment.shadow_count > 0;
             const point = &vertex.point;
             const bsdf = &vertex.bsdf;
             const white: Vec3 = .splat(.{ 1, 1, 1 });
@@ -261,14 +261,16 @@ fn ReceiverOf(comptime Lanes: type) type {
             const irradiance = environment_file
                 .irradiance(Lanes, environment, point.normal, receiver.lit)
                 .mul(openness(whole.diffuse, hidden.diffuse))
-                .add(bounced.mul(bounce(around, hidden.diffuse_sky, whole.diffuse_sky)));
-            var sum = bsdf.diffuse_albedo.mul(irradiance);
+                .add(bounced.scale(bounce(hidden.diffuse_sky, whole.diffuse_sky)));
+            // Where lights tell what arrives, a texture would tell it again.
+            const occlusion = if (has_lights) F32.splat(1) else point.material.occlusion;
+            var sum = bsdf.diffuse_albedo.mul(irradiance).scale(occlusion);
             const untraced = receiver.lit.andNot(traced);
             if (untraced.any()) {
                 const smooth = environment_file
                     .radiance(Lanes, environment, receiver.lobe, roughness, .zero(), untraced);
                 const lobe = smooth.mul(openness(whole.glossy, hidden.glossy))
-                    .add(bounced.mul(bounce(around, hidden.glossy_sky, whole.glossy_sky)));
+                    .add(bounced.scale(bounce(hidden.glossy_sky, whole.glossy_sky)));
                 const tail = whole.tail.sub(hidden.tail);
                 const counted = whole.tail_sky.min(bsdf.specular_albedo.scale(.splat(0.5)));
                 const seen = bsdf.specular_albedo.mul(lobe)
@@ -298,14 +300,12 @@ fn ReceiverOf(comptime Lanes: type) type {
             return F32.select(known, share, .zero());
         }
 
-        /// Radiance of what hides the sky, as a share of the mean, where it is white.
-        inline fn bounce(around: Vec3, hidden: F32, whole: F32) Vec3 {
+        /// Radiance of what hides the sky, as a share of the mean, where it is white: it sees the sky
+        /// itself, unless that is hidden all over.
+        inline fn bounce(hidden: F32, whole: F32) F32 {
             const one: F32 = .splat(1);
-            const white: Vec3 = .splat(.{ 1, 1, 1 });
             const closed = shareOf(hidden, whole).max(.zero()).min(one);
-            const partly = closed.mul(one.sub(closed)).mul(.splat(bounce_partly));
-            const linear = closed.mul(.splat(bounce_linear));
-            return white.scale(linear).add(white.add(around).scale(partly));
+            return closed.mul(one.sub(closed.mul(closed))).mul(.splat(bounce_share));
         }
     };
 }

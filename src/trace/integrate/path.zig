@@ -157,8 +157,8 @@ pub fn Vertex(comptime Lanes: type) type {
             vertex.seen = .splat(false);
             const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
             if (ray.active.andNot(missed).none()) return;
-            vertex.point = visibility.interactionOf(Lanes, frame, path, group);
             const point = &vertex.point;
+            visibility.findInteraction(Lanes, frame, path, group, point);
             point.opacity = Lanes.F32.select(point.culled, .zero(), point.opacity);
             vertex.bsdf = .of(point);
             vertex.seen = point.hit.bitAnd(point.opacity.gt(.zero()));

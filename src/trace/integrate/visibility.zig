@@ -242,32 +242,54 @@ pub fn Visibility(comptime Kernel: type) type {
 
 /// The points that the rays of a group of a `PathState` see. Asserts that some active ray hit
 /// something.
-pub fn interactionOf(
+pub fn findInteraction(
     comptime Lanes: type,
     frame: *const Frame,
     path: anytype,
     group: usize,
-) interaction_file.Interaction(Lanes) {
+    point: *interaction_file.Interaction(Lanes),
+) void {
     const ray = &path.bundle.groups[group];
     const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
     const hit = ray.active.andNot(missed);
     std.debug.assert(hit.any());
     const corners: interaction_file.Corners(Lanes) =
         .of(frame.geometry, ray.closest.primitive, hit);
+    point.* = interaction_file.resolve(Lanes, frame, &corners, &hitOf(Lanes, ray, &corners, hit));
+    if (!frame.needsFootprints()) return;
+    const cone = [2]Lanes.F32{ path.cone_width[group], path.cone_spread[group] };
+    addFootprint(Lanes, frame, ray, cone, point);
+}
+
+inline fn hitOf(
+    comptime Lanes: type,
+    ray: *const ray_file.Ray(Lanes),
+    corners: *const interaction_file.Corners(Lanes),
+    hit: Lanes.Mask,
+) interaction_file.Hit(Lanes) {
     const weights = triangle.edgeFunctionsOf(Lanes, corners.position, ray.line);
-    const at: interaction_file.Hit(Lanes) = .{
+    return .{
         .mask = hit,
         .origin = ray.line.origin,
         .direction = ray.line.direction,
         .t = ray.closest.t,
         .barycentrics = weights.barycentrics(),
     };
-    var point = interaction_file.resolve(Lanes, frame, &corners, &at);
-    if (frame.needsFootprints()) {
-        const cone = [2]Lanes.F32{ path.cone_width[group], path.cone_spread[group] };
-        texturing.apply(Lanes, frame, &corners, &at, ray.closest.primitive, cone, &point);
-    }
-    return point;
+}
+
+/// What depends on the cones of rays. It gathers what hits are made of once more, so that the
+/// compiler keeps it in registers where there are no cones.
+noinline fn addFootprint(
+    comptime Lanes: type,
+    frame: *const Frame,
+    ray: *const ray_file.Ray(Lanes),
+    cone: [2]Lanes.F32,
+    point: *interaction_file.Interaction(Lanes),
+) void {
+    const primitive = ray.closest.primitive;
+    const corners: interaction_file.Corners(Lanes) = .of(frame.geometry, primitive, point.hit);
+    const hit = hitOf(Lanes, ray, &corners, point.hit);
+    texturing.apply(Lanes, frame, &corners, &hit, primitive, cone, point);
 }
 
 /// The shadow rays of points off surfaces (`Interaction.offsetOrigin`), which never hit the

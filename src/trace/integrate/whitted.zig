@@ -116,8 +116,10 @@ pub fn Whitted(comptime Kernel: type) type {
             for (first_sample..first_sample + sample_count) |sample| {
                 whitted.radiance = @splat(.splat(.{ 0, 0, 0 }));
                 whitted.escaped = @splat(.zero());
-                whitted.displayed = @splat(.splat(.{ 0, 0, 0 }));
-                whitted.display_share = @splat(.zero());
+                if (whitted.keeps_display) {
+                    whitted.displayed = @splat(.splat(.{ 0, 0, 0 }));
+                    whitted.display_share = @splat(.zero());
+                }
                 whitted.pushPrimary(rectangle, @intCast(sample));
                 while (whitted.stack.pop()) |path| {
                     // A copy: what the step pushes takes its place.
@@ -208,7 +210,8 @@ pub fn Whitted(comptime Kernel: type) type {
             if (gone.none()) return;
             var throughput: Vec3 = .select(gone, path.throughput[group], .splat(.{ 0, 0, 0 }));
             if (path.depth == 0) throughput = throughput.scale(whitted.floor_light[group]);
-            const environment = whitted.frame.environment;
+            const around = whitted.frame.environment;
+            const environment = if (path.depth == 0) around.backdrop orelse around else around;
             if (path.depth > 0 or environment.is_seen) {
                 const seen = environment_light.seenBy(Kernel, environment, path, group, gone);
                 return whitted.add(group, throughput.mul(seen));

@@ -144,7 +144,7 @@ pub fn colored(
 
 /// Gives points their footprints, and what the textures of their materials say. `cone` is the
 /// width at the origin of the ray, and the spread.
-pub noinline fn apply(
+pub fn apply(
     comptime Lanes: type,
     frame: *const Frame,
     corners: *const interaction_file.Corners(Lanes),
