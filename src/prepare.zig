@@ -18,6 +18,7 @@ const alpha = @import("prepare/alpha.zig");
 const bvh_input = @import("prepare/bvh/input.zig");
 const bvh_wide = @import("prepare/bvh/wide.zig");
 const check = @import("prepare/bvh/check.zig");
+const deform = @import("prepare/deform.zig");
 const flatten = @import("prepare/flatten.zig");
 const environment = @import("prepare/environment.zig");
 const light = @import("prepare/light.zig");
@@ -195,7 +196,7 @@ pub fn pose(
         loaded.parts.instances,
         loaded.parts.meshes,
         attributesOf(&loaded.textures),
-        place.maps,
+        &place,
         settings.pool,
         diagnostic,
     );
@@ -426,6 +427,8 @@ fn testThreads(from: *const Scene, lanes: u8, quality: TreeQuality) !usize {
         var other = try testPrepare(from, settings);
         defer other.deinit();
         try expectSameBytes(reference.geometry.positions, other.geometry.positions);
+        try expectSameBytes(reference.geometry.normals, other.geometry.normals);
+        try expectSameBytes(reference.geometry.colors, other.geometry.colors);
         try expectSameBytes(reference.geometry.triangles, other.geometry.triangles);
         switch (lanes) {
             inline 4, 8, 16 => |width| {
@@ -650,6 +653,128 @@ test "a mirroring node keeps fronts and normals outward" {
     const tilted = result.geometry.normals[1];
     try std.testing.expectApproxEqRel(@as(f32, -0.6 / 0.8 / 2.0), tilted[0] / tilted[2], 1e-6);
     try std.testing.expectEqual(math.Vec3{ 7, 0, 0 }, result.geometry.positions[1]);
+}
+
+/// A grid of 150 x 150 vertices with all that deforms it.
+fn makeDeformed(from: *Scene) !void {
+    const arena = from.arena.allocator();
+    const side = 150;
+    const count = side * side;
+    const positions = try arena.alloc(math.Vec3, count);
+    const deltas = try arena.alloc(math.Vec3, count);
+    const colors = try arena.alloc([4]f32, count);
+    const joints = try arena.alloc([4]u16, count);
+    const weights = try arena.alloc([4]f32, count);
+    for (positions, deltas, colors, joints, weights, 0..) |*at, *delta, *color, *four, *of, index| {
+        const x: f32 = @floatFromInt(index % side);
+        const y: f32 = @floatFromInt(index / side);
+        at.* = .{ x, y, 0 };
+        delta.* = .{ y / 64, x / 32, x * y / 512 };
+        color.* = .{ x / side, y / side, 0.5, 1 };
+        four.* = .{ 0, 1, 0, 1 };
+        of.* = .{ x, y, 1, 2 };
+    }
+    const grid = try arena.alloc([3]u32, (side - 1) * (side - 1));
+    for (grid, 0..) |*triangle, index| {
+        const first: u32 = @intCast(index / (side - 1) * side + index % (side - 1));
+        triangle.* = .{ first, first + 1, first + side };
+    }
+    const target: scene.MorphTarget = .{ .positions = deltas, .normals = deltas, .colors = colors };
+    from.meshes = try arena.dupe(scene.Mesh, &.{.{
+        .positions = positions,
+        .normals = positions,
+        .colors = colors,
+        .morph_targets = try arena.dupe(scene.MorphTarget, &.{ target, .{}, target }),
+        .joint_sets = try arena.dupe(scene.JointSet, &.{
+            .{ .joints = joints, .weights = weights },
+            .{ .joints = joints, .weights = colors },
+        }),
+        .triangles = grid,
+        .material = 0,
+    }});
+    const above: math.AffineD = .fromTrs(.{ 3, 4, 5 }, .{ 0.6, 0, 0, 0.8 }, .{ 1, 2, 1 });
+    const below: math.AffineD = .fromTrs(.{ 0, 0, 9 }, .{ 0, 0.6, 0.8, 0 }, .{ 0.1, 1, 3 });
+    from.nodes = try arena.dupe(scene.Node, &.{
+        .{ .parent = scene.none, .local = above }, .{ .parent = 0, .local = below },
+    });
+    from.skins = try arena.dupe(scene.Skin, &.{.{
+        .joints = &.{ 1, 0 },
+        .inverse_bind_maps = try arena.dupe(math.AffineD, &.{ above, .identity }),
+    }});
+    from.instances = &.{
+        .{ .mesh = 0, .node = 0, .morph_weights = &.{ 0.3, 1, -0.7 } },
+        .{ .mesh = 0, .node = 0, .morph_weights = &.{ 0.3, 1, -0.7 }, .skin = 0 },
+        .{ .mesh = 0, .node = 1, .skin = 0 },
+        .{ .mesh = 0, .node = 1, .morph_weights = &.{ 0, 1, 0 } },
+    };
+    from.materials = &.{.{}};
+    from.check();
+}
+
+test "deformed vertices are the same by any number of threads" {
+    var from: Scene = .init(std.testing.allocator);
+    defer from.deinit();
+    try makeDeformed(&from);
+    const kept = try testThreads(&from, 4, .fast);
+    try std.testing.expectEqual(4 * 149 * 149, kept);
+    var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 2 });
+    defer result.deinit();
+    const mesh = &from.meshes[0];
+    const place = try place_file.compose(std.testing.allocator, &from);
+    defer place.deinit(std.testing.allocator);
+    const used_count = mesh.positions.len - 1; // No triangle has the last corner.
+    for (from.instances, 0..) |*instance, number| for (0..used_count) |vertex| {
+        const at = deform.place(mesh, instance, place.maps, place.joint_maps, vertex);
+        const found = result.geometry.positions[number * used_count + vertex];
+        try std.testing.expectEqual(place_file.round(at), found);
+    };
+}
+
+test "tangents of deformed meshes go with the joints" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    const arena = from.arena.allocator();
+    from.images = &.{.{
+        .name = "flat",
+        .bytes = try texture.TestImage.png(arena, 1, 1, 3, &@as([3]u8, .{ 128, 128, 255 })),
+    }};
+    from.textures = &.{.{ .image = 0 }};
+    from.materials = &.{.{ .normal_texture = .{ .texture = 0 }, .normal_scale = 0.5 }};
+    var meshes: [1]scene.Mesh = .{from.meshes[0]};
+    meshes[0].texcoords[0] = &.{ .{ 0, 0 }, .{ 1, 0 }, .{ 0, 1 } };
+    meshes[0].normals = &@as([3]math.Vec3, @splat(.{ 0, 0, 1 }));
+    meshes[0].tangents = &@as([3][4]f32, @splat(.{ 1, 0, 0, 1 }));
+    meshes[0].morph_targets = &.{.{
+        .tangents = &@as([3]math.Vec3, @splat(.{ 0, 1, 0 })),
+        .texcoords = .{ &@as([3][2]f32, @splat(.{ 1, 2 })), null, null, null },
+    }};
+    meshes[0].joint_sets = &.{.{
+        .joints = &@as([3][4]u16, @splat(@splat(0))),
+        .weights = &@as([3][4]f32, @splat(.{ 1, 0, 0, 0 })),
+    }};
+    from.meshes = &meshes;
+    from.nodes = &.{.{ .parent = scene.none, .local = .scale(.{ -3, 4, 1 }) }};
+    from.skins = &.{.{ .joints = &.{0}, .inverse_bind_maps = &.{.identity} }};
+    from.instances = &.{.{ .mesh = 0, .node = 0, .morph_weights = &.{1}, .skin = 0 }};
+    from.check();
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    var diagnostic: Diagnostic = .{};
+    var times: StageTimes = .{};
+    const io = std.testing.io;
+    var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
+    defer loaded.deinit();
+    const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
+    var result = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
+    defer result.deinit();
+    for (result.geometry.tangents, result.geometry.normals) |tangent, normal| {
+        for ([4]f32{ -0.6, 0.8, 0, -1 }, tangent) |wanted, found| {
+            try std.testing.expectApproxEqAbs(wanted, found, 1e-6);
+        }
+        try std.testing.expectEqual(math.Vec3{ 0, 0, 1 }, normal);
+    }
+    try std.testing.expectEqual([2]f32{ 2, 2 }, result.geometry.texcoords[0][1]);
 }
 
 test "colours are white where a mesh has none" {
@@ -885,6 +1010,7 @@ test {
     _ = bvh_wide;
     _ = alpha;
     _ = check;
+    _ = deform;
     _ = flatten;
     _ = light;
     _ = material;

@@ -19,7 +19,8 @@ pub const Grid = @import("scene/grid.zig");
 /// Index that stands for "none".
 pub const none: u32 = std.math.maxInt(u32);
 
-/// A node of the hierarchy: where things are. Only nodes that the shown scene reaches.
+/// A node of the hierarchy: where things are. Only nodes that the shown scene reaches, and those
+/// that the joints of what it shows hang from.
 pub const Node = struct {
     /// Index of the parent, always lower than the node's own, or `none` for a root.
     parent: u32,
@@ -66,6 +67,36 @@ pub const TextureView = struct {
     transform: [2][3]f32 = .{ .{ 1, 0, 0 }, .{ 0, 1, 0 } },
 };
 
+/// What a morph target adds to every vertex of a mesh that has as much itself, times its weight;
+/// null: nothing (glTF 2.0, section 3.7.2.2).
+pub const MorphTarget = struct {
+    positions: ?[]const Vec3 = null,
+    normals: ?[]const Vec3 = null,
+    /// The sign of the bitangent stays.
+    tangents: ?[]const Vec3 = null,
+    colors: ?[]const [4]f32 = null,
+    texcoords: [texcoord_set_count]?[]const [2]f32 = @splat(null),
+};
+
+/// Four of the joints that move each vertex (glTF 2.0, section 3.7.3.3).
+pub const JointSet = struct {
+    /// Numbers among the joints of a skin.
+    joints: []const [4]u16,
+    /// At least 0. All of a vertex's sum up to more than 0, not necessarily to 1.
+    weights: []const [4]f32,
+};
+
+/// Sets of joints of a mesh at most.
+pub const joint_set_count = 2;
+
+/// Nodes that meshes are hung on.
+pub const Skin = struct {
+    /// Nodes by number of the joint.
+    joints: []const u32,
+    /// By number of the joint: from the mesh's space to the joint's own, where it was bound.
+    inverse_bind_maps: []const AffineD,
+};
+
 /// Triangles with one material, in the space of the node that shows them.
 pub const Mesh = struct {
     positions: []const Vec3,
@@ -78,6 +109,10 @@ pub const Mesh = struct {
     /// One a vertex: a direction and, fourth, 1 or -1 for the sign of the bitangent; null: where a
     /// normal texture needs them they are made.
     tangents: ?[]const [4]f32 = null,
+    /// What instances may add to the vertices.
+    morph_targets: []const MorphTarget = &.{},
+    /// What moves the vertices of instances with a skin, at most `joint_set_count`.
+    joint_sets: []const JointSet = &.{},
     /// Vertex indices, counter-clockwise seen from the front.
     triangles: []const [3]u32,
     /// Index into `Scene.materials`.
@@ -88,6 +123,11 @@ pub const Mesh = struct {
 pub const Instance = struct {
     mesh: u32,
     node: u32,
+    /// One for each morph target of the mesh; empty: all are 0.
+    morph_weights: []const f32 = &.{},
+    /// Index into `Scene.skins`, of meshes with joints: these place the mesh, not the node. Or
+    /// `none`.
+    skin: u32 = none,
 };
 
 /// What to do with the base colour's alpha.
@@ -220,6 +260,7 @@ pub const Scene = struct {
     nodes: []const Node = &.{},
     meshes: []const Mesh = &.{},
     instances: []const Instance = &.{},
+    skins: []const Skin = &.{},
     materials: []const Material = &.{},
     lights: []const Light = &.{},
     cameras: []const Camera = &.{},
@@ -283,6 +324,7 @@ pub const Scene = struct {
         }
         for (scene.meshes) |mesh| {
             assert(mesh.material < scene.materials.len);
+            checkDeformation(&mesh);
             if (mesh.normals) |normals| assert(normals.len == mesh.positions.len);
             if (mesh.colors) |colors| assert(colors.len == mesh.positions.len);
             if (mesh.tangents) |tangents| assert(tangents.len == mesh.positions.len);
@@ -295,6 +337,20 @@ pub const Scene = struct {
         for (scene.instances) |instance| {
             assert(instance.mesh < scene.meshes.len);
             assert(instance.node < scene.nodes.len);
+            const mesh = &scene.meshes[instance.mesh];
+            const weights = instance.morph_weights;
+            assert(weights.len == 0 or weights.len == mesh.morph_targets.len);
+            for (weights) |weight| assert(std.math.isFinite(weight));
+            if (instance.skin == none) continue;
+            const joint_count = scene.skins[instance.skin].joints.len;
+            for (mesh.joint_sets) |set| for (set.joints) |joints| {
+                for (joints) |joint| assert(joint < joint_count);
+            };
+        }
+        for (scene.skins) |skin| {
+            assert(skin.joints.len == skin.inverse_bind_maps.len);
+            for (skin.joints) |node| assert(node < scene.nodes.len);
+            for (skin.inverse_bind_maps) |map| assert(map.isFinite());
         }
         for (scene.textures) |texture| assert(texture.image < scene.images.len);
         for (scene.materials) |*material| inline for (texture_fields) |field| {
@@ -311,6 +367,20 @@ pub const Scene = struct {
         for (scene.lights) |light| assert(light.node < scene.nodes.len);
         for (scene.cameras) |camera| assert(camera.node < scene.nodes.len);
         assert(scene.camera_default == none or scene.camera_default < scene.cameras.len);
+    }
+
+    fn checkDeformation(mesh: *const Mesh) void {
+        const count = mesh.positions.len;
+        for (mesh.morph_targets) |target| {
+            inline for (.{ "positions", "normals", "tangents", "colors" }) |name| {
+                if (@field(target, name)) |deltas| assert(deltas.len == count);
+            }
+            for (target.texcoords) |set| if (set) |deltas| assert(deltas.len == count);
+        }
+        assert(mesh.joint_sets.len <= joint_set_count);
+        for (mesh.joint_sets) |set| {
+            assert(set.joints.len == count and set.weights.len == count);
+        }
     }
 };
 

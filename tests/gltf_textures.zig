@@ -73,13 +73,15 @@ fn makeBuffer() [188]u8 {
     return bytes;
 }
 
-fn putFloats(bytes: []u8, values: []const f32) void {
+/// Writes floats as a file has them.
+pub fn putFloats(bytes: []u8, values: []const f32) void {
     for (values, 0..) |value, index| {
         std.mem.writeInt(u32, bytes[4 * index ..][0..4], @bitCast(value), .little);
     }
 }
 
-const Replacement = struct { []const u8, []const u8 };
+/// What stands in a document, and what is to stand there.
+pub const Replacement = struct { []const u8, []const u8 };
 
 /// The document with each first occurrence replaced. The caller frees it.
 fn makeText(replacements: []const Replacement) ![]u8 {
@@ -96,7 +98,8 @@ fn makeText(replacements: []const Replacement) ![]u8 {
     return text;
 }
 
-fn replace(text: []const u8, old: []const u8, new: []const u8) ![]u8 {
+/// `text` with the first `old` replaced, which has to be there. The caller frees it.
+pub fn replace(text: []const u8, old: []const u8, new: []const u8) ![]u8 {
     const index = std.mem.find(u8, text, old) orelse {
         std.debug.print("{s} is not there\n", .{old});
         return error.TestUnexpectedResult;

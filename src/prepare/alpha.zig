@@ -119,6 +119,7 @@ const Work = struct {
             is_listed[instance.mesh] = true;
             const mesh = &work.meshes[instance.mesh];
             const lookup = work.alphaLookup(mesh.material) orelse continue;
+            if (hasAlphaInMotion(mesh, lookup.texcoord_set)) continue;
             const bounds = &work.bounds[lookup.texture];
             if (bounds.* == null) {
                 bounds.* = try .init(gpa, &work.set.textures.all[lookup.texture].levels[0]);
@@ -204,8 +205,9 @@ const Work = struct {
                 try drawn.append(arena, instance);
             }
             if (whole_mesh[instance.mesh] == scene.none) continue;
-            const whole = whole_mesh[instance.mesh];
-            try drawn.append(arena, .{ .mesh = whole, .node = instance.node });
+            var whole_instance = instance;
+            whole_instance.mesh = whole_mesh[instance.mesh];
+            try drawn.append(arena, whole_instance);
         }
         work.set.materials = parts.uses.items;
         work.set.lookups = parts.lookups.items;
@@ -217,6 +219,14 @@ const Work = struct {
         };
     }
 };
+
+/// Whether morph targets may change what a vertex shows of its texture, or of its alpha.
+fn hasAlphaInMotion(mesh: *const Mesh, texcoord_set: u32) bool {
+    for (mesh.morph_targets) |*target| {
+        if (target.colors != null or target.texcoords[texcoord_set] != null) return true;
+    }
+    return false;
+}
 
 /// The parts while they become more.
 const Building = struct {
@@ -599,6 +609,7 @@ fn loadAndSplit(gpa: Allocator, file: []const u8) !void {
         .positions = &positions,
         .texcoords = .{ &set, null, null, null },
         .triangles = &.{ .{ 6, 7, 8 }, .{ 0, 1, 2 }, .{ 3, 4, 5 } },
+        .morph_targets = &.{.{}},
         .material = 1,
     }, .{
         .positions = &positions,
@@ -606,7 +617,9 @@ fn loadAndSplit(gpa: Allocator, file: []const u8) !void {
         .material = 0,
     } };
     from.nodes = &.{.{ .parent = scene.none, .local = .identity }};
-    from.instances = &.{ .{ .mesh = 0, .node = 0 }, .{ .mesh = 1, .node = 0 } };
+    from.instances = &.{
+        .{ .mesh = 0, .node = 0, .morph_weights = &.{0.5} }, .{ .mesh = 1, .node = 0 },
+    };
     var pool: parallel.Pool = .init(1);
     defer pool.deinit();
     var diagnostic: @import("../diagnostic.zig").Diagnostic = .{};
@@ -628,6 +641,9 @@ fn loadAndSplit(gpa: Allocator, file: []const u8) !void {
     try testing.expectEqual(3, parts.instances.len);
     const drawn = [_]u32{ 0, 2, 1 };
     for (parts.instances, drawn) |instance, mesh| try testing.expectEqual(mesh, instance.mesh);
+    for (parts.instances, [_]usize{ 1, 1, 0 }) |instance, count| {
+        try testing.expectEqual(count, instance.morph_weights.len);
+    }
     const expected = [_][3]u32{ .{ 3, 4, 5 }, .{ 0, 1, 2 }, .{ 6, 7, 8 } };
     for (parts.meshes, expected, [_]u32{ 1, 0, 2 }) |mesh, triangle, material| {
         try testing.expectEqualSlices([3]u32, &.{triangle}, mesh.triangles);
@@ -640,6 +656,19 @@ fn loadAndSplit(gpa: Allocator, file: []const u8) !void {
     try testing.expectEqual(texture.missing, after[0].channels[3]);
     try testing.expectEqual(before[0].texture, after[0].texture);
     try testing.expectEqual(before[1], after[1]);
+}
+
+test hasAlphaInMotion {
+    var target: scene.MorphTarget = .{};
+    var mesh: Mesh = .{ .positions = &.{}, .triangles = &.{}, .material = 0 };
+    try testing.expect(!hasAlphaInMotion(&mesh, 1));
+    mesh.morph_targets = (&target)[0..1];
+    target.positions = &.{};
+    target.texcoords[0] = &.{};
+    try testing.expect(!hasAlphaInMotion(&mesh, 1));
+    try testing.expect(hasAlphaInMotion(&mesh, 0));
+    target.colors = &.{};
+    try testing.expect(hasAlphaInMotion(&mesh, 1));
 }
 
 test "a mesh becomes what is seen whole and what is seen in part" {

@@ -1,7 +1,8 @@
 //! The triangle soup: instances of meshes become one list of triangles in world space.
 //!
-//! In: a scene and the world maps of its nodes. Out: vertices and triangles in the order of the
-//! instances, without those that have no area or no finite place. Fronts stay fronts under
+//! In: a scene and the world maps of its nodes and joints. Out: vertices, deformed as instances ask
+//! for, and triangles in the order of the instances, without those that have no area or no finite
+//! place. Fronts stay fronts under
 //! mirroring maps. The arrays are the same whatever the number of threads: work is cut into fixed
 //! chunks that write to places known before.
 
@@ -15,6 +16,7 @@ const bvh_split = @import("bvh/split.zig");
 const huge_pages = @import("../huge_pages.zig");
 const assert = std.debug.assert;
 const vec3 = math.vec3;
+const deform = @import("deform.zig");
 const pose_file = @import("pose.zig");
 const Affine = math.Affine;
 const AffineD = math.AffineD;
@@ -64,10 +66,12 @@ pub const TriangleSoup = struct {
 /// One instance: where its vertices and triangles come from and go to.
 const Draw = struct {
     mesh: *const scene.Mesh,
-    map: AffineD,
-    direction_map: Affine,
-    normal_map: Affine,
-    /// The map turns fronts into backs.
+    maps: Maps,
+    /// Of morph targets; empty: none changes the mesh.
+    weights: []const f32,
+    /// In place of `maps`; empty: the mesh has no skin.
+    joint_maps: []const AffineD,
+    /// The maps turn fronts into backs.
     mirrored: bool,
     /// First vertex of the mesh that a triangle uses, and how many from there.
     vertex_source: u32,
@@ -75,6 +79,18 @@ const Draw = struct {
     /// First vertex and triangle in the soup, the latter before any is dropped.
     vertex_target: u32,
     triangle_target: u32,
+};
+
+/// Maps into the world.
+const Maps = struct {
+    point: AffineD,
+    direction: Affine,
+    normal: Affine,
+
+    fn of(map: AffineD, mirrored: bool) Maps {
+        const scaled = scaledDown(.of(map));
+        return .{ .point = map, .direction = scaled, .normal = normalMap(scaled, mirrored) };
+    }
 };
 
 /// What a chunk of triangles came to.
@@ -85,21 +101,21 @@ const ChunkResult = struct {
     centroid_bounds: Box3 = .empty,
 };
 
-/// Flattens what is drawn: instances of `meshes` at nodes, whose world maps are `maps`. The soup's
-/// arrays come from `arena`, what is needed meanwhile from `gpa`.
+/// Flattens what is drawn: instances of `meshes`, where `pose` has their nodes and joints. The
+/// soup's arrays come from `arena`, what is needed meanwhile from `gpa`.
 pub fn flatten(
     gpa: std.mem.Allocator,
     arena: std.mem.Allocator,
     instances: []const scene.Instance,
     meshes: []const scene.Mesh,
     attributes: Attributes,
-    maps: []const AffineD,
+    pose: *const pose_file.Pose,
     pool: *parallel.Pool,
     diagnostic: *Diagnostic,
 ) Error!TriangleSoup {
     const draws = try gpa.alloc(Draw, instances.len);
     defer gpa.free(draws);
-    const size = try plan(gpa, instances, meshes, maps, draws, diagnostic);
+    const size = try plan(gpa, instances, meshes, pose, draws, diagnostic);
     const count = size.vertex_count;
 
     var work: Work = .{
@@ -132,7 +148,7 @@ fn plan(
     gpa: std.mem.Allocator,
     instances: []const scene.Instance,
     meshes: []const scene.Mesh,
-    maps: []const AffineD,
+    pose: *const pose_file.Pose,
     draws: []Draw,
     diagnostic: *Diagnostic,
 ) Error!Size {
@@ -148,14 +164,16 @@ fn plan(
         const mesh = &meshes[instance.mesh];
         if (ranges[instance.mesh] == null) ranges[instance.mesh] = .of(mesh.triangles);
         const range = ranges[instance.mesh].?;
-        const map = maps[instance.node];
-        const mirrored = map.determinant() < 0;
-        const scaled = scaledDown(.of(map));
+        const map = pose.maps[instance.node];
+        const has_skin = instance.skin != scene.none;
+        const joint_maps: []const AffineD = if (has_skin) pose.joint_maps[instance.skin] else &.{};
+        const mirrored = if (has_skin) deform.isMirrored(joint_maps) else map.determinant() < 0;
+        const is_morphed = deform.isMorphed(instance.morph_weights);
         draw.* = .{
             .mesh = mesh,
-            .map = map,
-            .direction_map = scaled,
-            .normal_map = normalMap(scaled, mirrored),
+            .maps = .of(map, mirrored),
+            .weights = if (is_morphed) instance.morph_weights else &.{},
+            .joint_maps = joint_maps,
             .mirrored = mirrored,
             .vertex_source = range.first,
             .vertex_count = range.count,
@@ -270,21 +288,78 @@ const Work = struct {
         assert(from >= draw.vertex_target and to - draw.vertex_target <= draw.vertex_count);
         const source = draw.vertex_source + (from - draw.vertex_target);
         const count = to - from;
+        const white: [4]f32 = .{ 1, 1, 1, 1 };
+        if (work.colors.len > 0) copy(work.colors[from..to], draw.mesh.colors, source, white);
+        for (work.texcoords, draw.mesh.texcoords) |to_set, set| {
+            if (to_set.len > 0) copy(to_set[from..to], set, source, .{ 0, 0 });
+        }
+        if (draw.weights.len > 0) work.morphColors(draw, from, to, source);
+        if (draw.weights.len > 0 or draw.joint_maps.len > 0) {
+            return work.placeDeformed(draw, from, to, source);
+        }
         for (work.positions[from..to], draw.mesh.positions[source..][0..count]) |*to_p, p| {
-            to_p.* = pose_file.round(draw.map.point(pose_file.widen(p)));
+            to_p.* = pose_file.round(draw.maps.point.point(pose_file.widen(p)));
         }
         if (draw.mesh.normals) |normals| {
             for (work.normals[from..to], normals[source..][0..count]) |*to_n, n| {
-                to_n.* = tameNormal(draw.normal_map.direction(n));
+                to_n.* = tameNormal(draw.maps.normal.direction(n));
             }
         } else {
             @memset(work.normals[from..to], .{ 0, 0, 0 });
         }
         if (work.tangents.len > 0) placeTangents(draw, work.tangents[from..to], source);
-        const white: [4]f32 = .{ 1, 1, 1, 1 };
-        if (work.colors.len > 0) copy(work.colors[from..to], draw.mesh.colors, source, white);
-        for (work.texcoords, draw.mesh.texcoords) |to_set, set| {
-            if (to_set.len > 0) copy(to_set[from..to], set, source, .{ 0, 0 });
+    }
+
+    /// Adds to colours and texture coordinates what morph targets do.
+    fn morphColors(work: *Work, draw: *const Draw, from: usize, to: usize, source: usize) void {
+        const mesh = draw.mesh;
+        if (work.colors.len > 0 and deform.isChanged(mesh, draw.weights, .colors)) {
+            const colors = work.colors[from..to];
+            deform.morph(mesh, draw.weights, .colors, 0, source, colors);
+            // glTF 2.0, section 3.7.2.2. Written so that NaN becomes 0.
+            for (colors) |*color| for (color) |*value| {
+                value.* = if (!(value.* > 0)) 0 else if (value.* < 1) value.* else 1;
+            };
+        }
+        for (work.texcoords, 0..) |all, set| {
+            if (all.len == 0 or mesh.texcoords[set] == null) continue;
+            if (!deform.isChanged(mesh, draw.weights, .{ .texcoords = set })) continue;
+            const texcoords = all[from..to];
+            deform.morph(mesh, draw.weights, .texcoords, set, source, texcoords);
+            for (texcoords, mesh.texcoords[set].?[source..][0..texcoords.len]) |*at, modelled| {
+                const is_finite = std.math.isFinite(at[0]) and std.math.isFinite(at[1]);
+                if (!is_finite) at.* = modelled;
+            }
+        }
+    }
+
+    /// Places vertices after morph targets and joints have had their say. Normals and tangents
+    /// become unit vectors, for each has a map of its own.
+    fn placeDeformed(work: *Work, draw: *const Draw, from: usize, to: usize, source: usize) void {
+        const mesh = draw.mesh;
+        const positions = work.positions[from..to];
+        @memcpy(positions, mesh.positions[source..][0..positions.len]);
+        deform.morph(mesh, draw.weights, .positions, 0, source, positions);
+        const normals = work.normals[from..to];
+        copy(normals, mesh.normals, source, .{ 0, 0, 0 });
+        if (mesh.normals != null) deform.morph(mesh, draw.weights, .normals, 0, source, normals);
+        const has_tangents = work.tangents.len > 0;
+        const tangents = work.tangents[if (has_tangents) from else 0..if (has_tangents) to else 0];
+        copy(tangents, mesh.tangents, source, .{ 0, 0, 0, 1 });
+        if (mesh.tangents != null) deform.morph(mesh, draw.weights, .tangents, 0, source, tangents);
+        const sign: f32 = if (draw.mirrored) -1 else 1;
+        for (positions, normals, 0..) |*position, *normal, index| {
+            const maps: Maps = if (draw.joint_maps.len > 0)
+                .of(deform.blend(mesh.joint_sets, draw.joint_maps, source + index), draw.mirrored)
+            else
+                draw.maps;
+            position.* = pose_file.round(maps.point.point(pose_file.widen(position.*)));
+            normal.* = vec3.normalize(maps.normal.direction(normal.*)) orelse .{ 0, 0, 0 };
+            if (!has_tangents or mesh.tangents == null) continue;
+            const tangent = &tangents[index];
+            const along = maps.direction.direction(tangent[0..3].*);
+            const unit = vec3.normalize(along) orelse Vec3{ 0, 0, 0 };
+            tangent.* = .{ unit[0], unit[1], unit[2], tangent[3] * sign };
         }
     }
 
@@ -391,7 +466,7 @@ fn placeTangents(draw: *const Draw, to: [][4]f32, source: usize) void {
     const tangents = draw.mesh.tangents orelse return @memset(to, .{ 0, 0, 0, 1 });
     const sign: f32 = if (draw.mirrored) -1 else 1;
     for (to, tangents[source..][0..to.len]) |*to_t, t| {
-        const mapped = tameNormal(draw.direction_map.direction(t[0..3].*));
+        const mapped = tameNormal(draw.maps.direction.direction(t[0..3].*));
         to_t.* = .{ mapped[0], mapped[1], mapped[2], t[3] * sign };
     }
 }

@@ -1,13 +1,15 @@
 //! The pose: where the nodes of a scene are in the world, composed in double precision.
 //!
 //! In: the nodes with their maps into the parent's space, parents first. Out: one map into world
-//! space each, and the center of what is drawn. Where all of it is far away for its size, as models
-//! on the globe are, the world's origin is moved near to it, so that single precision is enough
-//! from there on. A map may overflow to infinity or NaN; who uses it looks.
+//! space each, one for each joint of a skin, and the center of what is drawn. Where all of it is
+//! far away for its size, as models on the globe are, the world's origin is moved near to it, so
+//! that single precision is enough from there on. A map may overflow to infinity or NaN; who uses
+//! it looks.
 
 const std = @import("std");
 const math = @import("../math.zig");
 const scene = @import("../scene.zig");
+const deform = @import("deform.zig");
 const assert = std.debug.assert;
 const vec3d = math.vec3d;
 const AffineD = math.AffineD;
@@ -23,6 +25,7 @@ const sample_count_max = 1023;
 pub const Pose = struct {
     /// By node, into the world.
     maps: []const AffineD,
+    joint_maps: deform.JointMaps,
     /// The median of the vertices by coordinate: in the middle of most of them, however far away
     /// a few are.
     center: Vec3d,
@@ -31,6 +34,7 @@ pub const Pose = struct {
 
     /// Frees the maps.
     pub fn deinit(pose: *const Pose, gpa: std.mem.Allocator) void {
+        deform.deinit(pose.joint_maps, gpa);
         gpa.free(pose.maps);
     }
 };
@@ -39,6 +43,7 @@ pub const Pose = struct {
 /// before its children.
 pub fn compose(gpa: std.mem.Allocator, from: *const scene.Scene) error{OutOfMemory}!Pose {
     const maps = try gpa.alloc(AffineD, from.nodes.len);
+    errdefer gpa.free(maps);
     for (from.nodes, maps, 0..) |node, *map, index| {
         if (node.parent == scene.none) {
             map.* = node.local;
@@ -47,10 +52,14 @@ pub fn compose(gpa: std.mem.Allocator, from: *const scene.Scene) error{OutOfMemo
             map.* = .compose(maps[node.parent], node.local);
         }
     }
-    var pose: Pose = .{ .maps = maps, .center = @splat(0), .size = 0 };
+    const joint_maps = try deform.composeJoints(gpa, from.skins, maps);
+    var pose: Pose = .{ .maps = maps, .joint_maps = joint_maps, .center = @splat(0), .size = 0 };
     findCenter(from, &pose);
     const shift = shiftOf(&pose);
     for (maps) |*map| map.translation = vec3d.sub(map.translation, shift);
+    for (joint_maps) |of_skin| for (of_skin) |*map| {
+        map.translation = vec3d.sub(map.translation, shift);
+    };
     pose.center = vec3d.sub(pose.center, shift);
     return pose;
 }
@@ -72,15 +81,16 @@ fn findCenter(from: *const scene.Scene, pose: *Pose) void {
     const stride = vertex_count / sample_count_max + 1;
     var count: usize = 0;
     var next: u64 = 0; // Of the next sample, from the first vertex of the instance on.
-    for (from.instances) |instance| {
-        const positions = from.meshes[instance.mesh].positions;
-        while (next < positions.len) : (next += stride) {
-            const at = pose.maps[instance.node].point(widen(positions[@intCast(next)]));
+    for (from.instances) |*instance| {
+        const mesh = &from.meshes[instance.mesh];
+        while (next < mesh.positions.len) : (next += stride) {
+            const vertex: usize = @intCast(next);
+            const at = deform.place(mesh, instance, pose.maps, pose.joint_maps, vertex);
             if (!vec3d.isFinite(at)) continue;
             for (&coordinates, at) |*list, coordinate| list[count] = coordinate;
             count += 1;
         }
-        next -= positions.len;
+        next -= mesh.positions.len;
     }
     if (count == 0) return;
     for (&coordinates, &pose.center) |*list, *center| {
@@ -108,6 +118,36 @@ fn testPose(nodes: []const scene.Node, positions: []const math.Vec3, node: u32) 
     from.meshes = &.{.{ .positions = positions, .triangles = &.{}, .material = 0 }};
     from.instances = &.{.{ .mesh = 0, .node = node }};
     return compose(gpa, &from);
+}
+
+test "the center is that of what joints move, and they move with it" {
+    const gpa = std.testing.allocator;
+    var from: scene.Scene = .init(gpa);
+    defer from.deinit();
+    from.nodes = &.{
+        .{ .parent = scene.none, .local = .identity },
+        .{ .parent = scene.none, .local = .translate(.{ 4_700_000.25, 0, 0 }) },
+    };
+    const corners = [_]math.Vec3{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 }, .{ 1, 1, 0 } };
+    const joints: [4][4]u16 = @splat(.{ 0, 0, 0, 0 });
+    const weights: [4][4]f32 = @splat(.{ 0.3, 0.1, 0, 0 });
+    from.meshes = &.{.{
+        .positions = &corners,
+        .joint_sets = &.{.{ .joints = &joints, .weights = &weights }},
+        .triangles = &.{},
+        .material = 0,
+    }};
+    from.skins = &.{.{ .joints = &.{1}, .inverse_bind_maps = &.{.translate(.{ 8, 0, 0 })} }};
+    from.instances = &.{.{ .mesh = 0, .node = 0, .skin = 0 }};
+    const pose = try compose(gpa, &from);
+    defer pose.deinit(gpa);
+    for (pose.center) |coordinate| try std.testing.expect(@abs(coordinate) <= 1);
+    const instance = &from.instances[0];
+    const at = deform.place(&from.meshes[0], instance, pose.maps, pose.joint_maps, 0);
+    try std.testing.expect(@abs(at[0]) <= 2);
+    try std.testing.expectEqual(0.25, at[0] - @floor(at[0]));
+    // The other node is left behind.
+    try std.testing.expect(pose.maps[0].translation[0] < -4e6);
 }
 
 test "a child moves with its parent" {

@@ -211,12 +211,35 @@ fn split(
         .triangles = triangles,
         .material = mesh.material,
     };
-    if (mesh.normals) |all| result.normals = try splitting.extended(arena, Vec3, all);
-    if (mesh.colors) |all| result.colors = try splitting.extended(arena, [4]f32, all);
-    for (&result.texcoords, mesh.texcoords) |*to, set| {
-        if (set) |all| to.* = try splitting.extended(arena, [2]f32, all);
+    try extendVertices(&splitting, arena, mesh, &result);
+    const targets = try arena.alloc(scene.MorphTarget, mesh.morph_targets.len);
+    for (targets, mesh.morph_targets) |*to, *target| {
+        to.* = .{};
+        if (target.positions) |all| to.positions = try splitting.extended(arena, Vec3, all);
+        try extendVertices(&splitting, arena, target, to);
     }
+    result.morph_targets = targets;
+    const sets = try arena.alloc(scene.JointSet, mesh.joint_sets.len);
+    for (sets, mesh.joint_sets) |*to, set| to.* = .{
+        .joints = try splitting.extended(arena, [4]u16, set.joints),
+        .weights = try splitting.extended(arena, [4]f32, set.weights),
+    };
+    result.joint_sets = sets;
     return result;
+}
+
+/// Gives a mesh, or a morph target, what vertices have besides their place and tangent.
+fn extendVertices(
+    splitting: *const Splitting,
+    arena: Allocator,
+    from: anytype,
+    to: anytype,
+) error{OutOfMemory}!void {
+    if (from.normals) |all| to.normals = try splitting.extended(arena, Vec3, all);
+    if (from.colors) |all| to.colors = try splitting.extended(arena, [4]f32, all);
+    for (&to.texcoords, from.texcoords) |*to_set, set| {
+        if (set) |all| to_set.* = try splitting.extended(arena, [2]f32, all);
+    }
 }
 
 /// First vertex of those that triangles use, and how many there are from there to the last.
@@ -328,7 +351,16 @@ test "a vertex between mirrored halves becomes two at the same place" {
         .{ 0, 0, 0, 1 }, .{ 1, 0, 0, 1 }, .{ 2, 0, 0, 1 }, .{ 3, 0, 0, 1 }, .{ 4, 0, 0, 1 },
         .{ 5, 0, 0, 1 }, .{ 6, 0, 0, 1 },
     };
+    var deltas: [7]Vec3 = undefined;
+    var joints: [7][4]u16 = undefined;
+    for (&deltas, &joints, 0..) |*delta, *four, vertex| {
+        delta.* = @splat(@floatFromInt(vertex));
+        four.* = @splat(@intCast(vertex));
+    }
+    mesh.morph_targets = &.{ .{}, .{ .positions = &deltas, .normals = &deltas } };
+    mesh.joint_sets = &.{.{ .joints = &joints, .weights = mesh.colors.? }};
     const made = try withTangents(testing.allocator, arena.allocator(), &mesh, &identity_lookup);
+    try testing.expectEqual(null, made.morph_targets[0].positions);
     try testing.expectEqual(8, made.positions.len); // Six are used, two of them twice.
     try testing.expectEqual(4, made.material);
     for (made.triangles, mesh.triangles, 0..) |triangle, source, index| {
@@ -338,6 +370,11 @@ test "a vertex between mirrored halves becomes two at the same place" {
             try testing.expectEqual(mesh.normals.?[vertex], made.normals.?[corner]);
             try testing.expectEqual(mesh.colors.?[vertex], made.colors.?[corner]);
             try testing.expectEqual(mesh.texcoords[0].?[vertex], made.texcoords[0].?[corner]);
+            const target = &made.morph_targets[1];
+            try testing.expectEqual(deltas[vertex], target.positions.?[corner]);
+            try testing.expectEqual(deltas[vertex], target.normals.?[corner]);
+            try testing.expectEqual(joints[vertex], made.joint_sets[0].joints[corner]);
+            try testing.expectEqual(mesh.colors.?[vertex], made.joint_sets[0].weights[corner]);
             try testing.expectEqual([4]f32{ sign, 0, 0, sign }, made.tangents.?[corner]);
         }
     }

@@ -225,6 +225,9 @@ const Work = struct {
             if (matters) if (mesh.colors) |colors| {
                 range = .{ .least = std.math.inf(f32), .largest = 0 };
                 for (colors) |color| range = join(range, exactly(color[3]));
+                for (mesh.morph_targets) |target| {
+                    if (target.colors != null) range = join(range, .{ .least = 0, .largest = 1 });
+                }
             };
             const all = &work.vertex_alpha[mesh.material];
             all.* = if (work.is_drawn[mesh.material]) join(all.*, range) else range;

@@ -19,6 +19,7 @@ scene: Scene,
 nodes: std.ArrayList(scene_data.Node) = .empty,
 meshes: std.ArrayList(scene_data.Mesh) = .empty,
 instances: std.ArrayList(scene_data.Instance) = .empty,
+skins: std.ArrayList(scene_data.Skin) = .empty,
 materials: std.ArrayList(scene_data.Material) = .empty,
 lights: std.ArrayList(scene_data.Light) = .empty,
 cameras: std.ArrayList(scene_data.Camera) = .empty,
@@ -27,8 +28,8 @@ textures: std.ArrayList(scene_data.Texture) = .empty,
 texture_indices: std.AutoHashMapUnmanaged(scene_data.Texture, u32) = .empty,
 
 const list_names = [_][]const u8{
-    "nodes",    "meshes", "instances", "materials", "lights", "cameras", "images",
-    "textures",
+    "nodes",   "meshes", "instances", "skins", "materials", "lights",
+    "cameras", "images", "textures",
 };
 
 /// A scene with nothing in it. `deinit` it, unless `finish` took it over.
@@ -82,8 +83,21 @@ pub fn addMesh(builder: *Builder, mesh: scene_data.Mesh) Error!u32 {
 
 /// Adds an instance of a mesh at a node.
 pub fn addInstance(builder: *Builder, mesh: u32, node: u32) Error!void {
-    assert(mesh < builder.meshes.items.len and node < builder.nodes.items.len);
-    _ = try builder.add("instances", scene_data.Instance{ .mesh = mesh, .node = node });
+    try builder.addDeformedInstance(.{ .mesh = mesh, .node = node });
+}
+
+/// Adds an instance that may have morph weights, which live in the arena, and a skin that exists.
+pub fn addDeformedInstance(builder: *Builder, instance: scene_data.Instance) Error!void {
+    assert(instance.mesh < builder.meshes.items.len);
+    assert(instance.node < builder.nodes.items.len);
+    assert(instance.skin == scene_data.none or instance.skin < builder.skins.items.len);
+    _ = try builder.add("instances", instance);
+}
+
+/// Adds a skin of nodes that exist, whose arrays live in the arena, and returns its index.
+pub fn addSkin(builder: *Builder, skin: scene_data.Skin) Error!u32 {
+    for (skin.joints) |node| assert(node < builder.nodes.items.len);
+    return builder.add("skins", skin);
 }
 
 /// Adds a mesh in world space with its only instance.

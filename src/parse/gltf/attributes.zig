@@ -1,9 +1,9 @@
 //! Vertex attributes: the accessors that a primitive draws from, each of the right kind.
 //!
 //! In: a primitive's attributes, indices and morph targets. Out: the accessors of its positions,
-//! normals, colours, texture coordinates and tangents. The kinds are those of glTF 2.0, section
-//! 3.7.2.1, and of KHR_mesh_quantization; an attribute that is not drawn has to be of its kind as
-//! well.
+//! normals, colours, texture coordinates, tangents, joints and their weights. The kinds are those
+//! of glTF 2.0, sections 3.7.2.1, 3.7.2.2 and 3.7.3.3, and of KHR_mesh_quantization; an attribute
+//! that is not drawn has to be of its kind as well.
 
 const std = @import("std");
 const c = @import("../cgltf.zig");
@@ -25,6 +25,10 @@ pub const Used = struct {
     color: ?u32 = null,
     tangent: ?u32 = null,
     texcoords: [scene.texcoord_set_count]?u32 = @splat(null),
+    joints: [scene.joint_set_count]?u32 = @splat(null),
+    weights: [scene.joint_set_count]?u32 = @splat(null),
+    /// Whether there are more joints than there are sets for.
+    has_more_joints: bool = false,
 };
 
 /// Finds and checks the attributes of a primitive, and those of its morph targets. Without
@@ -48,6 +52,9 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
     for (list) |*attribute| {
         const index = accessorIndex(source, attribute);
         try checkAttribute(source, attribute, index, positions.count, place);
+        if (attribute.type == .joints and attribute.index >= scene.joint_set_count) {
+            used.has_more_joints = true;
+        }
         const slot = slotOf(&used, attribute) orelse continue;
         if (slot.* != null) {
             return source.fail("{f}: {f} stands twice", .{ place, quote(attribute) });
@@ -62,12 +69,26 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
     return used;
 }
 
+/// The attributes of a morph target, which `find` has checked.
+pub fn ofTarget(source: *const Source, target: *const c.cgltf_morph_target) Used {
+    var used: Used = .{};
+    for (Source.slice(target.attributes, target.attributes_count)) |*attribute| {
+        const slot = slotOf(&used, attribute) orelse continue;
+        slot.* = accessorIndex(source, attribute);
+    }
+    return used;
+}
+
 /// Where an attribute goes; null: it is not drawn.
 fn slotOf(used: *Used, attribute: *const c.cgltf_attribute) ?*?u32 {
     const set = attribute.index;
-    if (attribute.type == .texcoord) {
-        return if (set >= 0 and set < used.texcoords.len) &used.texcoords[@intCast(set)] else null;
-    }
+    const sets: []?u32 = switch (attribute.type) {
+        .texcoord => &used.texcoords,
+        .joints => &used.joints,
+        .weights => &used.weights,
+        else => &.{},
+    };
+    if (set >= 0 and set < sets.len) return &sets[@intCast(set)];
     if (set != 0) return null;
     return switch (attribute.type) {
         .position => &used.position,
@@ -143,14 +164,17 @@ fn checkTarget(
     const index = accessorIndex(source, attribute);
     const accessor = try gltf_accessors.resolve(source, index) orelse return;
     try checkCount(source, accessor, index, vertex_count, place);
-    const vector = switch (attribute.type) {
+    const count = accessor.component_count;
+    const fits = switch (attribute.type) {
         .position,
         .normal,
         .tangent,
-        => true,
-        else => false,
+        => count == 3,
+        .texcoord => count == 2,
+        .color => count == 3 or count == 4,
+        else => true,
     };
-    if (vector and accessor.component_count != 3) return source.fail(
+    if (!fits or accessor.component == .u32) return source.fail(
         "{f}: accessor {d} has no type for a morph target's {f}",
         .{ place, index, quote(attribute) },
     );

@@ -1,10 +1,11 @@
 //! glTF's meshes become triangle lists with one material each.
 //!
 //! In: primitives (glTF 2.0, section 3.7.2). Out: `scene.Mesh`es in the scene's memory, with the
-//! texture coordinates and tangents that their material's textures need. A set of coordinates that
-//! is missing counts as 0, as it does in other viewers. What several primitives share is decoded
-//! once. Every index has been compared with the number of
-//! vertices, every number is finite; strips and fans are taken apart (section 3.7.2.1).
+//! texture coordinates and tangents that their material's textures need, and with the morph targets
+//! and joints that drawn nodes use. A set of coordinates that is missing counts as 0, as it does in
+//! other viewers. What several primitives share is decoded once. Every index has been compared with
+//! the number of vertices, every number is finite; strips and fans are taken apart (section
+//! 3.7.2.1).
 
 const std = @import("std");
 const c = @import("../cgltf.zig");
@@ -29,12 +30,28 @@ normals: std.AutoHashMapUnmanaged(u32, []const Vec3) = .empty,
 colors: std.AutoHashMapUnmanaged(u32, []const [4]f32) = .empty,
 texcoords: std.AutoHashMapUnmanaged(u32, []const [2]f32) = .empty,
 tangents: std.AutoHashMapUnmanaged(u32, []const [4]f32) = .empty,
+/// Of morph targets.
+color_deltas: std.AutoHashMapUnmanaged(u32, []const [4]f32) = .empty,
+joints: std.AutoHashMapUnmanaged(JointAccessors, Joints) = .empty,
 triangles: std.AutoHashMapUnmanaged(Connection, []const [3]u32) = .empty,
 /// Whether a mesh without the coordinates of its textures has been met.
 coordinates_missed: bool = false,
 
-/// Meshes `first..first + count` of the scene.
-pub const Range = struct { first: u32, count: u32 };
+/// Meshes `first..first + count` of the scene, and the largest number of a joint that moves them.
+pub const Range = struct { first: u32, count: u32, joint_max: u32 };
+
+/// What drawn nodes ask of a mesh besides its triangles.
+pub const Deformation = struct {
+    /// By morph target: whether one gives it a weight; empty: none has.
+    targets: []bool = &.{},
+    has_skin: bool = false,
+};
+
+/// By set: the accessors of joints and weights, or `scene.none`.
+const JointAccessors = [scene.joint_set_count][2]u32;
+
+/// What the vertices of a mesh hang on.
+const Joints = struct { sets: []const scene.JointSet, largest: u32 };
 
 /// What determines a triangle list.
 const Connection = struct {
@@ -51,26 +68,35 @@ const Mode = enum { triangles, strip, fan };
 pub fn deinit(meshes: *Meshes) void {
     const gpa = meshes.source.gpa;
     inline for (.{
-        "ranges", "positions", "normals", "colors", "texcoords", "tangents", "triangles",
+        "ranges",   "positions",    "normals", "colors",    "texcoords",
+        "tangents", "color_deltas", "joints",  "triangles",
     }) |name| @field(meshes, name).deinit(gpa);
     meshes.* = undefined;
 }
 
-/// The scene's meshes of the glTF mesh with this index, decoded at the first call.
-pub fn get(meshes: *Meshes, mesh_index: u32) Error!Range {
+/// The scene's meshes of the glTF mesh with this index, decoded at the first call with what all
+/// drawn nodes ask for.
+pub fn get(meshes: *Meshes, mesh_index: u32, deformation: Deformation) Error!Range {
     const gpa = meshes.source.gpa;
     if (meshes.ranges.get(mesh_index)) |range| return range;
     const mesh = Source.item(meshes.source.data.meshes, mesh_index);
     const builder = meshes.source.builder;
     const first: u32 = @intCast(builder.meshes.items.len);
+    var range: Range = .{ .first = first, .count = 0, .joint_max = 0 };
     for (Source.slice(mesh.primitives, mesh.primitives_count), 0..) |*primitive, index| {
         const place: Place = .{ .mesh = mesh_index, .primitive = @intCast(index) };
         const decoded = try meshes.decode(primitive, place) orelse continue;
-        _ = try builder.addMesh(decoded);
+        const index_of = try builder.addMesh(decoded.mesh);
+        const drawn = &builder.meshes.items[index_of];
+        drawn.morph_targets = try meshes.decodeTargets(drawn, primitive, deformation.targets);
+        if (!deformation.has_skin) continue;
+        const joints = try meshes.decodeJoints(&decoded.used, drawn.positions.len, place);
+        drawn.joint_sets = joints.sets;
+        range.joint_max = @max(range.joint_max, joints.largest);
     }
-    const count: u32 = @intCast(builder.meshes.items.len - first);
-    try meshes.ranges.put(gpa, mesh_index, .{ .first = first, .count = count });
-    return .{ .first = first, .count = count };
+    range.count = @intCast(builder.meshes.items.len - first);
+    try meshes.ranges.put(gpa, mesh_index, range);
+    return range;
 }
 
 /// Where a primitive stands, for messages.
@@ -84,7 +110,10 @@ pub const Place = struct {
     }
 };
 
-fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Error!?scene.Mesh {
+/// A mesh as it is modelled, and what it was made of.
+const Decoded = struct { mesh: scene.Mesh, used: attributes.Used };
+
+fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Error!?Decoded {
     const source = meshes.source;
     const mode: Mode = switch (primitive.type) {
         .triangles => .triangles,
@@ -118,7 +147,7 @@ fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Er
             try meshes.materials.useDefault(),
     };
     try meshes.decodeForTextures(&mesh, &used, place);
-    return mesh;
+    return .{ .mesh = mesh, .used = used };
 }
 
 /// What the textures of its material need of a mesh, and no more.
@@ -190,6 +219,17 @@ fn decodeTangents(meshes: *Meshes, index: u32) Error![]const [4]f32 {
 fn decodeColors(meshes: *Meshes, index: u32) Error![]const [4]f32 {
     if (meshes.colors.get(index)) |known| return known;
     const source = meshes.source;
+    const colors = try meshes.decodeRgba(index, 1);
+    if (clampColors(colors)) {
+        source.warn("accessor {d}: colours out of range are clamped", .{index});
+    }
+    try meshes.colors.put(source.gpa, index, colors);
+    return colors;
+}
+
+/// Colours as RGBA, with this alpha where the file has none.
+fn decodeRgba(meshes: *Meshes, index: u32, missing_alpha: f32) Error![][4]f32 {
+    const source = meshes.source;
     const accessor = try attributes.required(source, index);
     try source.charge(@as(u64, accessor.count) * @sizeOf([4]f32));
     const colors = try source.arena.alloc([4]f32, accessor.count);
@@ -199,18 +239,151 @@ fn decodeColors(meshes: *Meshes, index: u32) Error![]const [4]f32 {
         const opaque_colors = try source.gpa.alloc([3]f32, accessor.count);
         defer source.gpa.free(opaque_colors);
         const first = accessors.decodeFloats(3, accessor, opaque_colors);
-        for (colors, opaque_colors) |*color, rgb| color.* = rgb ++ [1]f32{1};
+        for (colors, opaque_colors) |*color, rgb| color.* = rgb ++ [1]f32{missing_alpha};
         break :not_finite first;
     };
     if (not_finite) |bad| return source.fail(
         "accessor {d}: element {d} is not finite",
         .{ index, bad },
     );
-    if (clampColors(colors)) {
-        source.warn("accessor {d}: colours out of range are clamped", .{index});
-    }
-    try meshes.colors.put(source.gpa, index, colors);
     return colors;
+}
+
+/// Of the morph targets that have weights, what the mesh has as well; the others add nothing.
+fn decodeTargets(
+    meshes: *Meshes,
+    mesh: *const scene.Mesh,
+    primitive: *const c.cgltf_primitive,
+    weighted: []const bool,
+) Error![]const scene.MorphTarget {
+    if (weighted.len == 0) return &.{};
+    const source = meshes.source;
+    try source.charge(@as(u64, weighted.len) * @sizeOf(scene.MorphTarget));
+    const targets = try source.arena.alloc(scene.MorphTarget, weighted.len);
+    const raw_targets = Source.slice(primitive.targets, primitive.targets_count);
+    for (targets, raw_targets, weighted) |*target, *raw, is_weighted| {
+        target.* = .{};
+        if (!is_weighted) continue;
+        const used = attributes.ofTarget(source, raw);
+        if (used.position) |index| {
+            target.positions = try meshes.floats(3, &meshes.positions, index);
+        }
+        if (mesh.normals != null) if (used.normal) |index| {
+            target.normals = try meshes.floats(3, &meshes.normals, index);
+        };
+        if (mesh.tangents != null) if (used.tangent) |index| {
+            target.tangents = try meshes.floats(3, &meshes.normals, index);
+        };
+        if (mesh.colors != null) if (used.color) |index| {
+            target.colors = try meshes.decodeColorDeltas(index);
+        };
+        for (&target.texcoords, mesh.texcoords, used.texcoords) |*to, set, accessor| {
+            if (set != null) if (accessor) |index| {
+                to.* = try meshes.floats(2, &meshes.texcoords, index);
+            };
+        }
+    }
+    return targets;
+}
+
+fn decodeColorDeltas(meshes: *Meshes, index: u32) Error![]const [4]f32 {
+    if (meshes.color_deltas.get(index)) |known| return known;
+    const deltas = try meshes.decodeRgba(index, 0);
+    try meshes.color_deltas.put(meshes.source.gpa, index, deltas);
+    return deltas;
+}
+
+/// The joints of a primitive's vertices, none with a warning where it has none.
+fn decodeJoints(
+    meshes: *Meshes,
+    used: *const attributes.Used,
+    vertex_count: usize,
+    place: Place,
+) Error!Joints {
+    const source = meshes.source;
+    if (used.has_more_joints) source.warn(
+        "{f}: more than {d} joints a vertex, the rest is left out",
+        .{ place, 4 * scene.joint_set_count },
+    );
+    var key: JointAccessors = @splat(@splat(scene.none));
+    var count: usize = 0;
+    for (used.joints, used.weights, 0..) |joints, weights, set| {
+        if (joints != null and weights != null) {
+            key[count] = .{ joints.?, weights.? };
+            count += 1;
+        } else if (joints != null or weights != null) source.warn(
+            "{f}: JOINTS_{d} or WEIGHTS_{d} stands alone, and is left out",
+            .{ place, set, set },
+        );
+    }
+    if (count == 0) {
+        source.warn("{f}: has a skin but no joints, its node places it", .{place});
+        return .{ .sets = &.{}, .largest = 0 };
+    }
+    if (meshes.joints.get(key)) |known| return known;
+    try source.charge(@as(u64, vertex_count) * count * (@sizeOf([4]u16) + @sizeOf([4]f32)));
+    var joints: [scene.joint_set_count][][4]u16 = undefined;
+    var weights: [scene.joint_set_count][][4]f32 = undefined;
+    const sets = try source.arena.alloc(scene.JointSet, count);
+    for (sets, joints[0..count], weights[0..count], key[0..count]) |*set, *numbers, *of, pair| {
+        numbers.* = try decodeJointNumbers(source, pair[0]);
+        of.* = try decodeJointWeights(source, pair[1]);
+        set.* = .{ .joints = numbers.*, .weights = of.* };
+    }
+    const largest = tidyJoints(joints[0..count], weights[0..count]);
+    const decoded: Joints = .{ .sets = sets, .largest = largest };
+    try meshes.joints.put(source.gpa, key, decoded);
+    return decoded;
+}
+
+fn decodeJointNumbers(source: *Source, index: u32) Error![][4]u16 {
+    var accessor = try attributes.required(source, index);
+    accessor.normalized = false; // 16 bits are exact in a float.
+    const numbers = try source.gpa.alloc([4]f32, accessor.count);
+    defer source.gpa.free(numbers);
+    assert(accessors.decodeFloats(4, accessor, numbers) == null);
+    const joints = try source.arena.alloc([4]u16, accessor.count);
+    for (joints, numbers) |*to, from| {
+        for (to, from) |*joint, number_of| joint.* = @intFromFloat(number_of);
+    }
+    return joints;
+}
+
+/// None below 0, with a warning where there was one.
+fn decodeJointWeights(source: *Source, index: u32) Error![][4]f32 {
+    const accessor = try attributes.required(source, index);
+    const weights = try source.arena.alloc([4]f32, accessor.count);
+    if (accessors.decodeFloats(4, accessor, weights)) |bad| return source.fail(
+        "accessor {d}: element {d} is not finite",
+        .{ index, bad },
+    );
+    var clamped = false;
+    for (weights) |*four| for (four) |*weight| if (weight.* < 0) {
+        weight.* = 0;
+        clamped = true;
+    };
+    if (clamped) source.warn("accessor {d}: weights below 0 are taken as 0", .{index});
+    return weights;
+}
+
+/// Makes joints without weight joint 0, and vertices without any weight their first joint's.
+/// Returns the largest number of a joint that counts.
+fn tidyJoints(joints: []const [][4]u16, weights: []const [][4]f32) u32 {
+    var largest: u32 = 0;
+    for (0..joints[0].len) |vertex| {
+        var has_weight = false;
+        for (weights) |set| for (set[vertex]) |weight| {
+            if (weight > 0) has_weight = true;
+        };
+        if (!has_weight) weights[0][vertex][0] = 1;
+        for (joints, weights) |numbers, set| {
+            for (&numbers[vertex], set[vertex]) |*joint, weight| {
+                if (!(weight > 0)) joint.* = 0;
+                largest = @max(largest, joint.*);
+            }
+        }
+    }
+    return largest;
 }
 
 /// Whether any had to be.
@@ -312,6 +485,21 @@ test clampColors {
     try std.testing.expect(clampColors(colors[2..3]));
     const expected = [_][4]f32{ .{ 0, 0.5, 2, 1 }, .{ 0, 0, 0, 0 }, .{ 0, 0, 0, 1 } };
     try std.testing.expectEqual(expected, colors);
+}
+
+test tidyJoints {
+    var first = [_][4]u16{ .{ 5, 6, 9, 9 }, .{ 7, 9, 9, 9 }, .{ 9, 9, 9, 9 } };
+    var second = [_][4]u16{ .{ 1, 9, 9, 9 }, .{ 9, 9, 9, 9 }, .{ 9, 9, 8, 9 } };
+    var first_weights = [_][4]f32{ .{ 0.5, 0.25, 0, 0 }, @splat(0), @splat(0) };
+    var second_weights = [_][4]f32{ .{ 0.5, 0, 0, 0 }, @splat(0), .{ 0, 0, 0.5, 0 } };
+    try std.testing.expectEqual(8, tidyJoints(&.{ &first, &second }, &.{
+        &first_weights, &second_weights,
+    }));
+    try std.testing.expectEqual([3][4]u16{ .{ 5, 6, 0, 0 }, .{ 7, 0, 0, 0 }, @splat(0) }, first);
+    try std.testing.expectEqual([3][4]u16{ .{ 1, 0, 0, 0 }, @splat(0), .{ 0, 0, 8, 0 } }, second);
+    // The one without any hangs on its first joint.
+    try std.testing.expectEqual([4]f32{ 1, 0, 0, 0 }, first_weights[1]);
+    try std.testing.expectEqual([4]f32{ 0, 0, 0, 0 }, first_weights[2]);
 }
 
 test assemble {

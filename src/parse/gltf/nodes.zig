@@ -54,6 +54,34 @@ pub fn collect(source: *const Source, shown: ?*const c.cgltf_scene) Error![]cons
     return origins.toOwnedSlice(gpa);
 }
 
+/// The scene's node of a glTF node. It is added, with those that it hangs below, where `places`
+/// (by glTF node: the scene's, or `scene.none`) knows of none.
+pub fn reach(source: *const Source, places: []u32, origin: u32) Error!u32 {
+    const gpa = source.gpa;
+    var missing: std.ArrayList(u32) = .empty;
+    defer missing.deinit(gpa);
+    var parent: u32 = scene.none;
+    var next: ?u32 = origin;
+    while (next) |index| {
+        if (places[index] != scene.none) {
+            parent = places[index];
+            break;
+        }
+        if (missing.items.len == places.len) return source.fail(
+            "node {d}: is its own ancestor, or hangs below a node that is",
+            .{origin},
+        );
+        try missing.append(gpa, index);
+        const above = Source.item(source.data.nodes, index).parent orelse break;
+        next = Source.indexOf(source.data.nodes, above);
+    }
+    while (missing.pop()) |index| {
+        parent = try source.builder.addNode(parent, try localTransform(source, index));
+        places[index] = parent;
+    }
+    return parent;
+}
+
 /// The scene that is asked for, by default the one that the file shows: `scene`, else the first
 /// one; null: the file has none, and none is asked for.
 pub fn choose(

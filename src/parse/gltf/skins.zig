@@ -1,32 +1,48 @@
-//! Skins and morph targets, which are checked but not applied: meshes stand as they were modelled.
+//! Skins and morph targets (glTF 2.0, sections 3.7.3 and 3.7.2.2): how drawn nodes deform meshes.
 //!
-//! In: skins (glTF 2.0, section 3.7.3) and weights (section 3.7.2.2). Out: an error where they do
-//! not fit the meshes that are drawn with them, a warning that they are not applied.
+//! In: skins, and the weights of nodes and meshes; all are checked, drawn or not. Out: what of a
+//! mesh its nodes ask for, the scene's skins, the weights of an instance. Joints that hang outside
+//! of the shown scene become nodes of it as well.
 
 const std = @import("std");
 const c = @import("../cgltf.zig");
+const math = @import("../../math.zig");
+const scene = @import("../../scene.zig");
 const accessors = @import("../accessor.zig");
+const attributes = @import("attributes.zig");
 const gltf_accessors = @import("accessors.zig");
+const nodes = @import("nodes.zig");
+const Meshes = @import("meshes.zig");
 const Source = @import("source.zig");
+const AffineD = math.AffineD;
 const Error = Source.Error;
 const Skins = @This();
 
 source: *Source,
 /// What has been found out about a mesh; nodes may share meshes.
 known: std.AutoHashMapUnmanaged(u32, Facts) = .empty,
+/// By glTF skin that is drawn: the scene's.
+indices: std.AutoHashMapUnmanaged(u32, u32) = .empty,
+/// By glTF node: the scene's node, or `scene.none`; as long as needed only where there are skins.
+places: []u32 = &.{},
 
 const Facts = struct {
     /// Morph targets of each primitive.
     target_count: usize,
-    /// Whether a morph target has a weight of its own.
-    weighted: bool,
-    /// The largest joint number, 0 where there are none.
-    joint_max: u32,
+    /// What drawn nodes ask for.
+    deformation: Meshes.Deformation = .{},
+    /// The mesh's own weights in the scene, where some node goes by them.
+    weights: ?[]const f32 = null,
 };
 
 /// Frees what has been found out.
 pub fn deinit(skins: *Skins) void {
-    skins.known.deinit(skins.source.gpa);
+    const gpa = skins.source.gpa;
+    var facts = skins.known.valueIterator();
+    while (facts.next()) |entry| gpa.free(entry.deformation.targets);
+    skins.known.deinit(gpa);
+    skins.indices.deinit(gpa);
+    gpa.free(skins.places);
     skins.* = undefined;
 }
 
@@ -57,55 +73,132 @@ pub fn checkAll(skins: *Skins) Error!void {
     if (data.animations_count > 0) source.warn("animations are not applied yet", .{});
 }
 
-/// Warns of what a drawn node would do to its mesh besides placing it.
-pub fn checkNode(skins: *Skins, node: *const c.cgltf_node, mesh_index: u32) Error!void {
+/// Notes what the drawn nodes ask of their meshes. `origins` are the glTF nodes of the scene's.
+pub fn collect(skins: *Skins, origins: []const u32) Error!void {
     const source = skins.source;
-    const facts = try skins.get(mesh_index);
-    if (node.has_mesh_gpu_instancing != 0) {
-        source.warn("EXT_mesh_gpu_instancing is not supported: its meshes are drawn once", .{});
+    const data = source.data;
+    for (origins) |origin| {
+        const node = Source.item(data.nodes, origin);
+        const mesh = node.mesh orelse continue;
+        const facts = try skins.get(Source.indexOf(data.meshes, mesh));
+        const deformation = &facts.deformation;
+        if (node.skin != null) deformation.has_skin = true;
+        for (weightsOf(node), 0..) |weight, target| {
+            if (math.flushDenormal(weight) == 0) continue;
+            if (deformation.targets.len == 0) {
+                const targets = try source.gpa.alloc(bool, facts.target_count);
+                @memset(targets, false);
+                deformation.targets = targets;
+            }
+            deformation.targets[target] = true;
+        }
+        if (node.skin == null or skins.places.len > 0) continue;
+        skins.places = try source.gpa.alloc(u32, data.nodes_count);
+        @memset(skins.places, scene.none);
+        for (origins, 0..) |shown, place| skins.places[shown] = @intCast(place);
     }
-    const own_weights = Source.slice(node.weights, node.weights_count);
-    const weighted = if (own_weights.len > 0) anyWeight(own_weights) else facts.weighted;
-    if (weighted) source.warn("morph targets are not applied yet", .{});
-    const skin = node.skin orelse return;
-    source.warn("skins are not applied yet", .{});
-    if (facts.joint_max >= skin[0].joints_count) return source.fail(
+}
+
+/// What drawn nodes ask of a mesh.
+pub fn deformationOf(skins: *const Skins, mesh_index: u32) Meshes.Deformation {
+    return skins.known.get(mesh_index).?.deformation;
+}
+
+/// The weights that a drawn node gives its mesh, as `scene.Instance` has them.
+pub fn instanceWeights(skins: *Skins, node: *const c.cgltf_node) Error![]const f32 {
+    const source = skins.source;
+    const facts = try skins.get(Source.indexOf(source.data.meshes, node.mesh));
+    if (facts.deformation.targets.len == 0) return &.{};
+    const is_own = node.weights_count > 0;
+    if (!is_own) if (facts.weights) |weights| return weights;
+    const weights = try source.arena.dupe(f32, weightsOf(node));
+    for (weights) |*weight| weight.* = math.flushDenormal(weight.*);
+    if (!is_own) facts.weights = weights;
+    return weights;
+}
+
+/// The scene's skin of a drawn node, whose mesh is `range`; `scene.none` without one.
+pub fn instanceSkin(skins: *Skins, node: *const c.cgltf_node, range: Meshes.Range) Error!u32 {
+    const skin = node.skin orelse return scene.none;
+    const source = skins.source;
+    if (range.joint_max >= skin[0].joints_count) return source.fail(
         "mesh {d}: joint {d} of {d}",
-        .{ mesh_index, facts.joint_max, skin[0].joints_count },
+        .{
+            Source.indexOf(source.data.meshes, node.mesh), range.joint_max, skin[0].joints_count,
+        },
+    );
+    const index = Source.indexOf(source.data.skins, skin);
+    if (skins.indices.get(index)) |known| return known;
+    const made = try source.builder.addSkin(try skins.decode(index));
+    try skins.indices.put(source.gpa, index, made);
+    return made;
+}
+
+fn decode(skins: *Skins, index: u32) Error!scene.Skin {
+    const source = skins.source;
+    const skin = Source.item(source.data.skins, index);
+    const count = skin.joints_count;
+    try source.charge(@as(u64, count) * (@sizeOf(u32) + @sizeOf(AffineD)));
+    const joints = try source.arena.alloc(u32, count);
+    for (joints, Source.slice(skin.joints, count)) |*joint, node| {
+        const origin = Source.indexOf(source.data.nodes, node);
+        joint.* = try nodes.reach(source, skins.places, origin);
+    }
+    const maps = try source.arena.alloc(AffineD, count);
+    if (skin.inverse_bind_matrices) |matrices| {
+        try skins.decodeMatrices(index, Source.indexOf(source.data.accessors, matrices), maps);
+    } else @memset(maps, .identity);
+    return .{ .joints = joints, .inverse_bind_maps = maps };
+}
+
+fn decodeMatrices(skins: *Skins, index: u32, accessor_index: u32, maps: []AffineD) Error!void {
+    const source = skins.source;
+    const accessor = try attributes.required(source, accessor_index);
+    try source.charge(@as(u64, accessor.count) * @sizeOf([16]f32));
+    const matrices = try source.gpa.alloc([16]f32, accessor.count);
+    defer source.gpa.free(matrices);
+    // `checkAll` has found all numbers finite.
+    std.debug.assert(accessors.decodeFloats(16, accessor, matrices) == null);
+    var is_affine = true;
+    for (maps, matrices[0..maps.len]) |*map, m| {
+        for ([4]f32{ m[3], m[7], m[11], m[15] }, [4]f32{ 0, 0, 0, 1 }) |value, wanted| {
+            if (!(@abs(value - wanted) <= 1e-5)) is_affine = false;
+        }
+        map.* = .{
+            .x = .{ m[0], m[1], m[2] },
+            .y = .{ m[4], m[5], m[6] },
+            .z = .{ m[8], m[9], m[10] },
+            .translation = .{ m[12], m[13], m[14] },
+        };
+    }
+    if (!is_affine) source.warn(
+        "skin {d}: inverseBindMatrices are not affine, their last rows are ignored",
+        .{index},
     );
 }
 
-fn get(skins: *Skins, mesh_index: u32) Error!Facts {
-    if (skins.known.get(mesh_index)) |facts| return facts;
+/// A node's weights, or those of its mesh where it has none.
+fn weightsOf(node: *const c.cgltf_node) []const f32 {
+    if (node.weights_count > 0) return Source.slice(node.weights, node.weights_count);
+    return Source.slice(node.mesh[0].weights, node.mesh[0].weights_count);
+}
+
+/// Valid until the next mesh is met.
+fn get(skins: *Skins, mesh_index: u32) Error!*Facts {
+    if (skins.known.getPtr(mesh_index)) |facts| return facts;
     const source = skins.source;
     const mesh = Source.item(source.data.meshes, mesh_index);
-    var facts: Facts = .{ .target_count = 0, .weighted = false, .joint_max = 0 };
+    var facts: Facts = .{ .target_count = 0 };
     for (Source.slice(mesh.primitives, mesh.primitives_count), 0..) |*primitive, index| {
         if (index == 0) facts.target_count = primitive.targets_count;
         if (primitive.targets_count != facts.target_count) return source.fail(
             "mesh {d}: primitives with {d} and {d} morph targets",
             .{ mesh_index, facts.target_count, primitive.targets_count },
         );
-        for (Source.slice(primitive.attributes, primitive.attributes_count)) |*attribute| {
-            if (attribute.type != .joints) continue;
-            const accessor_index = Source.indexOf(source.data.accessors, attribute.data);
-            facts.joint_max = @max(facts.joint_max, try skins.largestJoint(accessor_index));
-        }
     }
     try checkWeights(source, "mesh", mesh_index, mesh.weights_count, facts.target_count);
-    facts.weighted = anyWeight(Source.slice(mesh.weights, mesh.weights_count));
     try skins.known.put(source.gpa, mesh_index, facts);
-    return facts;
-}
-
-fn largestJoint(skins: *Skins, index: u32) Error!u32 {
-    const source = skins.source;
-    const accessor = try gltf_accessors.resolve(source, index) orelse return 0;
-    try source.charge(@as(u64, accessor.count) * accessor.elementBytes());
-    return accessors.largestInteger(accessor) orelse source.fail(
-        "accessor {d}: joints have to be unsigned integers",
-        .{index},
-    );
+    return skins.known.getPtr(mesh_index).?;
 }
 
 fn checkWeights(
@@ -119,9 +212,4 @@ fn checkWeights(
         "{s} {d}: {d} weights for {d} morph targets",
         .{ owner, index, weight_count, target_count },
     );
-}
-
-fn anyWeight(weights: []const f32) bool {
-    for (weights) |weight| if (weight != 0) return true;
-    return false;
 }
