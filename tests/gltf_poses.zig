@@ -97,18 +97,25 @@ fn read(
     replacements: []const Replacement,
     said: *Diagnostic,
 ) !raylane.scene.Scene {
+    const text = try makeText(buffer, replacements);
+    defer gpa.free(text);
+    const scene = try raylane.parse.parseBytes(gpa, testing.io, text, .cwd(), .{}, said);
+    scene.check();
+    return scene;
+}
+
+/// The caller frees it.
+fn makeText(buffer: *const Buffer, replacements: []const Replacement) ![]const u8 {
     const encoder = std.base64.standard.Encoder;
     var digits: [encoder.calcSize(@sizeOf(Buffer))]u8 = undefined;
     var text = try texts.replace(document, "$DATA", encoder.encode(&digits, buffer));
-    defer gpa.free(text);
+    errdefer gpa.free(text);
     for (replacements) |pair| {
         const changed = try texts.replace(text, pair[0], pair[1]);
         gpa.free(text);
         text = changed;
     }
-    const scene = try raylane.parse.parseBytes(gpa, testing.io, text, .cwd(), .{}, said);
-    scene.check();
-    return scene;
+    return text;
 }
 
 /// Where the vertices are; the world is the caller's.
@@ -381,4 +388,19 @@ test "what no drawn node asks for is not read" {
     try testing.expectEqual(null, mesh.morph_targets[0].colors);
     try testing.expectEqual(Vec3{ 0, 3, 0 }, mesh.morph_targets[1].positions.?[5]);
     try testing.expectEqual(null, mesh.morph_targets[2].positions);
+}
+
+test "memory that runs out is an error that leaks nothing" {
+    const buffer = makeBuffer();
+    const text = try makeText(&buffer, &.{ targets, meshWeights("[0.5,1,2]") });
+    defer gpa.free(text);
+    const one = struct {
+        fn one(failing: std.mem.Allocator, bytes: []const u8) !void {
+            var said: Diagnostic = .{};
+            const io = testing.io;
+            var scene = try raylane.parse.parseBytes(failing, io, bytes, .cwd(), .{}, &said);
+            scene.deinit();
+        }
+    }.one;
+    try testing.checkAllAllocationFailures(gpa, one, .{text});
 }
