@@ -220,6 +220,11 @@ pub fn Vertex(comptime Lanes: type) type {
         /// Throughput of the path up to here, opacity included.
         throughput: Lanes.Vec3,
 
+        /// Before any is found: what `find` keeps is of none.
+        pub fn init(vertex: *@This()) void {
+            vertex.bsdf.albedo = .unknown;
+        }
+
         /// Where the rays of a group end. Where none hit anything, all but `seen` is undefined.
         pub fn find(vertex: *@This(), frame: *const Frame, path: anytype, group: usize) void {
             const ray = &path.bundle.groups[group];
@@ -229,7 +234,7 @@ pub fn Vertex(comptime Lanes: type) type {
             const point = &vertex.point;
             visibility.findInteraction(Lanes, frame, path, group, point);
             point.opacity = Lanes.F32.select(point.culled, .zero(), point.opacity);
-            vertex.bsdf = .of(point);
+            vertex.bsdf.become(point);
             vertex.seen = point.hit.bitAnd(point.opacity.gt(.zero()));
             const throughput = path.throughputAt(group, point.distance).scale(point.opacity);
             vertex.throughput = .select(vertex.seen, throughput, .splat(.{ 0, 0, 0 }));

@@ -80,6 +80,7 @@ pub fn Whitted(comptime Kernel: type) type {
             whitted.visibility.init(frame);
             whitted.environment_lights = .init(frame.environment, settings.sample_count);
             whitted.stack.count = 0;
+            for (&whitted.vertices) |*vertex| vertex.init();
             return whitted;
         }
 
