@@ -210,6 +210,12 @@ pub fn Whitted(comptime Kernel: type) type {
             if (gone.none()) return;
             var throughput: Vec3 = .select(gone, path.throughput[group], .splat(.{ 0, 0, 0 }));
             if (path.depth == 0) throughput = throughput.scale(whitted.floor_light[group]);
+            whitted.addSurroundings(group, gone, throughput);
+        }
+
+        /// Adds what is around the scene as rays see it, worth what is said, 0 in other lanes.
+        fn addSurroundings(whitted: *Self, group: usize, gone: Mask, throughput: Vec3) void {
+            const path = &whitted.path;
             const around = whitted.frame.environment;
             const environment = if (path.depth == 0) around.backdrop orelse around else around;
             if (path.depth > 0 or environment.is_seen) {
@@ -305,7 +311,6 @@ pub fn Whitted(comptime Kernel: type) type {
         /// Pushes what goes straight on behind holes, culled backs and blended surfaces.
         fn pushRest(whitted: *Self) void {
             const path = &whitted.path;
-            if (path.transparency_depth == visibility_file.transparency_depth_max) return;
             var masks: [group_count]Mask = undefined;
             var any_left = false;
             for (&masks, &whitted.vertices, &path.bundle.groups) |*mask, *vertex, *ray| {
@@ -316,6 +321,8 @@ pub fn Whitted(comptime Kernel: type) type {
                 any_left = any_left or mask.any();
             }
             if (!any_left) return;
+            if (path.transparency_depth == visibility_file.transparency_depth_max)
+                return whitted.endRest(&masks);
             const rest = whitted.stack.push(path.depth, path.transparency_depth + 1);
             rest.bundle = path.bundle;
             rest.sigma_a = path.sigma_a;
@@ -328,6 +335,18 @@ pub fn Whitted(comptime Kernel: type) type {
                 ray.closest = .before(.splat(std.math.inf(f32)));
                 const clear = F32.splat(1).sub(vertex.point.opacity);
                 rest.throughput[group] = path.throughput[group].scale(clear);
+            }
+        }
+
+        /// Ends rays that have gone through as many surfaces as they may: what is left of them is
+        /// better spent on what is around the scene than on a black that nothing there has.
+        fn endRest(whitted: *Self, masks: *const [group_count]Mask) void {
+            for (masks, &whitted.vertices, 0..) |mask, *vertex, group| {
+                if (mask.none()) continue;
+                const clear = F32.splat(1).sub(vertex.point.opacity);
+                const left = whitted.path.throughput[group].scale(clear);
+                const none: Vec3 = .splat(.{ 0, 0, 0 });
+                whitted.addSurroundings(group, mask, .select(mask, left, none));
             }
         }
 
