@@ -146,8 +146,9 @@ pub const Bench = struct {
         return 1 + @as(usize, variant.lanes) * 64 + kind;
     }
 
-    /// Finds a source, starts the meter and looks at the machine at rest.
-    fn findEnergy(
+    /// Finds a source, starts the meter and looks at the machine at rest. Not inlined: what it
+    /// needs of the stack is not to be there while scenes are measured.
+    noinline fn findEnergy(
         bench: *Bench,
         wanted: energy.Wanted,
         source: *energy.Source,
