@@ -255,10 +255,9 @@ pub fn Whitted(comptime Kernel: type) type {
             vertex.find(whitted.frame, &whitted.path, group);
             if (vertex.seen.none()) return;
             const material = &vertex.point.material;
-            const glow = if (whitted.frame.environment.map == null)
-                material.emissive.add(whitted.scatterAmbient(vertex))
-            else
-                material.emissive;
+            var glow = material.emissive;
+            if (whitted.frame.environment.map == null)
+                glow = glow.add(whitted.scatterAmbient(vertex));
             const shown: Vec3 = .select(material.unlit, material.base_color, glow);
             const arriving = vertex.throughput.mul(shown);
             if (!whitted.keeps_display or whitted.path.depth > 0)
