@@ -154,7 +154,7 @@ const sections: []const Section = &.{
         .{
             .usage = "--env FILE",
             .help = "light from all around: an equirectangular image of\n" ++
-                "radiance (hdr, png, jpg), studio or none (default:\n" ++
+                "radiance (exr, hdr, png), studio or none (default:\n" ++
                 "the scene's, or studio, dim around its own lights)",
         },
         .{ .usage = "--env-intensity X", .help = "multiplies its radiance (default: 1)" },
@@ -380,7 +380,7 @@ const Parser = struct {
                 return reader.bad(given, "a scene's name or its index"),
             .up_axis => options.load.up_axis = try reader.choice(given, settings.UpAxis),
             .background => options.view.background = backgroundOf(given.value) orelse
-                return reader.bad(given, "env, studio, transparent, a colour or R,G,B"),
+                return parser.noBackground(given),
             .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
             .floor => options.view.floor = try reader.choice(given, settings.Floor),
             .ambient => options.view.ambient = radiance(given.value) orelse
@@ -462,6 +462,16 @@ const Parser = struct {
                 try reader.number(given, settings.environment_shadow_count),
             else => unreachable, // Those that `set` hands on.
         }
+    }
+
+    fn noBackground(parser: *Parser, given: Reader.Given) Error {
+        const names = [_][]const u8{ "env", "studio", "transparent" } ++ colors.names;
+        if (nearest(given.value, &names)) |name| {
+            return parser.reader.fail("option '{s}': no colour {f}, did you mean '{s}'?", .{
+                given.long, quote(given.value), name,
+            });
+        }
+        return parser.reader.bad(given, "env, studio, transparent, a colour or R,G,B");
     }
 
     fn variantOf(parser: *Parser, name: []const u8) Error!usize {
@@ -855,6 +865,8 @@ test "values arrive as they were meant" {
     try std.testing.expectEqual(.z, (try optionsForTest(&.{"--up-axis=z"})).load.up_axis);
     const background = (try optionsForTest(&.{"--background=#FF8001"})).view.background;
     try std.testing.expectEqual([3]u8{ 255, 128, 1 }, background.srgb);
+    try expectUsage("no colour 'rod', did you mean 'red'?", &.{ "--background=rod", "s" });
+    try expectUsage("did you mean 'transparent'?", &.{ "--background=trasparent", "s" });
     const name = (try optionsForTest(&.{"--background=Tan"})).view.background;
     try std.testing.expectEqual([3]u8{ 0xd2, 0xb4, 0x8c }, name.srgb);
     const linear = (try optionsForTest(&.{"--background=0,0.5,2"})).view.background;

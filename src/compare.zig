@@ -14,6 +14,7 @@ const settings = @import("settings.zig");
 const ssim = @import("compare/ssim.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const Identity = @import("identity.zig").Identity;
 
 /// `InputOutput`: the file cannot be read; `InvalidInput`: it is no image.
 pub const Error = parse_resource.Error;
@@ -22,15 +23,17 @@ pub const Picture = picture_file.Picture;
 /// Linear light behind what is transparent.
 pub const grey = picture_file.grey;
 
-/// The image at a path, of radiance made brighter by `exposure_ev` stops.
+/// The image at a path, of radiance made brighter by `exposure_ev` stops; an error if that is the
+/// file `output`, which is about to be replaced.
 pub fn read(
     gpa: Allocator,
     io: std.Io,
     path: []const u8,
+    output: ?Identity,
     exposure_ev: f32,
     diagnostic: *Diagnostic,
 ) Error!Picture {
-    var opened = try parse_resource.open(gpa, io, path, .{}, diagnostic);
+    var opened = try parse_resource.open(gpa, io, path, .{ .output = output }, diagnostic);
     defer opened.close();
     const scale: f32 = @floatCast(elementary.exp(exposure_ev * std.math.ln2));
     const file = opened.main.bytes;

@@ -171,12 +171,25 @@ fn printBench(
 fn compare(gpa: Allocator, io: Io, options: *const cli.Compare, diagnostic: *Diagnostic) ExitCode {
     var account: Account = .init(gpa, null);
     const allocator = account.allocator();
+    var target: ?Target = openMap(io, options.output, diagnostic) catch {
+        say(io, "raylane: {f}: {s}\n", .{ printable(options.output.?), diagnostic.message.text() });
+        return .failed;
+    };
+    defer if (target) |*map| map.abandon();
+    const replaced = if (target) |*map| map.replaces else null;
     var pictures: [2]raylane.compare.Picture = undefined;
     var count: usize = 0;
     defer for (pictures[0..count]) |*picture| picture.deinit(allocator);
     for (&pictures, options.images) |*picture, name| {
         const ev = options.exposure_ev;
-        picture.* = raylane.compare.read(allocator, io, name, ev, diagnostic) catch |err| {
+        picture.* = raylane.compare.read(
+            allocator,
+            io,
+            name,
+            replaced,
+            ev,
+            diagnostic,
+        ) catch |err| {
             if (err == error.OutOfMemory) account.explain(&diagnostic.message);
             say(io, "raylane: {f}: {s}\n", .{ printable(name), diagnostic.message.text() });
             return exitCodeOf(err);
@@ -192,8 +205,16 @@ fn compare(gpa: Allocator, io: Io, options: *const cli.Compare, diagnostic: *Dia
         });
         return .invalid;
     }
-    return printComparison(allocator, io, options, .{ first, second }, diagnostic) catch
+    const map = if (target) |*map| map else null;
+    return printComparison(allocator, io, options, .{ first, second }, map, diagnostic) catch
         outOfMemory(io);
+}
+
+/// Where the picture of the differences goes; null: there is none.
+fn openMap(io: Io, path: ?[]const u8, diagnostic: *Diagnostic) raylane.output.TargetError!?Target {
+    const name = path orelse return null;
+    if (cli.isStdout(name)) return Target.openStdout(io);
+    return try Target.openFile(io, &signals.temporary_files, name, diagnostic);
 }
 
 fn printComparison(
@@ -201,14 +222,16 @@ fn printComparison(
     io: Io,
     options: *const cli.Compare,
     pictures: [2]*const raylane.compare.Picture,
+    map: ?*Target,
     diagnostic: *Diagnostic,
 ) error{ OutOfMemory, WriteFailed }!ExitCode {
     var comparison: raylane.compare.Comparison = try .of(gpa, pictures[0], pictures[1]);
     defer comparison.deinit(gpa);
-    if (options.output) |name| {
-        writeHeatMap(gpa, io, name, &comparison, diagnostic) catch |err| {
+    if (map) |target| {
+        writeHeatMap(gpa, target, &comparison, diagnostic) catch |err| {
             if (err == error.OutOfMemory) return error.OutOfMemory;
-            say(io, "raylane: {f}: {s}\n", .{ printable(name), diagnostic.message.text() });
+            const name = printable(options.output.?);
+            say(io, "raylane: {f}: {s}\n", .{ name, diagnostic.message.text() });
             return .failed;
         };
     }
@@ -237,16 +260,10 @@ fn printComparison(
 
 fn writeHeatMap(
     gpa: Allocator,
-    io: Io,
-    name: []const u8,
+    target: *Target,
     comparison: *const raylane.compare.Comparison,
     diagnostic: *Diagnostic,
 ) error{ OutOfMemory, InputOutput }!void {
-    var target = if (cli.isStdout(name))
-        Target.openStdout(io)
-    else
-        try Target.openFile(io, &signals.temporary_files, name, diagnostic);
-    defer target.abandon();
     const pixels = try comparison.heatMap(gpa);
     defer gpa.free(pixels);
     const width = comparison.width;

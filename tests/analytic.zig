@@ -321,6 +321,34 @@ test "open furnace: in ambient light of radiance 1 whatever absorbs nothing cann
     }
 }
 
+test "what lies behind more surfaces than a ray may go through is not black" {
+    var veil = fixture.flat(.{ 1, 0, 0 });
+    veil.alpha_mode = .blend;
+    veil.base_color[3] = 1e-6;
+    for ([_]bool{ false, true }) |transparent| for ([_]usize{ 255, 256, 300 }) |count| {
+        var builder: Builder = try .init();
+        for (0..count) |index| {
+            const z = -2 - 0.01 * @as(f32, @floatFromInt(index));
+            try builder.addQuad(veil, .{ 0, 0, z }, .{ 9, 0, 0 }, .{ 0, 9, 0 });
+        }
+        try builder.addCamera(.{ 0, 0, 0 }, 1);
+        var scene = try builder.finish();
+        defer scene.deinit();
+        var image = try fixture.render(&scene, .{
+            .width = 8,
+            .height = 8,
+            .ambient = 0,
+            .background = .{ 0.25, 0.5, 2 },
+            .transparent = transparent,
+        });
+        defer image.deinit(gpa);
+        const expected: [3]f32 = if (transparent) .{ 0, 0, 0 } else .{ 0.25, 0.5, 2 };
+        for (image.pixels) |pixel| {
+            for (expected, pixel[0..3]) |channel, found| try expectClose(channel, found, 1e-3);
+        }
+    };
+}
+
 test "vertex alpha makes no hole in what is opaque" {
     var builder: Builder = try .init();
     try builder.addQuad(fixture.flat(.{ 1, 1, 1 }), .{ 0, 0, -2 }, .{ 9, 0, 0 }, .{ 0, 9, 0 });

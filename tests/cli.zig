@@ -1471,8 +1471,15 @@ test "compare: figures, a map, thresholds, and images that cannot be compared" {
     try testing.expectStringStartsWith(broken.stderr, "raylane: d.ppm: ");
     const absent = try sandbox.expectExit(1, &.{ "compare", "a.ppm", "absent.png" });
     try testing.expectStringStartsWith(absent.stderr, "raylane: absent.png: ");
+    try sandbox.write("e.png", "a text");
+    const itself = try sandbox.expectExit(1, &.{ "compare", "e.png", "a.ppm", "-o./e.png" });
+    try testing.expectEqualStrings(
+        "raylane: e.png: would be overwritten by the output\n",
+        itself.stderr,
+    );
+    try testing.expectEqualStrings("a text", try sandbox.read("e.png"));
     _ = try sandbox.expectExit(2, &.{ "compare", "a.ppm" });
     const help = try sandbox.expectExit(0, &.{ "compare", "--help" });
     try testing.expect(std.mem.find(u8, help.stdout, "--threshold") != null);
-    try sandbox.expectFiles(&.{ "a.ppm", "b.ppm", "c.ppm", "d.ppm", "m.png" });
+    try sandbox.expectFiles(&.{ "a.ppm", "b.ppm", "c.ppm", "d.ppm", "e.png", "m.png" });
 }

@@ -374,6 +374,9 @@ test "materials" {
         .{ "\"metallicFactor\":0", "\"metallicFactor\":-1", odd(
             "material 0: metallicFactor -1 is not in 0..1, clamped",
         ) },
+        .{ "\"BLEND\"", "\"MASK\",\"alphaCutoff\":-1", odd(
+            "material 0: alphaCutoff -1 is below 0, clamped",
+        ) },
         .{ "\"BLEND\"", "\"GLOW\"", odd("materials[0].alphaMode: 'GLOW' is not known, ignored") },
         .{ "\"attenuationDistance\":2", "\"attenuationDistance\":0", odd(
             "material 0: attenuationDistance 0 is not above 0, left out",

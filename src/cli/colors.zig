@@ -41,6 +41,18 @@ const table =
     \\white ffffff  whitesmoke f5f5f5  yellow ffff00  yellowgreen 9acd32
 ;
 
+/// All names.
+pub const names: [148][]const u8 = names: {
+    @setEvalBranchQuota(100_000);
+    var words = std.mem.tokenizeAny(u8, table, " \n");
+    var all: [148][]const u8 = undefined;
+    for (&all) |*name| {
+        name.* = words.next().?;
+        _ = words.next().?; // Its codes.
+    }
+    break :names all;
+};
+
 /// The codes of a name, in either case; null where there is no such colour.
 pub fn named(name: []const u8) ?[3]u8 {
     var words = std.mem.tokenizeAny(u8, table, " \n");
@@ -83,7 +95,8 @@ test named {
         try std.testing.expect(named(word) != null);
         previous = word;
     }
-    try std.testing.expectEqual(148, count);
+    try std.testing.expectEqual(names.len, count);
+    try std.testing.expectEqualStrings(previous, names[names.len - 1]);
 }
 
 test hexadecimal {

@@ -221,7 +221,10 @@ const Reader = struct {
 
     fn clamp(reader: Reader, name: []const u8, value: f32, low: f32, high: f32) f32 {
         if (value >= low and value <= high) return math.flushDenormal(value);
-        reader.source.warn(
+        if (high == float_max) reader.source.warn(
+            "material {d}: {s} {d} is below {d}, clamped",
+            .{ reader.index, name, value, low },
+        ) else reader.source.warn(
             "material {d}: {s} {d} is not in {d}..{d}, clamped",
             .{ reader.index, name, value, low, high },
         );

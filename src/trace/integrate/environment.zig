@@ -58,6 +58,38 @@ pub fn addEscaped(
     if (gone.none()) return;
     var throughput: Vec3 = .select(gone, path.throughput[group], .splat(.{ 0, 0, 0 }));
     if (path.depth == 0) throughput = throughput.scale(floor_light);
+    addSurroundings(Kernel, around, path, group, gone, throughput, sample);
+}
+
+/// Ends paths that have gone straight on through as many surfaces as they may: what is left of them
+/// is better spent on what is around the scene than on a black that nothing there has.
+pub fn endRest(
+    comptime Kernel: type,
+    around: *const world_file.Environment,
+    path: *const path_file.PathState(Kernel),
+    vertices: *const [Kernel.group_count]path_file.Vertex(Kernel.Rays),
+    sample: *sample_file.Sample(Kernel),
+) void {
+    if (path.transparency_depth < visibility_file.transparency_depth_max) return;
+    const masks = path.restLanes(vertices) orelse return;
+    for (masks, vertices, 0..) |mask, *vertex, group| {
+        if (mask.none()) continue;
+        const left = path.restThroughput(vertex, group);
+        const throughput: Kernel.Rays.Vec3 = .select(mask, left, .splat(.{ 0, 0, 0 }));
+        addSurroundings(Kernel, around, path, group, mask, throughput, sample);
+    }
+}
+
+/// Adds what is around the scene as rays see it, worth `throughput`, which is 0 in other lanes.
+fn addSurroundings(
+    comptime Kernel: type,
+    around: *const world_file.Environment,
+    path: *const path_file.PathState(Kernel),
+    group: usize,
+    gone: Kernel.Rays.Mask,
+    throughput: Kernel.Rays.Vec3,
+    sample: *sample_file.Sample(Kernel),
+) void {
     const environment = if (path.depth == 0) around.backdrop orelse around else around;
     if (path.depth > 0 or environment.is_seen)
         return sample.add(group, throughput.mul(seenBy(Kernel, environment, path, group, gone)));

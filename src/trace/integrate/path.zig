@@ -123,6 +123,33 @@ pub fn PathState(comptime Kernel: type) type {
             path.sigma_a[group] = .select(material.volume, beyond, before.sigma_a[group]);
         }
 
+        /// Lanes of paths that go straight on behind their vertices, by group; null: none does.
+        pub fn restLanes(
+            path: *const @This(),
+            vertices: *const [Kernel.group_count]Vertex(Kernel.Rays),
+        ) ?[Kernel.group_count]Kernel.Rays.Mask {
+            var masks: [Kernel.group_count]Kernel.Rays.Mask = undefined;
+            var any_left = false;
+            for (&masks, vertices, &path.bundle.groups) |*mask, *vertex, *ray| {
+                const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
+                mask.* = ray.active.andNot(missed);
+                if (mask.none()) continue;
+                mask.* = mask.bitAnd(vertex.point.opacity.lt(.splat(1)));
+                any_left = any_left or mask.any();
+            }
+            return if (any_left) masks else null;
+        }
+
+        /// What is left of a group's throughput behind a vertex.
+        pub fn restThroughput(
+            path: *const @This(),
+            vertex: *const Vertex(Kernel.Rays),
+            group: usize,
+        ) Vec3 {
+            const clear = Kernel.Rays.F32.splat(1).sub(vertex.point.opacity);
+            return path.throughput[group].scale(clear);
+        }
+
         /// What is left of a group's throughput at a distance: Beer and Lambert's law.
         pub fn throughputAt(
             path: *const @This(),
@@ -176,16 +203,7 @@ pub fn PathStack(comptime Kernel: type) type {
             vertices: *const [Kernel.group_count]Vertex(Kernel.Rays),
         ) void {
             if (path.transparency_depth == visibility.transparency_depth_max) return;
-            var masks: [Kernel.group_count]Kernel.Rays.Mask = undefined;
-            var any_left = false;
-            for (&masks, vertices, &path.bundle.groups) |*mask, *vertex, *ray| {
-                const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
-                mask.* = ray.active.andNot(missed);
-                if (mask.none()) continue;
-                mask.* = mask.bitAnd(vertex.point.opacity.lt(.splat(1)));
-                any_left = any_left or mask.any();
-            }
-            if (!any_left) return;
+            const masks = path.restLanes(vertices) orelse return;
             const rest = stack.push(path.depth, path.transparency_depth + 1);
             rest.bundle = path.bundle;
             rest.sigma_a = path.sigma_a;
@@ -196,8 +214,7 @@ pub fn PathStack(comptime Kernel: type) type {
                 if (mask.none()) continue;
                 ray.tnear = ray.closest;
                 ray.closest = .before(.splat(std.math.inf(f32)));
-                const clear = Kernel.Rays.F32.splat(1).sub(vertex.point.opacity);
-                rest.throughput[group] = path.throughput[group].scale(clear);
+                rest.throughput[group] = path.restThroughput(vertex, group);
             }
         }
 

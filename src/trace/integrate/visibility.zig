@@ -20,7 +20,8 @@ const Grid = @import("../traverse/beam/grid.zig").Grid;
 const Frame = world_file.Frame;
 const Light = world_file.Light;
 
-/// Surfaces that one ray goes on through without a bounce (holes, blended or culled ones).
+/// Surfaces that one ray goes on through without a bounce (holes, blended or culled ones); beyond
+/// them a ray that looks for surfaces leaves the scene, and one that looks for light is stopped.
 pub const transparency_depth_max = 255;
 
 /// Surfaces that weaken a shadow ray before the rest counts as opaque.

@@ -153,6 +153,8 @@ pub fn Whitted(comptime Kernel: type) type {
             if (any_seen) whitted.addLights(coherence);
             // The last pushed is traced first: reflection, refraction, the ray's own rest.
             whitted.stack.pushRest(path, &whitted.vertices);
+            const around = whitted.frame.environment;
+            environment_light.endRest(Kernel, around, path, &whitted.vertices, &whitted.sample);
             if (!any_seen or whitted.isEnd()) return;
             whitted.pushRefraction();
             whitted.pushReflection();
