@@ -155,7 +155,7 @@ const sections: []const Section = &.{
             .usage = "--env FILE",
             .help = "light from all around: an equirectangular image of\n" ++
                 "radiance (exr, hdr, png), studio or none (default:\n" ++
-                "the scene's, or studio for scenes without light)",
+                "the scene's, or studio, dim around its own lights)",
         },
         .{ .usage = "--env-intensity X", .help = "multiplies its radiance (default: 1)" },
         .{

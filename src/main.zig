@@ -422,7 +422,8 @@ const Job = struct {
         if (!job.options.verbose) return;
         if (world.facts.camera_is_default) job.sayOfScene("view: framed on all there is", .{});
         if (world.facts.environment_is_default) {
-            job.sayOfScene("environment: the studio", .{});
+            const dimmed = if (world.facts.own_light_count > 0) ", dimmed" else "";
+            job.sayOfScene("environment: the studio{s}", .{dimmed});
         }
         if (world.facts.lights_are_default) {
             job.sayOfScene("lights: three directional ones fixed to the camera", .{});

@@ -26,8 +26,12 @@ pub const Background = @import("output/background.zig").Background;
 pub const Picture = encode_file.Picture;
 /// How many pixels look like nothing.
 pub const Tally = encode_file.Tally;
-/// The exposure that suits a picture, in stops.
+/// The exposure that suits a picture.
 pub const meter = exposure_file.meter;
+/// See `meter`.
+pub const Metered = exposure_file.Metered;
+/// What an exposure multiplies radiance by.
+pub const exposureScale = exposure_file.scaleOf;
 /// What targets create until they are in place.
 pub const TemporaryFiles = @import("output/temporary.zig").TemporaryFiles;
 

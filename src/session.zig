@@ -97,6 +97,8 @@ pub const Session = struct {
     traced: trace.Statistics = .{},
     /// What the film was traced with.
     rendered: settings.Render = .{},
+    /// What the view shows, for the exposure; null: not metered yet.
+    metered: ?output.Metered = null,
     /// What it was written with, where that is not linear.
     appearance: ?Report.Appearance = null,
 
@@ -258,6 +260,7 @@ pub const Session = struct {
             &session.pool,
             &session.scene.?,
             chosen,
+            session.seen.ambient != null,
             session.output,
             session.diagnostic,
         );
@@ -269,6 +272,8 @@ pub const Session = struct {
         const start = Io.Clock.awake.now(session.io);
         session.rendered = choices;
         session.appearance = null;
+        session.metered = null;
+        try session.dimStudio();
         session.traced = try trace.trace(
             session.gpa,
             choices.variant,
@@ -348,14 +353,47 @@ pub const Session = struct {
         };
     }
 
-    /// In stops: as chosen, or by a small picture of the view, so that it does not depend on the
-    /// pixels that are to be written. Its time counts as tracing.
+    /// In stops: as chosen, or metered. That time counts as tracing.
     fn exposureOf(session: *Session, exposure: settings.Exposure) trace.Error!f32 {
         if (!session.isMetered(exposure)) return if (exposure == .ev) exposure.ev else 0;
         const start = Io.Clock.awake.now(session.io);
+        const metered = try session.meter();
+        session.times.trace_ns += session.since(start);
+        return metered.ev;
+    }
+
+    /// The studio is around lights that the scene has itself, so that what they do not reach is no
+    /// hole.
+    fn isStudioDimmed(session: *const Session) bool {
+        const facts = &session.world.?.facts;
+        return facts.environment_is_default and facts.own_light_count > 0;
+    }
+
+    /// Makes the studio's light a share of its usual one as it is seen with the exposure for the
+    /// scene's own lights, whichever exposure is chosen; all of it where these light next to
+    /// nothing.
+    fn dimStudio(session: *Session) trace.Error!void {
+        if (!session.isStudioDimmed()) return;
+        const metered = try session.meter();
+        const share: f32 = if (metered.is_black) 1 else studio_share;
+        const intensity = session.seen.environment.intensity;
+        const scale = share * intensity / output.exposureScale(metered.ev);
+        session.world.?.environment.scale = @splat(scale);
+    }
+
+    /// Meters a small picture of the view, so that the result does not depend on the pixels that
+    /// are to be written, without a studio that is dimmed by it.
+    fn meter(session: *Session) trace.Error!output.Metered {
+        if (session.metered) |metered| return metered;
         const world = &session.world.?;
         const whole = world.view;
         defer world.view = whole;
+        const around = world.environment;
+        defer world.environment = around;
+        if (session.isStudioDimmed()) {
+            world.environment.map = null;
+            world.environment.is_seen = false;
+        }
         const longest: f32 = @floatFromInt(@max(whole.width, whole.height));
         const scale = @min(1, @as(f32, meter_side) / longest);
         inline for (.{ &world.view.width, &world.view.height }) |side| {
@@ -371,9 +409,8 @@ pub const Session = struct {
         const variant_index = session.rendered.variant;
         _ = try trace.trace(session.gpa, variant_index, &world.frame(), &film, chosen);
         const display = if (film.display) |*other| other else null;
-        const ev = try output.meter(session.gpa, &film.image, display);
-        session.times.trace_ns += session.since(start);
-        return ev;
+        session.metered = try output.meter(session.gpa, &film.image, display);
+        return session.metered.?;
     }
 
     /// Says so where the picture shows next to nothing, and what may help.
@@ -543,6 +580,9 @@ pub fn processorCount() usize {
 
 /// Pixels on the long side of the picture that is metered.
 const meter_side = 64;
+
+/// Share of its usual light that the studio has around lights of the scene.
+const studio_share = 0.1;
 
 /// The radiance of a background; null: as the lights or the scene have it.
 fn radianceOf(background: settings.Background) ?[3]f32 {

@@ -190,7 +190,7 @@ pub const Environment = struct {
     shadow_count: u32 = environment_shadow_count.default,
 
     pub const Source = union(enum) {
-        /// The scene's, or the studio where a scene has no light at all.
+        /// The scene's, or the studio: dimmed where the scene has lights of its own.
         default,
         none,
         studio,

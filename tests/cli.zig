@@ -774,6 +774,13 @@ test "the exposure is metered by lights of the file alone, and the report says i
         "builtin:cornell", "-r40x30", "-o-", try arena.print("--exposure={d}", .{ev}),
     });
     try testing.expectEqualSlices(u8, try sandbox.read("cornell.png"), again.stdout);
+    // What surrounds the lights does not depend on it.
+    const radiance = [_][]const u8{ "builtin:cornell", "-q", "-r40x30", "-o-", "--format=pfm" };
+    const darker = try sandbox.expectExit(0, &(radiance ++ .{"--exposure=-3"}));
+    const automatic = try sandbox.expectExit(0, &radiance);
+    try testing.expectEqualSlices(u8, automatic.stdout, darker.stdout);
+    const lamp = try sandbox.expectExit(0, &(radiance ++ .{"--env=none"}));
+    try testing.expect(!std.mem.eql(u8, automatic.stdout, lamp.stdout));
 
     try sandbox.write("empty.gltf", empty_scene);
     const unlit = try sandbox.expectExit(0, &.{ "empty.gltf", "-q", "-r4x4", "--stats=json" });

@@ -228,6 +228,93 @@ test "it is darker below a box than beside it, and every variant says so alike" 
     try std.testing.expectApproxEqRel(image.at(4, 31).*[1], image.at(32, 31).*[1], 0.01);
 }
 
+const Lamp = struct { position: [3]f32 = .{ -4, 1, -4 }, intensity: f32 };
+
+/// A mirror and a matte sphere by a lamp on their left, or without any.
+fn spheres(lamp: ?Lamp) !raylane.scene.Scene {
+    var mirror = fixture.matte(.{ 0.9, 0.8, 0.7 });
+    mirror.metallic = 1;
+    mirror.roughness = 0;
+    var builder: Builder = try .init();
+    try builder.addSphere(mirror, .{ 0.9, 0, -5 }, 0.8, 12);
+    try builder.addSphere(fixture.matte(.{ 0.8, 0.8, 0.8 }), .{ -0.9, 0, -5 }, 0.8, 12);
+    if (lamp) |light| try builder.addPointLight(light.position, light.intensity);
+    try builder.addCamera(.{ 0, 0, 0 }, 0.4);
+    return builder.finish();
+}
+
+/// The picture of spheres, and the exposure for it.
+fn expose(lamp: ?Lamp, options: fixture.Options) !struct { image: Image, ev: f32 } {
+    var scene = try spheres(lamp);
+    defer scene.deinit();
+    var diagnostic: raylane.diagnostic.Diagnostic = .{};
+    var session: raylane.session.Session =
+        .init(gpa, std.testing.io, options.thread_count, &diagnostic);
+    defer session.deinit();
+    const lanes = raylane.variant.compiled[options.variant].lanes;
+    try fixture.view(&session, &scene, lanes, options);
+    const image = (try fixture.trace(&session, options)).*;
+    session.film = null; // The caller's now.
+    return .{ .image = image, .ev = if (session.metered) |metered| metered.ev else 0 };
+}
+
+test "around lights of the scene there is a tenth of the studio, as the exposure shows it" {
+    const common: fixture.Options = .{ .width = 48, .height = 48, .sample_count = 2 };
+    var dark = common;
+    dark.environment = .{ .source = .none };
+    var studio = common;
+    studio.environment = .{ .intensity = 2 };
+    var surrounded = try expose(null, studio);
+    defer surrounded.image.deinit(gpa);
+    var ev_before: f32 = undefined;
+    for ([_]f32{ 0.5, 50 }) |intensity| {
+        var lit = try expose(.{ .intensity = intensity }, dark);
+        defer lit.image.deinit(gpa);
+        var hash: ?u64 = null;
+        for (0..raylane.variant.compiled.len) |variant| for ([_]usize{ 1, 3 }) |thread_count| {
+            var options = studio;
+            options.variant = variant;
+            options.thread_count = thread_count;
+            var both = try expose(.{ .intensity = intensity }, options);
+            defer both.image.deinit(gpa);
+            try std.testing.expectEqual(hash orelse both.image.hash(), both.image.hash());
+            if (hash == null and intensity == 50)
+                try std.testing.expectApproxEqAbs(ev_before - @log2(100.0), both.ev, 0.011);
+            hash = both.image.hash();
+            ev_before = both.ev;
+            const share = 0.1 / @exp2(both.ev);
+            for (lit.image.pixels, surrounded.image.pixels, both.image.pixels) |own, around, sum| {
+                for (own, around, sum, 0..) |light, studio_light, seen, channel| {
+                    if (channel == 3) continue;
+                    const expected = light + share * studio_light;
+                    try std.testing.expectApproxEqAbs(expected, seen, 1e-4 * (expected + share));
+                }
+            }
+        };
+        // The middle of the mirror, where the light is not.
+        try std.testing.expectEqual([4]f32{ 0, 0, 0, 1 }, lit.image.at(37, 24).*);
+    }
+    try expect(surrounded.image.at(37, 24).*[1] > 0.02);
+}
+
+test "there is all of the studio where lights of the scene light nothing" {
+    const options: fixture.Options = .{ .environment = .{ .source = .studio } };
+    var studio = try expose(null, options);
+    // Within the matte one.
+    const lamp: Lamp = .{ .position = .{ -0.9, 0, -5 }, .intensity = 5 };
+    defer studio.image.deinit(gpa);
+    var lit = try expose(lamp, .{ .environment = .{} });
+    defer lit.image.deinit(gpa);
+    try std.testing.expectEqual(studio.image.hash(), lit.image.hash());
+    try std.testing.expectEqual(0, lit.ev);
+    // Who asks for other light from everywhere gets that alone.
+    var ambient = try expose(lamp, .{ .environment = .{}, .ambient = 0.25 });
+    defer ambient.image.deinit(gpa);
+    var plain = try expose(lamp, .{ .ambient = 0.25 });
+    defer plain.image.deinit(gpa);
+    try std.testing.expectEqual(plain.image.hash(), ambient.image.hash());
+}
+
 test "a floor shows the shadow on it alone" {
     var texels = Sky.plain(.{ 0.5, 0.5, 0.5 });
     texels[2 * Sky.width + 40] = .{ 200, 200, 200 };

@@ -126,12 +126,6 @@ const long_generics = [_]LongGeneric{
         .why = "weighing and laying out in one",
     },
     .{
-        .path = "src/trace/integrate/whitted.zig",
-        .name = "Whitted",
-        .lines = 375,
-        .why = "one algorithm over one state",
-    },
-    .{
         .path = "src/trace/traverse/beam/shadow_receivers.zig",
         .name = "ShadowReceivers",
         .lines = 255,

@@ -21,20 +21,27 @@ const darkness_max = 256.0;
 /// Exposures are whole multiples of 1/100 stop, so that the number that is printed says it all.
 const steps_per_stop = 100;
 
+/// What a picture shows by radiance.
+pub const Metered = struct {
+    /// The exposure for it in stops, within `settings.exposure_auto_ev_max`; 0 where it shows
+    /// nothing, or nothing that is not black.
+    ev: f32 = 0,
+    /// Next to all of what is seen is black.
+    is_black: bool = true,
+};
+
 /// The factor of an exposure in stops, 2^ev. Asserts that it is within f32's normal range.
 pub fn scaleOf(ev: f32) f32 {
     assert(@abs(ev) <= 100);
     return @floatCast(math.elementary.pow(2, ev));
 }
 
-/// The exposure in stops of what a picture shows by radiance, within
-/// `settings.exposure_auto_ev_max`; 0 where it shows nothing, or nothing that is not black. With
-/// colours of the display, their pixels do not count.
+/// Meters a picture. With colours of the display, their pixels do not count.
 pub fn meter(
     gpa: std.mem.Allocator,
     image: *const Image,
     display: ?*const Image,
-) error{OutOfMemory}!f32 {
+) error{OutOfMemory}!Metered {
     const luminances = try gpa.alloc(f32, image.pixels.len);
     defer gpa.free(luminances);
     var count: usize = 0;
@@ -44,16 +51,16 @@ pub fn meter(
         luminances[count] = luminanceOf(pixel) / share;
         count += 1;
     }
-    if (count == 0) return 0;
+    if (count == 0) return .{};
     const seen = luminances[0..count];
     std.mem.sort(f32, seen, {}, std.sort.asc(f32));
     // The least that enough of them do not exceed.
     const bright: f64 = seen[(count * highlight_percentile + 99) / 100 - 1];
-    if (bright < std.math.floatMin(f32)) return ofBrightest(seen[count - 1]);
+    if (bright < std.math.floatMin(f32)) return .{ .ev = ofBrightest(seen[count - 1]) };
     var sum: f64 = 0;
     for (seen) |luminance| sum += math.elementary.log(@max(luminance, bright / darkness_max));
     const average = math.elementary.exp(sum / @as(f64, @floatFromInt(count)));
-    return round(@min(key / average, highlight / bright));
+    return .{ .ev = round(@min(key / average, highlight / bright)), .is_black = false };
 }
 
 /// Where next to all is black: by the one thing that is not, a lamp's reflection or a sliver.
@@ -81,7 +88,7 @@ fn meterGrays(values: []const f32) !f32 {
     var image: Image = try .init(gpa, @intCast(values.len), 1);
     defer image.deinit(gpa);
     for (image.pixels, values) |*pixel, value| pixel.* = .{ value, value, value, 1 };
-    return meter(gpa, &image, null);
+    return (try meter(gpa, &image, null)).ev;
 }
 
 test "an exposure is a power of two" {
@@ -124,11 +131,12 @@ test "bounds, black, and nothing at all" {
     defer image.deinit(gpa);
     image.pixels[0] = .{ 0.36, 0.36, 0.36, 1 };
     image.pixels[1] = .{ 0, 0, 0, 0 };
-    try std.testing.expectEqual(-1, try meter(gpa, &image, null));
+    const metered: Metered = .{ .ev = -1, .is_black = false };
+    try std.testing.expectEqual(metered, try meter(gpa, &image, null));
     // What is the display's is not metered.
     var display: Image = try .init(gpa, 2, 1);
     defer display.deinit(gpa);
     display.pixels[0] = .{ 1, 1, 1, 1 };
     display.pixels[1] = @splat(0);
-    try std.testing.expectEqual(0, try meter(gpa, &image, &display));
+    try std.testing.expectEqual(Metered{}, try meter(gpa, &image, &display));
 }

@@ -39,7 +39,7 @@ pub const Environment = struct {
 
     /// How the scene is surrounded by what the user chose. The user's own file must be an image;
     /// where the scene's is none, a warning says so. It must not be `output`, which is about to be
-    /// replaced.
+    /// replaced. `has_ambient`: the user chose light from everywhere.
     pub fn choose(
         environment: *Environment,
         gpa: Allocator,
@@ -47,10 +47,11 @@ pub const Environment = struct {
         pool: *Pool,
         scene: *const Scene,
         choice: *const settings.Environment,
+        has_ambient: bool,
         output: ?Identity,
         diagnostic: *Diagnostic,
     ) Error!prepare.EnvironmentSettings {
-        const source = sourceFor(scene, choice.source);
+        const source = sourceFor(scene, choice.source, has_ambient);
         var chosen: prepare.EnvironmentSettings = .{
             .is_default = choice.source == .default and source == .studio,
             .is_studio = source == .studio,
@@ -81,10 +82,12 @@ pub const Environment = struct {
 fn sourceFor(
     scene: *const Scene,
     chosen: settings.Environment.Source,
+    has_ambient: bool,
 ) settings.Environment.Source {
     if (chosen != .default) return chosen;
     if (scene.environment != null) return .default;
-    return if (scene.lights.len == 0 and scene.ambient == null) .studio else .none;
+    if (scene.ambient != null) return .none;
+    return if (has_ambient and scene.lights.len > 0) .none else .studio;
 }
 
 fn isSame(left: settings.Environment.Source, right: settings.Environment.Source) bool {

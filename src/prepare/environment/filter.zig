@@ -153,6 +153,17 @@ const Place = struct { depth: u16, column: u16, row: u16 };
 /// Each level leaves three brothers.
 const stack_max = 3 * std.math.log2_int(u32, Tree.size_max / Tree.size_min) + 4;
 
+/// The largest of the lanes. By halves: of `@reduce(.Max)` the x86 backend of debug builds makes
+/// what an earlier vector left in a register.
+inline fn largestLane(comptime count: comptime_int, lanes: @Vector(count, f32)) f32 {
+    if (count == 1) return lanes[0];
+    const half = count / 2;
+    const all: [count]f32 = lanes;
+    const low: @Vector(half, f32) = all[0..half].*;
+    const high: @Vector(half, f32) = all[half..].*;
+    return largestLane(half, @select(f32, low > high, low, high));
+}
+
 /// Directions under way.
 const Block = struct {
     x: Lanes,
@@ -198,7 +209,7 @@ const Block = struct {
     inline fn meet(block: *Block, node: *const Node, is_leaf: bool) bool {
         const to = node.direction;
         const cosine = (block.x * splat(to[0]) + block.y * splat(to[1])) + block.z * splat(to[2]);
-        const nearest = @reduce(.Max, cosine);
+        const nearest = largestLane(lane_count, cosine);
         // A chord of the sphere is no longer than its arc, and a texel hardly longer than wide.
         if (nearest < 0 and nearest * nearest > 2 * node.solid_angle) return false;
         const distance_squared = 2 - 2 * nearest;
@@ -229,3 +240,31 @@ const Block = struct {
         return @splat(value);
     }
 };
+
+test "a level has the bits that it has in every build and on every target" {
+    var arena_state: std.heap.ArenaAllocator = .init(std.testing.allocator);
+    defer arena_state.deinit();
+    const arena = arena_state.allocator();
+    const finest: Level = try .init(arena, Tree.size_min);
+    for (0..finest.size) |row| for (0..finest.size) |column| {
+        const value: f32 = @floatFromInt(1 + (7 * row + 3 * column) % 11);
+        finest.at(column, row).* = .{ value, 2 * value, 3, 0 };
+    };
+    const pyramid = [_]Level{ try .init(arena, 16), finest };
+    for (0..16) |row| for (0..16) |column| {
+        pyramid[0].at(column, row).* = finest.at(column / 2, row / 2).*;
+    };
+    const tree: Tree = try .init(arena, &pyramid);
+    const Case = struct { Lobe, [4]u32 };
+    for ([_]Case{
+        .{ .cosine, .{ 0x40bb2b18, 0x40c047c8, 0x40c4b0b7, 0x40c7615e } },
+        .{ .{ .ggx = 0.125 }, .{ 0x3fd25f9e, 0x4088493b, 0x40df0c01, 0x411a0aa7 } },
+        .{ .{ .ggx = 0.5 }, .{ 0x40a38967, 0x40bb5c08, 0x40d4fab6, 0x40d368b4 } },
+    }) |case| {
+        const level: Level = try .init(arena, 8);
+        convolve(&tree, case[0], level, 4, 2);
+        var bits: [4]u32 = undefined;
+        for (&bits, 4..) |*to, column| to.* = @bitCast(level.at(column, 3).*[0]);
+        try std.testing.expectEqual(case[1], bits);
+    }
+}

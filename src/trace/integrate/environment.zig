@@ -17,6 +17,8 @@ const bsdf_file = @import("../shade/bsdf.zig");
 const environment_file = @import("../shade/environment.zig");
 const lights_file = @import("environment_lights.zig");
 const path_file = @import("path.zig");
+const ray_file = @import("../traverse/ray.zig");
+const sample_file = @import("sample.zig");
 const visibility_file = @import("visibility.zig");
 const EnvironmentLight = lights_file.EnvironmentLight;
 const EnvironmentLights = lights_file.EnvironmentLights;
@@ -33,14 +35,69 @@ pub fn Vertices(comptime Kernel: type) type {
         path: *const path_file.PathState(Kernel),
         all: *const [Kernel.group_count]path_file.Vertex(Kernel.Rays),
         /// Lanes whose reflection is traced: only the diffuse part is missing.
-        traced: [Kernel.group_count]Kernel.Rays.Mask,
+        traced: *const [Kernel.group_count]Kernel.Rays.Mask,
         /// No rays go on from here.
         is_end: bool,
     };
 }
 
+/// Adds what rays of a group see that left the scene, where primary ones meet the floor
+/// `floor_light` of it.
+pub fn addEscaped(
+    comptime Kernel: type,
+    around: *const world_file.Environment,
+    path: *const path_file.PathState(Kernel),
+    group: usize,
+    floor_light: Kernel.Rays.F32,
+    sample: *sample_file.Sample(Kernel),
+) void {
+    const Vec3 = Kernel.Rays.Vec3;
+    const ray = &path.bundle.groups[group];
+    const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
+    const gone = ray.active.bitAnd(missed);
+    if (gone.none()) return;
+    var throughput: Vec3 = .select(gone, path.throughput[group], .splat(.{ 0, 0, 0 }));
+    if (path.depth == 0) throughput = throughput.scale(floor_light);
+    addSurroundings(Kernel, around, path, group, gone, throughput, sample);
+}
+
+/// Adds what rays see that go on behind more surfaces than they may: what is around the scene. It
+/// is there in any case, while black would cover it.
+pub fn addCut(
+    comptime Kernel: type,
+    around: *const world_file.Environment,
+    path: *const path_file.PathState(Kernel),
+    vertices: *const [Kernel.group_count]path_file.Vertex(Kernel.Rays),
+    sample: *sample_file.Sample(Kernel),
+) void {
+    if (!path.isAtEnd()) return;
+    for (vertices, 0..) |*vertex, group| {
+        const cut = path.goesOn(group, vertex);
+        if (cut.none()) continue;
+        const left = path.throughputBehind(group, vertex);
+        const throughput: Kernel.Rays.Vec3 = .select(cut, left, .splat(.{ 0, 0, 0 }));
+        addSurroundings(Kernel, around, path, group, cut, throughput, sample);
+    }
+}
+
+/// The throughput of rays that are not `gone` is 0.
+fn addSurroundings(
+    comptime Kernel: type,
+    around: *const world_file.Environment,
+    path: *const path_file.PathState(Kernel),
+    group: usize,
+    gone: Kernel.Rays.Mask,
+    throughput: Kernel.Rays.Vec3,
+    sample: *sample_file.Sample(Kernel),
+) void {
+    const environment = if (path.depth == 0) around.backdrop orelse around else around;
+    if (path.depth > 0 or environment.is_seen)
+        return sample.add(group, throughput.mul(seenBy(Kernel, environment, path, group, gone)));
+    sample.addEscaped(group, throughput, environment.background);
+}
+
 /// What rays of a group see that leave the scene, in the lanes asked for.
-pub fn seenBy(
+fn seenBy(
     comptime Kernel: type,
     environment: *const world_file.Environment,
     path: *const path_file.PathState(Kernel),
@@ -58,8 +115,24 @@ pub fn seenBy(
     );
 }
 
-/// Adds the light of the environment. Vertices of coherent rays are near to each other. Returns how
-/// many shadow rays it took.
+/// Ambient light that points scatter: diffusely, and in place of rays that are not traced.
+pub fn scatterAmbient(
+    comptime Lanes: type,
+    environment: *const world_file.Environment,
+    vertex: *const path_file.Vertex(Lanes),
+    traced: Lanes.Mask,
+    is_end: bool,
+) Lanes.Vec3 {
+    const bsdf = &vertex.bsdf;
+    const diffuse = bsdf.diffuse_albedo.scale(vertex.point.material.occlusion);
+    const specular: Lanes.Vec3 = .select(traced, .splat(.{ 0, 0, 0 }), bsdf.specular_albedo);
+    var scattered = diffuse.add(specular);
+    if (is_end) scattered = scattered.add(bsdf.mirror.transmitted);
+    return scattered.scale(.splat(environment.ambient));
+}
+
+/// Adds the light of the environment's map, if there is one. Vertices of coherent rays are near to
+/// each other. Returns how many shadow rays it took.
 pub fn addLight(
     comptime Kernel: type,
     visibility: *visibility_file.Visibility(Kernel),
@@ -69,6 +142,8 @@ pub fn addLight(
     coherence: dispatch.Coherence,
     radiance: *[Kernel.group_count]Kernel.Rays.Vec3,
 ) u64 {
+    const environment = visibility.frame.environment;
+    if (environment.map == null) return 0;
     const Receiver = ReceiverOf(Kernel.Rays);
     const all = lights.all();
     var receivers: [Kernel.group_count]Receiver = undefined;
@@ -81,7 +156,6 @@ pub fn addLight(
     for (lights.ofSample(sample)) |part| for (part) |*light| {
         ray_count += addShadow(Kernel, visibility, light, vertices, coherence, &receivers);
     };
-    const environment = visibility.frame.environment;
     for (&receivers, vertices.all, vertices.traced, radiance) |*receiver, *vertex, traced, *sum| {
         if (receiver.lit.none()) continue;
         const is_end = vertices.is_end;

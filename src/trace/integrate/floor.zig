@@ -1,6 +1,6 @@
 //! A floor that cannot be seen and catches shadow: how much of the light arrives on a plane below.
 //!
-//! In: primary rays that left the scene, a height. Out: the share of a plane's light that arrives
+//! In: primary rays that left the scene. Out: the share of a plane's light that arrives
 //! where they meet it from above, as shadow rays of the environment's lights of a sample and of
 //! the scene's lights have it, weighed by luminance. As with surfaces (`environment.zig`), the mean
 //! over all samples is that of all lights.
@@ -14,20 +14,20 @@ const path_file = @import("path.zig");
 const visibility_file = @import("visibility.zig");
 const EnvironmentLights = @import("environment_lights.zig").EnvironmentLights;
 
-/// Finds the share in each lane, 1 where a ray does not meet the plane; `points` is room for where
-/// they do. Returns how many shadow rays it took.
+/// Finds the share in each lane, 1 where there is no floor or a ray does not meet it; `points` is
+/// room for where they do. Returns how many shadow rays it took.
 pub fn lightShare(
     comptime Kernel: type,
     visibility: *visibility_file.Visibility(Kernel),
     lights: *const EnvironmentLights,
     sample: u32,
-    height: f32,
     path: *const path_file.PathState(Kernel),
     points: *[Kernel.group_count]path_file.Vertex(Kernel.Rays),
     shares: *[Kernel.group_count]Kernel.Rays.F32,
 ) u64 {
     const Rays = Kernel.Rays;
     shares.* = @splat(.splat(1));
+    const height = visibility.frame.environment.floor_height orelse return 0;
     var any_met = false;
     for (points, 0..) |*point, group| {
         meet(Kernel, height, path, group, point);

@@ -40,10 +40,17 @@ pub fn PathState(comptime Kernel: type) type {
         /// Surfaces that the ray has gone on through without a bounce.
         transparency_depth: u32,
 
+        /// Nothing on the way yet.
+        pub fn start(path: *@This()) void {
+            path.throughput = @splat(.splat(.{ 1, 1, 1 }));
+            path.sigma_a = @splat(.splat(.{ 0, 0, 0 }));
+            path.roughness = @splat(.zero());
+        }
+
         /// Gives primary rays their cones.
-        pub fn startCones(path: *@This(), start: camera.Footprint) void {
-            const slope: F32 = .splat(start.slope);
-            path.cone_width = @splat(.splat(start.width));
+        pub fn startCones(path: *@This(), footprint: camera.Footprint) void {
+            const slope: F32 = .splat(footprint.slope);
+            path.cone_width = @splat(.splat(footprint.width));
             for (&path.bundle.groups, &path.cone_spread) |*ray, *spread| {
                 spread.* = slope.div(ray.line.direction.length());
             }
@@ -85,6 +92,62 @@ pub fn PathState(comptime Kernel: type) type {
                 ray_cone.refracted(Kernel.Rays, spread, width, point.curvature, eta);
             path.cone_width[group] = width;
             path.cone_spread[group] = .select(material.volume, bent, spread);
+        }
+
+        /// Starts the active rays of a group off a surface, on the side that `away` points to.
+        pub fn leave(
+            path: *@This(),
+            before: *const @This(),
+            group: usize,
+            point: *const Interaction,
+            away: Vec3,
+            direction: Vec3,
+        ) void {
+            const origin = point.offsetOrigin(away, .zero());
+            const from = before.bundle.groups[group].closest.primitive;
+            path.roughness[group] = before.roughness[group].max(point.material.roughness);
+            const ray = &path.bundle.groups[group];
+            ray.* = .endless(.init(origin, direction), from, ray.active);
+        }
+
+        /// Takes rays of a group through a surface, into what it bounds or out of it.
+        pub fn cross(
+            path: *@This(),
+            before: *const @This(),
+            group: usize,
+            point: *const Interaction,
+        ) void {
+            const material = &point.material;
+            const outside: Vec3 = .splat(.{ 0, 0, 0 });
+            const beyond: Vec3 = .select(point.back, outside, material.sigma_a);
+            path.sigma_a[group] = .select(material.volume, beyond, before.sigma_a[group]);
+        }
+
+        /// Rays have gone through as many surfaces without a bounce as they may.
+        pub fn isAtEnd(path: *const @This()) bool {
+            return path.transparency_depth == visibility.transparency_depth_max;
+        }
+
+        /// Rays of a group that go straight on behind holes, culled backs and blended surfaces.
+        pub fn goesOn(
+            path: *const @This(),
+            group: usize,
+            vertex: *const Vertex(Kernel.Rays),
+        ) Kernel.Rays.Mask {
+            const ray = &path.bundle.groups[group];
+            const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
+            const met = ray.active.andNot(missed);
+            if (met.none()) return met;
+            return met.bitAnd(vertex.point.opacity.lt(.splat(1)));
+        }
+
+        /// Throughput of those.
+        pub fn throughputBehind(
+            path: *const @This(),
+            group: usize,
+            vertex: *const Vertex(Kernel.Rays),
+        ) Vec3 {
+            return path.throughput[group].scale(F32.splat(1).sub(vertex.point.opacity));
         }
 
         /// What is left of a group's throughput at a distance: Beer and Lambert's law.
@@ -130,6 +193,35 @@ pub fn PathStack(comptime Kernel: type) type {
             path.depth = depth;
             path.transparency_depth = transparency_depth;
             return path;
+        }
+
+        /// Pushes what of a path goes straight on behind holes, culled backs and blended surfaces,
+        /// if any does.
+        pub fn pushRest(
+            stack: *@This(),
+            path: *const PathState(Kernel),
+            vertices: *const [Kernel.group_count]Vertex(Kernel.Rays),
+        ) void {
+            if (path.isAtEnd()) return;
+            var masks: [Kernel.group_count]Kernel.Rays.Mask = undefined;
+            var any_left = false;
+            for (&masks, vertices, 0..) |*mask, *vertex, group| {
+                mask.* = path.goesOn(group, vertex);
+                any_left = any_left or mask.any();
+            }
+            if (!any_left) return;
+            const rest = stack.push(path.depth, path.transparency_depth + 1);
+            rest.bundle = path.bundle;
+            rest.sigma_a = path.sigma_a;
+            rest.keepCones(path);
+            rest.roughness = path.roughness;
+            for (&rest.bundle.groups, masks, vertices, 0..) |*ray, mask, *vertex, group| {
+                ray.active = mask;
+                if (mask.none()) continue;
+                ray.tnear = ray.closest;
+                ray.closest = .before(.splat(std.math.inf(f32)));
+                rest.throughput[group] = path.throughputBehind(group, vertex);
+            }
         }
 
         /// The last pushed, to be used before the next is; null if none waits.
