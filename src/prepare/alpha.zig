@@ -281,8 +281,8 @@ const Bounds = struct {
     /// Along an axis: blocks that are looked at first, and at most in all.
     const few = 4;
     const many = 16;
-    /// Larger texture coordinates leave too few digits for texels.
-    const coordinate_max: f32 = 1024;
+    /// Places that are more texels away, or sums of such, have too few digits for parts of one.
+    const distance_max: f32 = 1 << 19;
 
     const Blocks = struct { columns: u32, rows: u32, codes: [][2]u8 };
 
@@ -359,8 +359,10 @@ const Bounds = struct {
             for (triangle) |vertex| {
                 const set = mesh.texcoords[lookup.texcoord_set];
                 const at: [2]f32 = if (set) |all| all[vertex] else .{ 0, 0 };
-                const coordinate = row[0] * at[0] + row[1] * at[1] + row[2];
-                if (!(@abs(coordinate) <= coordinate_max)) return .some;
+                const parts = [3]f32{ row[0] * at[0], row[1] * at[1], row[2] };
+                const extent = @abs(parts[0]) + @abs(parts[1]) + @abs(parts[2]);
+                if (!(extent * @as(f32, @floatFromInt(size)) <= distance_max)) return .some;
+                const coordinate = parts[0] + parts[1] + parts[2];
                 low = @min(low, coordinate);
                 high = @max(high, coordinate);
             }
@@ -508,6 +510,26 @@ test "left there is nothing, right there is all, by every wrap" {
         const lookup = testLookup(case[0]);
         const share = bounds.classify(&lookup, &mesh, .{ 0, 1, 2 }, limits);
         try testing.expectEqual(case[2], share);
+    }
+}
+
+test "what has no digits left for texels is looked at again when it is hit" {
+    var alpha: [64 * 64]u8 = undefined;
+    for (&alpha, 0..) |*code, texel| code.* = if (texel % 64 < 32) 0 else 255;
+    var texels: [4 * alpha.len]u8 = undefined;
+    const level = testTexels(64, 64, &alpha, &texels);
+    const bounds: Bounds = try .init(testing.allocator, &level);
+    defer bounds.deinit(testing.allocator);
+    const limits: Limits = .{ .whole = 128, .seen = 128 };
+    // A float at 10^6 has steps of 4 texels, whatever is taken away behind it.
+    for ([_]f32{ 0, 1e6 }, [_]Share{ .whole, .some }) |far, share| {
+        const coordinates = [3][2]f32{
+            .{ far + 0.625, 0 }, .{ far + 0.75, 0 }, .{ far + 0.75, 1 },
+        };
+        const mesh = testMesh(&coordinates);
+        var lookup = testLookup(.repeat);
+        lookup.transform[0][2] = -far;
+        try testing.expectEqual(share, bounds.classify(&lookup, &mesh, .{ 0, 1, 2 }, limits));
     }
 }
 

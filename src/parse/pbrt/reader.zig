@@ -701,6 +701,9 @@ pub fn finish(reader: *Reader) Error!void {
     if (builder.sky) |sky| {
         if (scene.environment == null) scene.background = sky;
         scene.ambient = spectra.luminance(sky);
+    } else if (builder.scene.lights.items.len > 0) {
+        // The file says all the light that there is.
+        scene.ambient = 0;
     }
     try builder.finish(view.place.?, projection);
 }

@@ -61,26 +61,26 @@ pub fn addEscaped(
     addSurroundings(Kernel, around, path, group, gone, throughput, sample);
 }
 
-/// Adds what rays see that go on behind more surfaces than they may: what is around the scene. It
-/// is there in any case, while black would cover it.
-pub fn addCut(
+/// Ends paths that have gone straight on through as many surfaces as they may: what is left of them
+/// is better spent on what is around the scene than on a black that nothing there has.
+pub fn endRest(
     comptime Kernel: type,
     around: *const world_file.Environment,
     path: *const path_file.PathState(Kernel),
     vertices: *const [Kernel.group_count]path_file.Vertex(Kernel.Rays),
     sample: *sample_file.Sample(Kernel),
 ) void {
-    if (!path.isAtEnd()) return;
-    for (vertices, 0..) |*vertex, group| {
-        const cut = path.goesOn(group, vertex);
-        if (cut.none()) continue;
-        const left = path.throughputBehind(group, vertex);
-        const throughput: Kernel.Rays.Vec3 = .select(cut, left, .splat(.{ 0, 0, 0 }));
-        addSurroundings(Kernel, around, path, group, cut, throughput, sample);
+    if (path.transparency_depth < visibility_file.transparency_depth_max) return;
+    const masks = path.restLanes(vertices) orelse return;
+    for (masks, vertices, 0..) |mask, *vertex, group| {
+        if (mask.none()) continue;
+        const left = path.restThroughput(vertex, group);
+        const throughput: Kernel.Rays.Vec3 = .select(mask, left, .splat(.{ 0, 0, 0 }));
+        addSurroundings(Kernel, around, path, group, mask, throughput, sample);
     }
 }
 
-/// The throughput of rays that are not `gone` is 0.
+/// Adds what is around the scene as rays see it, worth `throughput`, which is 0 in other lanes.
 fn addSurroundings(
     comptime Kernel: type,
     around: *const world_file.Environment,

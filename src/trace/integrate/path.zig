@@ -123,31 +123,31 @@ pub fn PathState(comptime Kernel: type) type {
             path.sigma_a[group] = .select(material.volume, beyond, before.sigma_a[group]);
         }
 
-        /// Rays have gone through as many surfaces without a bounce as they may.
-        pub fn isAtEnd(path: *const @This()) bool {
-            return path.transparency_depth == visibility.transparency_depth_max;
+        /// Lanes of paths that go straight on behind their vertices, by group; null: none does.
+        pub fn restLanes(
+            path: *const @This(),
+            vertices: *const [Kernel.group_count]Vertex(Kernel.Rays),
+        ) ?[Kernel.group_count]Kernel.Rays.Mask {
+            var masks: [Kernel.group_count]Kernel.Rays.Mask = undefined;
+            var any_left = false;
+            for (&masks, vertices, &path.bundle.groups) |*mask, *vertex, *ray| {
+                const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
+                mask.* = ray.active.andNot(missed);
+                if (mask.none()) continue;
+                mask.* = mask.bitAnd(vertex.point.opacity.lt(.splat(1)));
+                any_left = any_left or mask.any();
+            }
+            return if (any_left) masks else null;
         }
 
-        /// Rays of a group that go straight on behind holes, culled backs and blended surfaces.
-        pub fn goesOn(
+        /// What is left of a group's throughput behind a vertex.
+        pub fn restThroughput(
             path: *const @This(),
-            group: usize,
             vertex: *const Vertex(Kernel.Rays),
-        ) Kernel.Rays.Mask {
-            const ray = &path.bundle.groups[group];
-            const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
-            const met = ray.active.andNot(missed);
-            if (met.none()) return met;
-            return met.bitAnd(vertex.point.opacity.lt(.splat(1)));
-        }
-
-        /// Throughput of those.
-        pub fn throughputBehind(
-            path: *const @This(),
             group: usize,
-            vertex: *const Vertex(Kernel.Rays),
         ) Vec3 {
-            return path.throughput[group].scale(F32.splat(1).sub(vertex.point.opacity));
+            const clear = Kernel.Rays.F32.splat(1).sub(vertex.point.opacity);
+            return path.throughput[group].scale(clear);
         }
 
         /// What is left of a group's throughput at a distance: Beer and Lambert's law.
@@ -202,14 +202,8 @@ pub fn PathStack(comptime Kernel: type) type {
             path: *const PathState(Kernel),
             vertices: *const [Kernel.group_count]Vertex(Kernel.Rays),
         ) void {
-            if (path.isAtEnd()) return;
-            var masks: [Kernel.group_count]Kernel.Rays.Mask = undefined;
-            var any_left = false;
-            for (&masks, vertices, 0..) |*mask, *vertex, group| {
-                mask.* = path.goesOn(group, vertex);
-                any_left = any_left or mask.any();
-            }
-            if (!any_left) return;
+            if (path.transparency_depth == visibility.transparency_depth_max) return;
+            const masks = path.restLanes(vertices) orelse return;
             const rest = stack.push(path.depth, path.transparency_depth + 1);
             rest.bundle = path.bundle;
             rest.sigma_a = path.sigma_a;
@@ -220,7 +214,7 @@ pub fn PathStack(comptime Kernel: type) type {
                 if (mask.none()) continue;
                 ray.tnear = ray.closest;
                 ray.closest = .before(.splat(std.math.inf(f32)));
-                rest.throughput[group] = path.throughputBehind(group, vertex);
+                rest.throughput[group] = path.restThroughput(vertex, group);
             }
         }
 
@@ -243,6 +237,11 @@ pub fn Vertex(comptime Lanes: type) type {
         /// Throughput of the path up to here, opacity included.
         throughput: Lanes.Vec3,
 
+        /// Before any is found: what `find` keeps is of none.
+        pub fn init(vertex: *@This()) void {
+            vertex.bsdf.albedo = .unknown;
+        }
+
         /// Where the rays of a group end. Where none hit anything, all but `seen` is undefined.
         pub fn find(vertex: *@This(), frame: *const Frame, path: anytype, group: usize) void {
             const ray = &path.bundle.groups[group];
@@ -252,7 +251,7 @@ pub fn Vertex(comptime Lanes: type) type {
             const point = &vertex.point;
             visibility.findInteraction(Lanes, frame, path, group, point);
             point.opacity = Lanes.F32.select(point.culled, .zero(), point.opacity);
-            vertex.bsdf = .of(point);
+            vertex.bsdf.become(point);
             vertex.seen = point.hit.bitAnd(point.opacity.gt(.zero()));
             const throughput = path.throughputAt(group, point.distance).scale(point.opacity);
             vertex.throughput = .select(vertex.seen, throughput, .splat(.{ 0, 0, 0 }));

@@ -80,6 +80,7 @@ pub fn Whitted(comptime Kernel: type) type {
             whitted.visibility.init(frame);
             whitted.environment_lights = .init(frame.environment, settings.sample_count);
             whitted.stack.count = 0;
+            for (&whitted.vertices) |*vertex| vertex.init();
             return whitted;
         }
 
@@ -141,10 +142,10 @@ pub fn Whitted(comptime Kernel: type) type {
                 &whitted.vertices,
                 &whitted.floor_light,
             );
-            const environment = whitted.frame.environment;
-            const sample = &whitted.sample;
             var any_seen = false;
             for (&whitted.vertices, whitted.floor_light, 0..) |*vertex, floor_light, group| {
+                const environment = whitted.frame.environment;
+                const sample = &whitted.sample;
                 environment_light.addEscaped(Kernel, environment, path, group, floor_light, sample);
                 whitted.find(group, vertex);
                 any_seen = any_seen or vertex.seen.any();
@@ -152,7 +153,8 @@ pub fn Whitted(comptime Kernel: type) type {
             if (any_seen) whitted.addLights(coherence);
             // The last pushed is traced first: reflection, refraction, the ray's own rest.
             whitted.stack.pushRest(path, &whitted.vertices);
-            environment_light.addCut(Kernel, environment, path, &whitted.vertices, sample);
+            const around = whitted.frame.environment;
+            environment_light.endRest(Kernel, around, path, &whitted.vertices, &whitted.sample);
             if (!any_seen or whitted.isEnd()) return;
             whitted.pushRefraction();
             whitted.pushReflection();

@@ -26,6 +26,8 @@ const missing_mean_least = 3e-4;
 /// The albedo of surfaces of some roughness in lanes.
 pub fn Albedo(comptime Lanes: type) type {
     return struct {
+        /// The square of roughness that it is of; not a number: of none.
+        alpha: F32,
         /// Mean over the hemisphere of 1 - E, weighted by the cosine; > 0.
         missing_mean: F32,
         /// That of Schlick's weight over the light that E sends on; 1/21 where smooth.
@@ -37,6 +39,13 @@ pub fn Albedo(comptime Lanes: type) type {
 
         const F32 = Lanes.F32;
 
+        /// All but `alpha` is undefined.
+        pub const unknown: @This() = none: {
+            var albedo: @This() = undefined;
+            albedo.alpha = .splat(std.math.nan(f32));
+            break :none albedo;
+        };
+
         /// For alpha, the square of roughness, 0..1.
         pub inline fn of(alpha: F32) @This() {
             const missing = polynomial(alpha, 2, .{ 9.462515, -30.22713, 107.8654, -20.94779 })
@@ -44,6 +53,7 @@ pub fn Albedo(comptime Lanes: type) type {
             const schlick = polynomial(alpha, 0, .{ 0.04769431, 0.4108013, -0.1874746, 0.1529256 })
                 .div(polynomial(alpha, 0, .{ 1, 9.598781, 52.12378 }));
             return .{
+                .alpha = alpha,
                 .missing_mean = missing.max(.splat(missing_mean_least)),
                 .schlick_mean = schlick,
                 .missing_above = .{

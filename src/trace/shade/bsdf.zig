@@ -65,6 +65,16 @@ pub fn Bsdf(comptime Lanes: type) type {
 
         /// That of the surface at these points.
         pub fn of(point: *const Interaction(Lanes)) Self {
+            var bsdf: Self = undefined;
+            bsdf.albedo = .unknown;
+            bsdf.become(point);
+            return bsdf;
+        }
+
+        /// Becomes that of the surface at these points, with the same bits as `of`. Of what it was
+        /// before, what depends on the roughness alone stays where that is the same in all lanes,
+        /// as it mostly is in neighbours: a fourth of the work.
+        pub fn become(bsdf: *Self, point: *const Interaction(Lanes)) void {
             const one: F32 = .splat(1);
             const white: Vec3 = .splat(.{ 1, 1, 1 });
             const material = &point.material;
@@ -72,44 +82,53 @@ pub fn Bsdf(comptime Lanes: type) type {
             const base = material.base_color.min(white);
             const base_f0 = material.dielectric_f0;
             const base_f90 = grazingOf(base_f0);
-            const f0 = splat3(Lanes, base_f0.mul(dielectric)).add(base.scale(material.metallic));
-            const f90 = base_f90.mul(dielectric).add(material.metallic);
             const cos_view = point.normal.dot(point.view).max(.splat(1e-4)).min(one);
             const boundary: Boundary(Lanes) = .of(point, cos_view);
+            const albedo = &bsdf.albedo;
             const roughness = material.roughness;
-            const albedo: albedo_file.Albedo(Lanes) = .of(roughness.mul(roughness));
+            const squared = roughness.mul(roughness);
+            if (!albedo.alpha.eq(squared).all()) albedo.* = .of(squared);
             const directional = albedo.at(boundary.cos_fresnel);
-            const scatter = multipleOf(&albedo, f0, f90);
-            const specular = schlickOf(f0, f90, directional.schlick)
-                .scale(one.sub(directional.missing)).add(scatter.scale(directional.missing));
-            const scatter_base = multipleOf(&albedo, splat3(Lanes, base_f0), base_f90).x;
+            const scatter_base = multipleOf(albedo, base_f0, base_f90);
+            bsdf.f0 = splat3(Lanes, base_f0);
+            bsdf.f90 = base_f90;
+            var scatter = splat3(Lanes, scatter_base);
+            var specular = splat3(Lanes, specularOf(directional, scatter_base, base_f0, base_f90));
+            // Without metal all channels are those of the base.
+            if (!material.metallic.eq(.zero()).all()) {
+                const f0 = splat3(Lanes, base_f0.mul(dielectric))
+                    .add(base.scale(material.metallic));
+                const f90 = base_f90.mul(dielectric).add(material.metallic);
+                inline for (.{ "x", "y", "z" }) |channel| {
+                    const many = multipleOf(albedo, @field(f0, channel), f90);
+                    @field(scatter, channel) = many;
+                    @field(specular, channel) =
+                        specularOf(directional, many, @field(f0, channel), f90);
+                }
+                bsdf.f0 = f0;
+                bsdf.f90 = f90;
+            }
+            specular = .select(boundary.total, white, specular);
             const below = one.sub(directional.single(base_f0, base_f90))
                 .sub(scatter_base.mul(directional.missing)).max(.zero());
             const open = F32.select(boundary.total, .zero(), below.mul(dielectric));
             const passing = open.mul(material.transmission);
-            const diffuse_albedo = base.scale(open.sub(passing));
+            bsdf.specular_albedo = specular;
+            bsdf.diffuse_albedo = base.scale(open.sub(passing));
             const rough = roughness.max(.splat(highlight_roughness_least));
-            const alpha = rough.mul(rough);
-            return .{
-                .specular_albedo = .select(boundary.total, white, specular),
-                .diffuse_albedo = diffuse_albedo,
-                .f0 = f0,
-                .f90 = f90,
-                .alpha = alpha,
-                .cos_view = cos_view,
-                .smith_view = microfacet.smith(Lanes, cos_view, alpha.mul(alpha)),
-                .albedo = albedo,
-                .multiple = scatter
-                    .scale(directional.missing.div(albedo.missing_mean).mul(inverse_pi)),
-                .diffuse = diffuse_albedo
-                    .scale(inverse_pi.div(belowMean(&albedo, base_f0, base_f90, scatter_base))),
-                .multiple_base = scatter_base,
-                .mirror = .{
-                    .reflected = .select(boundary.total, white, specular),
-                    .transmitted = base.scale(passing),
-                    .refraction = boundary.refraction,
-                    .total = boundary.total,
-                },
+            bsdf.alpha = rough.mul(rough);
+            bsdf.cos_view = cos_view;
+            bsdf.smith_view = microfacet.smith(Lanes, cos_view, bsdf.alpha.mul(bsdf.alpha));
+            bsdf.multiple = scatter
+                .scale(directional.missing.div(albedo.missing_mean).mul(inverse_pi));
+            const below_mean = belowMean(albedo, base_f0, base_f90, scatter_base);
+            bsdf.diffuse = bsdf.diffuse_albedo.scale(inverse_pi.div(below_mean));
+            bsdf.multiple_base = scatter_base;
+            bsdf.mirror = .{
+                .reflected = specular,
+                .transmitted = base.scale(passing),
+                .refraction = boundary.refraction,
+                .total = boundary.total,
             };
         }
 
@@ -212,21 +231,22 @@ pub fn Bsdf(comptime Lanes: type) type {
 
         /// Light that microfacets send on more than once, as a share of what has not left after the
         /// first time (Kulla and Conty 2017, with the loss at each of the reflections).
-        inline fn multipleOf(
-            albedo: *const albedo_file.Albedo(Lanes),
-            f0: Vec3,
-            f90: F32,
-        ) Vec3 {
-            const white: Vec3 = .splat(.{ 1, 1, 1 });
+        inline fn multipleOf(albedo: *const albedo_file.Albedo(Lanes), f0: F32, f90: F32) F32 {
+            const one: F32 = .splat(1);
             // The mean of Schlick's approximation over the hemisphere.
-            const mean = schlickOf(f0, f90, .splat(1.0 / 21.0));
-            const lost = white.sub(mean.scale(albedo.missing_mean));
-            const leaving = F32.splat(1).sub(albedo.missing_mean);
-            return .{
-                .x = mean.x.mul(mean.x).mul(leaving).div(lost.x),
-                .y = mean.y.mul(mean.y).mul(leaving).div(lost.y),
-                .z = mean.z.mul(mean.z).mul(leaving).div(lost.z),
-            };
+            const mean = f0.add(f90.sub(f0).mul(.splat(1.0 / 21.0)));
+            const lost = one.sub(mean.mul(albedo.missing_mean));
+            return mean.mul(mean).mul(one.sub(albedo.missing_mean)).div(lost);
+        }
+
+        /// Directional albedo of the specular lobe, what is scattered more than once included.
+        inline fn specularOf(
+            directional: albedo_file.Directional(Lanes),
+            scatter: F32,
+            f0: F32,
+            f90: F32,
+        ) F32 {
+            return directional.single(f0, f90).add(scatter.mul(directional.missing));
         }
 
         /// Mean over the hemisphere, weighted by the cosine, of what the specular lobe leaves to
@@ -588,6 +608,29 @@ test "no energy is made: reflected, transmitted and diffuse shares sum to 1 at m
             }
         };
     };
+}
+
+test "what a surface was before is not seen in what it becomes" {
+    var random = std.Random.DefaultPrng.init(11);
+    const numbers = random.random();
+    var bsdf: Bsdf(Single) = .of(&testPoint(.{ 0, 1, 0 }));
+    for (0..500) |_| {
+        var point = testPoint(viewAt(numbers.float(f32)).lane(0));
+        const metallic: f32 = @floatFromInt(numbers.uintLessThan(u32, 3));
+        const roughness: f32 = @floatFromInt(numbers.uintLessThan(u32, 3));
+        setRough(&point, metallic / 2, roughness / 2);
+        point.material.base_color = .splat(.{ 0.9, 0.5, numbers.float(f32) });
+        point.material.transmission = .splat(numbers.float(f32));
+        bsdf.become(&point);
+        const anew: Bsdf(Single) = .of(&point);
+        for ([_][2]Single.Vec3{
+            .{ anew.specular_albedo, bsdf.specular_albedo },
+            .{ anew.diffuse_albedo, bsdf.diffuse_albedo },
+            .{ anew.mirror.reflected, bsdf.mirror.reflected },
+            .{ anew.mirror.transmitted, bsdf.mirror.transmitted },
+            .{ anew.eval(&point, .splat(ways[3])), bsdf.eval(&point, .splat(ways[3])) },
+        }) |pair| try std.testing.expectEqual(pair[0].lane(0), pair[1].lane(0));
+    }
 }
 
 test "an index of 1 is no boundary: all light is the base's" {
