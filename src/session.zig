@@ -415,7 +415,6 @@ pub const Session = struct {
 
     /// Says so where the picture shows next to nothing, and what may help.
     fn hint(session: *Session, tally: output.Tally) void {
-        if (session.facts.triangle_count == 0) return; // The parser has said so.
         const total = session.film.?.image.pixels.len;
         if (isNearlyAll(tally.clear, total)) return session.hintOf(
             "background",

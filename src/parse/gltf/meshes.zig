@@ -372,8 +372,10 @@ fn tidyJoints(joints: []const [][4]u16, weights: []const [][4]f32) u32 {
     var largest: u32 = 0;
     for (0..joints[0].len) |vertex| {
         var has_weight = false;
-        for (weights) |set| for (set[vertex]) |weight| {
-            if (weight > 0) has_weight = true;
+        for (weights) |set| for (&set[vertex]) |*weight| {
+            // As they count where vertices are placed: those alone would sum up to nothing.
+            weight.* = math.flushDenormal(weight.*);
+            if (weight.* > 0) has_weight = true;
         };
         if (!has_weight) weights[0][vertex][0] = 1;
         for (joints, weights) |numbers, set| {
@@ -491,14 +493,15 @@ test tidyJoints {
     var first = [_][4]u16{ .{ 5, 6, 9, 9 }, .{ 7, 9, 9, 9 }, .{ 9, 9, 9, 9 } };
     var second = [_][4]u16{ .{ 1, 9, 9, 9 }, .{ 9, 9, 9, 9 }, .{ 9, 9, 8, 9 } };
     var first_weights = [_][4]f32{ .{ 0.5, 0.25, 0, 0 }, @splat(0), @splat(0) };
-    var second_weights = [_][4]f32{ .{ 0.5, 0, 0, 0 }, @splat(0), .{ 0, 0, 0.5, 0 } };
+    var second_weights = [_][4]f32{ .{ 0.5, 0, 0, 0 }, .{ 1e-40, 0, 0, 0 }, .{ 0, 0, 0.5, 0 } };
     try std.testing.expectEqual(8, tidyJoints(&.{ &first, &second }, &.{
         &first_weights, &second_weights,
     }));
     try std.testing.expectEqual([3][4]u16{ .{ 5, 6, 0, 0 }, .{ 7, 0, 0, 0 }, @splat(0) }, first);
     try std.testing.expectEqual([3][4]u16{ .{ 1, 0, 0, 0 }, @splat(0), .{ 0, 0, 8, 0 } }, second);
-    // The one without any hangs on its first joint.
+    // The one without any that counts hangs on its first joint.
     try std.testing.expectEqual([4]f32{ 1, 0, 0, 0 }, first_weights[1]);
+    try std.testing.expectEqual([4]f32{ 0, 0, 0, 0 }, second_weights[1]);
     try std.testing.expectEqual([4]f32{ 0, 0, 0, 0 }, first_weights[2]);
 }
 
