@@ -167,8 +167,8 @@ const sections: []const Section = &.{
             .usage = "--env-shadows N",
             .help = "directional lights a sample that stand for it, to\n" ++
                 "find how much of it arrives, " ++ settings.environment_shadow_count.text() ++
-                comptimePrint("\n(default: {d}; 0: all of it everywhere)", .{
-                    settings.environment_shadow_count.default,
+                comptimePrint("\n(default: {d}, with a floor {d}; 0: all of it)", .{
+                    settings.environment_shadow_count.default, settings.floor_shadow_count,
                 }),
         },
         .{

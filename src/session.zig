@@ -228,6 +228,7 @@ pub const Session = struct {
         const start = Io.Clock.awake.now(session.io);
         var environment = try session.chooseFor(&session.environment, &choices.environment);
         environment.is_seen = background == .env or background == .studio;
+        environment.shadow_count = choices.shadowCount();
         var backdrop: ?prepare.EnvironmentSettings = null;
         if (background == .studio and !environment.is_studio) {
             var studio = choices.environment;

@@ -58,6 +58,8 @@ pub const jpeg_quality: Range = .{ .min = 1, .max = 100, .default = 90 };
 pub const exposure_ev_max = 64;
 /// Directional lights a sample that stand for an environment, to find how much of it arrives.
 pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4 };
+/// And where a floor catches their shadows, unless the user says.
+pub const floor_shadow_count = 16;
 /// Largest that automatic exposure chooses.
 pub const exposure_auto_ev_max = 10;
 /// Measures of how far two pictures are from each other.
@@ -186,8 +188,9 @@ pub const Environment = struct {
     /// Turn about y in degrees, counter-clockwise from above; null: none, but the studio turns with
     /// the camera.
     rotation_deg: ?f32 = null,
-    /// Within `environment_shadow_count`.
-    shadow_count: u32 = environment_shadow_count.default,
+    /// Within `environment_shadow_count`; null: its default, or with a floor, on which each light's
+    /// shadow can be seen, `floor_shadow_count`.
+    shadow_count: ?u32 = null,
 
     pub const Source = union(enum) {
         /// The scene's, or the studio: dimmed where the scene has lights of its own.
@@ -274,6 +277,12 @@ pub const View = struct {
     /// mapped; without it, as in the thesis, they are radiance, and the background's default comes
     /// with the lights.
     display_referred: bool = true,
+
+    /// Directional lights a sample that stand for the environment.
+    pub fn shadowCount(view: *const View) u32 {
+        if (view.environment.shadow_count) |count| return count;
+        return if (view.floor == .shadow) floor_shadow_count else environment_shadow_count.default;
+    }
 };
 
 /// How rays are traced.

@@ -57,7 +57,6 @@ pub const Environment = struct {
             .is_studio = source == .studio,
             .scale = @splat(choice.intensity),
             .rotation_deg = choice.rotation_deg,
-            .shadow_count = choice.shadow_count,
         };
         if (!isSame(source, environment.source)) {
             environment.drop();
