@@ -223,8 +223,11 @@ const TestPackages = struct {
         const b = packages.owner;
         const target = resolve(b, query);
         const is_here = target.result.cpu.arch == b.graph.host.result.cpu.arch;
-        const package: Package =
-            .init(b, target, packages.optimize, packages.headers, packages.options);
+        var options = packages.options;
+        // ARMv7 has AArch64's variants of the same code: two of them show that the bits agree.
+        const is_second_arm = target.result.cpu.arch == .arm and !is_here;
+        if (is_second_arm and options.extent == .all) options.extent = .few;
+        const package: Package = .init(b, target, packages.optimize, packages.headers, options);
         list.append(b.allocator, .{
             .name = name,
             .package = package,
