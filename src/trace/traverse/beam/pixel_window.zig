@@ -5,6 +5,7 @@
 
 const std = @import("std");
 const kernel_file = @import("../kernel.zig");
+const simd = @import("../../../simd.zig");
 const vec3 = @import("../../../math.zig").vec3;
 const edges_file = @import("edges.zig");
 const Grid = @import("grid.zig").Grid;
@@ -96,11 +97,14 @@ pub const Dual = struct {
             .mul(.splat(16 * edges_file.unit_roundoff * dual.gain));
         // Also where |t| is so small that rounding may have turned its sign.
         const bounded = least_t.gt(.zero()).bitAnd(margin.lt(.splat(side)));
+        // What is not a number, as of corners at the origin, does not become a whole one.
+        const first: F32 = .zero();
+        const last: F32 = .splat(side - 1);
         window = .{
-            .first_x = .select(bounded, firstOf(Lanes, low[0].sub(margin)), .zero()),
-            .first_y = .select(bounded, firstOf(Lanes, low[1].sub(margin)), .zero()),
-            .last_x = .select(bounded, lastOf(Lanes, high[0].add(margin)), end),
-            .last_y = .select(bounded, lastOf(Lanes, high[1].add(margin)), end),
+            .first_x = firstOf(Lanes, .select(bounded, low[0].sub(margin), first)),
+            .first_y = firstOf(Lanes, .select(bounded, low[1].sub(margin), first)),
+            .last_x = lastOf(Lanes, .select(bounded, high[0].add(margin), last)),
+            .last_y = lastOf(Lanes, .select(bounded, high[1].add(margin), last)),
         };
         const empty = window.first_x.gt(window.last_x).bitOr(window.first_y.gt(window.last_y));
         return .{ window, empty.bitNot() };
@@ -119,3 +123,29 @@ pub const Dual = struct {
         return past.toI32().sub(.splat(1));
     }
 };
+
+test "corners at the origin may be seen anywhere; a small triangle has its pixels" {
+    const dual: Dual = .{
+        .origin = .{ 0, 0, 0 },
+        .column = .{ 1, 0, 0 },
+        .row = .{ 0, 1, 0 },
+        .depth = .{ 0, 0, 1 },
+        .gain = 18,
+    };
+    inline for (.{ .scalar, .vector, .intrinsics }) |backend| {
+        const Lanes = simd.Lanes(backend, 4);
+        var corners: [3]Lanes.Vec3 = @splat(.splat(.{ 0, 0, 0 }));
+        const there: Lanes.Mask = .fromBits(2);
+        for (&corners, [3][3]f32{ .{ 5.2, 2.9, 1 }, .{ 6.4, 2.9, 1 }, .{ 5.2, 4.1, 1 } }) |*to, at|
+            to.* = .select(there, .splat(at), to.*);
+        var facet: edges_file.Facet(Lanes) = undefined;
+        facet.length = .splat(2);
+        facet.reach = .splat(8);
+        const window, const seen = dual.windowOf(Lanes, corners, &facet);
+        try std.testing.expect(seen.all());
+        try std.testing.expectEqual([4]i32{ 0, 6, 0, 0 }, window.first_x.toArray());
+        try std.testing.expectEqual([4]i32{ 15, 6, 15, 15 }, window.last_x.toArray());
+        try std.testing.expectEqual([4]i32{ 0, 3, 0, 0 }, window.first_y.toArray());
+        try std.testing.expectEqual([4]i32{ 15, 4, 15, 15 }, window.last_y.toArray());
+    }
+}
