@@ -131,6 +131,7 @@ test {
     _ = @import("trace/traverse/beam/budget.zig");
     _ = @import("trace/traverse/beam/tile_depth_buffer.zig");
     _ = @import("trace/traverse/beam/grid.zig");
+    _ = beam.pixel_window;
     _ = @import("trace/integrate/sampler.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/offset.zig");
