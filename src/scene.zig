@@ -16,6 +16,12 @@ pub const Builder = @import("scene/builder.zig");
 /// How points in rows become triangles.
 pub const Grid = @import("scene/grid.zig");
 
+const material_file = @import("scene/material.zig");
+
+pub const AlphaMode = material_file.AlphaMode;
+pub const Material = material_file.Material;
+pub const texture_fields = material_file.texture_fields;
+
 /// Index that stands for "none".
 pub const none: u32 = std.math.maxInt(u32);
 
@@ -128,64 +134,6 @@ pub const Instance = struct {
     /// Index into `Scene.skins`, of meshes with joints: these place the mesh, not the node. Or
     /// `none`.
     skin: u32 = none,
-};
-
-/// What to do with the base colour's alpha.
-pub const AlphaMode = enum { @"opaque", mask, blend };
-
-/// glTF's metallic-roughness material with the factors of its extensions.
-pub const Material = struct {
-    /// Linear RGB and alpha, 0..1.
-    base_color: [4]f32 = .{ 1, 1, 1, 1 },
-    metallic: f32 = 1,
-    roughness: f32 = 1,
-    /// Radiance emitted, linear RGB, strength included.
-    emissive: Vec3 = .{ 0, 0, 0 },
-    alpha_mode: AlphaMode = .@"opaque",
-    /// With `AlphaMode.mask`, what has less alpha is a hole.
-    alpha_cutoff: f32 = 0.5,
-    double_sided: bool = false,
-    /// The base colour is shown as it is, without light (KHR_materials_unlit).
-    unlit: bool = false,
-    /// Index of refraction, >= 1 (KHR_materials_ior).
-    ior: f32 = 1.5,
-    /// Share of light that goes through, 0..1 (KHR_materials_transmission).
-    transmission: f32 = 0,
-    /// Whether the surface bounds a volume (KHR_materials_volume with a thickness above 0): rays
-    /// bend; otherwise the wall is thin and they go straight on.
-    volume: bool = false,
-    /// Colour that white light turns to after `attenuation_distance` inside, linear RGB.
-    attenuation_color: Vec3 = .{ 1, 1, 1 },
-    /// In metres of the scene's space; infinity: no attenuation.
-    attenuation_distance: f32 = std.math.inf(f32),
-    /// Red, green, blue (sRGB) and alpha, multiplied with `base_color`.
-    base_color_texture: ?TextureView = null,
-    /// Red: a number that alpha is multiplied with, as PBRT's shapes have it.
-    alpha_texture: ?TextureView = null,
-    /// Green: roughness, blue: metallic, each multiplied with its factor.
-    metallic_roughness_texture: ?TextureView = null,
-    /// Tangent-space normals.
-    normal_texture: ?TextureView = null,
-    /// Multiplies x and y of the normal.
-    normal_scale: f32 = 1,
-    /// Red: share of the light from all sides that arrives.
-    occlusion_texture: ?TextureView = null,
-    /// How much of the occlusion counts, 0..1.
-    occlusion_strength: f32 = 1,
-    /// Red, green, blue (sRGB), multiplied with `emissive`.
-    emissive_texture: ?TextureView = null,
-
-    /// Whether it has any.
-    pub fn hasTextures(material: *const Material) bool {
-        inline for (texture_fields) |field| if (@field(material, field) != null) return true;
-        return false;
-    }
-};
-
-/// The textures of a material.
-pub const texture_fields = [_][]const u8{
-    "base_color_texture", "alpha_texture",     "metallic_roughness_texture",
-    "normal_texture",     "occlusion_texture", "emissive_texture",
 };
 
 /// Light from all around, as an image by direction.

@@ -22,6 +22,7 @@ pub const EnvironmentPart = environment_file.EnvironmentPart;
 pub const EnvironmentSource = environment_file.EnvironmentSource;
 pub const EnvironmentTexel = environment_file.EnvironmentTexel;
 pub const Geometry = geometry_file.Geometry;
+pub const Layers = @import("world/layers.zig").Layers;
 pub const Lookup = textures_file.Lookup;
 pub const Light = @import("world/light.zig").Light;
 pub const Material = materials_file.Material;
@@ -55,6 +56,11 @@ pub const Frame = struct {
     pub inline fn needsFootprints(frame: *const Frame) bool {
         const environment = frame.environment;
         return frame.hasTextures() or environment.map != null or environment.backdrop != null;
+    }
+
+    /// Whether a material has any.
+    pub inline fn hasLayers(frame: *const Frame) bool {
+        return frame.materials.layers.len > 0;
     }
 
     /// Whether a material has any.

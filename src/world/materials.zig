@@ -2,6 +2,7 @@
 
 const math = @import("../math.zig");
 const Vec3 = math.Vec3;
+const Layers = @import("layers.zig").Layers;
 const Lookup = @import("textures.zig").Lookup;
 
 /// The metallic-roughness model of glTF 2.0 with transmission and volume.
@@ -34,6 +35,8 @@ pub const Material = struct {
     /// Its textures: `Materials.lookups[first_lookup..][0..lookup_count]`.
     first_lookup: u32 = 0,
     lookup_count: u32 = 0,
+    /// Those of slots of layers: that many, directly behind them.
+    layer_lookup_count: u32 = 0,
 
     /// Whether no light passes, wherever a surface of it is hit.
     pub fn stopsLight(material: *const Material) bool {
@@ -46,6 +49,8 @@ pub const Material = struct {
 pub const Materials = struct {
     /// `Triangle.material` counts these.
     all: []const Material,
+    /// By material; empty where no drawn one has any.
+    layers: []const Layers = &.{},
     /// By material: the scene's that it was made of.
     sources: []const u32 = &.{},
     /// Of all materials, one after the other.

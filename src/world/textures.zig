@@ -21,7 +21,39 @@ pub const Texture = struct {
 };
 
 /// What of a material a lookup is for.
-pub const Slot = enum(u8) { base_color, metallic_roughness, normal, occlusion, emissive };
+pub const Slot = enum(u8) {
+    base_color,
+    metallic_roughness,
+    normal,
+    occlusion,
+    emissive,
+    // Those of `Layers` and what else few materials have: from here on.
+    transmission,
+    specular,
+    specular_color,
+    glossiness,
+    clearcoat,
+    clearcoat_roughness,
+    clearcoat_normal,
+    sheen_color,
+    sheen_roughness,
+    iridescence,
+    iridescence_thickness,
+    anisotropy,
+    diffuse_transmission,
+    diffuse_transmission_color,
+    multiscatter_color,
+
+    /// Slots of every material.
+    pub const base_count = @backingInt(Slot.transmission);
+    /// All slots.
+    pub const count = @typeInfo(Slot).@"enum".field_names.len;
+
+    /// Whether its lookups are `Material.layer_lookup_count`'s.
+    pub fn isOfLayers(slot: Slot) bool {
+        return @backingInt(slot) >= base_count;
+    }
+};
 
 /// A texture as one material uses it; several for one slot are multiplied.
 pub const Lookup = struct {

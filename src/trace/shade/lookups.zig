@@ -13,8 +13,34 @@ const Slot = world_file.Slot;
 const Texel = texture_file.Texel;
 const Texture = world_file.Texture;
 
-/// Slots of a material.
-pub const slot_count = texture_file.textures_max;
+/// Some slots that follow each other.
+pub const Slots = enum {
+    /// Those of every material.
+    base,
+    /// Those of layers.
+    layers,
+
+    /// The number of the first.
+    pub fn first(slots: Slots) usize {
+        return switch (slots) {
+            .base => 0,
+            .layers => Slot.base_count,
+        };
+    }
+
+    /// How many.
+    pub fn count(slots: Slots) usize {
+        return switch (slots) {
+            .base => Slot.base_count,
+            .layers => Slot.count - Slot.base_count,
+        };
+    }
+
+    /// The number of a slot among these.
+    pub inline fn indexOf(slots: Slots, slot: Slot) usize {
+        return @backingInt(slot) - slots.first();
+    }
+};
 
 /// In `Lookup.channels`: there is no such channel.
 const absent = 255;
@@ -29,31 +55,35 @@ pub const Point = struct {
 };
 
 /// Channels by slot, 0..1; 1 where there is no texture.
-pub const Values = [slot_count][4]f32;
+pub fn Values(comptime slots: Slots) type {
+    return [slots.count()][4]f32;
+}
 
 /// Multiplies the slots, which begin with 1, with what textures say at a point.
 pub fn sample(
+    comptime slots: Slots,
     frame: *const Frame,
     lookups: []const Lookup,
     point: *const Point,
-    values: *Values,
+    values: *Values(slots),
 ) void {
+    const at_once = texture_file.textures_max;
     const all = frame.textures.all;
     var rest = lookups;
     while (rest.len > 0) {
-        var textures: [slot_count]*const Texture = undefined;
+        var textures: [at_once]*const Texture = undefined;
         var count: usize = 0;
-        for (rest[0..@min(rest.len, slot_count)]) |*lookup| {
+        for (rest[0..@min(rest.len, at_once)]) |*lookup| {
             if (count > 0 and !texture_file.isSampledAlike(all, &rest[0], lookup)) break;
             textures[count] = &all[lookup.texture];
             count += 1;
         }
         const footprint = footprintOf(frame.geometry, &rest[0], point);
-        var texels: [slot_count]Texel = undefined;
+        var texels: [at_once]Texel = undefined;
         texture_file.sample(textures[0..count], &rest[0], &footprint, &texels);
         for (rest[0..count], texels[0..count]) |*lookup, texel| {
             const channels = channelsOf(lookup, texel);
-            for (&values[@backingInt(lookup.slot)], channels) |*value, channel| value.* *= channel;
+            for (&values[slots.indexOf(lookup.slot)], channels) |*value, channel| value.* *= channel;
         }
         rest = rest[count..];
     }
@@ -61,14 +91,15 @@ pub fn sample(
 
 /// The same of one slot alone.
 pub fn sampleSlot(
+    comptime slots: Slots,
     frame: *const Frame,
     lookups: []const Lookup,
     slot: Slot,
     point: *const Point,
-    values: *Values,
+    values: *Values(slots),
 ) void {
     for (lookups, 0..) |*lookup, index| {
-        if (lookup.slot == slot) sample(frame, lookups[index..][0..1], point, values);
+        if (lookup.slot == slot) sample(slots, frame, lookups[index..][0..1], point, values);
     }
 }
 
@@ -144,7 +175,8 @@ fn channelsOf(lookup: *const Lookup, texel: Texel) [4]f32 {
         to.* = if (number == absent) 1 else from[number];
     }
     // A normal of two channels is of unit length.
-    if (lookup.slot == .normal and lookup.channels[2] == absent) {
+    const is_normal = lookup.slot == .normal or lookup.slot == .clearcoat_normal;
+    if (is_normal and lookup.channels[2] == absent) {
         const x = 2 * channels[0] - 1;
         const y = 2 * channels[1] - 1;
         const squared = 1 - (x * x + y * y);

@@ -18,7 +18,7 @@ const Wrap = world_file.Wrap;
 pub const Texel = @Vector(4, f32);
 
 /// Textures that can be sampled at once: one for each slot.
-pub const textures_max = @typeInfo(world_file.Slot).@"enum".field_names.len;
+pub const textures_max = world_file.Slot.base_count;
 
 /// Probes along a footprint at most.
 const probes_max = 8;

@@ -29,9 +29,9 @@ pub fn Place(comptime Lanes: type) type {
 }
 
 /// What textures say: by slot, channel and lane, 1 where there is none.
-pub fn Texels(comptime Lanes: type) type {
+pub fn Texels(comptime Lanes: type, comptime slots: lookups_file.Slots) type {
     return struct {
-        values: [lookups_file.slot_count][4][Lanes.count]f32,
+        values: [slots.count()][4][Lanes.count]f32,
         /// By component; 0 where a normal texture is not used.
         tangents: [4][Lanes.count]f32,
 
@@ -55,10 +55,8 @@ pub fn Texels(comptime Lanes: type) type {
             };
             const used = &materials.used;
             for (used.numbers[0..used.count], used.lanes[0..used.count]) |number, lanes| {
-                const material = &frame.materials.all[number];
-                if (material.lookup_count == 0) continue;
-                const lookups = frame.materials
-                    .lookups[material.first_lookup..][0..material.lookup_count];
+                const lookups = lookupsOf(frame.materials, number);
+                if (lookups.len == 0) continue;
                 var bits = lanes.bitAnd(place.asked).bits();
                 while (bits != 0) : (bits &= bits - 1) {
                     const lane = @ctz(bits);
@@ -70,11 +68,11 @@ pub fn Texels(comptime Lanes: type) type {
                             .{ axes[1][0][lane], axes[1][1][lane] },
                         },
                     };
-                    var values: lookups_file.Values = @splat(@splat(1));
+                    var values: lookups_file.Values(slots) = @splat(@splat(1));
                     if (slot) |one|
-                        lookups_file.sampleSlot(frame, lookups, one, &point, &values)
+                        lookups_file.sampleSlot(slots, frame, lookups, one, &point, &values)
                     else
-                        lookups_file.sample(frame, lookups, &point, &values);
+                        lookups_file.sample(slots, frame, lookups, &point, &values);
                     texels.put(lane, &values);
                     if (slot == null and lookups_file.has(lookups, .normal))
                         texels.putTangent(lane, lookups_file.tangentAt(frame.geometry, &point));
@@ -83,7 +81,17 @@ pub fn Texels(comptime Lanes: type) type {
             return texels;
         }
 
-        fn put(texels: *Self, lane: usize, values: *const lookups_file.Values) void {
+        inline fn lookupsOf(materials: *const world_file.Materials, number: u32) []const Lookup {
+            const material = &materials.all[number];
+            const first = material.first_lookup;
+            return switch (slots) {
+                .base => materials.lookups[first..][0..material.lookup_count],
+                .layers => materials
+                    .lookups[first + material.lookup_count ..][0..material.layer_lookup_count],
+            };
+        }
+
+        fn put(texels: *Self, lane: usize, values: *const lookups_file.Values(slots)) void {
             for (&texels.values, values) |*slot, channels| {
                 for (slot, channels) |*channel, value| channel[lane] = value;
             }
@@ -113,7 +121,7 @@ pub fn Texels(comptime Lanes: type) type {
             comptime slot: Slot,
             comptime channel: usize,
         ) Lanes.F32 {
-            return .fromArray(texels.values[@backingInt(slot)][channel]);
+            return .fromArray(texels.values[slots.indexOf(slot)][channel]);
         }
 
         /// The first three.
@@ -135,7 +143,7 @@ pub fn colored(
     place: *const Place(Lanes),
     color: material_file.Color(Lanes),
 ) material_file.Color(Lanes) {
-    const texels: Texels(Lanes) = .find(frame, materials, place, .base_color);
+    const texels: Texels(Lanes, .base) = .find(frame, materials, place, .base_color);
     return .{
         .rgb = color.rgb.mul(texels.vector(.base_color)),
         .alpha = color.alpha.mul(texels.float(.base_color, 3)),
@@ -169,7 +177,7 @@ pub fn apply(
         .barycentrics = hit.barycentrics,
         .axes = .ofCorners(corners.position, point.view.neg(), point.cone_width),
     };
-    const texels: Texels(Lanes) = .find(frame, &materials, &place, null);
+    const texels: Texels(Lanes, .base) = .find(frame, &materials, &place, null);
     const material = &point.material;
     material.base_color = material.base_color.mul(texels.vector(.base_color));
     const color = corners.colorAt(frame.geometry, hit.barycentrics);
