@@ -9,6 +9,7 @@
 const std = @import("std");
 const world_file = @import("../../world.zig");
 const math = @import("../../math.zig");
+const bundle_file = @import("../traverse/bundle.zig");
 const multi_hit = @import("../traverse/multi_hit.zig");
 const boundaries_file = @import("boundaries.zig");
 const exponential = @import("../shade/exponential.zig");
@@ -82,7 +83,7 @@ pub fn Passage(comptime Kernel: type) type {
         }
 
         /// The share of light that volumes leave, of rays that end at `t` if that is finite.
-        pub noinline fn left(passage: *Self, t: f32, direction: Vec3) Vec3 {
+        fn left(passage: *Self, t: f32, direction: Vec3) Vec3 {
             if (t < std.math.inf(f32)) for (0..Kernel.ray_count) |lane| passage.advance(lane, t);
             const length = direction.length().neg();
             return .{
@@ -149,6 +150,20 @@ pub fn Passage(comptime Kernel: type) type {
             return boundary.before;
         }
     };
+}
+
+/// Takes away what volumes absorb of light that ends at `t` on the way of rays.
+pub noinline fn absorb(
+    comptime Kernel: type,
+    passages: *[Kernel.group_count]Passage(Kernel),
+    bundle: *const bundle_file.Bundle(Kernel),
+    t: f32,
+    transmittances: *[Kernel.group_count]Kernel.Rays.Vec3,
+) void {
+    for (passages, &bundle.groups, transmittances) |*passage, *ray, *value| {
+        if (!passage.is_started) continue;
+        value.* = value.mul(passage.left(t, ray.line.direction));
+    }
 }
 
 const Crossings = [multi_hit.hits_max]volumes_file.Crossing;

@@ -128,26 +128,13 @@ pub fn Visibility(comptime Kernel: type) type {
         ) void {
             transmittances.* = @splat(.splat(.{ 1, 1, 1 }));
             visibility.occlusionPrepass(bundle, light, coherence, transmittances);
-            if (visibility.frame.materials.has_transmission) {
-                for (&visibility.passages) |*passage| passage.start(visibility.frame);
-                visibility.weaken(bundle, light, vertices, transmittances);
-                if (visibility.frame.materials.volumes.len > 0)
-                    visibility.absorb(bundle, light, transmittances);
-            } else visibility.weaken(bundle, light, vertices, transmittances);
-        }
-
-        /// By what volumes absorb.
-        fn absorb(
-            visibility: *Self,
-            bundle: *const Bundle,
-            light: *const Light,
-            transmittances: *[group_count]Vec3,
-        ) void {
-            for (&bundle.groups, &visibility.passages, transmittances) |*ray, *passage, *value| {
-                if (!passage.is_started) continue;
-                const left = passage.left(shadowEnd(light), ray.line.direction);
-                value.* = value.mul(left);
-            }
+            const frame = visibility.frame;
+            const passages = &visibility.passages;
+            const transmits = frame.materials.has_transmission;
+            if (transmits) for (passages) |*passage| passage.start(frame);
+            visibility.weaken(bundle, light, vertices, transmittances);
+            if (transmits and frame.materials.volumes.len > 0)
+                passage_file.absorb(Kernel, passages, bundle, shadowEnd(light), transmittances);
         }
 
         /// By surfaces.
