@@ -154,7 +154,7 @@ const unsigned short rl_cgltf_layout[] = {
     STRUCTURE(cgltf_morph_target, attributes, attributes_count),
     STRUCTURE(cgltf_primitive, type, indices, material, attributes, attributes_count, targets,
               targets_count, extras, has_draco_mesh_compression, draco_mesh_compression, mappings,
-              mappings_count, extensions),
+              mappings_count, extensions_count),
     STRUCTURE(cgltf_mesh, name, primitives, primitives_count, weights, weights_count,
               target_names, extras),
     STRUCTURE(cgltf_skin, name, joints, joints_count, skeleton, inverse_bind_matrices, extras),

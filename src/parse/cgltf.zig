@@ -313,7 +313,7 @@ pub const cgltf_primitive = extern struct {
     draco_mesh_compression: [3]usize,
     mappings: [*c]cgltf_material_mapping,
     mappings_count: usize,
-    extensions: [2]usize,
+    extensions_count: [2]usize,
 };
 
 pub const cgltf_mesh = extern struct {

@@ -414,6 +414,8 @@ const Work = struct {
             const request = &work.requests.items[request_index];
             if (request.pyramid == null) continue;
             const lookup = lookupOf(material, use, texture, request);
+            // The image has nothing of what is wanted, which counts as 1.
+            if (std.mem.allEqual(u8, &lookup.channels, missing)) continue;
             if (use == .alpha) alpha.least = 0; // Nobody has looked at the red.
             if (use == .base_color and lookup.channels[3] != missing) alpha = .{
                 .least = alpha.least * request.alpha.least,
@@ -801,8 +803,8 @@ test "channels that no material uses are not kept" {
         try testing.expectEqual(case[1].slot(), set.lookups[0].slot);
         try testing.expectEqual(case[3], set.lookups[0].channels);
         try testing.expectEqual(MaterialUse{
-            .first_lookup = 0,
             .lookup_count = 1,
+            .tangents = if (case[1] == .normal) .{} else null,
             .alpha = switch (case[0].alpha_mode) {
                 .blend => .{ .least = 40.0 / 255.0, .largest = 40.0 / 255.0 },
                 .mask => .{ .least = 0 },
@@ -814,6 +816,147 @@ test "channels that no material uses are not kept" {
         try testing.expectEqual(case[2].len, texture.channel_count);
         try testing.expectEqual(case[1].isLight(), texture.is_srgb);
         try testing.expectEqual(case[2].len, set.byte_count);
+    }
+}
+
+/// A material whose layers all have a say, each use with the texture of its number.
+fn layeredMaterial(view: scene.TextureView) scene.Material {
+    var material: scene.Material = .{
+        .metallic = 0,
+        .roughness = 0.5,
+        .emissive = .{ 1, 1, 1 },
+        .transmission = 1,
+        .volume = true,
+        .attenuation_color = .{ 0.5, 0.5, 0.5 },
+        .attenuation_distance = 1,
+        .specular_color = .{ 2, 2, 2 },
+        .clearcoat = 1,
+        .clearcoat_roughness = 1,
+        .sheen_color = .{ 1, 1, 1 },
+        .sheen_roughness = 1,
+        .iridescence = 1,
+        .anisotropy = 1,
+        .diffuse_transmission = 1,
+        .multiscatter_color = .{ 0.5, 0.5, 0.5 },
+    };
+    inline for (scene.texture_fields) |field| @field(material, field) = view;
+    return material;
+}
+
+test "layers' textures: which channels are kept, as light or as numbers" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const file = try TestImage.png(files.allocator(), 1, 1, 4, &.{ 10, 20, 30, 40 });
+    const colors = [_]u8{ 10, 20, 30 };
+    const Case = struct { Use, []const u8 };
+    const cases = [_]Case{
+        .{ .transmission, &.{10} },          .{ .specular, &.{40} },
+        .{ .specular_color, &colors },       .{ .glossiness, &.{40} },
+        .{ .clearcoat, &.{10} },             .{ .clearcoat_roughness, &.{20} },
+        .{ .clearcoat_normal, &colors },     .{ .sheen_color, &colors },
+        .{ .sheen_roughness, &.{40} },       .{ .iridescence, &.{10} },
+        .{ .iridescence_thickness, &.{20} }, .{ .anisotropy, &colors },
+        .{ .diffuse_transmission, &.{40} },  .{ .diffuse_transmission_color, &colors },
+        .{ .multiscatter_color, &colors },
+    };
+    try testing.expectEqual(world.Slot.count - world.Slot.base_count, cases.len);
+    const uses = std.enums.values(Use);
+    for (cases, uses[uses.len - cases.len ..]) |case, expected_use| {
+        try testing.expectEqual(expected_use, case[0]);
+        const all = layeredMaterial(.{ .texture = 0 });
+        var material = all;
+        inline for (scene.texture_fields) |field| @field(material, field) = null;
+        switch (case[0]) {
+            inline else => |use| {
+                const field = @tagName(use) ++ "_texture";
+                @field(material, field) = @field(all, field);
+            },
+        }
+        var from = try testScene(testing.allocator, &.{file}, &.{material});
+        defer from.deinit();
+        var diagnostic: Diagnostic = .{};
+        var set = try testLoad(&from, 1, &diagnostic);
+        defer set.deinit();
+        try testing.expectEqual(MaterialUse{
+            .layer_lookup_count = 1,
+            .tangents = .{}, // For the anisotropy.
+        }, set.materials[0]);
+        try testing.expectEqual(case[0].slot(), set.lookups[0].slot);
+        const texture = &set.textures.all[0];
+        try testing.expectEqualSlices(u8, case[1], texture.levels[0].texels);
+        try testing.expectEqual(case[0].isLight(), texture.is_srgb);
+        for (set.lookups[0].channels, 0..) |channel, index| {
+            const wanted: u8 = if (index < case[1].len) @intCast(index) else missing;
+            try testing.expectEqual(wanted, channel);
+        }
+    }
+}
+
+test "lookups of a material: base slots first, those of layers directly behind" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const file = try TestImage.png(files.allocator(), 1, 1, 4, &.{ 10, 20, 30, 40 });
+    const all = layeredMaterial(.{ .texture = 0, .texcoord_set = 3 });
+    var unlit = all;
+    unlit.unlit = true;
+    var plain: scene.Material = .{};
+    inline for (scene.texture_fields) |field| @field(plain, field) = @field(all, field);
+    var from = try testScene(testing.allocator, &.{file}, &.{ all, unlit, plain });
+    defer from.deinit();
+    var diagnostic: Diagnostic = .{};
+    var set = try testLoad(&from, 1, &diagnostic);
+    defer set.deinit();
+    const use = set.materials[0];
+    try testing.expectEqual(world.Slot.base_count, use.lookup_count);
+    try testing.expectEqual(world.Slot.count - world.Slot.base_count, use.layer_lookup_count);
+    for (set.lookupsOf(0), 0..) |lookup, index| {
+        try testing.expectEqual(index, @backingInt(lookup.slot));
+        try testing.expectEqual(index >= use.lookup_count, lookup.slot.isOfLayers());
+    }
+    try testing.expectEqual(3, use.tangents.?.texcoord_set);
+    // One texture of light and one of numbers, which has all channels for all who want some.
+    try testing.expectEqual(2, set.textures.all.len);
+    try testing.expectEqual(1, set.lookupsOf(1).len);
+    try testing.expectEqual(.base_color, set.lookupsOf(1)[0].slot);
+    // Without factors only those of the base are left; emissive is not, for it is 0.
+    try testing.expectEqual(world.Slot.base_count - 1, set.materials[2].lookup_count);
+    const kept = set.lookupsOf(2)[set.materials[2].lookup_count..];
+    try testing.expectEqual(2, kept.len);
+    for (kept, [_]world.Slot{ .specular, .specular_color }) |lookup, slot| {
+        try testing.expectEqual(slot, lookup.slot);
+    }
+}
+
+test "alpha as a number: alone, beside gray, and where there is none" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const view: scene.TextureView = .{ .texture = 0 };
+    const Case = struct { u8, []const u8, []const u8, ?u8 };
+    for ([_]Case{
+        .{ 2, &.{ 50, 60 }, &.{ 50, 60 }, 1 },
+        .{ 4, &.{ 10, 20, 30, 60 }, &.{ 20, 30, 60 }, 2 },
+        .{ 4, &.{ 10, 20, 30, 255 }, &.{ 20, 30 }, null },
+        .{ 3, &.{ 10, 20, 30 }, &.{ 20, 30 }, null },
+    }) |case| {
+        const file = try TestImage.png(files.allocator(), 1, 1, case[0], case[1]);
+        var from = try testScene(testing.allocator, &.{ file, file }, &.{
+            .{ .metallic_roughness_texture = view, .specular_texture = view },
+            .{ .metallic = 0, .specular = 0.5, .specular_texture = .{ .texture = 1 } },
+        });
+        defer from.deinit();
+        var diagnostic: Diagnostic = .{};
+        var set = try testLoad(&from, 1, &diagnostic);
+        defer set.deinit();
+        try testing.expectEqual(0, diagnostic.warning_count);
+        const lookups = set.lookupsOf(0);
+        const texels = set.textures.all[lookups[0].texture].levels[0].texels;
+        try testing.expectEqualSlices(u8, case[2], texels);
+        // An image that has nothing of what is wanted is no texture.
+        const alpha_count: usize = if (case[3] == null) 0 else 1;
+        if (case[3]) |channel| try testing.expectEqual(channel, lookups[1].channels[0]);
+        try testing.expectEqual(1 + alpha_count, lookups.len);
+        try testing.expectEqual(alpha_count, set.lookupsOf(1).len);
+        try testing.expectEqual(1 + alpha_count, set.textures.all.len);
     }
 }
 
