@@ -217,6 +217,7 @@ pub fn pose(
         arena.allocator(),
         &loaded.parts,
         &loaded.textures,
+        soup.positions,
         soup.triangles,
     );
     const tree_start = Clock.awake.now(io);
@@ -1023,6 +1024,7 @@ test {
     _ = view_file;
     _ = @import("prepare/framing.zig");
     _ = @import("prepare/mikktspace.zig");
+    _ = @import("prepare/volumes.zig");
     _ = @import("prepare/bvh/split.zig");
     _ = bvh_input;
     _ = @import("prepare/bvh/build.zig");

@@ -38,6 +38,7 @@ pub const TreeStatistics = geometry_file.TreeStatistics;
 pub const Triangle = geometry_file.Triangle;
 pub const TrianglePack = geometry_file.TrianglePack;
 pub const View = view_file.View;
+pub const Volume = @import("world/volume.zig").Volume;
 pub const Wrap = textures_file.Wrap;
 pub const cache_line_bytes = geometry_file.cache_line_bytes;
 pub const none = geometry_file.none;

@@ -10,12 +10,14 @@ const world_file = @import("../../world.zig");
 const statistics = @import("../../statistics.zig");
 const ray_file = @import("../traverse/ray.zig");
 const bundle_file = @import("../traverse/bundle.zig");
+const boundaries_file = @import("boundaries.zig");
 const dispatch = @import("../traverse/dispatch.zig");
 const multi_hit = @import("../traverse/multi_hit.zig");
 const triangle = @import("../traverse/triangle.zig");
 const interaction_file = @import("../shade/interaction.zig");
 const layers_file = @import("../shade/layers.zig");
 const material_file = @import("../shade/material.zig");
+const offset = @import("../shade/offset.zig");
 const texturing = @import("../shade/texturing.zig");
 const Grid = @import("../traverse/beam/grid.zig").Grid;
 const Frame = world_file.Frame;
@@ -49,6 +51,8 @@ pub fn Visibility(comptime Kernel: type) type {
         frame: *const Frame,
         tests: statistics.TestCounts,
         hits: multi_hit.HitLists(Kernel),
+        /// By group, of the path under way; undefined in frames without volumes.
+        boundaries: [group_count]boundaries_file.Boundaries(Kernel),
 
         const Self = @This();
 
@@ -65,6 +69,55 @@ pub fn Visibility(comptime Kernel: type) type {
         pub fn closest(visibility: *Self, bundle: *Bundle, grid: ?*const Grid) Coherence {
             const geometry = visibility.frame.geometry;
             return dispatch.closestHit(Kernel, geometry, bundle, grid, &visibility.tests);
+        }
+
+        /// Finds what the hits of a path's rays do to the volumes that they are in.
+        pub inline fn findBoundaries(visibility: *Self, path: anytype) void {
+            const volumes = visibility.frame.materials.volumes;
+            if (volumes.len == 0) return;
+            const found = visibility.findBoundariesWith(path, null);
+            if (found.any_hidden or (found.any_met and volumes.len > 1))
+                visibility.findTouching(path);
+        }
+
+        const Found = struct { any_met: bool, any_hidden: bool };
+
+        fn findBoundariesWith(
+            visibility: *Self,
+            path: anytype,
+            touching: ?*const multi_hit.HitLists(Kernel),
+        ) Found {
+            var found: Found = .{ .any_met = false, .any_hidden = false };
+            for (&visibility.boundaries, &path.bundle.groups, 0..) |*boundaries, *ray, group| {
+                const nestings = &path.nestings[group];
+                boundaries.find(visibility.frame, ray, nestings, group, touching);
+                found.any_met = found.any_met or boundaries.met.any();
+                found.any_hidden = found.any_hidden or boundaries.hidden.any();
+            }
+            return found;
+        }
+
+        /// The same with boundaries so near to each other that rays which start off the first have
+        /// the others behind them.
+        noinline fn findTouching(visibility: *Self, path: anytype) void {
+            const frame = visibility.frame;
+            var bundle = path.bundle;
+            for (&bundle.groups, &visibility.boundaries) |*ray, *boundaries| {
+                ray.active = boundaries.met;
+                if (ray.active.none()) continue;
+                const corners: interaction_file.Corners(Rays) =
+                    .of(frame.geometry, ray.closest.primitive, ray.active);
+                const hit = hitOf(Rays, ray, &corners, ray.active);
+                const point = interaction_file.resolve(Rays, frame, &corners, &hit);
+                const length = offset
+                    .length(Rays, point.error_ulps, .zero(), point.offset_max);
+                const cosine = point.normal_geometric.dot(point.view).max(.splat(1e-3));
+                const reach = length.div(cosine.mul(ray.line.direction.length()));
+                ray.tnear = ray.closest;
+                ray.closest = .before(ray.tnear.t.add(reach));
+            }
+            visibility.hits.trace(&bundle, &visibility.tests);
+            _ = visibility.findBoundariesWith(path, &visibility.hits);
         }
 
         /// Transmittance of shadow rays (`shadowRay`) of this light to vertices, in the lanes of

@@ -128,6 +128,7 @@ pub fn Whitted(comptime Kernel: type) type {
             const primary = path.depth == 0 and path.transparency_depth == 0;
             const grid = if (primary and whitted.grid != null) &whitted.grid.? else null;
             const beams = whitted.visibility.closest(&path.bundle, grid);
+            whitted.visibility.findBoundaries(path);
             const coherence: dispatch.Coherence = if (path.depth == 0) .all else beams;
             if (path.depth == 0) whitted.rays.shadow += floor.lightShare(
                 Kernel,
@@ -164,7 +165,7 @@ pub fn Whitted(comptime Kernel: type) type {
         /// Finds the points that rays of a group see, and adds what these emit and the ambient
         /// light that they scatter.
         fn find(whitted: *Self, group: usize, vertex: *Vertex) void {
-            vertex.find(whitted.frame, &whitted.path, group);
+            vertex.find(&whitted.visibility, &whitted.path, group);
             whitted.bounces.choose(group, vertex, whitted.isEnd());
             if (vertex.seen.none()) return;
             const environment = whitted.frame.environment;
