@@ -126,6 +126,7 @@ test {
     _ = dispatch;
     _ = @import("trace/integrate/environment_lights.zig");
     _ = @import("trace/integrate/camera.zig");
+    _ = @import("trace/integrate/numbers.zig");
     _ = @import("trace/integrate/path.zig");
     _ = tiles;
     _ = @import("trace/traverse/beam/budget.zig");
