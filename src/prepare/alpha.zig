@@ -136,7 +136,8 @@ const Work = struct {
 
     fn alphaLookup(work: *const Work, material: u32) ?*const world.Lookup {
         for (work.set.lookupsOf(material)) |*lookup| {
-            if (lookup.slot == .base_color and lookup.channels[3] != texture_use.missing) return lookup;
+            if (lookup.slot != .base_color) continue;
+            if (lookup.channels[3] != texture_use.missing) return lookup;
         }
         return null;
     }

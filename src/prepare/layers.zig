@@ -215,7 +215,11 @@ test "each layer brings its own numbers" {
             },
         },
         .{
-            .{ .metallic = 0, .diffuse_transmission = 1, .diffuse_transmission_color = .{ 0, 1, 0 } },
+            .{
+                .metallic = 0,
+                .diffuse_transmission = 1,
+                .diffuse_transmission_color = .{ 0, 1, 0 },
+            },
             .{ .diffuse_transmission = 1, .diffuse_transmission_color = .{ 0, 1, 0 } },
         },
     }) |case| {

@@ -1127,7 +1127,8 @@ test "threads change nothing, batches neither" {
 }
 
 test "floats become the nearest codes" {
-    const request: Request = .{ .image = 0, .is_srgb = true, .wanted = .{ true, true, true, false } };
+    const wanted: [4]bool = .{ true, true, true, false };
+    const request: Request = .{ .image = 0, .is_srgb = true, .wanted = wanted };
     const stored = storedChannels(3, &request, false);
     var codes: [3]u8 = undefined;
     pickFloats(3, &.{ 0.5, 2, 0 }, &stored, true, &codes);

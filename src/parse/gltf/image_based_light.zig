@@ -32,7 +32,8 @@ pub fn read(source: *Source, textures: *Textures, shown: *const c.cgltf_scene) E
     const Lights = struct { lights: []const Light };
     const data = source.data;
     const all = Source.slice(data.data_extensions, data.data_extensions_count);
-    const use = try text.parse(Use, arena, reference) orelse return leaveOut(source, "has no light");
+    const use = try text.parse(Use, arena, reference) orelse
+        return leaveOut(source, "has no light");
     const described = text.find(all, extension_name) orelse "";
     const lights = try text.parse(Lights, arena, described) orelse
         return leaveOut(source, "is not as it should be");
