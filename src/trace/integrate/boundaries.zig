@@ -8,7 +8,9 @@ const world_file = @import("../../world.zig");
 const math = @import("../../math.zig");
 const multi_hit = @import("../traverse/multi_hit.zig");
 const ray_file = @import("../traverse/ray.zig");
+const visibility_file = @import("visibility.zig");
 const interaction_file = @import("../shade/interaction.zig");
+const offset = @import("../shade/offset.zig");
 const volumes_file = @import("../shade/volumes.zig");
 const vec3 = math.vec3;
 const Crossing = volumes_file.Crossing;
@@ -35,6 +37,53 @@ pub fn planeOf(geometry: *const world_file.Geometry, primitive: u32) [3]f32 {
         vec3.sub(geometry.positions[corner[1]], first),
         vec3.sub(geometry.positions[corner[2]], first),
     );
+}
+
+/// Finds what the hits of a path's rays do to the volumes that they are in.
+pub fn search(comptime Kernel: type, visibility: anytype, path: anytype) void {
+    const found = findAll(Kernel, visibility, path, null);
+    if (found.any_hidden or (found.any_met and visibility.frame.materials.volumes.len > 1))
+        searchTouching(Kernel, visibility, path);
+}
+
+const Found = struct { any_met: bool, any_hidden: bool };
+
+fn findAll(
+    comptime Kernel: type,
+    visibility: anytype,
+    path: anytype,
+    touching: ?*const multi_hit.HitLists(Kernel),
+) Found {
+    var found: Found = .{ .any_met = false, .any_hidden = false };
+    for (&visibility.boundaries, &path.bundle.groups, 0..) |*boundaries, *ray, group| {
+        boundaries.find(visibility.frame, ray, &path.nestings[group], group, touching);
+        found.any_met = found.any_met or boundaries.met.any();
+        found.any_hidden = found.any_hidden or boundaries.hidden.any();
+    }
+    return found;
+}
+
+/// The same with boundaries so near to each other that rays which start off the first have the
+/// others behind them.
+noinline fn searchTouching(comptime Kernel: type, visibility: anytype, path: anytype) void {
+    const Rays = Kernel.Rays;
+    const frame: *const Frame = visibility.frame;
+    var bundle = path.bundle;
+    for (&bundle.groups, &visibility.boundaries) |*ray, *boundaries| {
+        ray.active = boundaries.met;
+        if (ray.active.none()) continue;
+        const corners: interaction_file.Corners(Rays) =
+            .of(frame.geometry, ray.closest.primitive, ray.active);
+        const hit = visibility_file.hitOf(Rays, ray, &corners, ray.active);
+        const point = interaction_file.resolve(Rays, frame, &corners, &hit);
+        const length = offset.length(Rays, point.error_ulps, .zero(), point.offset_max);
+        const cosine = point.normal_geometric.dot(point.view).max(.splat(1e-3));
+        const reach = length.div(cosine.mul(ray.line.direction.length()));
+        ray.tnear = ray.closest;
+        ray.closest = .before(ray.tnear.t.add(reach));
+    }
+    visibility.hits.trace(&bundle, &visibility.tests);
+    _ = findAll(Kernel, visibility, path, &visibility.hits);
 }
 
 /// Those that the rays of a group hit.

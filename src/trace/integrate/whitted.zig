@@ -127,8 +127,7 @@ pub fn Whitted(comptime Kernel: type) type {
             const path = &whitted.path;
             const primary = path.depth == 0 and path.transparency_depth == 0;
             const grid = if (primary and whitted.grid != null) &whitted.grid.? else null;
-            const beams = whitted.visibility.closest(&path.bundle, grid);
-            whitted.visibility.findBoundaries(path);
+            const beams = whitted.visibility.closest(path, grid);
             const coherence: dispatch.Coherence = if (path.depth == 0) .all else beams;
             if (path.depth == 0) whitted.rays.shadow += floor.lightShare(
                 Kernel,

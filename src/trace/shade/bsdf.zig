@@ -26,7 +26,7 @@ pub const highlight_roughness_least = 0.05;
 /// At grazing angles a boundary reflects all light (f90 = 1), unless it reflects less than 2 % at
 /// normal incidence, as no material does: down to an index of 1, which is no boundary, f90 falls to
 /// 0 (Lagarde and de Rousiers 2014, "Moving Frostbite to Physically Based Rendering").
-const f90_per_f0 = 50;
+pub const f90_per_f0 = 50;
 
 /// Up to this roughness reflections are traced; rougher surfaces see the ambient term instead.
 pub const mirror_roughness_max = 0.25;

@@ -57,24 +57,22 @@ pub const Boundary = struct {
     before: Nesting,
     beyond: Nesting,
 
-    /// Goes through surfaces in order. Neighbours in a mesh that meet in an edge which a ray hits
-    /// count as one, and a volume that a ray leaves without having entered it, as it does where it
-    /// starts inside, has been there all the time.
+    /// Those of surfaces in one place.
     pub fn cross(nesting: Nesting, crossings: []const Crossing) Boundary {
         var boundary: Boundary = .{ .before = nesting, .beyond = nesting };
+        boundary.take(crossings);
+        return boundary;
+    }
+
+    /// Goes through surfaces in one place, in order. Neighbours in a mesh that meet in an edge
+    /// which a ray hits count as one, and a volume that a ray leaves without having entered it, as
+    /// it does where it starts inside, has been there all the time.
+    pub fn take(boundary: *Boundary, crossings: []const Crossing) void {
         for (crossings, 0..) |crossing, index| {
             for (crossings[0..index]) |earlier| {
                 if (std.meta.eql(earlier, crossing)) break;
             } else boundary.crossOne(crossing);
         }
-        return boundary;
-    }
-
-    /// The volumes that a ray was in before it went through surfaces in different places.
-    pub fn startOf(crossings: []const Crossing) Nesting {
-        var boundary: Boundary = .{ .before = .air, .beyond = .air };
-        for (crossings) |crossing| boundary.crossOne(crossing);
-        return boundary.before;
     }
 
     fn crossOne(boundary: *Boundary, crossing: Crossing) void {
@@ -167,8 +165,10 @@ test "wine that touches its glass: one boundary, in whatever order" {
 test "what is left without having been entered was there before; what is too much is forgotten" {
     const air = Volume.air;
     try std.testing.expectEqual(Nesting.air, try expectBoundary(0, air, .air, &.{glass_out}));
-    const start: Nesting = Boundary.startOf(&.{ wine_out, glass_in, wine_in, glass_out });
-    try std.testing.expectEqual([4]u16{ 1, air, air, air }, start.ranks);
+    var way: Boundary = .cross(.air, &.{wine_out});
+    for ([_]Crossing{ glass_in, wine_in, glass_out }) |crossing| way.take(&.{crossing});
+    try std.testing.expectEqual([4]u16{ 1, air, air, air }, way.before.ranks);
+    try std.testing.expectEqual([4]u16{ 1, air, air, air }, way.beyond.ranks);
     var nesting: Nesting = .air;
     for ([_]u16{ 7, 3, 9, 5, 1, 3 }) |rank| nesting = nesting.entered(rank);
     try std.testing.expectEqual([4]u16{ 1, 3, 3, 5 }, nesting.ranks);
