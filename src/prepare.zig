@@ -147,13 +147,13 @@ fn visibleInstances(
     return visible.items;
 }
 
-/// What of the vertices the textures ask for.
+/// What of the vertices the materials ask for.
 fn attributesOf(textures: *const texture.TextureSet) flatten.Attributes {
     var attributes: flatten.Attributes = .{};
-    for (textures.lookups) |lookup| {
-        attributes.texcoord_sets[lookup.texcoord_set] = true;
-        if (lookup.slot == .normal) attributes.tangents = true;
-    }
+    for (textures.lookups) |lookup| attributes.texcoord_sets[lookup.texcoord_set] = true;
+    for (textures.materials) |use| if (use.tangents != null) {
+        attributes.tangents = true;
+    };
     return attributes;
 }
 
@@ -1018,6 +1018,8 @@ test {
     _ = place_file;
     _ = tangents;
     _ = texture;
+    _ = @import("prepare/layers.zig");
+    _ = @import("prepare/texture_use.zig");
     _ = @import("prepare/pyramid.zig");
     _ = view_file;
     _ = @import("prepare/framing.zig");

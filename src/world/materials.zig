@@ -41,15 +41,19 @@ pub const Material = struct {
     /// Those of slots of layers: that many, directly behind them.
     layer_lookup_count: u32 = 0,
 
+    /// Whether no light passes, wherever a surface of it is hit. Its textures are `lookups`.
+    pub fn stopsLight(material: *const Material, lookups: []const Lookup) bool {
+        if (material.blend > 0 or material.alpha_cutoff >= 0) return false;
+        var is_metal = material.metallic == 1;
+        for (lookups) |*lookup| {
+            if (lookup.slot == .metallic_roughness) is_metal = false; // Not everywhere.
+        }
+        return is_metal or material.transmission == 0;
+    }
+
     /// Whether light goes through, by refraction or straight on.
     pub fn transmits(material: *const Material) bool {
         return material.transmission * (1 - material.metallic) > 0 and material.unlit == 0;
-    }
-
-    /// Whether no light passes, wherever a surface of it is hit.
-    pub fn stopsLight(material: *const Material) bool {
-        const clear = material.transmission * (1 - material.metallic);
-        return clear == 0 and material.blend == 0 and material.alpha_cutoff < 0;
     }
 };
 

@@ -172,12 +172,39 @@ fn decodeForTextures(
             }
         }
     };
-    const normal_texture = material.normal_texture orelse return;
-    if (mesh.texcoords[normal_texture.texcoord_set] == null) {
-        mesh.material = try meshes.materials.useSmooth(mesh.material);
-    } else if (mesh.normals != null) { // Without, they count for nothing.
-        if (used.tangent) |index| mesh.tangents = try meshes.decodeTangents(index);
+    try meshes.decodeForTangents(mesh, used, material);
+}
+
+/// What bends normals, or has a direction along the surface, needs tangents, or coordinates to make
+/// them of; without these it counts for nothing.
+fn decodeForTangents(
+    meshes: *Meshes,
+    mesh: *scene.Mesh,
+    used: *const attributes.Used,
+    material: *const scene.Material,
+) Error!void {
+    var lacks: Materials.Lacks = .{};
+    var needed = false;
+    inline for (.{ "normal_texture", "clearcoat_normal_texture" }) |field| {
+        if (@field(material, field)) |view| {
+            if (mesh.texcoords[view.texcoord_set] == null)
+                @field(lacks, field) = true
+            else
+                needed = true;
+        }
     }
+    const has_tangents = mesh.normals != null and used.tangent != null; // See below.
+    if (material.anisotropy > 0) {
+        const set = if (material.anisotropy_texture) |view| view.texcoord_set else 0;
+        if (!needed and !has_tangents) if (used.texcoords[set]) |index| {
+            mesh.texcoords[set] = try meshes.floats(2, &meshes.texcoords, index);
+        };
+        lacks.anisotropy = !needed and !has_tangents and mesh.texcoords[set] == null;
+        if (!lacks.anisotropy) needed = true;
+    }
+    if (lacks.any()) mesh.material = try meshes.materials.useWithout(mesh.material, lacks);
+    // Tangents of a mesh without normals count for nothing (glTF 2.0, section 3.7.2.1).
+    if (needed and has_tangents) mesh.tangents = try meshes.decodeTangents(used.tangent.?);
 }
 
 fn floats(

@@ -8,6 +8,7 @@ const bundle_file = @import("../traverse/bundle.zig");
 const ray_file = @import("../traverse/ray.zig");
 const bsdf_file = @import("../shade/bsdf.zig");
 const interaction_file = @import("../shade/interaction.zig");
+const layers_file = @import("../shade/layers.zig");
 const exponential = @import("../shade/exponential.zig");
 const Nesting = @import("../shade/volumes.zig").Nesting;
 const ray_cone = @import("../shade/ray_cone.zig");
@@ -97,21 +98,29 @@ pub fn PathState(comptime Kernel: type) type {
             path.cone_spread[group] = .select(material.volume, bent, spread);
         }
 
-        /// Starts the active rays of a group off a surface, on the side that `away` points to.
+        /// How rays leave a surface.
+        pub const Departure = struct {
+            point: *const Interaction,
+            /// The geometric normal on the side that they go to.
+            away: Vec3,
+            direction: Vec3,
+            /// Of the lobe around the direction.
+            roughness: F32,
+        };
+
+        /// Starts the active rays of a group off a surface.
         pub fn leave(
             path: *@This(),
             before: *const @This(),
             group: usize,
-            point: *const Interaction,
-            away: Vec3,
-            direction: Vec3,
+            departure: *const Departure,
         ) void {
-            const origin = point.offsetOrigin(away, .zero());
+            const origin = departure.point.offsetOrigin(departure.away, .zero());
             const from = before.bundle.groups[group].closest.primitive;
+            path.roughness[group] = before.roughness[group].max(departure.roughness);
             path.nestings[group] = before.nestings[group];
-            path.roughness[group] = before.roughness[group].max(point.material.roughness);
             const ray = &path.bundle.groups[group];
-            ray.* = .endless(.init(origin, direction), from, ray.active);
+            ray.* = .endless(.init(origin, departure.direction), from, ray.active);
         }
 
         /// Takes rays of a group through a surface, into what it bounds or out of it.
@@ -183,8 +192,9 @@ pub fn PathStack(comptime Kernel: type) type {
         states: [states_max]PathState(Kernel),
         count: usize,
 
-        /// At each depth a ray leaves at most the rest of itself, a refraction and a reflection.
-        const states_max = 3 * (depth_limit + 1);
+        /// At each depth a ray leaves at most the rest of itself, a refraction for all channels and
+        /// one for each, and reflections by the base and by a coat.
+        const states_max = 7 * (depth_limit + 1);
 
         /// Room for rays of the given depth; the caller fills in the rest.
         pub fn push(
@@ -243,6 +253,8 @@ pub fn Vertex(comptime Lanes: type) type {
     return struct {
         point: interaction_file.Interaction(Lanes),
         bsdf: bsdf_file.Bsdf(Lanes),
+        /// Undefined where the bsdf has no layers.
+        layers: layers_file.Layers(Lanes),
         /// Lanes that have a vertex.
         seen: Lanes.Mask,
         /// Throughput of the path up to here, opacity included.
@@ -264,10 +276,25 @@ pub fn Vertex(comptime Lanes: type) type {
             visibility.findInteraction(Lanes, frame, path, group, point);
             if (frame.materials.volumes.len > 0) seer.boundaries[group].apply(point);
             point.opacity = Lanes.F32.select(point.culled, .zero(), point.opacity);
-            vertex.bsdf.become(point);
+            if (frame.hasLayers()) vertex.findLayers(frame, path, group) else vertex.bsdf.become(point);
             vertex.seen = point.hit.bitAnd(point.opacity.gt(.zero()));
             const throughput = path.throughputAt(group, point.distance).scale(point.opacity);
             vertex.throughput = .select(vertex.seen, throughput, .splat(.{ 0, 0, 0 }));
+        }
+
+        /// Finds the BSDF in frames in which some have further lobes.
+        noinline fn findLayers(
+            vertex: *@This(),
+            frame: *const Frame,
+            path: anytype,
+            group: usize,
+        ) void {
+            const ray = &path.bundle.groups[group];
+            visibility.findLayers(Lanes, frame, ray, &vertex.point, &vertex.layers);
+            if (vertex.layers.present.any())
+                vertex.bsdf.becomeLayered(&vertex.point, &vertex.layers)
+            else
+                vertex.bsdf.become(&vertex.point);
         }
     };
 }

@@ -17,6 +17,7 @@ const dispatch = @import("../traverse/dispatch.zig");
 const multi_hit = @import("../traverse/multi_hit.zig");
 const triangle = @import("../traverse/triangle.zig");
 const interaction_file = @import("../shade/interaction.zig");
+const layers_file = @import("../shade/layers.zig");
 const material_file = @import("../shade/material.zig");
 const texturing = @import("../shade/texturing.zig");
 const Grid = @import("../traverse/beam/grid.zig").Grid;
@@ -335,6 +336,24 @@ noinline fn addFootprint(
     const corners: interaction_file.Corners(Lanes) = .of(frame.geometry, primitive, point.hit);
     const hit = hitOf(Lanes, ray, &corners, point.hit);
     texturing.apply(Lanes, frame, &corners, &hit, primitive, cone, point);
+}
+
+/// The further lobes at points (`findInteraction`), in frames in which materials have some.
+pub fn findLayers(
+    comptime Lanes: type,
+    frame: *const Frame,
+    ray: *const ray_file.Ray(Lanes),
+    point: *interaction_file.Interaction(Lanes),
+    layers: *layers_file.Layers(Lanes),
+) void {
+    const primitive = ray.closest.primitive;
+    const corners: interaction_file.Corners(Lanes) = .of(frame.geometry, primitive, point.hit);
+    const hit = hitOf(Lanes, ray, &corners, point.hit);
+    layers_file.find(Lanes, frame, &.{
+        .corners = &corners,
+        .hit = &hit,
+        .primitive = primitive,
+    }, point, layers);
 }
 
 /// The shadow rays of points off surfaces (`Interaction.offsetOrigin`), which never hit the

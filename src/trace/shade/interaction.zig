@@ -245,7 +245,7 @@ pub inline fn unit(comptime Lanes: type, vector: Lanes.Vec3) Lanes.Vec3 {
 
 /// The interpolated normal at unit length, on the side of the geometric one; that one itself where
 /// the vertices have none (zero).
-fn shadingNormal(
+pub fn shadingNormal(
     comptime Lanes: type,
     smooth: Lanes.Vec3,
     normal_geometric: Lanes.Vec3,

@@ -35,17 +35,22 @@ pub fn Color(comptime Lanes: type) type {
     };
 }
 
-/// Some of a scene's materials, put into lanes a field at a time: mostly there is one for all.
+/// Some of a scene's materials in lanes.
 pub fn Materials(comptime Lanes: type) type {
+    return Records(Lanes, world_file.Material);
+}
+
+/// Some records of floats, put into lanes a field at a time: mostly there is one for all.
+pub fn Records(comptime Lanes: type, comptime Record: type) type {
     return struct {
-        all: []const world_file.Material,
+        all: []const Record,
         used: Unique(Lanes),
 
         const Self = @This();
 
         /// Those with these numbers in the lanes asked for.
         pub inline fn of(
-            all: []const world_file.Material,
+            all: []const Record,
             numbers: Lanes.I32,
             asked: Lanes.Mask,
         ) Self {
@@ -64,6 +69,11 @@ pub fn Materials(comptime Lanes: type) type {
                 .y = materials.pick(name, 1),
                 .z = materials.pick(name, 2),
             };
+        }
+
+        /// A field of two floats.
+        pub inline fn pair(materials: *const Self, comptime name: []const u8) [2]Lanes.F32 {
+            return .{ materials.pick(name, 0), materials.pick(name, 1) };
         }
 
         /// A field, or a component of one.
