@@ -30,6 +30,7 @@ pub const Materials = materials_file.Materials;
 pub const Node = geometry_file.Node;
 pub const Padding = @import("world/padding.zig").Padding;
 pub const Slot = textures_file.Slot;
+pub const Sphere = geometry_file.Sphere;
 pub const Texture = textures_file.Texture;
 pub const TextureLevel = textures_file.Level;
 pub const Textures = textures_file.Textures;
@@ -83,6 +84,8 @@ pub const Facts = struct {
     own_light_count: usize = 0,
     /// Triangles left out because they have no area or no finite place.
     degenerate_count: u64,
+    /// Triangles that points and lines became.
+    stroke_triangle_count: u64 = 0,
 };
 
 /// Everything that tracing needs, and its memory.
