@@ -187,7 +187,6 @@ pub fn Whitted(comptime Kernel: type) type {
 
         /// Adds what the points that rays see scatter of the light that arrives.
         fn addLights(whitted: *Self, coherence: dispatch.Coherence) void {
-            const path = &whitted.path;
             const radiance = &whitted.sample.radiance;
             whitted.rays.shadow += environment_light.addLight(
                 Kernel,
@@ -195,7 +194,7 @@ pub fn Whitted(comptime Kernel: type) type {
                 &whitted.environment_lights,
                 whitted.sample.number,
                 &.{
-                    .path = path,
+                    .path = &whitted.path,
                     .all = &whitted.vertices,
                     .traced = &whitted.reflected,
                     .is_end = whitted.isEnd(),
@@ -207,8 +206,9 @@ pub fn Whitted(comptime Kernel: type) type {
                 Kernel,
                 &whitted.visibility,
                 light,
-                path,
+                &whitted.path,
                 &whitted.vertices,
+                &whitted.reflected,
                 coherence,
                 radiance,
             );
