@@ -139,6 +139,7 @@ test {
     _ = @import("trace/shade/albedo.zig");
     _ = @import("trace/shade/bsdf.zig");
     _ = @import("trace/shade/microfacet.zig");
+    _ = @import("trace/shade/sheen.zig");
     _ = @import("trace/shade/unique.zig");
     _ = @import("trace/shade/texture.zig");
     _ = @import("trace/shade/ray_cone.zig");
