@@ -180,7 +180,8 @@ fn integrate(cosine: f32, roughness: f32) f64 {
 
 test "the lobe is the text's formula" {
     const cosines = [_][3]f64{
-        .{ 0.9, 0.7, 0.3 }, .{ 0.1, 0.2, 0.05 }, .{ 0.5, 0.999, 0.4 }, .{ 1, 1, 1 }, .{ 0, 0.5, 0.6 },
+        .{ 0.9, 0.7, 0.3 }, .{ 0.1, 0.2, 0.05 }, .{ 0.5, 0.999, 0.4 },
+        .{ 1, 1, 1 },       .{ 0, 0.5, 0.6 },
     };
     for (cosines) |case| for ([_]f64{ 0.3, 0.6, 1 }) |roughness| {
         const alpha = roughness * roughness;
