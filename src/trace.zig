@@ -138,6 +138,8 @@ test {
     _ = @import("trace/shade/albedo.zig");
     _ = @import("trace/shade/bsdf.zig");
     _ = @import("trace/shade/microfacet.zig");
+    _ = @import("trace/shade/phase.zig");
+    _ = @import("trace/shade/transmission.zig");
     _ = @import("trace/shade/unique.zig");
     _ = @import("trace/shade/texture.zig");
     _ = @import("trace/shade/ray_cone.zig");

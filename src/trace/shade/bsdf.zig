@@ -13,6 +13,7 @@ const std = @import("std");
 const simd = @import("../../simd.zig");
 const albedo_file = @import("albedo.zig");
 const microfacet = @import("microfacet.zig");
+const transmission = @import("transmission.zig");
 const Interaction = @import("interaction.zig").Interaction;
 
 /// Least roughness of the lobe that lights without size and samples see: below it a highlight would
@@ -301,19 +302,18 @@ fn Boundary(comptime Lanes: type) type {
                 .refraction = point.view.neg(),
             };
             const eta = F32.select(point.back, material.ior, one.div(material.ior));
-            const sin_squared = one.sub(cos_view.mul(cos_view));
-            const cos_squared = one.sub(eta.mul(eta).mul(sin_squared));
-            const cos_inside = cos_squared.max(.zero()).sqrt();
-            const along = point.view.neg();
-            const turned = point.normal.scale(eta.mul(cos_view).sub(cos_inside));
-            const bent = along.scale(eta).add(turned);
+            const bent = transmission.refract(Lanes, point.view, point.normal, eta);
             // A shading normal far from the triangle's can bend light back to the same side.
-            const through = bent.dot(point.normal_geometric).lt(.zero());
+            const through = bent.direction.dot(point.normal_geometric).lt(.zero());
             const leaving = material.volume.bitAnd(point.back);
             return .{
-                .total = material.volume.bitAnd(cos_squared.lt(.zero())),
-                .cos_fresnel = F32.select(leaving, cos_inside, cos_view),
-                .refraction = .select(material.volume.bitAnd(through), bent, along),
+                .total = material.volume.bitAnd(bent.total),
+                .cos_fresnel = F32.select(leaving, bent.cos_beyond, cos_view),
+                .refraction = .select(
+                    material.volume.bitAnd(through),
+                    bent.direction,
+                    point.view.neg(),
+                ),
             };
         }
     };
