@@ -26,6 +26,7 @@ const material = @import("prepare/material.zig");
 const place_file = @import("prepare/pose.zig");
 const tangents = @import("prepare/tangents.zig");
 const texture = @import("prepare/texture.zig");
+const strokes = @import("prepare/strokes.zig");
 const view_file = @import("prepare/view.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
@@ -63,7 +64,14 @@ pub const PoseSettings = struct {
     lanes: u8,
     pool: *parallel.Pool,
     tree_quality: TreeQuality = .default,
+    /// Diameter of points and width of lines, in pixels of the automatic view.
+    point_size: f32 = choices.point_size.default,
+    /// What decides how large these are.
+    view: WantedView = .{},
 };
+
+/// See `PoseSettings`.
+pub const WantedView = view_file.Wanted;
 
 /// What is seen of it, and in what light.
 pub const ViewSettings = struct {
@@ -147,13 +155,13 @@ fn visibleInstances(
     return visible.items;
 }
 
-/// What of the vertices the textures ask for.
+/// What of the vertices the materials ask for.
 fn attributesOf(textures: *const texture.TextureSet) flatten.Attributes {
     var attributes: flatten.Attributes = .{};
-    for (textures.lookups) |lookup| {
-        attributes.texcoord_sets[lookup.texcoord_set] = true;
-        if (lookup.slot == .normal) attributes.tangents = true;
-    }
+    for (textures.lookups) |lookup| attributes.texcoord_sets[lookup.texcoord_set] = true;
+    for (textures.materials) |use| if (use.tangents != null) {
+        attributes.tangents = true;
+    };
     return attributes;
 }
 
@@ -190,33 +198,29 @@ pub fn pose(
     var arena: std.heap.ArenaAllocator = .init(gpa);
     errdefer arena.deinit();
     const place = try place_file.compose(arena.allocator(), from);
-    const soup = try flatten.flatten(
+    var soup = try flatten.flatten(
         gpa,
         arena.allocator(),
         loaded.parts.instances,
         loaded.parts.meshes,
         attributesOf(&loaded.textures),
+        settings.point_size,
         &place,
         settings.pool,
         diagnostic,
     );
-    var geometry: world.Geometry = .{
-        .tree = world.Geometry.empty.tree,
-        .positions = soup.positions,
-        .normals = soup.normals,
-        .colors = soup.colors,
-        .texcoords = soup.texcoords,
-        .tangents = soup.tangents,
-        .triangles = soup.triangles,
-        .bounds = soup.bounds,
-        .centroid_bounds = soup.centroid_bounds,
-        .padding = .init(place_file.round(place.center), soup.bounds),
-        .size = @floatCast(place.size),
-    };
+    var geometry = geometryOf(&soup, &place);
+    if (soup.strokes.spheres.len > 0) {
+        const materials = loaded.parts.materials;
+        const pixel = try view_file.pixelSize(gpa, from, materials, &geometry, &settings.view);
+        try strokes.draw(gpa, &soup, pixel * settings.point_size / 2, settings.pool);
+        geometry = geometryOf(&soup, &place);
+    }
     const materials = try material.place(
         arena.allocator(),
         &loaded.parts,
         &loaded.textures,
+        soup.positions,
         soup.triangles,
     );
     const tree_start = Clock.awake.now(io);
@@ -231,10 +235,35 @@ pub fn pose(
         .node_maps = place.maps,
         .materials = materials,
         .textures = loaded.textures.textures,
-        .facts = .{ .tree = tree_facts, .degenerate_count = soup.dropped_count },
+        .facts = .{
+            .tree = tree_facts,
+            .degenerate_count = soup.dropped_count,
+            .stroke_triangle_count = soup.triangles.len - geometry.surfaces().len,
+        },
     };
     if (builtin.mode == .debug) try check.check(gpa, &result);
     return result;
+}
+
+/// All but the tree.
+fn geometryOf(soup: *const flatten.TriangleSoup, place: *const place_file.Pose) world.Geometry {
+    var geometry: world.Geometry = .{
+        .tree = world.Geometry.empty.tree,
+        .positions = soup.positions,
+        .normals = soup.normals,
+        .colors = soup.colors,
+        .tangents = soup.tangents,
+        .triangles = soup.triangles,
+        .surface_count = soup.surface_count,
+        .spheres = soup.strokes.spheres,
+        .sphere_radius = soup.sphere_radius,
+        .bounds = soup.bounds,
+        .centroid_bounds = soup.centroid_bounds,
+        .padding = .init(place_file.round(place.center), soup.bounds),
+        .size = @floatCast(place.size),
+    };
+    for (&geometry.texcoords, soup.texcoords) |*to, set| to.* = set;
+    return geometry;
 }
 
 fn nanoseconds(duration: std.Io.Duration) u64 {
@@ -1012,15 +1041,19 @@ test {
     _ = check;
     _ = deform;
     _ = flatten;
+    _ = strokes;
     _ = light;
     _ = material;
     _ = place_file;
     _ = tangents;
     _ = texture;
+    _ = @import("prepare/layers.zig");
+    _ = @import("prepare/texture_use.zig");
     _ = @import("prepare/pyramid.zig");
     _ = view_file;
     _ = @import("prepare/framing.zig");
     _ = @import("prepare/mikktspace.zig");
+    _ = @import("prepare/volumes.zig");
     _ = @import("prepare/bvh/split.zig");
     _ = bvh_input;
     _ = @import("prepare/bvh/build.zig");

@@ -64,6 +64,9 @@ pub const Pose = struct {
     /// Width of the tree: the variant's that is to render.
     lanes: u8,
     tree_quality: settings.TreeQuality = .default,
+    /// What `view` will be asked for: points and lines are as large as its pixels want them, and
+    /// stay so until the next pose.
+    view: settings.View = .{},
 };
 
 /// One scene, its threads, and what has been made so far. Must stay where it is.
@@ -212,6 +215,13 @@ pub const Session = struct {
             .lanes = chosen.lanes,
             .pool = &session.pool,
             .tree_quality = chosen.tree_quality,
+            .point_size = chosen.view.point_size,
+            .view = .{
+                .camera = chosen.view.camera,
+                .viewpoint = chosen.view.viewpoint,
+                .resolution = chosen.view.resolution,
+                .long_side = chosen.view.long_side,
+            },
         }, session.diagnostic, &session.times);
     }
 
@@ -469,7 +479,8 @@ pub const Session = struct {
         const tree = &session.world.?.facts.tree;
         const textures = &session.loaded.?.textures;
         return .{
-            .triangle_count = session.facts.triangle_count,
+            .triangle_count = session.facts.triangle_count +
+                session.world.?.facts.stroke_triangle_count,
             .width = image.width,
             .height = image.height,
             .sample_count = session.sampleCount(choices),

@@ -126,6 +126,7 @@ test {
     _ = dispatch;
     _ = @import("trace/integrate/environment_lights.zig");
     _ = @import("trace/integrate/camera.zig");
+    _ = @import("trace/integrate/numbers.zig");
     _ = @import("trace/integrate/path.zig");
     _ = tiles;
     _ = @import("trace/traverse/beam/budget.zig");
@@ -133,6 +134,7 @@ test {
     _ = @import("trace/traverse/beam/grid.zig");
     _ = beam.pixel_window;
     _ = @import("trace/integrate/sampler.zig");
+    _ = @import("trace/shade/cosine.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/offset.zig");
     _ = @import("trace/shade/albedo.zig");
@@ -141,6 +143,7 @@ test {
     _ = @import("trace/shade/phase.zig");
     _ = @import("trace/shade/transmission.zig");
     _ = @import("trace/shade/unique.zig");
+    _ = @import("trace/shade/volumes.zig");
     _ = @import("trace/shade/texture.zig");
     _ = @import("trace/shade/ray_cone.zig");
     _ = @import("trace/shade/lookups.zig");

@@ -34,17 +34,26 @@ pub fn addLight(
         if (vertex.seen.none()) continue;
         const point = &vertex.point;
         const arrival = light_file.arrive(Rays, light, point);
-        const lit = vertex.seen.andNot(point.material.unlit)
-            .bitAnd(point.normal.dot(arrival.to_light).gt(zero))
+        const front = point.normal.dot(arrival.to_light).gt(zero)
             .bitAnd(point.normal_geometric.dot(arrival.to_light).gt(zero));
+        var lit = front;
+        var away = point.normal_geometric;
+        if (vertex.bsdf.layered) {
+            const behind = vertex.bsdf.isBehind(point, arrival.to_light);
+            lit = front.bitOr(behind);
+            away = .select(behind, away.neg(), away);
+        }
+        lit = lit.bitAnd(vertex.seen).andNot(point.material.unlit);
         if (lit.none()) continue;
-        const response = vertex.bsdf.eval(point, arrival.to_light);
+        var response = vertex.bsdf.eval(point, arrival.to_light);
+        if (vertex.bsdf.layered)
+            response = .select(front, response, vertex.bsdf.evalBehind(point, arrival.to_light));
         const worth = vertex.throughput.mul(response).mul(arrival.irradiance);
         unshadowed[group] = worth;
         const shines = worth.x.gt(zero).bitOr(worth.y.gt(zero)).bitOr(worth.z.gt(zero));
         arrives.* = lit.bitAnd(shines);
         const primitive = path.bundle.groups[group].closest.primitive;
-        const end = point.offsetOrigin(point.normal_geometric, arrival.distance);
+        const end = point.offsetOrigin(away, arrival.distance);
         ray.* = visibility_file.shadowRay(Rays, light, end, primitive, arrives.*);
         ray_count += arrives.popCount();
     }
