@@ -416,11 +416,11 @@ fn integrate(boundary: *const TestBoundary) f64 {
             const opening = horizon * x * x * x;
             const to_light = axis.scale(.splat(@floatCast(@cos(opening))))
                 .add(away.scale(.splat(@floatCast(@sin(opening)))));
-            const weight = @sin(opening) * horizon * 3 * x * x * 2 * std.math.pi / (steps * sectors);
+            const weight = @sin(opening) * horizon * 3 * x * x;
             sum += weight * boundary.eval(to_light).lane(0);
         }
     }
-    return sum;
+    return sum * 2 * std.math.pi / (steps * sectors);
 }
 
 /// Mean of what samples bring if all light behind is white.
