@@ -435,6 +435,7 @@ const Parser = struct {
         options.view.environment.source = .none;
         options.view.background = .default;
         options.view.display_referred = false;
+        options.view.emitters = false;
         options.write.exposure = settings.thesis.exposure;
         options.write.tone_mapping = settings.thesis.tone_mapping;
     }
@@ -955,7 +956,7 @@ test "the last of several options counts, around --thesis too" {
     try std.testing.expectEqual(null, thesis.thread_count);
     try std.testing.expectEqual(0, thesis.write.exposure.ev);
     try std.testing.expectEqual(.linear, thesis.write.tone_mapping);
-    try std.testing.expect(!thesis.view.display_referred);
+    try std.testing.expect(!thesis.view.display_referred and !thesis.view.emitters);
     const changed = try optionsForTest(&.{ "--thesis", "--depth=9", "-t7" });
     try std.testing.expectEqual(9, changed.render.depth);
     try std.testing.expectEqual(7, changed.thread_count);

@@ -228,6 +228,8 @@ pub const Scene = struct {
     environment: ?EnvironmentMap = null,
     /// Index of the camera that the file itself would use, `none` without cameras.
     camera_default: u32 = none,
+    /// Surfaces that emit are all of the lights that the file says, each to be lit by in full.
+    has_area_lights: bool = false,
     /// Ambient radiance that the source of the scene asks for; null: by the rules of shading.
     ambient: ?f32 = null,
     /// What is seen where there is nothing, linear RGB; null: by the rules of shading.

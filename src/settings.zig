@@ -278,6 +278,9 @@ pub const View = struct {
     ambient: ?f32 = null,
     environment: Environment = .{},
     floor: Floor = .none,
+    /// Surfaces that emit light what is around them, as far as it shows; without it only where the
+    /// file calls them lights.
+    emitters: bool = true,
     background: Background = .default,
     /// Colours of unlit surfaces and of the background are the display's, neither exposed nor tone
     /// mapped; without it, as in the thesis, they are radiance, and the background's default comes
