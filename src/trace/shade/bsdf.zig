@@ -14,8 +14,8 @@ const simd = @import("../../simd.zig");
 const albedo_file = @import("albedo.zig");
 const microfacet = @import("microfacet.zig");
 const interface_file = @import("interface.zig");
-const Coating = @import("coating.zig").Coating;
 const transmission_file = @import("transmission.zig");
+const Coating = @import("coating.zig").Coating;
 const Interaction = @import("interaction.zig").Interaction;
 const Layers = @import("layers.zig").Layers;
 
@@ -737,6 +737,7 @@ test "no energy is made: reflected, transmitted and diffuse shares sum to 1 at m
                 point.material.transmission = .splat(transmission);
                 point.material.volume = .splat(transmission > 0);
                 point.back = .splat(back);
+                point.eta = .splat(if (back) 1.5 else 1.0 / 1.5);
                 const bsdf: Bsdf(Single) = .of(&point);
                 const shares = [_]Single.Vec3{
                     bsdf.specular_albedo, bsdf.diffuse_albedo, bsdf.mirror.transmitted,
@@ -813,6 +814,7 @@ test "Snell's law, total internal reflection and the thin wall" {
     try std.testing.expectApproxEqRel(-0.6 / 1.5, entering.mirror.refraction.x.lane(0), 1e-5);
     try std.testing.expect(!entering.mirror.total.lane(0));
     point.back = .splat(true);
+    point.eta = .splat(1.5);
     const leaving = Bsdf(Single).of(&point); // sin 0.6 * 1.5 = 0.9
     try std.testing.expectApproxEqRel(@as(f32, -0.9), leaving.mirror.refraction.x.lane(0), 1e-5);
     point.view = .splat(.{ 0.8, 0.6, 0 }); // sin 0.8 * 1.5 > 1

@@ -427,7 +427,8 @@ fn integrate(boundary: *const TestBoundary) f64 {
     var sum: f64 = 0;
     for (0..sectors) |j| {
         const angle = (@as(f32, @floatFromInt(j)) + 0.5) / sectors * 2 * std.math.pi;
-        const away = across[0].scale(.splat(@cos(angle))).add(across[1].scale(.splat(@sin(angle))));
+        const away = across[0].scale(.splat(@cos(angle)))
+            .add(across[1].scale(.splat(@sin(angle))));
         const heights = [2]f64{ behind.dot(axis).lane(0), behind.dot(away).lane(0) };
         const horizon = std.math.atan2(heights[0], -heights[1]);
         for (0..steps) |i| {
@@ -435,11 +436,11 @@ fn integrate(boundary: *const TestBoundary) f64 {
             const opening = horizon * x * x * x;
             const to_light = axis.scale(.splat(@floatCast(@cos(opening))))
                 .add(away.scale(.splat(@floatCast(@sin(opening)))));
-            const weight = @sin(opening) * horizon * 3 * x * x * 2 * std.math.pi / (steps * sectors);
+            const weight = @sin(opening) * horizon * 3 * x * x;
             sum += weight * boundary.eval(to_light).lane(0);
         }
     }
-    return sum;
+    return sum * 2 * std.math.pi / (steps * sectors);
 }
 
 /// Mean of what samples bring if all light behind is white.
