@@ -126,6 +126,7 @@ test {
     _ = dispatch;
     _ = @import("trace/integrate/environment_lights.zig");
     _ = @import("trace/integrate/camera.zig");
+    _ = @import("trace/integrate/numbers.zig");
     _ = @import("trace/integrate/path.zig");
     _ = tiles;
     _ = @import("trace/traverse/beam/budget.zig");
@@ -144,6 +145,7 @@ test {
     _ = @import("trace/shade/microfacet.zig");
     _ = @import("trace/shade/sheen.zig");
     _ = @import("trace/shade/unique.zig");
+    _ = @import("trace/shade/volumes.zig");
     _ = @import("trace/shade/texture.zig");
     _ = @import("trace/shade/ray_cone.zig");
     _ = @import("trace/shade/lookups.zig");
