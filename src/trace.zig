@@ -144,6 +144,8 @@ test {
     _ = @import("trace/shade/chi_squared.zig");
     _ = @import("trace/shade/microfacet.zig");
     _ = @import("trace/shade/sheen.zig");
+    _ = @import("trace/shade/phase.zig");
+    _ = @import("trace/shade/transmission.zig");
     _ = @import("trace/shade/unique.zig");
     _ = @import("trace/shade/volumes.zig");
     _ = @import("trace/shade/texture.zig");
