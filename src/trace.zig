@@ -139,7 +139,9 @@ test {
     _ = @import("trace/shade/iridescence.zig");
     _ = @import("trace/shade/offset.zig");
     _ = @import("trace/shade/albedo.zig");
+    _ = @import("trace/shade/anisotropy.zig");
     _ = @import("trace/shade/bsdf.zig");
+    _ = @import("trace/shade/chi_squared.zig");
     _ = @import("trace/shade/microfacet.zig");
     _ = @import("trace/shade/sheen.zig");
     _ = @import("trace/shade/phase.zig");
