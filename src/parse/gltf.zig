@@ -156,6 +156,9 @@ fn addInstances(
 
 /// Says what the picture will lack.
 fn warnOfGaps(source: *const Source, scene: *const Scene) void {
+    for (scene.meshes) |*mesh| {
+        if (mesh.points.len > 0 or mesh.segments.len > 0) return;
+    }
     if (scene.triangleCount() == 0) {
         source.warn("nothing to render: no triangles", .{});
     } else if (!hasArea(scene)) {
