@@ -376,6 +376,7 @@ const Job = struct {
         try session.pose(.{
             .lanes = raylane.variant.compiled[options.render.variant].lanes,
             .tree_quality = options.tree_quality,
+            .view = options.view,
         });
         try session.view(options.view);
         job.sayWarnings();
@@ -444,7 +445,8 @@ const Job = struct {
     fn sayVariants(job: *Job, names: []const []const u8) void {
         if (!job.options.verbose or job.options.load.material_variant != .default) return;
         for (names, 0..) |name, index| {
-            job.sayOfScene("material variant {d}: {f}, not chosen", .{ index, raylane.diagnostic.quote(name) });
+            const quoted = raylane.diagnostic.quote(name);
+            job.sayOfScene("material variant {d}: {f}, not chosen", .{ index, quoted });
         }
     }
 

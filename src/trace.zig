@@ -134,12 +134,14 @@ test {
     _ = @import("trace/traverse/beam/grid.zig");
     _ = beam.pixel_window;
     _ = @import("trace/integrate/sampler.zig");
+    _ = @import("trace/shade/cosine.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/offset.zig");
     _ = @import("trace/shade/albedo.zig");
     _ = @import("trace/shade/bsdf.zig");
     _ = @import("trace/shade/microfacet.zig");
     _ = @import("trace/shade/unique.zig");
+    _ = @import("trace/shade/volumes.zig");
     _ = @import("trace/shade/texture.zig");
     _ = @import("trace/shade/ray_cone.zig");
     _ = @import("trace/shade/lookups.zig");

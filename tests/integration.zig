@@ -12,6 +12,7 @@ test {
     _ = @import("analytic.zig");
     _ = @import("decode.zig");
     _ = @import("environment.zig");
+    _ = @import("glass.zig");
     _ = @import("gltf_materials.zig");
     _ = @import("gltf_poses.zig");
     _ = @import("gltf_textures.zig");

@@ -13,12 +13,14 @@ const AlphaRange = @import("texture.zig").AlphaRange;
 const MaterialUse = @import("texture.zig").MaterialUse;
 const Parts = @import("alpha.zig").Parts;
 const TextureSet = @import("texture.zig").TextureSet;
+const volumes_file = @import("volumes.zig");
 
-/// The world's materials in the order of the parts'; `triangles` are the world's.
+/// The world's materials in the order of the parts'; positions and triangles are the world's.
 pub fn place(
     arena: Allocator,
     parts: *const Parts,
     textures: *const TextureSet,
+    positions: []const [3]f32,
     triangles: []const world.Triangle,
 ) error{OutOfMemory}!world.Materials {
     const converted = try arena.alloc(world.Material, parts.materials.len);
@@ -31,12 +33,14 @@ pub fn place(
     }
     var has_layers = false;
     var has_transparency = false;
+    var has_transmission = false;
     var has_holes = false;
     for (parts.instances) |instance| {
         const index = parts.meshes[instance.mesh].material;
         const used = &converted[index];
         has_layers = has_layers or layers[index].present > 0;
         has_transparency = has_transparency or isTransparent(used);
+        has_transmission = has_transmission or used.transmits();
         has_holes = has_holes or used.alpha_cutoff >= 0;
     }
     const stops_all = !has_transparency and !has_holes;
@@ -45,6 +49,8 @@ pub fn place(
         .layers = if (has_layers) layers else &.{},
         .sources = parts.sources,
         .lookups = textures.lookups,
+        .volumes = try volumes_file.rank(arena, converted, positions, triangles),
+        .has_transmission = has_transmission,
         .has_transparency = has_transparency,
         .has_holes = has_holes,
         .occluders = if (stops_all)

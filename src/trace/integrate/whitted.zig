@@ -127,7 +127,7 @@ pub fn Whitted(comptime Kernel: type) type {
             const path = &whitted.path;
             const primary = path.depth == 0 and path.transparency_depth == 0;
             const grid = if (primary and whitted.grid != null) &whitted.grid.? else null;
-            const beams = whitted.visibility.closest(&path.bundle, grid);
+            const beams = whitted.visibility.closest(path, grid);
             const coherence: dispatch.Coherence = if (path.depth == 0) .all else beams;
             if (path.depth == 0) whitted.rays.shadow += floor.lightShare(
                 Kernel,
@@ -164,7 +164,7 @@ pub fn Whitted(comptime Kernel: type) type {
         /// Finds the points that rays of a group see, and adds what these emit and the ambient
         /// light that they scatter.
         fn find(whitted: *Self, group: usize, vertex: *Vertex) void {
-            vertex.find(whitted.frame, &whitted.path, group);
+            vertex.find(&whitted.visibility, &whitted.path, group);
             whitted.bounces.choose(group, vertex, whitted.isEnd());
             if (vertex.seen.none()) return;
             const environment = whitted.frame.environment;
@@ -182,7 +182,6 @@ pub fn Whitted(comptime Kernel: type) type {
 
         /// Adds what the points that rays see scatter of the light that arrives.
         fn addLights(whitted: *Self, coherence: dispatch.Coherence) void {
-            const path = &whitted.path;
             const radiance = &whitted.sample.radiance;
             whitted.rays.shadow += environment_light.addLight(
                 Kernel,
@@ -190,7 +189,7 @@ pub fn Whitted(comptime Kernel: type) type {
                 &whitted.environment_lights,
                 whitted.sample.number,
                 &.{
-                    .path = path,
+                    .path = &whitted.path,
                     .all = &whitted.vertices,
                     .traced = &whitted.bounces.reflected,
                     .coat_traced = &whitted.bounces.coat_reflected,
@@ -203,8 +202,9 @@ pub fn Whitted(comptime Kernel: type) type {
                 Kernel,
                 &whitted.visibility,
                 light,
-                path,
+                &whitted.path,
                 &whitted.vertices,
+                &whitted.bounces.reflected,
                 coherence,
                 radiance,
             );

@@ -26,7 +26,7 @@ pub const highlight_roughness_least = 0.05;
 /// At grazing angles a boundary reflects all light (f90 = 1), unless it reflects less than 2 % at
 /// normal incidence, as no material does: down to an index of 1, which is no boundary, f90 falls to
 /// 0 (Lagarde and de Rousiers 2014, "Moving Frostbite to Physically Based Rendering").
-const f90_per_f0 = 50;
+pub const f90_per_f0 = 50;
 
 /// Up to this roughness reflections are traced; rougher surfaces see the ambient term instead.
 pub const mirror_roughness_max = 0.25;
@@ -399,7 +399,7 @@ fn Boundary(comptime Lanes: type) type {
                 .cos_fresnel = cos_view,
                 .refraction = point.view.neg(),
             };
-            const eta = F32.select(point.back, material.ior, one.div(material.ior));
+            const eta = point.eta;
             const sin_squared = one.sub(cos_view.mul(cos_view));
             const cos_squared = one.sub(eta.mul(eta).mul(sin_squared));
             const cos_inside = cos_squared.max(.zero()).sqrt();
@@ -408,7 +408,7 @@ fn Boundary(comptime Lanes: type) type {
             const bent = along.scale(eta).add(turned);
             // A shading normal far from the triangle's can bend light back to the same side.
             const through = bent.dot(point.normal_geometric).lt(.zero());
-            const leaving = material.volume.bitAnd(point.back);
+            const leaving = material.volume.bitAnd(eta.gt(one));
             return .{
                 .total = material.volume.bitAnd(cos_squared.lt(.zero())),
                 .cos_fresnel = F32.select(leaving, cos_inside, cos_view),
@@ -487,6 +487,10 @@ fn testPoint(view: [3]f32) Interaction(Single) {
         .offset_max = .zero(),
         .cone_width = .zero(),
         .curvature = .zero(),
+        .hidden = .splat(false),
+        .eta = .splat(1.0 / 1.5),
+        .sigma_beyond = .splat(.{ 0, 0, 0 }),
+        .beyond = @splat(.air),
         .material = .{
             .base_color = .splat(.{ 1, 1, 1 }),
             .emissive = .splat(.{ 0, 0, 0 }),

@@ -148,17 +148,30 @@ pub fn Attenuation(comptime Lanes: type) type {
         /// Lanes where the surface is there at all: not in holes.
         weakens: Lanes.Mask,
 
-        /// Past what alpha leaves open, and in the base colour through what transmits.
-        pub inline fn of(materials: *const Materials(Lanes), color: Color(Lanes)) @This() {
+        /// Past what alpha leaves open, and in the base colour through what transmits, by a share
+        /// that textures and reflection leave of it.
+        pub inline fn of(
+            materials: *const Materials(Lanes),
+            color: Color(Lanes),
+            passing: Lanes.F32,
+        ) @This() {
             const one: Lanes.F32 = .splat(1);
             const stopped = opacity(Lanes, materials, color.alpha);
-            const base = materials.color("base_color").mul(color.rgb);
-            const clear = materials.float("transmission").mul(one.sub(materials.float("metallic")));
+            const white: Lanes.Vec3 = .splat(.{ 1, 1, 1 });
+            const base = materials.color("base_color").mul(color.rgb).min(white);
+            const clear = materials.float("transmission")
+                .mul(one.sub(materials.float("metallic"))).mul(passing);
             const rest = one.sub(stopped);
             return .{
                 .share = base.scale(clear.mul(stopped)).add(.{ .x = rest, .y = rest, .z = rest }),
                 .weakens = stopped.gt(.zero()),
             };
+        }
+
+        /// Surfaces in these lanes are not there.
+        pub inline fn hide(attenuation: *@This(), lanes: Lanes.Mask) void {
+            attenuation.share = .select(lanes, .splat(.{ 1, 1, 1 }), attenuation.share);
+            attenuation.weakens = attenuation.weakens.andNot(lanes);
         }
     };
 }

@@ -155,6 +155,21 @@ pub fn colored(
     };
 }
 
+/// What textures leave of transmission.
+pub fn transmission(
+    comptime Lanes: type,
+    frame: *const Frame,
+    materials: *const material_file.Materials(Lanes),
+    place: *const Place(Lanes),
+) Lanes.F32 {
+    const used = &materials.used;
+    for (used.numbers[0..used.count]) |number| {
+        if (frame.materials.all[number].layer_lookup_count > 0) break;
+    } else return .splat(1);
+    const texels: Texels(Lanes, .layers) = .find(frame, materials, place, .transmission);
+    return texels.float(.transmission, 0);
+}
+
 /// Gives points their footprints, and what the textures of their materials say. `cone` is the
 /// width at the origin of the ray, and the spread.
 pub fn apply(
