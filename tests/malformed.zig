@@ -810,7 +810,7 @@ fn outcomeOf(path: []const u8) []const u8 {
             return if (said.message.text().len > 0) "error" else "an error without a message";
         },
         error.OutOfMemory => return "out of memory",
-        error.SceneUnknown => unreachable, // The file's own is asked for.
+        error.SceneUnknown, error.MaterialVariantUnknown => unreachable, // None is asked for.
     };
     defer scene.deinit();
     scene.check();
