@@ -377,7 +377,10 @@ fn emittersOf(
         count = @min(count, emitter_lights.count_max);
     }
     const arena = seen.arena.allocator();
-    seen.emitters = try emitter_lights.make(gpa, arena, pieces, &seen.geometry, count);
+    seen.emitters = try emitter_lights.make(gpa, arena, pieces, &seen.geometry, .{
+        .count_max = count,
+        .cuts_round = from.has_area_lights,
+    });
     return seen.emitters.?;
 }
 

@@ -137,6 +137,7 @@ test {
     _ = @import("trace/shade/cosine.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/iridescence.zig");
+    _ = @import("trace/shade/light.zig");
     _ = @import("trace/shade/offset.zig");
     _ = @import("trace/shade/albedo.zig");
     _ = @import("trace/shade/anisotropy.zig");

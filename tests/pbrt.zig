@@ -551,7 +551,7 @@ test "materials as the table of docs/pbrt.md has them" {
             "\"uber\" \"rgb opacity\" [.5 .5 .5] \"rgb Kr\" [1 1 1]",
             .{ 0.25, 0.25, 0.25, 0.5 },
             0,
-            0,
+            0.638943,
             1.5,
         },
         .{
@@ -589,6 +589,102 @@ test "materials as the table of docs/pbrt.md has them" {
         try expectNear(case[4], material.ior, 1e-4);
         try expect(material.double_sided);
     }
+}
+
+fn expectMaterial(text: []const u8, expected: anytype) !void {
+    errdefer std.debug.print("{s}\n", .{text});
+    var buffer: [512]u8 = undefined;
+    var scene = try readClean(try std.mem.print(
+        &buffer,
+        plain_camera ++ "WorldBegin Material {s} Shape \"sphere\"",
+        .{text},
+    ));
+    defer scene.deinit();
+    const material = materialOf(&scene);
+    inline for (comptime std.meta.fieldNames(@TypeOf(expected))) |name| {
+        errdefer std.debug.print("{s}\n", .{name});
+        const found = @field(material, name);
+        const wanted = @field(expected, name);
+        if (@TypeOf(found) == f32) {
+            try expectNear(wanted, found, 1e-4);
+        } else for (found, @as(@TypeOf(found), wanted)) |a, b| try expectNear(b, a, 1e-4);
+    }
+}
+
+test "what materials have beyond that" {
+    try expectMaterial("\"plastic\" \"rgb Ks\" [.1 .2 .4]", .{
+        .ior = 1.5,
+        .specular = 0.4,
+        .specular_color = .{ 0.25, 0.5, 1 },
+    });
+    // All of it where light grazes, Ks at normal incidence.
+    try expectMaterial("\"substrate\" \"rgb Ks\" [.02 .04 .01]", .{
+        .ior = 1.5,
+        .specular = 1,
+        .specular_color = .{ 0.5, 1, 0.25 },
+    });
+    try expectMaterial("\"uber\" \"rgb Kr\" [.5 .5 .5] \"rgb Ks\" [1 .5 0]", .{
+        .clearcoat = 0.5,
+        .clearcoat_roughness = 0,
+        .specular_color = .{ 1, 0.5, 0 },
+    });
+    try expectMaterial("\"glass\" \"rgb Kr\" [.5 .25 0] \"float roughness\" .02", .{
+        .specular = 0.5,
+        .specular_color = .{ 1, 0.5, 0 },
+        .roughness = 0.442850,
+        .transmission = 1,
+    });
+    const coated = "\"coatedconductor\" \"rgb reflectance\" [.5 .6 .7] " ++
+        "\"float interface.roughness\" .25 \"float conductor.roughness\" .04 " ++
+        "\"float interface.eta\" 1.4 \"bool remaproughness\" false";
+    try expectMaterial(coated, .{
+        .metallic = 1,
+        .roughness = 0.2,
+        .clearcoat = 0.0277778 / 0.04,
+        .clearcoat_roughness = 0.5,
+        .base_color = .{ 0.5, 0.6, 0.7, 1 },
+    });
+    const brushed = "\"conductor\" \"float uroughness\" .04 \"float vroughness\" .28 " ++
+        "\"bool remaproughness\" false";
+    try expectMaterial(brushed, .{
+        .roughness = 0.2,
+        .anisotropy = 0.5,
+        .anisotropy_rotation_rad = std.math.pi / 2.0,
+    });
+    try expectMaterial("\"translucent\" \"rgb reflect\" [.6 .6 .6] \"rgb transmit\" [.2 0 .4]", .{
+        .diffuse_transmission = 0.4,
+        .diffuse_transmission_color = .{ 0.125, 0, 0.25 },
+        .base_color = .{ 0.25, 0.25, 0.25, 1 },
+    });
+    const leaf = "\"diffusetransmission\" \"rgb reflectance\" [.1 .2 0] " ++
+        "\"rgb transmittance\" [.1 .3 .1] \"float scale\" 2";
+    try expectMaterial(leaf, .{
+        .diffuse_transmission = 0.6,
+        .base_color = .{ 0.5, 1, 0, 1 },
+        .diffuse_transmission_color = .{ 1.0 / 3.0, 1, 1.0 / 3.0 },
+    });
+    const car = "\"disney\" \"rgb color\" [.2 .2 .2] \"float clearcoat\" 1 " ++
+        "\"float clearcoatgloss\" 0 \"float sheen\" .5 \"float anisotropic\" .8 " ++
+        "\"float speculartint\" 1";
+    try expectMaterial(car, .{
+        .clearcoat = 0.25,
+        .clearcoat_roughness = @sqrt(0.1),
+        .sheen_color = .{ 0.5, 0.5, 0.5 },
+        // Alpha .25 over and times the root of the aspect ratio .28.
+        .roughness = 0.363719,
+        .anisotropy_rotation_rad = 0,
+    });
+    try expectMaterial("\"hair\" \"rgb color\" [.3 .2 .1]", .{
+        .base_color = .{ 0.3, 0.2, 0.1, 1 },
+        .roughness = @sqrt(0.3),
+        .ior = 1.55,
+    });
+    try expectMaterial("\"hair\" \"rgb sigma_a\" [0 .01 1]", .{
+        .base_color = .{ 1, 0.554966, 0.002772, 1 },
+    });
+    // Brass is yellow.
+    try expectMaterial("\"conductor\" \"spectrum eta\" \"metal-CuZn-eta\" " ++
+        "\"spectrum k\" \"metal-CuZn-k\"", .{ .base_color = .{ 0.8871, 0.7887, 0.4339, 1 } });
 }
 
 test "glass bends, thin glass does not, subsurface is what much scattering leaves" {

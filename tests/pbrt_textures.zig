@@ -230,6 +230,32 @@ test "the seam of a sphere is closed" {
     for (0..33) |row| try testing.expectEqual(positions[33 * row], positions[33 * row + 32]);
 }
 
+test "pictures of specular colours, of what is transmitted, and of numbers" {
+    var folder: Folder = try .make();
+    defer folder.free();
+    const cases = .{
+        .{ "\"plastic\" \"texture Ks\" \"t\"", "specular_color_texture" },
+        .{ "\"glass\" \"texture Kr\" \"t\"", "specular_color_texture" },
+        .{ "\"translucent\" \"texture Kd\" \"t\"", "diffuse_transmission_color_texture" },
+        .{
+            "\"diffusetransmission\" \"texture transmittance\" \"t\"",
+            "diffuse_transmission_color_texture",
+        },
+        .{ "\"disney\" \"texture roughness\" \"t\"", "metallic_roughness_texture" },
+        .{ "\"disney\" \"texture clearcoat\" \"t\"", "clearcoat_texture" },
+        .{ "\"disney\" \"texture spectrans\" \"t\"", "transmission_texture" },
+    };
+    inline for (cases) |case| {
+        var scene = try folder.readClean(comptime world(picture ++ " Material " ++ case[0] ++
+            " " ++ with_uv));
+        defer scene.deinit();
+        errdefer std.debug.print("{s}\n", .{case[0]});
+        const material = &scene.materials[scene.meshes[0].material];
+        try testing.expect(@field(material, case[1]) != null);
+        try testing.expect(scene.meshes[0].texcoords[0] != null);
+    }
+}
+
 test "a normal map and a shining picture" {
     var folder: Folder = try .make();
     defer folder.free();
@@ -338,8 +364,6 @@ test "power and illuminance" {
         // 2 pi ((1 - 1/2) + (1/2 - 0) / 2).
         .{ "LightSource \"spot\" \"float coneangle\" 90 \"float conedeltaangle\" 30 " ++
             "\"float power\" 4.71238898", 1 },
-        .{ "AreaLightSource \"diffuse\" \"float power\" 6.28318531 Shape \"trianglemesh\" " ++
-            "\"point P\" [0 0 0 2 0 0 0 2 0] \"integer indices\" [0 1 2]", 1 },
     };
     inline for (cases) |case| {
         var scene = try folder.readClean(comptime world(case[0] ++ " " ++ triangle));
@@ -348,6 +372,13 @@ test "power and illuminance" {
         for (scene.lights[0].color) |channel| {
             try testing.expectApproxEqRel(case[1], channel, 1e-5);
         }
+    }
+    var area = try folder.readClean(comptime world("AreaLightSource \"diffuse\" " ++
+        "\"float power\" 6.28318531 Shape \"trianglemesh\" " ++
+        "\"point P\" [0 0 0 2 0 0 0 2 0] \"integer indices\" [0 1 2]"));
+    defer area.deinit();
+    for (area.materials[area.meshes[0].material].emissive) |channel| {
+        try testing.expectApproxEqRel(1, channel, 1e-5);
     }
     var sky = try folder.readClean(comptime world("LightSource \"infinite\" " ++
         "\"float illuminance\" 6.28318531 " ++ triangle));

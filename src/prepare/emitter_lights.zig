@@ -95,13 +95,18 @@ const Cluster = struct {
         return if (axis < 3) cluster.middle[axis] else cluster.normal[axis - 3];
     }
 
-    /// What a point in its place gets wrong; negative where it need not be cut.
-    fn cost(cluster: *const Cluster, flux_min: f64, geometry: *const world.Geometry) f64 {
+    /// What a point in its place gets wrong; negative where it need not be cut: where it is no wider
+    /// than a part of the scene's size, and if it shines to all sides, than `round_point`.
+    fn cost(
+        cluster: *const Cluster,
+        flux_min: f64,
+        geometry: *const world.Geometry,
+        round_point: f64,
+    ) f64 {
         if (cluster.pieces.len < 2 or cluster.flux < flux_min) return -1;
         const unlike = 1 - vec3d.dot(cluster.normal, cluster.normal);
         var least: f64 = geometry.size * point_share;
-        if (unlike > 0.5)
-            least = @max(least, vec3.maxComponent(geometry.bounds.extent()) * round_point_share);
+        if (unlike > 0.5) least = @max(least, round_point);
         if (cluster.variance <= least * least) return -1;
         return cluster.flux * cluster.variance * (1 + unlike);
     }
@@ -119,25 +124,35 @@ const Cluster = struct {
     }
 };
 
+/// How many lights there may be.
+pub const Limits = struct {
+    /// At least 1.
+    count_max: usize,
+    /// Clusters that shine to all sides are cut as far as flat ones.
+    cuts_round: bool,
+};
+
 /// The lights of some pieces, which change their order; from `arena`.
 pub fn make(
     gpa: Allocator,
     arena: Allocator,
     pieces: []Piece,
     geometry: *const world.Geometry,
-    light_count_max: usize,
+    limits: Limits,
 ) error{OutOfMemory}![]const world.Light {
     if (pieces.len == 0) return &.{};
-    std.debug.assert(light_count_max > 0);
-    var clusters: std.ArrayList(Cluster) = try .initCapacity(gpa, light_count_max);
+    std.debug.assert(limits.count_max > 0);
+    var clusters: std.ArrayList(Cluster) = try .initCapacity(gpa, limits.count_max);
     defer clusters.deinit(gpa);
     clusters.appendAssumeCapacity(.of(pieces));
     const flux_min = clusters.items[0].flux * cut_share;
-    while (clusters.items.len < light_count_max) {
+    const extent: f64 = vec3.maxComponent(geometry.bounds.extent());
+    const round_point = if (limits.cuts_round) 0 else extent * round_point_share;
+    while (clusters.items.len < limits.count_max) {
         var worst: ?*Cluster = null;
         var most: f64 = 0;
         for (clusters.items) |*cluster| {
-            const cost = cluster.cost(flux_min, geometry);
+            const cost = cluster.cost(flux_min, geometry, round_point);
             if (cost <= most) continue;
             worst = cluster;
             most = cost;
@@ -329,7 +344,10 @@ const TestEmitters = struct {
             .occluders = &.{},
         }, &.{ .all = test_emitters.textures });
         defer std.testing.allocator.free(pieces);
-        return make(std.testing.allocator, arena, pieces, &geometry, count);
+        return make(std.testing.allocator, arena, pieces, &geometry, .{
+            .count_max = count,
+            .cuts_round = false,
+        });
     }
 };
 

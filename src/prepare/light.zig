@@ -256,6 +256,30 @@ test "a spot shines along its node's -z from its node's origin, scale aside" {
     try std.testing.expectEqual(world.Light.Kind.point, placed[1].kind);
 }
 
+test "cones of equal angles have an edge, and those of a right angle end at it" {
+    const maps = [_]AffineD{.identity};
+    const lights = [_]scene.Light{
+        .{ .kind = .spot, .node = 0, .inner_cone_rad = 0.5, .outer_cone_rad = 0.5 },
+        .{ .kind = .spot, .node = 0, .outer_cone_rad = std.math.pi / 2.0 },
+    };
+    var arena_state: std.heap.ArenaAllocator = .init(std.testing.allocator);
+    defer arena_state.deinit();
+    var diagnostic: Diagnostic = .{};
+    var geometry: world.Geometry = .empty;
+    geometry.size = 1;
+    const placed = try place(arena_state.allocator(), &lights, &maps, &geometry, &diagnostic);
+    // KHR_lights_punctual: 1 / max(0.001, cos inner - cos outer).
+    try std.testing.expectApproxEqRel(@as(f32, 1000), placed[0].cone_scale, 1e-6);
+    const cosine = @cos(@as(f32, 0.5));
+    for ([_]f32{ 0, 0.001 }, [_]f32{ 0, 1 }) |beyond, share| {
+        const ramp = (cosine + beyond) * placed[0].cone_scale + placed[0].cone_offset;
+        try std.testing.expectApproxEqAbs(share, ramp, 1e-3);
+    }
+    // The cosine itself.
+    try std.testing.expectApproxEqAbs(@as(f32, 1), placed[1].cone_scale, 1e-6);
+    try std.testing.expectApproxEqAbs(@as(f32, 0), placed[1].cone_offset, 1e-6);
+}
+
 test "the rig turns with the camera" {
     var arena_state: std.heap.ArenaAllocator = .init(std.testing.allocator);
     defer arena_state.deinit();

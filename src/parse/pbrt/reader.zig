@@ -566,7 +566,8 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
     const material = try reader.shapeMaterial() orelse return;
     const surface = &reader.builder.scene.materials.items[material];
     const has_picture = if (graphics.area_light) |light| light.picture != null else false;
-    reader.tessellator.wants_texcoords = surface.hasTextures() or has_picture;
+    reader.tessellator.wants_texcoords =
+        surface.hasTextures() or surface.anisotropy > 0 or has_picture;
     if (graphics.area_light) |area_light| {
         if (reader.object == null) return reader.addAreaLight(kind, material, area_light);
         try input.warnHere("area light", "Shape: objects do not shine", .{});

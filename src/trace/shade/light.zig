@@ -4,6 +4,8 @@
 //! of punctual lights (KHR_lights_punctual) by inverse square, range window and cone; of emitters
 //! by their lobe, and as a disk has it on its axis, I / (d^2 + r^2).
 
+const std = @import("std");
+const simd = @import("../../simd.zig");
 const world_file = @import("../../world.zig");
 const Interaction = @import("interaction.zig").Interaction;
 const Light = world_file.Light;
@@ -57,4 +59,83 @@ pub fn arrive(
         .irradiance = Lanes.Vec3.splat(light.intensity).scale(factor),
         .distance = distance,
     };
+}
+
+const Single = simd.Lanes(.scalar, 1);
+
+/// What arrives at a point, by its first channel and the distance.
+fn testArrive(light: *const Light, position: [3]f32) [2]f32 {
+    var point: Interaction(Single) = undefined;
+    point.position = .splat(position);
+    const arrival = arrive(Single, light, &point);
+    return .{ arrival.irradiance.x.lane(0), arrival.distance.lane(0) };
+}
+
+test "a range ends light by a smooth window, as KHR_lights_punctual has it" {
+    var light: Light = .{
+        .kind = .point,
+        .from_receiver = false,
+        .position = .{ 1, 0, 0 },
+        .direction = .{ 0, 0, -1 },
+        .intensity = .{ 8, 8, 8 },
+        .range_inv_squared = 0,
+        .cone_scale = 0,
+        .cone_offset = 1,
+    };
+    // Intensity over the squared distance.
+    try std.testing.expectEqual([2]f32{ 2, 2 }, testArrive(&light, .{ 1, 2, 0 }));
+    // Times max(min(1 - (distance / range)^4, 1), 0).
+    light.range_inv_squared = 1.0 / 16.0;
+    const Case = struct { f32, f32 };
+    for ([_]Case{ .{ 1, 8 * 255.0 / 256.0 }, .{ 2, 1.875 }, .{ 4, 0 }, .{ 9, 0 } }) |case| {
+        const found = testArrive(&light, .{ 1, 0, case[0] })[0];
+        try std.testing.expectApproxEqRel(case[1], found, 1e-6);
+    }
+    // Directional lights have neither.
+    light.kind = .directional;
+    try std.testing.expectEqual([2]f32{ 8, 0 }, testArrive(&light, .{ 100, 0, 7 }));
+}
+
+test "a spot is full within its inner cone and ends at the outer one" {
+    const cosine_inner = 0.9;
+    const cosine_outer = 0.5;
+    const scale = 1 / (cosine_inner - cosine_outer);
+    const light: Light = .{
+        .kind = .spot,
+        .from_receiver = false,
+        .position = .{ 0, 0, 0 },
+        .direction = .{ 0, 0, -1 },
+        .intensity = .{ 4, 4, 4 },
+        .range_inv_squared = 0,
+        .cone_scale = scale,
+        .cone_offset = -cosine_outer * scale,
+    };
+    const Case = struct { f32, f32 };
+    // The square of a ramp in the cosine; nothing behind.
+    for ([_]Case{
+        .{ 1, 4 }, .{ 0.9, 4 }, .{ 0.7, 1 }, .{ 0.6, 0.25 }, .{ 0.5, 0 }, .{ 0.1, 0 }, .{ -1, 0 },
+    }) |case| {
+        const sine = @sqrt(1 - case[0] * case[0]);
+        const found = testArrive(&light, .{ sine, 0, -case[0] })[0];
+        try std.testing.expectApproxEqAbs(case[1], found, 1e-4);
+    }
+}
+
+test "an emitter falls off as a disk does on its axis, by its lobe" {
+    const light: Light = .{
+        .kind = .emitter,
+        .from_receiver = false,
+        .position = .{ 0, 0, 0 },
+        .direction = .{ 0, 0, -1 },
+        .intensity = .{ 3, 3, 3 },
+        .range_inv_squared = 0,
+        .cone_scale = 1,
+        .cone_offset = 0,
+        .disk = 2,
+    };
+    try std.testing.expectEqual([2]f32{ 1, 1 }, testArrive(&light, .{ 0, 0, -1 }));
+    // A cosine of 0.6 at a distance of 5.
+    const found = testArrive(&light, .{ 4, 0, -3 })[0];
+    try std.testing.expectApproxEqRel(@as(f32, 3 * 0.6 / 27.0), found, 1e-6);
+    try std.testing.expectEqual(0, testArrive(&light, .{ 0, 0, 1 })[0]);
 }
