@@ -386,6 +386,7 @@ fn shadowLimit(comptime Lanes: type, light: *const Light) ray_file.Hit(Lanes) {
     return .before(.splat(shadowEnd(light)));
 }
 
-fn shadowEnd(light: *const Light) f32 {
+/// The same as a number.
+pub fn shadowEnd(light: *const Light) f32 {
     return if (light.kind == .directional) std.math.inf(f32) else 1;
 }
