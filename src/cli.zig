@@ -181,6 +181,14 @@ const sections: []const Section = &.{
                 "without lights, otherwise 0)", .{settings.ambient_default}),
         },
         .{
+            .usage = "--point-size PIXELS",
+            .help = comptimePrint("width of points and lines where the automatic view looks\n" ++
+                "at, {d} to {d} (default: {d})", .{
+                settings.point_size.min,     settings.point_size.max,
+                settings.point_size.default,
+            }),
+        },
+        .{
             .usage = "--tessellation N",
             .help = "straight pieces of a circle in curved PBRT shapes,\n" ++
                 settings.tessellation.textWithDefault(),
@@ -397,6 +405,10 @@ const Parser = struct {
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .variant => options.render.variant = try parser.variantOf(given.value),
             .count_tests => options.count_tests = true,
+            .point_size => options.view.point_size = pointSizeOf(given.value) orelse
+                return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
+                    settings.point_size.min, settings.point_size.max,
+                })),
             .tessellation => {
                 options.load.tessellation = try reader.number(given, settings.tessellation);
             },
@@ -423,6 +435,7 @@ const Parser = struct {
         options.view.environment.source = .none;
         options.view.background = .default;
         options.view.display_referred = false;
+        options.view.emitters = false;
         options.write.exposure = settings.thesis.exposure;
         options.write.tone_mapping = settings.thesis.tone_mapping;
     }
@@ -547,6 +560,12 @@ fn bytesOf(text: []const u8) ?u64 {
     if (count == 0) return null;
     const shift: u6 = if (unit) |index| @intCast(10 * (index + 1)) else 0;
     return std.math.shlExact(u64, count, shift) catch null;
+}
+
+fn pointSizeOf(text: []const u8) ?f32 {
+    const pixels = numberOf(text) orelse return null;
+    const is_allowed = pixels >= settings.point_size.min and pixels <= settings.point_size.max;
+    return if (is_allowed) pixels else null;
 }
 
 /// A finite decimal number; a denormal one is zero, as everywhere in the renderer.
@@ -937,7 +956,7 @@ test "the last of several options counts, around --thesis too" {
     try std.testing.expectEqual(null, thesis.thread_count);
     try std.testing.expectEqual(0, thesis.write.exposure.ev);
     try std.testing.expectEqual(.linear, thesis.write.tone_mapping);
-    try std.testing.expect(!thesis.view.display_referred);
+    try std.testing.expect(!thesis.view.display_referred and !thesis.view.emitters);
     const changed = try optionsForTest(&.{ "--thesis", "--depth=9", "-t7" });
     try std.testing.expectEqual(9, changed.render.depth);
     try std.testing.expectEqual(7, changed.thread_count);

@@ -376,6 +376,7 @@ const Job = struct {
         try session.pose(.{
             .lanes = raylane.variant.compiled[options.render.variant].lanes,
             .tree_quality = options.tree_quality,
+            .view = options.view,
         });
         try session.view(options.view);
         session.dropScene();

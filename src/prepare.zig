@@ -20,12 +20,15 @@ const bvh_wide = @import("prepare/bvh/wide.zig");
 const check = @import("prepare/bvh/check.zig");
 const deform = @import("prepare/deform.zig");
 const flatten = @import("prepare/flatten.zig");
+const emitter_lights = @import("prepare/emitter_lights.zig");
+const emitters = @import("prepare/emitters.zig");
 const environment = @import("prepare/environment.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
 const place_file = @import("prepare/pose.zig");
 const tangents = @import("prepare/tangents.zig");
 const texture = @import("prepare/texture.zig");
+const strokes = @import("prepare/strokes.zig");
 const view_file = @import("prepare/view.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
@@ -63,7 +66,14 @@ pub const PoseSettings = struct {
     lanes: u8,
     pool: *parallel.Pool,
     tree_quality: TreeQuality = .default,
+    /// Diameter of points and width of lines, in pixels of the automatic view.
+    point_size: f32 = choices.point_size.default,
+    /// What decides how large these are.
+    view: WantedView = .{},
 };
+
+/// See `PoseSettings`.
+pub const WantedView = view_file.Wanted;
 
 /// What is seen of it, and in what light.
 pub const ViewSettings = struct {
@@ -79,6 +89,7 @@ pub const ViewSettings = struct {
     background: ?math.Vec3 = null,
     environment: light.EnvironmentSettings = .{},
     floor: choices.Floor = .none,
+    emitters: bool = true,
     /// What primary rays see in its place.
     backdrop: ?light.EnvironmentSettings = null,
 };
@@ -190,29 +201,24 @@ pub fn pose(
     var arena: std.heap.ArenaAllocator = .init(gpa);
     errdefer arena.deinit();
     const place = try place_file.compose(arena.allocator(), from);
-    const soup = try flatten.flatten(
+    var soup = try flatten.flatten(
         gpa,
         arena.allocator(),
         loaded.parts.instances,
         loaded.parts.meshes,
         attributesOf(&loaded.textures),
+        settings.point_size,
         &place,
         settings.pool,
         diagnostic,
     );
-    var geometry: world.Geometry = .{
-        .tree = world.Geometry.empty.tree,
-        .positions = soup.positions,
-        .normals = soup.normals,
-        .colors = soup.colors,
-        .texcoords = soup.texcoords,
-        .tangents = soup.tangents,
-        .triangles = soup.triangles,
-        .bounds = soup.bounds,
-        .centroid_bounds = soup.centroid_bounds,
-        .padding = .init(place_file.round(place.center), soup.bounds),
-        .size = @floatCast(place.size),
-    };
+    var geometry = geometryOf(&soup, &place);
+    if (soup.strokes.spheres.len > 0) {
+        const materials = loaded.parts.materials;
+        const pixel = try view_file.pixelSize(gpa, from, materials, &geometry, &settings.view);
+        try strokes.draw(gpa, &soup, pixel * settings.point_size / 2, settings.pool);
+        geometry = geometryOf(&soup, &place);
+    }
     const materials = try material.place(
         arena.allocator(),
         &loaded.parts,
@@ -232,10 +238,35 @@ pub fn pose(
         .node_maps = place.maps,
         .materials = materials,
         .textures = loaded.textures.textures,
-        .facts = .{ .tree = tree_facts, .degenerate_count = soup.dropped_count },
+        .facts = .{
+            .tree = tree_facts,
+            .degenerate_count = soup.dropped_count,
+            .stroke_triangle_count = soup.triangles.len - geometry.surfaces().len,
+        },
     };
     if (builtin.mode == .debug) try check.check(gpa, &result);
     return result;
+}
+
+/// All but the tree.
+fn geometryOf(soup: *const flatten.TriangleSoup, place: *const place_file.Pose) world.Geometry {
+    var geometry: world.Geometry = .{
+        .tree = world.Geometry.empty.tree,
+        .positions = soup.positions,
+        .normals = soup.normals,
+        .colors = soup.colors,
+        .tangents = soup.tangents,
+        .triangles = soup.triangles,
+        .surface_count = soup.surface_count,
+        .spheres = soup.strokes.spheres,
+        .sphere_radius = soup.sphere_radius,
+        .bounds = soup.bounds,
+        .centroid_bounds = soup.centroid_bounds,
+        .padding = .init(place_file.round(place.center), soup.bounds),
+        .size = @floatCast(place.size),
+    };
+    for (&geometry.texcoords, soup.texcoords) |*to, set| to.* = set;
+    return geometry;
 }
 
 fn nanoseconds(duration: std.Io.Duration) u64 {
@@ -292,11 +323,22 @@ noinline fn chooseView(
     );
     seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };
     seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
+    const shining = if (settings.emitters or from.has_area_lights)
+        try emittersOf(gpa, seen, from)
+    else
+        &.{};
+    if (from.has_area_lights) seen.lights = try std.mem.concat(arena, world.Light, &.{
+        seen.lights, shining,
+    });
     // What shines from everywhere is a light too.
     seen.facts.own_light_count = seen.lights.len;
     const has_map = settings.environment.map != null;
     const lights_are_default = seen.lights.len == 0 and from.ambient == null and !has_map;
     if (lights_are_default) seen.lights = try light.placeRig(arena, &seen.view.camera);
+    seen.facts.emitter_count = if (from.has_area_lights) 0 else shining.len;
+    if (seen.facts.emitter_count > 0) seen.lights = try std.mem.concat(arena, world.Light, &.{
+        seen.lights, shining,
+    });
     seen.environment = light.environment(
         lights_are_default,
         from.ambient,
@@ -314,6 +356,29 @@ noinline fn chooseView(
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
     seen.facts.environment_is_default = settings.environment.is_default;
+}
+
+/// Lights that stand for surfaces which emit: made once for a pose.
+fn emittersOf(
+    gpa: Allocator,
+    seen: *World,
+    from: *const Scene,
+) error{OutOfMemory}![]const world.Light {
+    if (seen.emitters) |made| return made;
+    const pieces = try emitters.find(gpa, &seen.geometry, &seen.materials, &seen.textures);
+    defer gpa.free(pieces);
+    var count: usize = emitter_lights.count_default;
+    if (from.has_area_lights) {
+        count = 0;
+        for (from.materials) |*one| {
+            if (math.vec3.maxComponent(one.emissive) > 0)
+                count += emitter_lights.count_default;
+        }
+        count = @min(count, emitter_lights.count_max);
+    }
+    const arena = seen.arena.allocator();
+    seen.emitters = try emitter_lights.make(gpa, arena, pieces, &seen.geometry, count);
+    return seen.emitters.?;
 }
 
 /// Gives a geometry that has all else a tree of `settings.lanes`, whose memory comes from `arena`.
@@ -1012,7 +1077,9 @@ test {
     _ = alpha;
     _ = check;
     _ = deform;
+    _ = emitter_lights;
     _ = flatten;
+    _ = strokes;
     _ = light;
     _ = material;
     _ = place_file;

@@ -103,7 +103,8 @@ pub const Skin = struct {
     inverse_bind_maps: []const AffineD,
 };
 
-/// Triangles with one material, in the space of the node that shows them.
+/// Triangles with one material, or points, or segments of lines, in the space of the node that shows
+/// them.
 pub const Mesh = struct {
     positions: []const Vec3,
     /// One a vertex, not necessarily of unit length; null: the faces are flat.
@@ -121,8 +122,18 @@ pub const Mesh = struct {
     joint_sets: []const JointSet = &.{},
     /// Vertex indices, counter-clockwise seen from the front.
     triangles: []const [3]u32,
+    /// Vertex indices: each is drawn as a small sphere.
+    points: []const u32 = &.{},
+    /// Vertex indices of both ends: each is drawn as a thin capsule. Ends with the same index are
+    /// joined.
+    segments: []const [2]u32 = &.{},
     /// Index into `Scene.materials`.
     material: u32,
+
+    /// Whether there is nothing to draw.
+    pub fn isEmpty(mesh: *const Mesh) bool {
+        return mesh.triangles.len == 0 and mesh.points.len == 0 and mesh.segments.len == 0;
+    }
 };
 
 /// A mesh at a node.
@@ -217,6 +228,8 @@ pub const Scene = struct {
     environment: ?EnvironmentMap = null,
     /// Index of the camera that the file itself would use, `none` without cameras.
     camera_default: u32 = none,
+    /// Surfaces that emit are all of the lights that the file says, each to be lit by in full.
+    has_area_lights: bool = false,
     /// Ambient radiance that the source of the scene asks for; null: by the rules of shading.
     ambient: ?f32 = null,
     /// What is seen where there is nothing, linear RGB; null: by the rules of shading.
@@ -280,6 +293,10 @@ pub const Scene = struct {
             for (mesh.positions) |position| assert(math.vec3.isFinite(position));
             for (mesh.triangles) |triangle| {
                 for (triangle) |vertex| assert(vertex < mesh.positions.len);
+            }
+            for (mesh.points) |vertex| assert(vertex < mesh.positions.len);
+            for (mesh.segments) |ends| {
+                for (ends) |vertex| assert(vertex < mesh.positions.len);
             }
         }
         for (scene.instances) |instance| {

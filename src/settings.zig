@@ -147,6 +147,12 @@ pub const Viewpoint = struct {
             viewpoint.orbit != null or viewpoint.orthographic;
     }
 };
+
+/// Diameter of points and width of lines, in pixels at the distance from which the automatic view
+/// looks at the middle of the scene.
+pub const point_size: struct { min: f32, max: f32, default: f32 } =
+    .{ .min = 0.1, .max = 100, .default = 1.5 };
+
 /// Which of a file's scenes to read.
 pub const SceneChoice = union(enum) {
     /// The one that the file shows.
@@ -272,11 +278,16 @@ pub const View = struct {
     ambient: ?f32 = null,
     environment: Environment = .{},
     floor: Floor = .none,
+    /// Surfaces that emit light what is around them, as far as it shows; without it only where the
+    /// file calls them lights.
+    emitters: bool = true,
     background: Background = .default,
     /// Colours of unlit surfaces and of the background are the display's, neither exposed nor tone
     /// mapped; without it, as in the thesis, they are radiance, and the background's default comes
     /// with the lights.
     display_referred: bool = true,
+    /// Within `point_size`.
+    point_size: f32 = point_size.default,
 
     /// Directional lights a sample that stand for the environment.
     pub fn shadowCount(view: *const View) u32 {

@@ -136,10 +136,12 @@ test {
     _ = @import("trace/integrate/sampler.zig");
     _ = @import("trace/shade/cosine.zig");
     _ = @import("trace/shade/exponential.zig");
+    _ = @import("trace/shade/iridescence.zig");
     _ = @import("trace/shade/offset.zig");
     _ = @import("trace/shade/albedo.zig");
     _ = @import("trace/shade/bsdf.zig");
     _ = @import("trace/shade/microfacet.zig");
+    _ = @import("trace/shade/sheen.zig");
     _ = @import("trace/shade/unique.zig");
     _ = @import("trace/shade/volumes.zig");
     _ = @import("trace/shade/phase.zig");

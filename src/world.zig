@@ -30,6 +30,7 @@ pub const Materials = materials_file.Materials;
 pub const Node = geometry_file.Node;
 pub const Padding = @import("world/padding.zig").Padding;
 pub const Slot = textures_file.Slot;
+pub const Sphere = geometry_file.Sphere;
 pub const Texture = textures_file.Texture;
 pub const TextureLevel = textures_file.Level;
 pub const Textures = textures_file.Textures;
@@ -81,8 +82,13 @@ pub const Facts = struct {
     environment_is_default: bool = false,
     /// Lights of the file that shine.
     own_light_count: usize = 0,
+    /// Lights that stand for surfaces which emit, the last of all: those of them that are not among
+    /// the file's own.
+    emitter_count: usize = 0,
     /// Triangles left out because they have no area or no finite place.
     degenerate_count: u64,
+    /// Triangles that points and lines became.
+    stroke_triangle_count: u64 = 0,
 };
 
 /// Everything that tracing needs, and its memory.
@@ -97,6 +103,8 @@ pub const World = struct {
     /// Made once a scene, by `prepare.load`, as are the lookups of the materials; not owned.
     textures: Textures,
     lights: []const Light = &.{},
+    /// In the place of all surfaces that emit; null: not made yet.
+    emitters: ?[]const Light = null,
     environment: Environment = .{ .ambient = 0, .background = @splat(0) },
     view: View = .nowhere,
     facts: Facts,

@@ -397,7 +397,10 @@ test "meshes, skins and weights" {
     try expectChanges(&.{
         .{ "\"mode\":4", "\"mode\":5", .fine },
         .{ "\"mode\":4", "\"mode\":6", .fine },
-        .{ "\"mode\":4", "\"mode\":1", odd("points and lines are not drawn") },
+        .{ "\"mode\":4", "\"mode\":0", .fine },
+        .{ "\"mode\":4", "\"mode\":1", .fine },
+        .{ "\"mode\":4", "\"mode\":2", .fine },
+        .{ "\"mode\":4", "\"mode\":3", .fine },
         .{ "\"mode\":4", "\"mode\":7", wrong("mesh 0, primitive 0: unknown mode") },
         .{ "\"indices\":3", "\"indices\":2", wrong(
             "accessor 2: indices have to be single unsigned integers",

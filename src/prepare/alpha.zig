@@ -119,6 +119,7 @@ const Work = struct {
             if (is_listed[instance.mesh]) continue;
             is_listed[instance.mesh] = true;
             const mesh = &work.meshes[instance.mesh];
+            if (mesh.triangles.len == 0) continue;
             const lookup = work.alphaLookup(mesh.material) orelse continue;
             if (hasAlphaInMotion(mesh, lookup.texcoord_set)) continue;
             const bounds = &work.bounds[lookup.texture];
@@ -203,7 +204,7 @@ const Work = struct {
         }
         var drawn: std.ArrayList(scene.Instance) = .empty;
         for (instances) |instance| {
-            if (parts.meshes.items[instance.mesh].triangles.len > 0) {
+            if (!parts.meshes.items[instance.mesh].isEmpty()) {
                 try drawn.append(arena, instance);
             }
             if (whole_mesh[instance.mesh] == scene.none) continue;

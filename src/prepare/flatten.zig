@@ -4,7 +4,8 @@
 //! for, and triangles in the order of the instances, without those that have no area or no finite
 //! place. Fronts stay fronts under
 //! mirroring maps. The arrays are the same whatever the number of threads: work is cut into fixed
-//! chunks that write to places known before.
+//! chunks that write to places known before. The vertices of points and lines are placed too, and
+//! room is left for the triangles that `strokes.zig` makes of them.
 
 const std = @import("std");
 const math = @import("../math.zig");
@@ -18,6 +19,7 @@ const assert = std.debug.assert;
 const vec3 = math.vec3;
 const deform = @import("deform.zig");
 const pose_file = @import("pose.zig");
+const strokes = @import("strokes.zig");
 const Affine = math.Affine;
 const AffineD = math.AffineD;
 const Box3 = math.Box3;
@@ -49,18 +51,32 @@ pub const Attributes = struct {
 
 /// All that there is to hit, in world space.
 pub const TriangleSoup = struct {
-    positions: []const Vec3,
-    normals: []const Vec3,
-    colors: []const [4]f32,
-    texcoords: [texcoord_set_count][]const [2]f32,
-    tangents: []const [4]f32,
+    positions: []Vec3,
+    normals: []Vec3,
+    colors: [][4]f32,
+    texcoords: [texcoord_set_count][][2]f32,
+    tangents: [][4]f32,
     triangles: []const world.Triangle,
+    /// How many of the triangles are not of points and lines.
+    surface_count: u32,
+    strokes: strokes.Strokes,
+    /// In metres, once the strokes are drawn.
+    sphere_radius: f32,
+    room: Room,
     /// Box of the triangles' corners, empty without triangles.
     bounds: Box3,
     /// Box of twice the centroids of the triangles' boxes, empty without triangles.
     centroid_bounds: Box3,
     /// Triangles left out.
     dropped_count: u64,
+};
+
+/// Where the triangles of points and lines go.
+pub const Room = struct {
+    /// The first of their vertices, which are at the end of the arrays.
+    vertex_first: u32,
+    /// All of the triangles' array: those that are there, and room behind them.
+    triangles: []world.Triangle,
 };
 
 /// One instance: where its vertices and triangles come from and go to.
@@ -102,13 +118,15 @@ const ChunkResult = struct {
 };
 
 /// Flattens what is drawn: instances of `meshes`, where `pose` has their nodes and joints. The
-/// soup's arrays come from `arena`, what is needed meanwhile from `gpa`.
+/// soup's arrays come from `arena`, what is needed meanwhile from `gpa`. Points and lines are to be
+/// `point_size` pixels wide, or nearly so.
 pub fn flatten(
     gpa: std.mem.Allocator,
     arena: std.mem.Allocator,
     instances: []const scene.Instance,
     meshes: []const scene.Mesh,
     attributes: Attributes,
+    point_size: f32,
     pose: *const pose_file.Pose,
     pool: *parallel.Pool,
     diagnostic: *Diagnostic,
@@ -116,28 +134,59 @@ pub fn flatten(
     const draws = try gpa.alloc(Draw, instances.len);
     defer gpa.free(draws);
     const size = try plan(gpa, instances, meshes, pose, draws, diagnostic);
-    const count = size.vertex_count;
+    const detail: strokes.Detail = .of(size.strokes, point_size);
+    const with_room = try size.withRoom(detail, diagnostic);
+    const count = with_room.vertex_count;
 
     var work: Work = .{
         .draws = draws,
+        .size = &size,
         .positions = try huge_pages.alloc(arena, Vec3, count),
         .normals = try huge_pages.alloc(arena, Vec3, count),
         .colors = try huge_pages.alloc(arena, [4]f32, if (size.has_colors) count else 0),
         .texcoords = undefined,
         .tangents = try huge_pages.alloc(arena, [4]f32, if (attributes.tangents) count else 0),
-        .triangles = try huge_pages.alloc(arena, world.Triangle, size.triangle_count),
+        .triangles = try huge_pages.alloc(arena, world.Triangle, with_room.triangle_count),
         .chunks = try gpa.alloc(ChunkResult, chunkCount(size.triangle_count)),
     };
     defer gpa.free(work.chunks);
     for (&work.texcoords, attributes.texcoord_sets) |*set, is_used| {
         set.* = try huge_pages.alloc(arena, [2]f32, if (is_used) count else 0);
     }
-    try pool.forEach(chunkCount(count), &work, Work.placeVertices);
+    try pool.forEach(chunkCount(size.vertex_count), &work, Work.placeVertices);
     try pool.forEach(work.chunks.len, &work, Work.placeTriangles);
-    return work.finish(diagnostic);
+    var soup = work.finish(diagnostic);
+    if (size.strokes.spheres > 0) {
+        soup.strokes = try work.collectStrokes(gpa, arena, detail, diagnostic);
+    }
+    return soup;
 }
 
-const Size = struct { vertex_count: u32 = 0, triangle_count: u32 = 0, has_colors: bool = false };
+const Size = struct {
+    vertex_count: u32 = 0,
+    triangle_count: u32 = 0,
+    has_colors: bool = false,
+    strokes: strokes.Count = .{},
+
+    /// With the triangles of points and lines.
+    fn withRoom(size: Size, detail: strokes.Detail, diagnostic: *Diagnostic) Error!Size {
+        const vertex_total = size.vertex_count + detail.vertexCount(size.strokes);
+        const triangle_total = size.triangle_count + detail.triangleCount(size.strokes);
+        if (@max(vertex_total, triangle_total) > element_count_max) return tooLarge(diagnostic);
+        var with_room = size;
+        with_room.vertex_count = @intCast(vertex_total);
+        with_room.triangle_count = @intCast(triangle_total);
+        return with_room;
+    }
+};
+
+fn tooLarge(diagnostic: *Diagnostic) error{SceneTooLarge} {
+    return diagnostic.fail(
+        error.SceneTooLarge,
+        "more than {d} triangles or vertices, instances, points and lines counted",
+        .{element_count_max},
+    );
+}
 
 fn chunkCount(count: usize) usize {
     return @divCeil(count, chunk_size);
@@ -155,6 +204,8 @@ fn plan(
     assert(draws.len == instances.len);
     const ranges = try gpa.alloc(?VertexRange, meshes.len);
     defer gpa.free(ranges);
+    const counts = try gpa.alloc(strokes.Count, meshes.len);
+    defer gpa.free(counts);
     @memset(ranges, null);
 
     var size: Size = .{};
@@ -162,8 +213,13 @@ fn plan(
     var triangle_total: u64 = 0;
     for (instances, draws) |instance, *draw| {
         const mesh = &meshes[instance.mesh];
-        if (ranges[instance.mesh] == null) ranges[instance.mesh] = .of(mesh.triangles);
+        if (ranges[instance.mesh] == null) {
+            const range: VertexRange = .of(mesh);
+            ranges[instance.mesh] = range;
+            counts[instance.mesh] = try countStrokes(gpa, mesh, range);
+        }
         const range = ranges[instance.mesh].?;
+        size.strokes.add(counts[instance.mesh]);
         const map = pose.maps[instance.node];
         const has_skin = instance.skin != scene.none;
         const joint_maps: []const AffineD = if (has_skin) pose.joint_maps[instance.skin] else &.{};
@@ -182,13 +238,7 @@ fn plan(
         };
         vertex_total += range.count;
         triangle_total += mesh.triangles.len;
-        if (vertex_total > element_count_max or triangle_total > element_count_max) {
-            return diagnostic.fail(
-                error.SceneTooLarge,
-                "more than {d} triangles or vertices, instances counted",
-                .{element_count_max},
-            );
-        }
+        if (@max(vertex_total, triangle_total) > element_count_max) return tooLarge(diagnostic);
         if (mesh.colors != null and range.count > 0) size.has_colors = true;
     }
     size.vertex_count = @intCast(vertex_total);
@@ -196,22 +246,36 @@ fn plan(
     return size;
 }
 
-/// The stretch of a mesh's vertices that its triangles use; files share one list of vertices among
-/// many meshes.
+fn countStrokes(
+    gpa: std.mem.Allocator,
+    mesh: *const scene.Mesh,
+    range: VertexRange,
+) error{OutOfMemory}!strokes.Count {
+    if (mesh.points.len == 0 and mesh.segments.len == 0) return .{};
+    var used: std.DynamicBitSetUnmanaged = try .initEmpty(gpa, range.count);
+    defer used.deinit(gpa);
+    strokes.mark(&used, mesh, range.first);
+    return .of(mesh, &used);
+}
+
+/// The stretch of a mesh's vertices that it uses; files share one list of vertices among many
+/// meshes.
 const VertexRange = struct {
     first: u32,
     count: u32,
 
-    fn of(triangles: []const [3]u32) VertexRange {
-        if (triangles.len == 0) return .{ .first = 0, .count = 0 };
+    fn of(mesh: *const scene.Mesh) VertexRange {
+        if (mesh.isEmpty()) return .{ .first = 0, .count = 0 };
         var lowest: u32 = std.math.maxInt(u32);
         var highest: u32 = 0;
-        for (triangles) |triangle| {
-            for (triangle) |vertex| {
-                lowest = @min(lowest, vertex);
-                highest = @max(highest, vertex);
-            }
-        }
+        inline for (.{
+            std.mem.bytesAsSlice(u32, std.mem.sliceAsBytes(mesh.triangles)),
+            mesh.points,
+            std.mem.bytesAsSlice(u32, std.mem.sliceAsBytes(mesh.segments)),
+        }) |vertices| for (vertices) |vertex| {
+            lowest = @min(lowest, vertex);
+            highest = @max(highest, vertex);
+        };
         assert(lowest <= highest);
         return .{ .first = lowest, .count = highest - lowest + 1 };
     }
@@ -260,6 +324,8 @@ fn tameNormal(normal: Vec3) Vec3 {
 /// Shared by the threads.
 const Work = struct {
     draws: []const Draw,
+    /// Of the arrays, but for the room at their ends.
+    size: *const Size,
     positions: []Vec3,
     normals: []Vec3,
     colors: [][4]f32,
@@ -270,7 +336,7 @@ const Work = struct {
 
     fn placeVertices(work: *Work, chunk: usize, _: usize) void {
         const begin = chunk * chunk_size;
-        const end = @min(begin + chunk_size, work.positions.len);
+        const end = @min(begin + chunk_size, work.size.vertex_count);
         var draw_index = lastAtOrBefore(work.draws, "vertex_target", begin);
         var from = begin;
         while (from < end) : (draw_index += 1) {
@@ -365,7 +431,7 @@ const Work = struct {
 
     fn placeTriangles(work: *Work, chunk: usize, _: usize) void {
         const begin = chunk * chunk_size;
-        const end = @min(begin + chunk_size, work.triangles.len);
+        const end = @min(begin + chunk_size, work.size.triangle_count);
         var result: ChunkResult = .{};
         var draw_index = lastAtOrBefore(work.draws, "triangle_target", begin);
         var from = begin;
@@ -442,15 +508,63 @@ const Work = struct {
             .positions = work.positions,
             .normals = work.normals,
             .colors = work.colors,
-            .texcoords = .{
-                work.texcoords[0], work.texcoords[1], work.texcoords[2], work.texcoords[3],
-            },
+            .texcoords = work.texcoords,
             .tangents = work.tangents,
             .triangles = work.triangles[0..kept_count],
+            .surface_count = @intCast(kept_count),
+            .strokes = .{},
+            .sphere_radius = 0,
+            .room = .{ .vertex_first = work.size.vertex_count, .triangles = work.triangles },
             .bounds = bounds,
             .centroid_bounds = centroid_bounds,
-            .dropped_count = work.triangles.len - kept_count,
+            .dropped_count = work.size.triangle_count - kept_count,
         };
+    }
+
+    /// Lists the strokes, without those that are nowhere.
+    fn collectStrokes(
+        work: *const Work,
+        gpa: std.mem.Allocator,
+        arena: std.mem.Allocator,
+        detail: strokes.Detail,
+        diagnostic: *Diagnostic,
+    ) error{OutOfMemory}!strokes.Strokes {
+        const count = &work.size.strokes;
+        const Spheres = std.ArrayList(world.Sphere);
+        var spheres: Spheres = try .initCapacity(arena, @intCast(count.spheres));
+        const Segments = std.ArrayList(strokes.Segment);
+        var segments: Segments = try .initCapacity(arena, @intCast(count.segments));
+        for (work.draws) |*draw| {
+            const mesh = draw.mesh;
+            if (mesh.points.len == 0 and mesh.segments.len == 0) continue;
+            var used: std.DynamicBitSetUnmanaged = try .initEmpty(gpa, draw.vertex_count);
+            defer used.deinit(gpa);
+            strokes.mark(&used, mesh, draw.vertex_source);
+            var vertices = used.iterator(.{});
+            while (vertices.next()) |vertex| {
+                const center = draw.vertex_target + @as(u32, @intCast(vertex));
+                if (!work.isPlaced(center)) continue;
+                spheres.appendAssumeCapacity(.{ .center = center, .material = mesh.material });
+            }
+            const shift = draw.vertex_target -% draw.vertex_source;
+            for (mesh.segments) |pair| {
+                const ends: [2]u32 = .{ pair[0] +% shift, pair[1] +% shift };
+                if (!work.isPlaced(ends[0]) or !work.isPlaced(ends[1])) continue;
+                segments.appendAssumeCapacity(.{ .ends = ends, .material = mesh.material });
+            }
+        }
+        const outside_count = count.spheres - spheres.items.len;
+        if (outside_count > 0) diagnostic.warn(
+            "{d} vertices of points and lines left out: they are farther than 2^40 m from the " ++
+                "origin",
+            .{outside_count},
+        );
+        return .{ .spheres = spheres.items, .segments = segments.items, .detail = detail };
+    }
+
+    fn isPlaced(work: *const Work, vertex: u32) bool {
+        const place = work.positions[vertex];
+        return isWithinRange(place, place, place);
     }
 };
 
@@ -483,8 +597,8 @@ fn lastAtOrBefore(draws: []const Draw, comptime field: []const u8, position: usi
     return low;
 }
 
-/// False for infinities and NaN too.
-fn isWithinRange(a: Vec3, b: Vec3, c: Vec3) bool {
+/// Whether a triangle is near enough to be hit; false for infinities and NaN too.
+pub fn isWithinRange(a: Vec3, b: Vec3, c: Vec3) bool {
     var within = true;
     inline for (.{ a, b, c }) |corner| {
         inline for (0..3) |axis| within = within and @abs(corner[axis]) <= coordinate_max;
@@ -492,7 +606,8 @@ fn isWithinRange(a: Vec3, b: Vec3, c: Vec3) bool {
     return within;
 }
 
-fn hasArea(a: Vec3, b: Vec3, c: Vec3) bool {
+/// Whether a triangle can be hit.
+pub fn hasArea(a: Vec3, b: Vec3, c: Vec3) bool {
     const normal = vec3.cross(vec3.sub(b, a), vec3.sub(c, a));
     return @abs(normal[0]) > area_twice_min or @abs(normal[1]) > area_twice_min or
         @abs(normal[2]) > area_twice_min;

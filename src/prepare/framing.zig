@@ -1,6 +1,6 @@
 //! Automatic framing: a camera with all of the scene in its picture, as large as a margin allows.
 //!
-//! In: the triangles, their materials and the picture's aspect. Out: a camera, or the direction,
+//! In: the triangles, their materials and the picture's aspect; points and lines by their vertices. Out: a camera, or the direction,
 //! the middle and the distance for one that is placed otherwise. What is transparent everywhere
 //! does not count. A flat model is seen from its front, others in a three-quarter view, unless
 //! hardly a front would be seen from there; the position is the nearest that has every vertex
@@ -82,6 +82,9 @@ const visible_share_min = 0.5;
 /// its depth at most that share of its size.
 const flat: struct { area_min: f64, depth_max: f64 } = .{ .area_min = 0.98, .depth_max = 0.05 };
 
+/// How far the camera is from a single point, in units of `Subject.size`.
+const point_distance = 0.01;
+
 /// Triangles looked at for the choice of the direction, at most (evenly spread).
 const sample_count_max = 1 << 16;
 
@@ -150,7 +153,8 @@ pub fn halfTangents(fov_degrees: ?f32, aspect: f64) [2]f64 {
     return if (aspect < 1) .{ narrowed, longer } else .{ longer, narrowed };
 }
 
-/// What is to be seen: the vertices of triangles that are not transparent everywhere.
+/// What is to be seen: the vertices of triangles, points and lines that are not transparent
+/// everywhere.
 pub const Subject = struct {
     shown: Shown,
     /// The vertices that count, at least one of them unless the scene is empty.
@@ -158,6 +162,8 @@ pub const Subject = struct {
     /// The middle of their box, and its longest side, > 0.
     center: Vec3d,
     size: f64,
+    /// All of it is at one place, and `size` made up.
+    is_point: bool = false,
     /// The axes of the camera that shows it best.
     basis: Basis,
 
@@ -174,12 +180,10 @@ pub const Subject = struct {
             .size = 1,
             .basis = .ofDirection(directions[0]),
         };
-        for (geometry.triangles) |*triangle| {
-            if (subject.shown.holds(triangle)) mark(&subject.used, triangle);
-        }
+        subject.markShown();
         if (subject.used.findFirstSet() == null) {
             subject.shown.all = true;
-            for (geometry.triangles) |*triangle| mark(&subject.used, triangle);
+            subject.markShown();
         }
         if (subject.used.findFirstSet() == null) return subject;
         const bounds = subject.measure();
@@ -191,6 +195,20 @@ pub const Subject = struct {
     pub fn deinit(subject: *Subject, gpa: std.mem.Allocator) void {
         subject.used.deinit(gpa);
         subject.* = undefined;
+    }
+
+    fn markShown(subject: *Subject) void {
+        const shown = &subject.shown;
+        for (shown.geometry.surfaces()) |*triangle| {
+            if (shown.holds(triangle)) mark(&subject.used, triangle);
+        }
+        subject.markSpheres(&subject.used);
+    }
+
+    fn markSpheres(subject: *const Subject, vertices: *std.DynamicBitSetUnmanaged) void {
+        for (subject.shown.geometry.spheres) |*sphere| {
+            if (subject.shown.holdsSphere(sphere)) vertices.set(sphere.center);
+        }
     }
 
     /// Sets middle and size by the vertices' box, which is returned.
@@ -205,7 +223,13 @@ pub const Subject = struct {
             middle.* = (@as(f64, lower) + upper) / 2;
             subject.size = larger(subject.size, @as(f64, upper) - lower);
         }
-        assert(subject.size > 0); // Triangles without an extent have no area.
+        if (subject.size > 0) return bounds;
+        // Triangles without an extent have no area, but points are seen. From far enough away that
+        // what is small there keeps its digits.
+        subject.is_point = true;
+        const c = subject.center;
+        const distance = larger(larger(1, @abs(c[0])), larger(@abs(c[1]), @abs(c[2])));
+        subject.size = distance / point_distance;
         return bounds;
     }
 
@@ -256,7 +280,8 @@ pub const Subject = struct {
     ) bool {
         const before = facing.count();
         const shown = &subject.shown;
-        for (shown.geometry.triangles) |*triangle| {
+        subject.markSpheres(facing);
+        for (shown.geometry.surfaces()) |*triangle| {
             if (!shown.holds(triangle)) continue;
             if (!shown.materials[triangle.material].double_sided) {
                 const normal = areaNormal(shown.geometry, triangle);
@@ -290,7 +315,8 @@ pub const Subject = struct {
             upper = vec3d.max(upper, point);
         }
         const extent = vec3d.scale(vec3d.sub(upper, lower), 0.5 / extent_max);
-        const least = 1e-9; // Of the size: a point has no extent.
+        // Of the size: a point has no extent.
+        const least: f64 = if (subject.is_point) point_distance else 1e-9;
         const half_height = larger(larger(extent[1], extent[0] / aspect), least) * subject.size;
         var place = vec3d.scale(vec3d.add(lower, upper), 0.5);
         place[2] = lower[2] - 1;
@@ -328,12 +354,14 @@ pub const Subject = struct {
         const aside = @sqrt(1 / (slope[0] * slope[0]) + toward * cos * cos);
         const above = @abs(toward * cos - sin / slope[1]);
         const below = @abs(toward * cos + sin / slope[1]);
-        var radius = 1e-6 * subject.size;
+        const sphere_radius = subject.shown.geometry.sphere_radius;
+        var radius: f64 = if (subject.is_point) point_distance else 1e-6;
+        radius *= subject.size;
         var vertices = subject.used.iterator(.{});
         while (vertices.next()) |vertex| {
             const p = relativeTo(target, subject.shown.geometry.positions[vertex]);
-            const r = @sqrt(p[0] * p[0] + p[2] * p[2]);
-            const nearer = toward * p[1] * sin;
+            const r = @sqrt(p[0] * p[0] + p[2] * p[2]) + sphere_radius;
+            const nearer = toward * (p[1] * sin + sphere_radius * @abs(sin));
             const over = p[1] * cos / slope[1];
             radius = larger(radius, r * aside + nearer);
             radius = larger(radius, r * above + nearer + over);
@@ -405,10 +433,18 @@ const Shown = struct {
 
     /// Whether alpha leaves something of the triangle.
     fn holds(shown: *const Shown, triangle: *const world.Triangle) bool {
-        const material = &shown.materials[triangle.material];
+        return shown.holdsVertices(&triangle.corner, triangle.material);
+    }
+
+    fn holdsSphere(shown: *const Shown, sphere: *const world.Sphere) bool {
+        return shown.holdsVertices(&.{sphere.center}, sphere.material);
+    }
+
+    fn holdsVertices(shown: *const Shown, vertices: []const u32, material_index: u32) bool {
+        const material = &shown.materials[material_index];
         if (shown.all or material.alpha_mode == .@"opaque") return true;
         var alpha: f32 = 0;
-        if (shown.geometry.colors.len == 0) alpha = 1 else for (triangle.corner) |vertex| {
+        if (shown.geometry.colors.len == 0) alpha = 1 else for (vertices) |vertex| {
             const color = shown.geometry.colors[vertex];
             alpha = if (color[3] > alpha) color[3] else alpha;
         }
@@ -428,6 +464,7 @@ fn areaNormal(geometry: *const world.Geometry, triangle: *const world.Triangle) 
 
 /// The axes to look along.
 fn chooseBasis(shown: *const Shown, bounds: math.Box3) Basis {
+    if (shown.geometry.surfaces().len == 0) return strokeBasis(bounds);
     if (flatFront(shown, bounds)) |front| return .look(vec3d.neg(front), .{ 0, 1, 0 });
     const axis = boardAxis(shown, bounds) orelse
         return .ofDirection(chooseDirection(shown, &directions));
@@ -437,6 +474,22 @@ fn chooseBasis(shown: *const Shown, bounds: math.Box3) Basis {
         direction.azimuth_degrees += 90;
     };
     return .ofDirection(chooseDirection(shown, &turned));
+}
+
+/// The axes to look along at points and lines alone: straight at those that lie in a plane across an
+/// axis of the world.
+fn strokeBasis(bounds: math.Box3) Basis {
+    const extent = bounds.extent();
+    const longest = vec3.maxComponent(extent);
+    var front: Vec3d = .{ 0, 0, 0 };
+    var flat_count: u32 = 0;
+    for (&front, extent) |*component, depth| {
+        if (depth > flat.depth_max * longest) continue;
+        component.* = 1;
+        flat_count += 1;
+    }
+    if (flat_count != 1) return .ofDirection(directions[0]);
+    return .look(vec3d.neg(front), .{ 0, 1, 0 });
 }
 
 /// The direction that the front of a flat model looks to, null for others. Where both sides show as
@@ -487,7 +540,7 @@ const Samples = struct {
     index: usize = 0,
 
     fn next(samples: *Samples) ?*const world.Triangle {
-        const triangles = samples.shown.geometry.triangles;
+        const triangles = samples.shown.geometry.surfaces();
         const stride = triangles.len / sample_count_max + 1;
         while (samples.index < triangles.len) {
             const triangle = &triangles[samples.index];
@@ -571,7 +624,8 @@ fn nearestPlace(points: []const Vec3d, half: [2]f64) Vec3d {
         }
         nearest = if (p[2] < nearest) p[2] else nearest;
     }
-    var place: Vec3d = .{ 0, 0, nearest - 0.01 }; // A point has no size to be framed by.
+    // A point has no size to be framed by.
+    var place: Vec3d = .{ 0, 0, nearest - point_distance };
     for (0..2) |axis| {
         const z = -(side[axis][0] + side[axis][1]) / (2 * slope[axis]);
         place[2] = if (z < place[2]) z else place[2];

@@ -89,6 +89,38 @@ pub fn choose(
     };
 }
 
+/// Metres that a pixel stands for where the automatic view of a scene looks at, whatever camera is
+/// used: points and lines do not change with it. In an orthographic view, everywhere.
+pub fn pixelSize(
+    gpa: std.mem.Allocator,
+    from: *const scene.Scene,
+    materials: []const scene.Material,
+    geometry: *const world.Geometry,
+    wanted: *const Wanted,
+) error{OutOfMemory}!f64 {
+    const size = pictureSize(from, wanted);
+    var subject: framing.Subject = try .init(gpa, geometry, materials);
+    defer subject.deinit(gpa);
+    const camera = try viewpoint_file.place(gpa, &subject, &.{
+        .fov_degrees = wanted.viewpoint.fov_degrees,
+        .orthographic = wanted.viewpoint.orthographic,
+    }, aspect(size));
+    const toward = vec3d.sub(subject.center, pose.widen(camera.origin));
+    const forward = pose.widen(camera.forward);
+    const distance = if (camera.orthographic) 1 else vec3d.dot(toward, forward);
+    const height: f64 = @floatFromInt(size[1]);
+    return 2 * distance * vec3d.length(pose.widen(camera.up)) / height;
+}
+
+/// Size of the picture that `choose` makes; a camera that it will not find has no say.
+fn pictureSize(from: *const scene.Scene, wanted: *const Wanted) [2]u32 {
+    var unsaid: Diagnostic = .{};
+    const in_place = wanted.viewpoint.replacesCamera();
+    const found = if (in_place) null else find(from, wanted.camera, &unsaid) catch null;
+    const own = if (found) |index| aspectOf(&from.cameras[index]) else null;
+    return wanted.size(from, own orelse aspect_default);
+}
+
 /// Index of the camera to use, null for a framing.
 fn find(
     from: *const scene.Scene,

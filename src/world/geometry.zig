@@ -147,6 +147,14 @@ pub const Triangle = extern struct {
     }
 };
 
+/// A sphere that stands for a point, or for an end of a line.
+pub const Sphere = struct {
+    /// Index into `Geometry.positions`.
+    center: u32,
+    /// Index into `Materials.all`.
+    material: u32,
+};
+
 /// Facts about the tree, for the report.
 pub const TreeStatistics = struct {
     node_count: u32,
@@ -177,6 +185,11 @@ pub const Geometry = struct {
     /// of the bitangent cross(normal, tangent); empty where no material has a normal texture.
     tangents: []const [4]f32 = &.{},
     triangles: []const Triangle,
+    /// How many triangles are of surfaces; those behind them are of points and lines.
+    surface_count: u32 = none,
+    /// Of points and lines, all with the same radius in metres.
+    spheres: []const Sphere = &.{},
+    sphere_radius: f32 = 0,
     /// Box of the triangles' corners, empty without any.
     bounds: Box3,
     /// Box of twice the centroids of the triangles' boxes, empty without any.
@@ -186,6 +199,11 @@ pub const Geometry = struct {
     /// The largest distance between quartiles of the vertices along an axis, in metres: how large
     /// most of the scene is.
     size: f32,
+
+    /// The triangles that are not of points and lines.
+    pub fn surfaces(geometry: *const Geometry) []const Triangle {
+        return geometry.triangles[0..@min(geometry.triangles.len, geometry.surface_count)];
+    }
 
     /// Without anything to hit, and without a tree.
     pub const empty: Geometry = .{

@@ -26,6 +26,8 @@ added: std.ArrayList(scene.Material) = .empty,
 default: ?u32 = null,
 /// By material: the one that does without something.
 reduced: std.AutoHashMapUnmanaged(Reduction, u32) = .empty,
+/// By material, and whether vertices are coloured: the one of points and lines without normals.
+unlit: std.AutoHashMapUnmanaged(struct { u32, bool }, u32) = .empty,
 
 /// What of a material a mesh cannot have for want of texture coordinates or tangents.
 pub const Lacks = struct {
@@ -54,6 +56,7 @@ pub fn deinit(materials: *Materials) void {
     gpa.free(materials.list);
     materials.added.deinit(gpa);
     materials.reduced.deinit(gpa);
+    materials.unlit.deinit(gpa);
     materials.* = undefined;
 }
 
@@ -88,6 +91,29 @@ pub fn useWithout(materials: *Materials, index: u32, lacks: Lacks) Error!u32 {
     const reduced = try materials.add(material);
     try materials.reduced.put(materials.source.gpa, reduction, reduced);
     return reduced;
+}
+
+/// A material for points and lines without normals, which are not lit but show the sum of base
+/// colour and emission (glTF 2.0, section 3.9.7); the latter as far as no texture and no colour of
+/// vertices multiplies the former alone.
+pub fn useUnlit(materials: *Materials, index: u32, has_colors: bool) Error!u32 {
+    if (materials.unlit.get(.{ index, has_colors })) |known| return known;
+    const lit = (try materials.use(index)).*;
+    if (lit.unlit) return index;
+    var material: scene.Material = .{
+        .base_color = lit.base_color,
+        .base_color_texture = lit.base_color_texture,
+        .alpha_mode = lit.alpha_mode,
+        .alpha_cutoff = lit.alpha_cutoff,
+        .double_sided = lit.double_sided,
+        .unlit = true,
+    };
+    if (!has_colors and lit.base_color_texture == null and lit.emissive_texture == null) {
+        for (material.base_color[0..3], lit.emissive) |*channel, emitted| channel.* += emitted;
+    }
+    const shown = try materials.add(material);
+    try materials.unlit.put(materials.source.gpa, .{ index, has_colors }, shown);
+    return shown;
 }
 
 fn add(materials: *Materials, material: scene.Material) Error!u32 {

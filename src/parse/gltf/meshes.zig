@@ -1,11 +1,11 @@
-//! glTF's meshes become triangle lists with one material each.
+//! glTF's meshes become lists of triangles, points or segments with one material each.
 //!
 //! In: primitives (glTF 2.0, section 3.7.2). Out: `scene.Mesh`es in the scene's memory, with the
 //! texture coordinates and tangents that their material's textures need, and with the morph targets
 //! and joints that drawn nodes use. A set of coordinates that is missing counts as 0, as it does in
 //! other viewers. What several primitives share is decoded once. Every index has been compared with
-//! the number of vertices, every number is finite; strips and fans are taken apart (section
-//! 3.7.2.1).
+//! the number of vertices, every number is finite; strips, fans and loops are taken apart (section
+//! 3.7.2.1). Points and lines without normals are not lit (section 3.9.7).
 
 const std = @import("std");
 const c = @import("../cgltf.zig");
@@ -34,6 +34,8 @@ tangents: std.AutoHashMapUnmanaged(u32, []const [4]f32) = .empty,
 color_deltas: std.AutoHashMapUnmanaged(u32, []const [4]f32) = .empty,
 joints: std.AutoHashMapUnmanaged(JointAccessors, Joints) = .empty,
 triangles: std.AutoHashMapUnmanaged(Connection, []const [3]u32) = .empty,
+segments: std.AutoHashMapUnmanaged(Connection, []const [2]u32) = .empty,
+points: std.AutoHashMapUnmanaged(Connection, []const u32) = .empty,
 /// Whether a mesh without the coordinates of its textures has been met.
 coordinates_missed: bool = false,
 
@@ -53,7 +55,7 @@ const JointAccessors = [scene.joint_set_count][2]u32;
 /// What the vertices of a mesh hang on.
 const Joints = struct { sets: []const scene.JointSet, largest: u32 };
 
-/// What determines a triangle list.
+/// What determines a list of triangles, segments or points.
 const Connection = struct {
     /// The accessor of the indices, or `scene.none`.
     indices: u32,
@@ -62,14 +64,77 @@ const Connection = struct {
 };
 
 /// How vertices follow one another.
-const Mode = enum { triangles, strip, fan };
+const Mode = enum {
+    points,
+    lines,
+    line_loop,
+    line_strip,
+    triangles,
+    strip,
+    fan,
+
+    /// Null: what glTF does not know.
+    fn of(primitive: *const c.cgltf_primitive) ?Mode {
+        return switch (primitive.type) {
+            .points => .points,
+            .lines => .lines,
+            .line_loop => .line_loop,
+            .line_strip => .line_strip,
+            .triangles => .triangles,
+            .triangle_strip => .strip,
+            .triangle_fan => .fan,
+            else => null,
+        };
+    }
+
+    /// Vertices of each element: a corner, an end or a point.
+    fn size(mode: Mode) u32 {
+        return switch (mode) {
+            .points => 1,
+            .lines, .line_loop, .line_strip => 2,
+            .triangles, .strip, .fan => 3,
+        };
+    }
+
+    /// What the elements are called in messages.
+    fn name(mode: Mode) []const u8 {
+        return switch (mode.size()) {
+            1 => "points",
+            2 => "lines",
+            else => "triangles",
+        };
+    }
+
+    /// Elements of so many vertices.
+    fn count(mode: Mode, vertex_count: u32) u32 {
+        return switch (mode) {
+            .points => vertex_count,
+            .lines => vertex_count / 2,
+            // Two vertices are joined but once.
+            .line_loop => if (vertex_count > 2) vertex_count else vertex_count -| 1,
+            .line_strip => vertex_count -| 1,
+            .triangles => vertex_count / 3,
+            .strip, .fan => vertex_count -| 2,
+        };
+    }
+
+    /// Whether vertices are left over.
+    fn leavesRest(mode: Mode, vertex_count: u32) bool {
+        if (vertex_count < mode.size()) return true;
+        return switch (mode) {
+            .lines, .triangles => vertex_count % mode.size() != 0,
+            else => false,
+        };
+    }
+};
 
 /// Frees what is not the scene's.
 pub fn deinit(meshes: *Meshes) void {
     const gpa = meshes.source.gpa;
     inline for (.{
         "ranges",   "positions",    "normals", "colors",    "texcoords",
-        "tangents", "color_deltas", "joints",  "triangles",
+        "tangents", "color_deltas", "joints",  "triangles", "segments",
+        "points",
     }) |name| @field(meshes, name).deinit(gpa);
     meshes.* = undefined;
 }
@@ -115,24 +180,12 @@ const Decoded = struct { mesh: scene.Mesh, used: attributes.Used };
 
 fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Error!?Decoded {
     const source = meshes.source;
-    const mode: Mode = switch (primitive.type) {
-        .triangles => .triangles,
-        .triangle_strip => .strip,
-        .triangle_fan => .fan,
-        .invalid => return source.fail("{f}: unknown mode", .{place}),
-        else => {
-            source.warn("points and lines are not drawn", .{});
-            return null;
-        },
-    };
+    const mode = Mode.of(primitive) orelse return source.fail("{f}: unknown mode", .{place});
     const used = try attributes.find(source, primitive, place);
     const position = used.position orelse {
         source.warn("{f}: without POSITION, not drawn", .{place});
         return null;
     };
-    const vertex_count: u32 = @intCast(source.data.accessors[position].count);
-    const triangles = try meshes.connect(primitive, mode, vertex_count, place);
-    if (triangles.len == 0) return null;
     var mesh: scene.Mesh = .{
         .positions = try meshes.floats(3, &meshes.positions, position),
         .normals = if (used.normal) |index|
@@ -140,12 +193,17 @@ fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Er
         else
             null,
         .colors = if (used.color) |index| try meshes.decodeColors(index) else null,
-        .triangles = triangles,
+        .triangles = &.{},
         .material = if (primitive.material) |material|
             Source.indexOf(source.data.materials, material)
         else
             try meshes.materials.useDefault(),
     };
+    try meshes.connect(&mesh, primitive, mode, place);
+    if (mesh.isEmpty()) return null;
+    if (mesh.normals == null and mode.size() < 3) {
+        mesh.material = try meshes.materials.useUnlit(mesh.material, mesh.colors != null);
+    }
     try meshes.decodeForTextures(&mesh, &used, place);
     return .{ .mesh = mesh, .used = used };
 }
@@ -431,49 +489,69 @@ fn clampColors(colors: [][4]f32) bool {
     return clamped;
 }
 
-/// Triangles of a primitive, every index below `vertex_count`.
+/// Gives a mesh the elements of a primitive, every index below the number of its vertices.
 fn connect(
     meshes: *Meshes,
+    mesh: *scene.Mesh,
     primitive: *const c.cgltf_primitive,
     mode: Mode,
-    vertex_count: u32,
     place: Place,
-) Error![]const [3]u32 {
-    const source = meshes.source;
+) Error!void {
     const connection: Connection = .{
         .indices = if (primitive.indices) |indices|
-            Source.indexOf(source.data.accessors, indices)
+            Source.indexOf(meshes.source.data.accessors, indices)
         else
             scene.none,
-        .vertex_count = vertex_count,
+        .vertex_count = @intCast(mesh.positions.len),
         .mode = mode,
     };
-    if (meshes.triangles.get(connection)) |known| return known;
-    const accessor: ?Accessor = if (primitive.indices != null)
+    switch (mode.size()) {
+        1 => mesh.points = try meshes.elements(u32, &meshes.points, connection, place),
+        2 => mesh.segments = try meshes.elements([2]u32, &meshes.segments, connection, place),
+        else => mesh.triangles = try meshes.elements([3]u32, &meshes.triangles, connection, place),
+    }
+}
+
+fn elements(
+    meshes: *Meshes,
+    comptime Element: type,
+    cache: *std.AutoHashMapUnmanaged(Connection, []const Element),
+    connection: Connection,
+    place: Place,
+) Error![]const Element {
+    const source = meshes.source;
+    if (cache.get(connection)) |known| return known;
+    const accessor: ?Accessor = if (connection.indices != scene.none)
         try attributes.indices(source, connection.indices)
     else
         null;
-    const count = if (accessor) |indexed| indexed.count else vertex_count;
-    const triangle_count = switch (mode) {
-        .triangles => count / 3,
-        .strip, .fan => count -| 2,
-    };
-    if (count < 3 or (mode == .triangles and count % 3 != 0)) source.warn(
-        "{f}: {d} vertices do not make whole triangles, the rest is left out",
-        .{ place, count },
+    const count = if (accessor) |indexed| indexed.count else connection.vertex_count;
+    const mode = connection.mode;
+    if (mode.leavesRest(count)) source.warn(
+        "{f}: {d} vertices do not make whole {s}, the rest is left out",
+        .{ place, count, mode.name() },
     );
-    try source.charge(@as(u64, triangle_count) * @sizeOf([3]u32));
-    const triangles = try source.arena.alloc([3]u32, triangle_count);
-    if (mode == .triangles and count % 3 == 0) {
-        try number(source, connection, accessor, @ptrCast(triangles));
+    const element_count = mode.count(count);
+    try source.charge(@as(u64, element_count) * @sizeOf(Element));
+    const list = try source.arena.alloc(Element, element_count);
+    const is_whole = switch (mode) {
+        .points, .lines, .triangles => !mode.leavesRest(count),
+        else => false,
+    };
+    if (is_whole) {
+        try number(source, connection, accessor, @ptrCast(list));
     } else {
         const vertices = try source.gpa.alloc(u32, count);
         defer source.gpa.free(vertices);
         try number(source, connection, accessor, vertices);
-        assemble(mode, vertices, triangles);
+        switch (Element) {
+            u32 => @memcpy(list, vertices[0..element_count]),
+            [2]u32 => join(mode, vertices, list),
+            else => assemble(mode, vertices, list),
+        }
     }
-    try meshes.triangles.put(source.gpa, connection, triangles);
-    return triangles;
+    try cache.put(source.gpa, connection, list);
+    return list;
 }
 
 /// The vertices of a primitive in the order of the file.
@@ -494,6 +572,14 @@ fn number(
     );
 }
 
+/// The last segment of a loop goes back to the first vertex.
+fn join(mode: Mode, vertices: []const u32, segments: [][2]u32) void {
+    for (segments, 0..) |*segment, index| segment.* = switch (mode) {
+        .lines => vertices[2 * index ..][0..2].*,
+        else => .{ vertices[index], vertices[(index + 1) % vertices.len] },
+    };
+}
+
 /// Strips and fans turn so that every triangle keeps the winding of the first.
 fn assemble(mode: Mode, vertices: []const u32, triangles: [][3]u32) void {
     for (triangles, 0..) |*triangle, index| triangle.* = switch (mode) {
@@ -504,6 +590,7 @@ fn assemble(mode: Mode, vertices: []const u32, triangles: [][3]u32) void {
             vertices[index + 2 - index % 2],
         },
         .fan => .{ vertices[index + 1], vertices[index + 2], vertices[0] },
+        .points, .lines, .line_loop, .line_strip => unreachable, // No triangles.
     };
 }
 
@@ -544,4 +631,30 @@ test assemble {
     try std.testing.expectEqual(fan, triangles);
     assemble(.triangles, &.{ 0, 1, 2, 3, 4, 5, 6 }, triangles[0..2]);
     try std.testing.expectEqual([3]u32{ 3, 4, 5 }, triangles[1]);
+}
+
+test join {
+    const vertices = [_]u32{ 7, 8, 9, 10, 11 };
+    var segments: [5][2]u32 = undefined;
+    join(.line_loop, &vertices, &segments);
+    const loop: [5][2]u32 = .{ .{ 7, 8 }, .{ 8, 9 }, .{ 9, 10 }, .{ 10, 11 }, .{ 11, 7 } };
+    try std.testing.expectEqual(loop, segments);
+    join(.line_strip, &vertices, segments[0..Mode.count(.line_strip, 5)]);
+    try std.testing.expectEqual(loop[0..4].*, segments[0..4].*);
+    join(.lines, &vertices, segments[0..Mode.count(.lines, 5)]);
+    try std.testing.expectEqual([2][2]u32{ .{ 7, 8 }, .{ 9, 10 } }, segments[0..2].*);
+}
+
+test Mode {
+    const Case = struct { mode: Mode, counts: [4]u32, rests: [4]bool };
+    for ([_]Case{
+        .{ .mode = .points, .counts = .{ 0, 1, 2, 3 }, .rests = .{ true, false, false, false } },
+        .{ .mode = .lines, .counts = .{ 0, 0, 1, 1 }, .rests = .{ true, true, false, true } },
+        .{ .mode = .line_loop, .counts = .{ 0, 0, 1, 3 }, .rests = .{ true, true, false, false } },
+        .{ .mode = .line_strip, .counts = .{ 0, 0, 1, 2 }, .rests = .{ true, true, false, false } },
+        .{ .mode = .fan, .counts = .{ 0, 0, 0, 1 }, .rests = .{ true, true, true, false } },
+    }) |case| for (case.counts, case.rests, 0..) |count, rest, vertex_count| {
+        try std.testing.expectEqual(count, case.mode.count(@intCast(vertex_count)));
+        try std.testing.expectEqual(rest, case.mode.leavesRest(@intCast(vertex_count)));
+    };
 }

@@ -147,10 +147,10 @@ pub fn Visibility(comptime Kernel: type) type {
             transmittances: *[group_count]Vec3,
         ) void {
             const none: Vec3 = .splat(.{ 0, 0, 0 });
-            const limit = shadowLimit(Rays, light);
             var weakened_counts: [group_count]F32 = @splat(.zero());
             for (0..transparency_depth_max / multi_hit.hits_max) |_| {
-                for (&bundle.groups) |*ray| ray.closest = limit;
+                for (&bundle.groups) |*ray|
+                    ray.closest = shadowLimit(Rays, light, ray.line.direction);
                 visibility.hits.trace(bundle, &visibility.tests);
                 var any_left = false;
                 for (&bundle.groups, transmittances, 0..) |*ray, *value, group| {
@@ -367,26 +367,35 @@ pub fn shadowRay(
     active: Lanes.Mask,
 ) ray_file.Ray(Lanes) {
     const source: Lanes.Vec3 = .splat(light.position);
+    const line: ray_file.Line(Lanes) = if (light.kind == .directional)
+        .init(point, Lanes.Vec3.splat(light.direction).neg())
+    else if (light.from_receiver)
+        .init(point, source.sub(point))
+    else
+        .init(source, point.sub(source));
     return .{
-        .line = if (light.kind == .directional)
-            .init(point, Lanes.Vec3.splat(light.direction).neg())
-        else if (light.from_receiver)
-            .init(point, source.sub(point))
-        else
-            .init(source, point.sub(source)),
+        .line = line,
         .tnear = .start(),
-        .closest = shadowLimit(Lanes, light),
+        .closest = shadowLimit(Lanes, light, line.direction),
         .skip = primitive,
         .active = active,
     };
 }
 
-/// Where shadow rays end.
-fn shadowLimit(comptime Lanes: type, light: *const Light) ray_file.Hit(Lanes) {
-    return .before(.splat(shadowEnd(light)));
-}
-
-/// The same as a number.
+/// Where shadow rays leave what they go through, at the latest.
 pub fn shadowEnd(light: *const Light) f32 {
     return if (light.kind == .directional) std.math.inf(f32) else 1;
+}
+
+/// Where shadow rays end: those with a light of some radius run from what they light.
+fn shadowLimit(
+    comptime Lanes: type,
+    light: *const Light,
+    direction: Lanes.Vec3,
+) ray_file.Hit(Lanes) {
+    if (light.kind == .directional) return .before(.splat(std.math.inf(f32)));
+    if (light.radius == 0) return .before(.splat(1));
+    std.debug.assert(light.from_receiver);
+    const length = direction.length().max(.splat(1e-20));
+    return .before(Lanes.F32.splat(1).sub(Lanes.F32.splat(light.radius).div(length)).max(.zero()));
 }

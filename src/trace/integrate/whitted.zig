@@ -197,7 +197,6 @@ pub fn Whitted(comptime Kernel: type) type {
 
         /// Adds what the points that rays see scatter of the light that arrives.
         fn addLights(whitted: *Self, coherence: dispatch.Coherence) void {
-            const path = &whitted.path;
             const radiance = &whitted.sample.radiance;
             whitted.rays.shadow += environment_light.addLight(
                 Kernel,
@@ -205,7 +204,7 @@ pub fn Whitted(comptime Kernel: type) type {
                 &whitted.environment_lights,
                 whitted.sample.number,
                 &.{
-                    .path = path,
+                    .path = &whitted.path,
                     .all = &whitted.vertices,
                     .traced = &whitted.bounces.reflected,
                     .coat_traced = &whitted.bounces.coat_reflected,
@@ -218,8 +217,9 @@ pub fn Whitted(comptime Kernel: type) type {
                 Kernel,
                 &whitted.visibility,
                 light,
-                path,
+                &whitted.path,
                 &whitted.vertices,
+                &whitted.bounces.reflected,
                 coherence,
                 radiance,
             );
