@@ -4,7 +4,7 @@
 //! lights and of the sample's part of the environment that a point on the way scatters towards the
 //! eye, added to the radiance of the sample: absorption, phase function (Henyey and Greenstein) and
 //! shadow rays, which go straight on through boundaries. The point is chosen by the transmittance
-//! of the channel that is weakened least, other points in each sample of each pixel.
+//! of the channel that is weakened least, another for each light in each sample of each pixel.
 //!
 //! Light scattered more than once is not traced, so that dense volumes would get too dark. As
 //! Wrenninge, Kulla and Lundqvist 2013 ("Oz: The Great and Volumetric") have it, octaves with half
@@ -35,6 +35,9 @@ const octave_count = 2;
 /// Least optical depth of a way: what is thinner is sampled evenly all the same.
 const depth_least = 0.01;
 
+/// How far the numbers of points for one light and the next are apart: the golden section.
+const golden = 0.6180339887498949;
+
 /// Which sample of which pixels a path is of.
 pub const Place = struct { rectangle: Rectangle, sample: u32 };
 
@@ -54,6 +57,16 @@ pub fn Medium(comptime Kernel: type) type {
         const Point = struct {
             /// Lanes that have one.
             lit: Rays.Mask,
+            /// The way through the volume: where it starts along the ray, its length, the density
+            /// of points on it but for its scale, and what of that density the way leaves out.
+            start: F32,
+            way: F32,
+            density: F32,
+            lost: F32,
+            /// Chooses the first point.
+            number: F32,
+            /// Scattering coefficient.
+            sigma_s: Vec3,
             /// Only its place and cone.
             point: interaction_file.Interaction(Rays),
             /// Of the ray, of unit length.
@@ -63,7 +76,7 @@ pub fn Medium(comptime Kernel: type) type {
             /// What is scattered of what is lost.
             albedo: Vec3,
             anisotropy: F32,
-            /// Light scattered towards the eye, but for `worth`.
+            /// Light scattered towards the eye.
             sum: Vec3,
         };
 
@@ -85,19 +98,46 @@ pub fn Medium(comptime Kernel: type) type {
             }
             if (!any_lit) return 0;
             var ray_count: u64 = 0;
+            var count: u32 = 0;
             for (lights.ofSample(place.sample)) |part| for (part) |*light| {
                 var energy: [3]f32 = undefined;
                 const scale = std.math.pi * light.weight;
                 for (&energy, light.irradiance) |*to, channel| to.* = channel * scale;
+                count += 1;
+                medium.choose(path, count);
                 ray_count += medium.addSource(visibility, &light.source, energy);
             };
-            for (frame.lights) |*light| ray_count += medium.addSource(visibility, light, null);
+            for (frame.lights) |*light| {
+                count += 1;
+                medium.choose(path, count);
+                ray_count += medium.addSource(visibility, light, null);
+            }
             for (&medium.points, radiance) |*point, *sum| {
                 if (point.lit.none()) continue;
-                const seen = point.sum.mul(point.worth);
-                sum.* = sum.add(.select(point.lit, seen, .splat(.{ 0, 0, 0 })));
+                sum.* = sum.add(.select(point.lit, point.sum, .splat(.{ 0, 0, 0 })));
             }
             return ray_count;
+        }
+
+        /// Chooses other points.
+        fn choose(medium: *Self, path: *const PathState, count: u32) void {
+            for (&medium.points, 0..) |*point, group| {
+                if (point.lit.any()) chooseOne(point, path, group, count);
+            }
+        }
+
+        fn chooseOne(point: *Point, path: *const PathState, group: usize, count: u32) void {
+            const one: F32 = .splat(1);
+            const steps = golden * @as(f64, @floatFromInt(count));
+            const sum = point.number.add(.splat(@floatCast(steps - @floor(steps))));
+            const number = sum.sub(sum.toI32().toF32());
+            const left = one.sub(number.mul(point.lost));
+            const distance = exponential.log(Rays, left).neg().div(point.density);
+            const at = point.start.add(distance.min(point.way));
+            const origin = path.bundle.groups[group].line.origin;
+            point.point.position = origin.add(point.direction.scale(at));
+            const pdf_inverse = point.lost.div(point.density.mul(left));
+            point.worth = path.throughputAt(group, at).mul(point.sigma_s).scale(pdf_inverse);
         }
 
         fn find(
@@ -112,36 +152,34 @@ pub fn Medium(comptime Kernel: type) type {
                 .andNot(ray.closest.primitive.eq(.splat(ray_file.no_primitive)));
             point.lit = .splat(false);
             if (hit.none()) return;
-            const sigma_s = scattering(point, frame, path, group, hit);
+            point.sigma_s = scattering(point, frame, path, group, hit);
             if (point.lit.none()) return;
             const sigma_t = path.sigma_t[group];
             const length = ray.line.direction.length();
             const start = ray.tnear.t.mul(length);
             const way = ray.closest.t.mul(length).sub(start);
-            const one: F32 = .splat(1);
             // Thinner than what can be told from nothing: no light.
             point.lit = point.lit.bitAnd(way.gt(.zero()));
             const thinnest = sigma_t.x.min(sigma_t.y).min(sigma_t.z);
             const density = thinnest.max(F32.splat(depth_least).div(way));
-            const lost = one.sub(exponential.expNegative(Rays, density.mul(way).neg()));
             const pixels = camera.pixels(Kernel, place.rectangle, group);
             const dimension = path_file.depth_limit + 1 + path.depth;
-            const number = numbers_file.at(Rays, pixels, place.sample, dimension)[0];
-            const left = one.sub(number.mul(lost));
-            const distance = exponential.log(Rays, left).neg().div(density).min(way);
-            const at = start.add(distance);
-            point.direction = ray.line.direction.scale(one.div(length));
-            point.point.position = ray.line.origin.add(point.direction.scale(at));
+            point.number = numbers_file.at(Rays, pixels, place.sample, dimension)[0];
+            point.start = start;
+            point.way = way;
+            point.density = density;
+            point.lost = F32.splat(1)
+                .sub(exponential.expNegative(Rays, density.mul(way).neg()));
+            point.direction = ray.line.direction.scale(F32.splat(1).div(length));
             point.point.cone_width = .zero();
-            const pdf_inverse = lost.div(density.mul(left));
-            point.worth = path.throughputAt(group, at).mul(sigma_s).scale(pdf_inverse);
             const tiny: Vec3 = .splat(@splat(std.math.floatMin(f32)));
             point.albedo = .{
-                .x = sigma_s.x.div(sigma_t.x.max(tiny.x)),
-                .y = sigma_s.y.div(sigma_t.y.max(tiny.y)),
-                .z = sigma_s.z.div(sigma_t.z.max(tiny.z)),
+                .x = point.sigma_s.x.div(sigma_t.x.max(tiny.x)),
+                .y = point.sigma_s.y.div(sigma_t.y.max(tiny.y)),
+                .z = point.sigma_s.z.div(sigma_t.z.max(tiny.z)),
             };
-            point.sum = aroundOf(frame, point);
+            chooseOne(point, path, group, 0);
+            point.sum = aroundOf(frame, point).mul(point.worth);
         }
 
         /// Scattering coefficients of what rays are in, and which of them are in something that
@@ -224,49 +262,56 @@ pub fn Medium(comptime Kernel: type) type {
                     passage.left(visibility_file.shadowEnd(light), way)
                 else
                     .splat(.{ 1, 1, 1 });
-                const scattered = octaves(point, arrival.to_light, share, through);
-                const seen = scattered.mul(arrival.irradiance);
+                const scattered = octaves(Rays, point, arrival.to_light, share, through);
+                const seen = scattered.mul(arrival.irradiance).mul(point.worth);
                 point.sum = point.sum.add(.select(lit, seen, .splat(.{ 0, 0, 0 })));
             }
             return ray_count;
         }
-
-        /// Light scattered to the eye per steradian, of a light of which `share` arrives by itself;
-        /// `through` is what volumes leave of that.
-        fn octaves(point: *const Point, to_light: Vec3, share: Vec3, through: Vec3) Vec3 {
-            const cosine = to_light.dot(point.direction);
-            var anisotropy = point.anisotropy;
-            var sum = share.scale(phase.eval(Rays, cosine, anisotropy));
-            var weight = surfaces(share, through);
-            var before = through;
-            for (0..octave_count) |_| {
-                const next: Vec3 = .{
-                    .x = before.x.sqrt(),
-                    .y = before.y.sqrt(),
-                    .z = before.z.sqrt(),
-                };
-                anisotropy = anisotropy.mul(.splat(0.5));
-                weight = weight.mul(point.albedo);
-                const gained = weight.mul(next.sub(before));
-                sum = sum.add(gained.scale(phase.eval(Rays, cosine, anisotropy)));
-                before = next;
-            }
-            return sum;
-        }
-
-        /// What surfaces leave; nothing where that cannot be told.
-        fn surfaces(share: Vec3, through: Vec3) Vec3 {
-            return .{
-                .x = quotient(share.x, through.x),
-                .y = quotient(share.y, through.y),
-                .z = quotient(share.z, through.z),
-            };
-        }
-
-        inline fn quotient(share: F32, through: F32) F32 {
-            const known = through.gt(.splat(1e-30));
-            const exact = share.div(F32.select(known, through, .splat(1)));
-            return F32.select(known, exact, .zero()).min(.splat(1));
-        }
     };
+}
+
+/// Light scattered to the eye per steradian, of a light of which `share` arrives by itself;
+/// `through` is what volumes leave of that.
+fn octaves(
+    comptime Lanes: type,
+    point: anytype,
+    to_light: Lanes.Vec3,
+    share: Lanes.Vec3,
+    through: Lanes.Vec3,
+) Lanes.Vec3 {
+    const cosine = to_light.dot(point.direction);
+    var anisotropy = point.anisotropy;
+    var sum = share.scale(phase.eval(Lanes, cosine, anisotropy));
+    var weight = surfaces(Lanes, share, through);
+    var before = through;
+    for (0..octave_count) |_| {
+        const next: Lanes.Vec3 = .{
+            .x = before.x.sqrt(),
+            .y = before.y.sqrt(),
+            .z = before.z.sqrt(),
+        };
+        anisotropy = anisotropy.mul(.splat(0.5));
+        weight = weight.mul(point.albedo);
+        const gained = weight.mul(next.sub(before));
+        sum = sum.add(gained.scale(phase.eval(Lanes, cosine, anisotropy)));
+        before = next;
+    }
+    return sum;
+}
+
+/// What surfaces leave; nothing where that cannot be told.
+fn surfaces(comptime Lanes: type, share: Lanes.Vec3, through: Lanes.Vec3) Lanes.Vec3 {
+    return .{
+        .x = quotient(Lanes, share.x, through.x),
+        .y = quotient(Lanes, share.y, through.y),
+        .z = quotient(Lanes, share.z, through.z),
+    };
+}
+
+inline fn quotient(comptime Lanes: type, share: Lanes.F32, through: Lanes.F32) Lanes.F32 {
+    const F32 = Lanes.F32;
+    const known = through.gt(.splat(1e-30));
+    const exact = share.div(F32.select(known, through, .splat(1)));
+    return F32.select(known, exact, .zero()).min(.splat(1));
 }
