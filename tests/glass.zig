@@ -239,7 +239,7 @@ fn scatteredBySlab(channel: usize, g: f64, is_forward: bool) f64 {
         const depth = sigma_t * if (is_forward) 2 - s else s;
         var arriving = @exp(-depth) * phaseOf(cosine, g);
         var weight: f64 = 1;
-        for (1..3) |octave| {
+        for (1..5) |octave| {
             const half = std.math.pow(f64, 0.5, @floatFromInt(octave));
             weight *= albedo;
             const gained = @exp(-depth * half) - @exp(-depth * 2 * half);

@@ -30,7 +30,7 @@ const Light = world_file.Light;
 const Rectangle = @import("../../film.zig").Rectangle;
 
 /// Octaves of light that is scattered more than once.
-const octave_count = 2;
+const octave_count = 4;
 
 /// Least optical depth of a way: what is thinner is sampled evenly all the same.
 const depth_least = 0.01;
