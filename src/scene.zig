@@ -226,6 +226,9 @@ pub const Scene = struct {
     images: []const Image = &.{},
     textures: []const Texture = &.{},
     environment: ?EnvironmentMap = null,
+    /// Names of what the file may be shown as, by the materials of its meshes (which are those of
+    /// the variant that was asked for); empty ones where it gives none.
+    material_variants: []const []const u8 = &.{},
     /// Index of the camera that the file itself would use, `none` without cameras.
     camera_default: u32 = none,
     /// Surfaces that emit are all of the lights that the file says, each to be lit by in full.

@@ -139,9 +139,13 @@ test {
     _ = @import("trace/shade/iridescence.zig");
     _ = @import("trace/shade/offset.zig");
     _ = @import("trace/shade/albedo.zig");
+    _ = @import("trace/shade/anisotropy.zig");
     _ = @import("trace/shade/bsdf.zig");
+    _ = @import("trace/shade/chi_squared.zig");
     _ = @import("trace/shade/microfacet.zig");
     _ = @import("trace/shade/sheen.zig");
+    _ = @import("trace/shade/phase.zig");
+    _ = @import("trace/shade/transmission.zig");
     _ = @import("trace/shade/unique.zig");
     _ = @import("trace/shade/volumes.zig");
     _ = @import("trace/shade/phase.zig");

@@ -48,6 +48,16 @@ const Parts = struct {
 };
 
 fn read(parts: Parts, said: *Diagnostic) !Scene {
+    const text = try makeText(parts);
+    defer gpa.free(text);
+    const dir: std.Io.Dir = .cwd(); // No file is named.
+    const scene = try raylane.parse.parseBytes(gpa, testing.io, text, dir, parts.settings, said);
+    scene.check();
+    return scene;
+}
+
+/// The document with its parts. The caller frees it.
+fn makeText(parts: Parts) ![]const u8 {
     var arena_state: std.heap.ArenaAllocator = .init(gpa);
     defer arena_state.deinit();
     const arena = arena_state.allocator();
@@ -71,7 +81,7 @@ fn read(parts: Parts, said: *Diagnostic) !Scene {
     const attributes = .{ parts.attributes, parts.primitive };
     try primitive.writer.print("\"attributes\":{{{s}}},{s}", attributes);
     var text: []const u8 = try gpa.dupe(u8, document);
-    defer gpa.free(text);
+    errdefer gpa.free(text);
     for ([_]gltf_textures.Replacement{
         .{ "$DATA", encoder.encode(&digits, &bytes) },
         .{ "$MATERIALS", parts.materials },
@@ -84,10 +94,7 @@ fn read(parts: Parts, said: *Diagnostic) !Scene {
         gpa.free(text);
         text = changed;
     }
-    const dir: std.Io.Dir = .cwd(); // No file is named.
-    const scene = try raylane.parse.parseBytes(gpa, testing.io, text, dir, parts.settings, said);
-    scene.check();
-    return scene;
+    return text;
 }
 
 /// The material as the file's only extension has it.
@@ -407,4 +414,101 @@ test "a mesh has of a material what its coordinates and tangents allow" {
         const set: usize = if (case[2].normal or case[0].ptr == plain_brushed.ptr) 0 else 2;
         try testing.expect(mesh.texcoords[set] != null);
     }
+}
+
+/// Three variants, of which the second has the last material, and the third none of its own.
+const variants = ",\"extensions\":{\"KHR_materials_variants\":{\"variants\":[" ++
+    "{\"name\":\"r\\u0065d\"},{\"name\":\"blue\"},{},{\"name\":\"blue\"}]}}";
+const mapped = "\"material\":0,\"extensions\":{\"KHR_materials_variants\":{\"mappings\":[" ++
+    "{\"material\":1,\"variants\":[0]},{\"material\":2,\"variants\":[9,1,3]}," ++
+    "{\"material\":0,\"variants\":[0]}]}}";
+const variant_materials = "{\"normalTexture\":{\"index\":0}}," ++
+    "{\"emissiveTexture\":{\"index\":1,\"texCoord\":1},\"emissiveFactor\":[1,0,0]}," ++
+    "{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":2,\"texCoord\":2}}}";
+
+test "a primitive has the material of the variant that is asked for, and nothing else is read" {
+    const Choice = raylane.settings.Choice;
+    const Case = struct { Choice, u8, u32, usize };
+    for ([_]Case{
+        .{ .default, 'a', 0, 0 },
+        .{ .{ .index = 0 }, 'b', 1, 1 },
+        .{ .{ .name = "red" }, 'b', 1, 1 },
+        .{ .{ .name = "blue" }, 'c', 2, 2 },
+        .{ .{ .index = 2 }, 'a', 0, 0 },
+        .{ .{ .index = 3 }, 'c', 2, 2 },
+    }) |case| {
+        var said: Diagnostic = .{};
+        var scene = try read(.{
+            .materials = variant_materials,
+            .primitive = mapped,
+            .more = variants,
+            .settings = .{ .material_variant = case[0] },
+        }, &said);
+        defer scene.deinit();
+        try testing.expectEqual(0, said.warning_count);
+        try testing.expectEqual(case[2], scene.meshes[0].material);
+        try testing.expectEqual(1, scene.images.len);
+        try testing.expectEqualStrings(&.{case[1]}, scene.images[0].bytes);
+        for (scene.meshes[0].texcoords, 0..) |set, number| {
+            try testing.expectEqual(number == case[3], set != null);
+        }
+        try testing.expectEqual(case[2] == 0, scene.meshes[0].tangents != null);
+        const names = [_][]const u8{ "red", "blue", "", "blue" };
+        try testing.expectEqual(names.len, scene.material_variants.len);
+        for (names, scene.material_variants) |name, found| {
+            try testing.expectEqualStrings(name, found);
+        }
+    }
+    // What has no material of its own may have one by a variant.
+    const bare = mapped["\"material\":0,".len..];
+    for ([_]Choice{ .default, .{ .index = 0 } }, [_]u32{ 3, 1 }) |choice, material| {
+        var said: Diagnostic = .{};
+        var scene = try read(.{
+            .materials = variant_materials,
+            .primitive = bare,
+            .more = variants,
+            .settings = .{ .material_variant = choice },
+        }, &said);
+        defer scene.deinit();
+        try testing.expectEqual(material, scene.meshes[0].material);
+    }
+}
+
+test "an unknown variant is an error that lists those that there are" {
+    const Case = struct { raylane.settings.Choice, []const u8, []const u8 };
+    const list = "the file has 0 'red', 1 'blue', 2, 3 'blue'";
+    for ([_]Case{
+        .{ .{ .index = 4 }, variants, "no material variant 4; " ++ list },
+        .{ .{ .name = "Red" }, variants, "no material variant 'Red'; " ++ list },
+        .{ .{ .index = 0 }, "", "no material variant 0; the file has none" },
+    }) |case| {
+        var said: Diagnostic = .{};
+        try testing.expectError(error.MaterialVariantUnknown, read(.{
+            .materials = variant_materials,
+            .more = case[1],
+            .settings = .{ .material_variant = case[0] },
+        }, &said));
+        try testing.expectEqualStrings(case[2], said.message.text());
+    }
+}
+
+test "every allocation may fail" {
+    const text = try makeText(.{
+        .materials = variant_materials ++ ",{\"extensions\":{\"KHR_materials_volume_scatter\":" ++
+            "{\"multiscatterColorTexture\":{\"index\":3}}}}",
+        .primitive = "\"material\":3",
+        .more = variants,
+    });
+    defer gpa.free(text);
+    const one = struct {
+        fn one(failing: std.mem.Allocator, bytes: []const u8) !void {
+            var said: Diagnostic = .{};
+            const dir: std.Io.Dir = .cwd();
+            const settings: raylane.settings.Load = .{ .material_variant = .{ .name = "blue" } };
+            var scene =
+                try raylane.parse.parseBytes(failing, testing.io, bytes, dir, settings, &said);
+            scene.deinit();
+        }
+    }.one;
+    try testing.checkAllAllocationFailures(gpa, one, .{text});
 }

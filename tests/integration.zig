@@ -10,6 +10,7 @@ const stb_image = @import("stb_image.zig");
 
 test {
     _ = @import("analytic.zig");
+    _ = @import("strokes.zig");
     _ = @import("decode.zig");
     _ = @import("environment.zig");
     _ = @import("glass.zig");

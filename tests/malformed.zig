@@ -401,6 +401,9 @@ test "meshes, skins and weights" {
         .{ "\"mode\":4", "\"mode\":1", .fine },
         .{ "\"mode\":4", "\"mode\":2", .fine },
         .{ "\"mode\":4", "\"mode\":3", .fine },
+        .{ "\"count\":6", "\"count\":5", odd(
+            "mesh 0, primitive 0: 5 vertices do not make whole triangles, the rest is left out",
+        ) },
         .{ "\"mode\":4", "\"mode\":7", wrong("mesh 0, primitive 0: unknown mode") },
         .{ "\"indices\":3", "\"indices\":2", wrong(
             "accessor 2: indices have to be single unsigned integers",
@@ -591,6 +594,41 @@ test "numbers in buffers" {
     try expectBytes(48, &flat, .fine);
 }
 
+test "indices of points and lines" {
+    var bytes = makeBuffer();
+    const modes = [4][]const u8{ "\"mode\":0", "\"mode\":1", "\"mode\":2", "\"mode\":3" };
+    for (modes, 0..) |mode, number| {
+        bytes[96] = 0;
+        var expected: []const u8 = "";
+        for ([_][]const u8{ "\"count\":6", "\"count\":5" }) |count| {
+            const whole = try makeText(&bytes);
+            defer gpa.free(whole);
+            const other = try replace(whole, "\"mode\":4", mode);
+            defer gpa.free(other);
+            const text = try replace(other, "\"count\":6", count);
+            defer gpa.free(text);
+            var said: Diagnostic = .{};
+            try tryParse(gpa, text, &said);
+            if (said.warning_count > 0) {
+                expected = mode;
+                const odd_line = "mesh 0, primitive 0: 5 vertices do not make whole lines, " ++
+                    "the rest is left out";
+                try std.testing.expectEqualStrings(odd_line, said.warnings[0].text());
+            }
+        }
+        try std.testing.expectEqual(number == 1, expected.len > 0);
+        bytes[96] = 4;
+        const whole = try makeText(&bytes);
+        defer gpa.free(whole);
+        const text = try replace(whole, "\"mode\":4", mode);
+        defer gpa.free(text);
+        var said: Diagnostic = .{};
+        try std.testing.expectError(error.InvalidInput, tryParse(gpa, text, &said));
+        const line = "accessor 3: index 4 with 4 vertices";
+        try std.testing.expectEqualStrings(line, said.message.text());
+    }
+}
+
 test "GLB headers and chunks" {
     const buffer = makeBuffer();
     const glb = try makeBinary(&buffer);
@@ -772,7 +810,7 @@ fn outcomeOf(path: []const u8) []const u8 {
             return if (said.message.text().len > 0) "error" else "an error without a message";
         },
         error.OutOfMemory => return "out of memory",
-        error.SceneUnknown => unreachable, // The file's own is asked for.
+        error.SceneUnknown, error.MaterialVariantUnknown => unreachable, // None is asked for.
     };
     defer scene.deinit();
     scene.check();

@@ -612,3 +612,14 @@ pub fn hasArea(a: Vec3, b: Vec3, c: Vec3) bool {
     return @abs(normal[0]) > area_twice_min or @abs(normal[1]) > area_twice_min or
         @abs(normal[2]) > area_twice_min;
 }
+
+test "more strokes than can be numbered are an error before memory is asked for" {
+    var diagnostic: Diagnostic = .{};
+    const size: Size = .{ .vertex_count = 9, .strokes = .{ .spheres = 1 << 28, .segments = 1 } };
+    const detail: strokes.Detail = .of(size.strokes, 1.5);
+    try std.testing.expectError(error.SceneTooLarge, size.withRoom(detail, &diagnostic));
+    const fewer: Size = .{ .vertex_count = 9, .strokes = .{ .spheres = 1 << 26 } };
+    const with_room = try fewer.withRoom(detail, &diagnostic);
+    try std.testing.expectEqual(9 + (6 << 26), with_room.vertex_count);
+    try std.testing.expectEqual(8 << 26, with_room.triangle_count);
+}

@@ -85,6 +85,10 @@ const flat: struct { area_min: f64, depth_max: f64 } = .{ .area_min = 0.98, .dep
 /// How far the camera is from a single point, in units of `Subject.size`.
 const point_distance = 0.01;
 
+/// How far an orbit's camera is from lines that it sees end on, in units of `Subject.size` over the
+/// slope of the picture's side.
+const end_distance = 0.1;
+
 /// Triangles looked at for the choice of the direction, at most (evenly spread).
 const sample_count_max = 1 << 16;
 
@@ -339,7 +343,8 @@ pub const Subject = struct {
     ///     d >= r |cos e -+ sin e / s_y| + y (sin e +- cos e / s_y)     above and below
     ///
     /// An orthographic camera, whose slopes are those of its sides over its distance, has but
-    /// d >= r / s_x and d >= (r |sin e| +- y cos e) / s_y.
+    /// d >= r / s_x and d >= (r |sin e| +- y cos e) / s_y. A sphere of radius R needs R / s or, in
+    /// perspective, R sqrt(1 / s^2 + 1) more.
     pub fn orbitRadius(
         subject: *const Subject,
         target: Vec3d,
@@ -355,17 +360,22 @@ pub const Subject = struct {
         const above = @abs(toward * cos - sin / slope[1]);
         const below = @abs(toward * cos + sin / slope[1]);
         const sphere_radius = subject.shown.geometry.sphere_radius;
+        var sphere: [2]f64 = undefined;
+        for (&sphere, slope) |*to, s| to.* = sphere_radius * @sqrt(1 / (s * s) + toward);
+        const narrow = if (slope[0] < slope[1]) slope[0] else slope[1];
+        const to_end = if (sphere_radius > 0) end_distance * subject.size / narrow else 0;
         var radius: f64 = if (subject.is_point) point_distance else 1e-6;
         radius *= subject.size;
         var vertices = subject.used.iterator(.{});
         while (vertices.next()) |vertex| {
             const p = relativeTo(target, subject.shown.geometry.positions[vertex]);
-            const r = @sqrt(p[0] * p[0] + p[2] * p[2]) + sphere_radius;
-            const nearer = toward * (p[1] * sin + sphere_radius * @abs(sin));
+            const r = @sqrt(p[0] * p[0] + p[2] * p[2]);
+            const nearer = toward * p[1] * sin;
             const over = p[1] * cos / slope[1];
-            radius = larger(radius, r * aside + nearer);
-            radius = larger(radius, r * above + nearer + over);
-            radius = larger(radius, r * below + nearer - over);
+            radius = larger(radius, to_end + nearer);
+            radius = larger(radius, r * aside + nearer + sphere[0]);
+            radius = larger(radius, r * above + nearer + over + sphere[1]);
+            radius = larger(radius, r * below + nearer - over + sphere[1]);
         }
         return radius;
     }
@@ -378,7 +388,7 @@ pub const Subject = struct {
             const p = relativeTo(target, subject.shown.geometry.positions[vertex]);
             distance = larger(distance, vec3d.length(p));
         }
-        return distance * (1 + margin);
+        return (distance + subject.shown.geometry.sphere_radius) * (1 + margin);
     }
 
     /// Vertices along the axes of a camera: relative to the middle, in units of the size,

@@ -15,6 +15,7 @@ const accessors = @import("../accessor.zig");
 const attributes = @import("attributes.zig");
 const Materials = @import("materials.zig");
 const Source = @import("source.zig");
+const variants = @import("variants.zig");
 const Accessor = accessors.Accessor;
 const Error = Source.Error;
 const Vec3 = math.Vec3;
@@ -23,6 +24,8 @@ const assert = std.debug.assert;
 
 source: *Source,
 materials: *Materials,
+/// The variant of materials that is shown.
+variant: ?u32,
 /// Index in the scene of a glTF mesh's first primitive, and how many are drawn.
 ranges: std.AutoHashMapUnmanaged(u32, Range) = .empty,
 positions: std.AutoHashMapUnmanaged(u32, []const Vec3) = .empty,
@@ -194,9 +197,7 @@ fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Er
             null,
         .colors = if (used.color) |index| try meshes.decodeColors(index) else null,
         .triangles = &.{},
-        .material = if (primitive.material) |material|
-            Source.indexOf(source.data.materials, material)
-        else
+        .material = variants.materialOf(source, primitive, meshes.variant) orelse
             try meshes.materials.useDefault(),
     };
     try meshes.connect(&mesh, primitive, mode, place);

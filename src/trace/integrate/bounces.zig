@@ -11,6 +11,7 @@ const bsdf_file = @import("../shade/bsdf.zig");
 const camera = @import("camera.zig");
 const numbers_file = @import("numbers.zig");
 const path_file = @import("path.zig");
+const transmission = @import("../shade/transmission.zig");
 const Frame = world_file.Frame;
 const Rectangle = @import("../../film.zig").Rectangle;
 
@@ -252,14 +253,12 @@ fn Step(comptime Kernel: type) type {
             for (masks, step.vertices, 0..) |mask, *vertex, group| {
                 if (mask.none()) continue;
                 const point = &vertex.point;
+                const passing = step.refracted(vertex, group, channel);
                 next.leave(step.path, group, &.{
                     .point = point,
                     .away = point.normal_geometric.neg(),
-                    .direction = vertex.bsdf.mirror.refraction,
-                    .roughness = step.roughnessLeft(
-                        point.material.roughness,
-                        step.spreadOf(point.material.roughness),
-                    ),
+                    .direction = passing.direction,
+                    .roughness = passing.roughness,
                 });
                 var share = vertex.bsdf.mirror.transmitted;
                 inline for (.{ "x", "y", "z" }, 0..) |name, index| {
@@ -273,6 +272,44 @@ fn Step(comptime Kernel: type) type {
                     next.refractCones(step.path, group, point);
             }
             return count;
+        }
+
+        /// Light that goes through: where from, and what roughness reflections as wide would have.
+        fn refracted(
+            step: *const Self,
+            vertex: *const Vertex,
+            group: usize,
+            comptime channel: ?usize,
+        ) struct { direction: Vec3, roughness: F32 } {
+            const point = &vertex.point;
+            const material = &point.material;
+            const thick = material.volume;
+            var eta = point.eta;
+            var direction = vertex.bsdf.mirror.refraction;
+            if (channel) |index| {
+                const iors = transmission
+                    .dispersedIors(Rays, material.ior, vertex.layers.dispersion);
+                const stretch = iors[index].div(material.ior);
+                eta = .select(eta.gt(.splat(1)), eta.mul(stretch), eta.div(stretch));
+                const bent = transmission.refract(Rays, point.view, point.normal, eta).direction;
+                const through = bent.dot(point.normal_geometric).lt(.zero());
+                direction = .select(through, bent, direction);
+            }
+            const alpha = material.roughness.mul(material.roughness);
+            const equal: F32 = .select(
+                thick,
+                transmission.equalAlpha(Rays, alpha, eta),
+                transmission.thinAlpha(Rays, alpha, material.ior),
+            );
+            const roughness = equal.max(.zero()).sqrt();
+            const spread = step.spreadOf(material.roughness);
+            if (spread.any()) {
+                const sampled = alpha.mul(.splat(sampled_alpha));
+                const found = transmission.boundaryOf(Rays, point, sampled, eta)
+                    .sample(step.numbers(group));
+                direction = .select(spread, found.to_light, direction);
+            }
+            return .{ .direction = direction, .roughness = step.roughnessLeft(roughness, spread) };
         }
 
         /// Room for the rays of the next depth in these lanes, and how many they are; null if there

@@ -43,7 +43,7 @@ pub fn addLight(
             .bitAnd(point.normal_geometric.dot(arrival.to_light).gt(zero));
         var lit = front;
         var away = point.normal_geometric;
-        if (vertex.bsdf.layered) {
+        if (vertex.bsdf.sees_behind) {
             const behind = vertex.bsdf.isBehind(point, arrival.to_light);
             lit = front.bitOr(behind);
             away = .select(behind, away.neg(), away);
@@ -54,7 +54,7 @@ pub fn addLight(
             toEmitter(Rays, vertex, light.disk, &arrival, traced[group])
         else
             vertex.bsdf.eval(point, arrival.to_light);
-        if (vertex.bsdf.layered)
+        if (vertex.bsdf.sees_behind)
             response = .select(front, response, vertex.bsdf.evalBehind(point, arrival.to_light));
         const worth = vertex.throughput.mul(response).mul(arrival.irradiance);
         unshadowed[group] = worth;

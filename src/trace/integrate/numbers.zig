@@ -16,6 +16,9 @@ const mirror_axis = 16384;
 /// Four dimensions after which the pattern is the same again, moved on by the golden section.
 const golden = 0.6180339887498949;
 
+/// How far the second number's pattern is moved: where columns are rows they would be the same.
+const beside = 41;
+
 /// The inverse of the plastic number, and of its square.
 const r2 = [2]f64{ 0.7548776662466927, 0.5698402909980532 };
 
@@ -30,7 +33,7 @@ pub fn at(
     const x = if (dimension % 2 == 0) pixel[0] else axis.sub(pixel[0]);
     const y = if (dimension / 2 % 2 == 0) pixel[1] else axis.sub(pixel[1]);
     const around = golden * @as(f64, @floatFromInt(dimension / 4));
-    var numbers = [2]Lanes.F32{ gradient(Lanes, x, y), gradient(Lanes, y, x) };
+    var numbers = [2]Lanes.F32{ gradient(Lanes, x, y), gradient(Lanes, y.add(.splat(beside)), x) };
     inline for (&numbers, r2) |*number, step| {
         const steps = step * @as(f64, @floatFromInt(sample)) + around;
         number.* = fraction(Lanes, number.add(.splat(@floatCast(steps - @floor(steps)))));

@@ -14,6 +14,7 @@ const simd = @import("../../simd.zig");
 const albedo_file = @import("albedo.zig");
 const microfacet = @import("microfacet.zig");
 const interface_file = @import("interface.zig");
+const transmission_file = @import("transmission.zig");
 const Coating = @import("coating.zig").Coating;
 const Interaction = @import("interaction.zig").Interaction;
 const Layers = @import("layers.zig").Layers;
@@ -65,11 +66,13 @@ pub fn Bsdf(comptime Lanes: type) type {
         /// Share of light that comes to what is below the dielectric's boundary.
         open: F32,
         mirror: Mirror(Lanes),
+        /// Share of white light from everywhere behind that leaves diffusely on this side.
+        back_albedo: Vec3,
+        /// Some lane scatters light from behind.
+        sees_behind: bool,
         /// Some lane has further lobes: what follows is defined then.
         layered: bool,
         coating: Coating(Lanes),
-        /// Share of white light from everywhere behind that leaves diffusely on this side.
-        back_albedo: Vec3,
 
         const Self = @This();
         const F32 = Lanes.F32;
@@ -91,6 +94,7 @@ pub fn Bsdf(comptime Lanes: type) type {
         pub fn become(bsdf: *Self, point: *const Interaction(Lanes)) void {
             const f0 = point.material.dielectric_f0;
             bsdf.layered = false;
+            bsdf.back_albedo = .splat(.{ 0, 0, 0 });
             bsdf.setBase(point, &.{ .f0 = f0, .f90 = grazingOf(Lanes, f0), .colors = null });
         }
 
@@ -193,6 +197,8 @@ pub fn Bsdf(comptime Lanes: type) type {
             const below_mean = belowMean(albedo, base_f0, base_f90, scatter_base);
             bsdf.diffuse = bsdf.diffuse_albedo.scale(inverse_pi.div(below_mean));
             bsdf.multiple_base = scatter_base;
+            bsdf.sees_behind = reflectance.colors != null or
+                material.transmission.gt(.zero()).andNot(material.volume).any();
             bsdf.base_f0 = base_f0;
             bsdf.base_f90 = base_f90;
             bsdf.mirror = .{
@@ -247,20 +253,25 @@ pub fn Bsdf(comptime Lanes: type) type {
         /// Lanes that light from a direction reaches from behind, and that send it to the view.
         pub fn isBehind(bsdf: *const Self, point: *const Interaction(Lanes), to_light: Vec3) Mask {
             const zero: F32 = .zero();
-            const back = bsdf.back_albedo;
+            const back = bsdf.back_albedo.add(bsdf.mirror.transmitted);
             return point.normal.dot(to_light).lt(zero)
                 .bitAnd(point.normal_geometric.dot(to_light).lt(zero))
                 .bitAnd(back.x.max(back.y).max(back.z).gt(zero));
         }
 
-        /// `eval` of light from behind; undefined without layers.
+        /// `eval` of light from behind: diffusely, and through panes. Volumes bend light on its way
+        /// in and out, which lights by themselves cannot follow.
         pub noinline fn evalBehind(
             bsdf: *const Self,
             point: *const Interaction(Lanes),
             to_light: Vec3,
         ) Vec3 {
             const cosine = point.normal.dot(to_light).neg().max(.zero());
-            return bsdf.back_albedo.scale(cosine.mul(inverse_pi));
+            const diffuse = bsdf.back_albedo.scale(cosine.mul(inverse_pi));
+            const boundary = transmission_file.boundaryOf(Lanes, point, bsdf.alpha, point.eta);
+            const density = boundary.pdf(to_light);
+            const pane = F32.select(point.material.volume, .zero(), density);
+            return diffuse.add(bsdf.mirror.transmitted.scale(pane));
         }
 
         noinline fn addCoating(
@@ -400,19 +411,18 @@ fn Boundary(comptime Lanes: type) type {
                 .refraction = point.view.neg(),
             };
             const eta = point.eta;
-            const sin_squared = one.sub(cos_view.mul(cos_view));
-            const cos_squared = one.sub(eta.mul(eta).mul(sin_squared));
-            const cos_inside = cos_squared.max(.zero()).sqrt();
-            const along = point.view.neg();
-            const turned = point.normal.scale(eta.mul(cos_view).sub(cos_inside));
-            const bent = along.scale(eta).add(turned);
+            const bent = transmission_file.refract(Lanes, point.view, point.normal, eta);
             // A shading normal far from the triangle's can bend light back to the same side.
-            const through = bent.dot(point.normal_geometric).lt(.zero());
+            const through = bent.direction.dot(point.normal_geometric).lt(.zero());
             const leaving = material.volume.bitAnd(eta.gt(one));
             return .{
-                .total = material.volume.bitAnd(cos_squared.lt(.zero())),
-                .cos_fresnel = F32.select(leaving, cos_inside, cos_view),
-                .refraction = .select(material.volume.bitAnd(through), bent, along),
+                .total = material.volume.bitAnd(bent.total),
+                .cos_fresnel = F32.select(leaving, bent.cos_beyond, cos_view),
+                .refraction = .select(
+                    material.volume.bitAnd(through),
+                    bent.direction,
+                    point.view.neg(),
+                ),
             };
         }
     };
@@ -727,6 +737,7 @@ test "no energy is made: reflected, transmitted and diffuse shares sum to 1 at m
                 point.material.transmission = .splat(transmission);
                 point.material.volume = .splat(transmission > 0);
                 point.back = .splat(back);
+                point.eta = .splat(if (back) 1.5 else 1.0 / 1.5);
                 const bsdf: Bsdf(Single) = .of(&point);
                 const shares = [_]Single.Vec3{
                     bsdf.specular_albedo, bsdf.diffuse_albedo, bsdf.mirror.transmitted,
@@ -803,6 +814,7 @@ test "Snell's law, total internal reflection and the thin wall" {
     try std.testing.expectApproxEqRel(-0.6 / 1.5, entering.mirror.refraction.x.lane(0), 1e-5);
     try std.testing.expect(!entering.mirror.total.lane(0));
     point.back = .splat(true);
+    point.eta = .splat(1.5);
     const leaving = Bsdf(Single).of(&point); // sin 0.6 * 1.5 = 0.9
     try std.testing.expectApproxEqRel(@as(f32, -0.9), leaving.mirror.refraction.x.lane(0), 1e-5);
     point.view = .splat(.{ 0.8, 0.6, 0 }); // sin 0.8 * 1.5 > 1

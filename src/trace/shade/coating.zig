@@ -9,6 +9,7 @@
 const bsdf_file = @import("bsdf.zig");
 const albedo_file = @import("albedo.zig");
 const microfacet = @import("microfacet.zig");
+const sheen = @import("sheen.zig");
 const Interaction = @import("interaction.zig").Interaction;
 const Layers = @import("layers.zig").Layers;
 
@@ -65,7 +66,8 @@ pub fn Coating(comptime Lanes: type) type {
             coating.below_coat = one.sub(coating.albedo);
             const fibres: Vec3 =
                 .select(layers.present, layers.sheen_color, .splat(.{ 0, 0, 0 }));
-            const share: F32 = .zero();
+            const cos_view = point.normal.dot(point.view).max(.splat(1e-4)).min(one);
+            const share = sheen.albedo(Lanes, cos_view, layers.sheen_roughness);
             coating.sheen_roughness = layers.sheen_roughness;
             coating.sheen_color = fibres.scale(coating.below_coat);
             coating.sheen_albedo = coating.sheen_color.scale(share);
@@ -107,7 +109,9 @@ pub fn Coating(comptime Lanes: type) type {
             const half = point.view.add(to_light).normalize();
             const cos_light = point.normal.dot(to_light).max(.zero()).min(one);
             const cos_half = point.normal.dot(half).max(.zero()).min(one);
-            const lit = cos_light.mul(cos_half).mul(cos_view).mul(.zero());
+            const value =
+                sheen.eval(Lanes, cos_half, cos_view, cos_light, coating.sheen_roughness);
+            const lit = F32.select(cos_light.gt(.zero()), value.mul(cos_light), .zero());
             return coating.sheen_color.scale(lit);
         }
     };

@@ -6,6 +6,7 @@
 //! at this view; the base below gets what the brightest channel leaves).
 
 const bsdf_file = @import("bsdf.zig");
+const iridescence = @import("iridescence.zig");
 const Interaction = @import("interaction.zig").Interaction;
 const Layers = @import("layers.zig").Layers;
 
@@ -30,14 +31,35 @@ pub fn Interface(comptime Lanes: type) type {
             const plain_f0 = material.dielectric_f0;
             const weight = F32.select(layers.present, layers.specular, one);
             const color: Vec3 = .select(layers.present, layers.specular_color, white);
-            const dielectric = color.scale(plain_f0).min(white).scale(weight);
-            const metal = material.base_color.min(white);
+            var dielectric = color.scale(plain_f0).min(white).scale(weight);
+            var metal = material.base_color.min(white);
+            const film = F32.select(layers.present, layers.iridescence, .zero());
+            if (film.gt(.zero()).any()) {
+                dielectric = filmed(point, layers, film, dielectric);
+                metal = filmed(point, layers, film, metal);
+            }
             const metallic = material.metallic;
             return .{
                 .f0 = dielectric.scale(one.sub(metallic)).add(metal.scale(metallic)),
                 .dielectric_f0 = dielectric.x.max(dielectric.y).max(dielectric.z),
                 .dielectric_f90 = bsdf_file.grazingOf(Lanes, plain_f0).mul(weight),
             };
+        }
+
+        /// With a share of film over it.
+        fn filmed(
+            point: *const Interaction(Lanes),
+            layers: *const Layers(Lanes),
+            share: F32,
+            f0: Vec3,
+        ) Vec3 {
+            const cosine = point.normal.dot(point.view).max(.splat(1e-4)).min(.splat(1));
+            const index = layers.iridescence_ior;
+            const thickness = layers.iridescence_thickness_nm;
+            const seen = iridescence.reflectance(Lanes, cosine, index, thickness, f0);
+            const film_f0 = iridescence.schlickF0(Lanes, seen, cosine);
+            const mixed = f0.add(film_f0.sub(f0).scale(share));
+            return .select(share.gt(.zero()), mixed, f0);
         }
     };
 }
