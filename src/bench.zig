@@ -247,6 +247,7 @@ pub const Bench = struct {
                 .resolution = .{ settings.width, settings.height },
                 .environment = .{ .source = .none },
                 .display_referred = false,
+                .emitters = false,
             },
             .sample_count = settings.sample_count,
             .depth = settings.depth,

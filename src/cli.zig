@@ -150,6 +150,10 @@ const sections: []const Section = &.{
     } },
     .{ .title = "Scene", .options = &.{
         .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
+        .{
+            .usage = "--material-variant N",
+            .help = "name or index of one of its variants of materials",
+        },
         .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
         .{
             .usage = "--env FILE",
@@ -384,8 +388,10 @@ const Parser = struct {
             .camera => options.view.camera = cameraOf(given.value) orelse
                 return reader.bad(given, "a camera's name, its index, or auto"),
             .eye, .target, .up, .orbit, .fov, .ortho => try parser.setViewpoint(given),
-            .scene => options.load.scene = sceneOf(given.value) orelse
+            .scene => options.load.scene = choiceOf(given.value) orelse
                 return reader.bad(given, "a scene's name or its index"),
+            .material_variant => options.load.material_variant = choiceOf(given.value) orelse
+                return reader.bad(given, "a material variant's name or its index"),
             .up_axis => options.load.up_axis = try reader.choice(given, settings.UpAxis),
             .background => options.view.background = backgroundOf(given.value) orelse
                 return parser.noBackground(given),
@@ -435,6 +441,7 @@ const Parser = struct {
         options.view.environment.source = .none;
         options.view.background = .default;
         options.view.display_referred = false;
+        options.view.emitters = false;
         options.write.exposure = settings.thesis.exposure;
         options.write.tone_mapping = settings.thesis.tone_mapping;
     }
@@ -643,7 +650,7 @@ fn cameraOf(text: []const u8) ?settings.Camera {
     return .{ .index = index };
 }
 
-fn sceneOf(text: []const u8) ?settings.SceneChoice {
+fn choiceOf(text: []const u8) ?settings.Choice {
     if (text.len == 0) return null;
     const index = integer(text, any_index) orelse return .{ .name = text };
     return .{ .index = index };
@@ -852,6 +859,7 @@ test "numbers keep to their ranges" {
             .bad = &.{ "0", "180", "-45", "nan", "inf", "", "45deg" },
         },
         .{ .flag = "--scene", .good = &.{ "0", "4294967296", "b c", "auto" }, .bad = &.{""} },
+        .{ .flag = "--material-variant", .good = &.{ "0", "b c" }, .bad = &.{""} },
         .{ .flag = "--up-axis", .good = &.{ "y", "z" }, .bad = &.{ "", "x", "Z", "-y" } },
         .{ .flag = "--output", .good = &.{ "-", "a.png", "b/A.PPM" }, .bad = &.{ "", "png" } },
     };
@@ -878,6 +886,8 @@ test "values arrive as they were meant" {
     const named = (try optionsForTest(&.{"--camera=7a"})).view.camera;
     try std.testing.expectEqualStrings("7a", named.name);
     try std.testing.expectEqual(7, (try optionsForTest(&.{"--scene=7"})).load.scene.index);
+    const painted = (try optionsForTest(&.{"--material-variant=red"})).load.material_variant;
+    try std.testing.expectEqualStrings("red", painted.name);
     const named_scene = (try optionsForTest(&.{"--scene=auto"})).load.scene;
     try std.testing.expectEqualStrings("auto", named_scene.name);
     try std.testing.expectEqual(.z, (try optionsForTest(&.{"--up-axis=z"})).load.up_axis);
@@ -955,7 +965,7 @@ test "the last of several options counts, around --thesis too" {
     try std.testing.expectEqual(null, thesis.thread_count);
     try std.testing.expectEqual(0, thesis.write.exposure.ev);
     try std.testing.expectEqual(.linear, thesis.write.tone_mapping);
-    try std.testing.expect(!thesis.view.display_referred);
+    try std.testing.expect(!thesis.view.display_referred and !thesis.view.emitters);
     const changed = try optionsForTest(&.{ "--thesis", "--depth=9", "-t7" });
     try std.testing.expectEqual(9, changed.render.depth);
     try std.testing.expectEqual(7, changed.thread_count);

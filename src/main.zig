@@ -277,7 +277,7 @@ fn writeHeatMap(
 fn exitCodeOf(err: (Job.Error || raylane.bench.Error)) ExitCode {
     return switch (err) {
         error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
-        error.CameraUnknown, error.SceneUnknown => .usage,
+        error.CameraUnknown, error.SceneUnknown, error.MaterialVariantUnknown => .usage,
         error.InvalidInput, error.SceneTooLarge => .invalid,
         error.ImagesDiffer => .differ,
         error.Canceled => unreachable, // Nobody asks for it here.
@@ -379,8 +379,9 @@ const Job = struct {
             .view = options.view,
         });
         try session.view(options.view);
-        session.dropScene();
         job.sayWarnings();
+        job.sayVariants(session.scene.?.material_variants);
+        session.dropScene();
         job.sayFacts(&session.world.?);
         session.checkWrite(options.write) catch return error.OutputFailed;
         try session.render(options.render);
@@ -437,6 +438,15 @@ const Job = struct {
         });
         if (world.facts.degenerate_count > 0) {
             job.sayOfScene("{d} triangles without area left out", .{world.facts.degenerate_count});
+        }
+    }
+
+    /// The same of what the file offers besides.
+    fn sayVariants(job: *Job, names: []const []const u8) void {
+        if (!job.options.verbose or job.options.load.material_variant != .default) return;
+        for (names, 0..) |name, index| {
+            const quoted = raylane.diagnostic.quote(name);
+            job.sayOfScene("material variant {d}: {f}, not chosen", .{ index, quoted });
         }
     }
 

@@ -13,9 +13,9 @@ const Allocator = std.mem.Allocator;
 const Resources = @import("parse/resource.zig");
 
 /// `InputOutput`: a file is missing or cannot be read. `InvalidInput`: it is read, but it is not
-/// what it should be, or it needs what is not supported. `SceneUnknown`: none of its scenes is the
-/// one that is asked for.
-pub const Error = Resources.Error || error{SceneUnknown};
+/// what it should be, or it needs what is not supported. `SceneUnknown`,
+/// `MaterialVariantUnknown`: none of its scenes, or variants, is the one that is asked for.
+pub const Error = Resources.Error || error{ SceneUnknown, MaterialVariantUnknown };
 
 /// Reads the scene at `path`. On an error the diagnostic holds one line without the path in it;
 /// what is odd but harmless becomes warnings there. The caller frees the scene with `deinit`.
@@ -35,14 +35,19 @@ pub fn parse(
     return gltf.read(&scene.resources, scene.main.bytes, diagnostic);
 }
 
-/// Whether what has but one scene, without a name, is asked for that.
-pub fn checkOnly(settings: Settings, diagnostic: *Diagnostic) error{SceneUnknown}!void {
+/// Whether what has but one scene, without a name, and no variants is asked for that.
+pub fn checkOnly(
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) error{ SceneUnknown, MaterialVariantUnknown }!void {
     const is_only = switch (settings.scene) {
         .default => true,
         .index => |index| index == 0,
         .name => false,
     };
     if (!is_only) return diagnostic.fail(error.SceneUnknown, "there is but one scene, 0", .{});
+    if (settings.material_variant != .default)
+        return diagnostic.fail(error.MaterialVariantUnknown, "it has no material variants", .{});
 }
 
 /// Reads a glTF file that is in memory, JSON or binary; what it names is looked for in `folder`.

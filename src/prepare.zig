@@ -20,6 +20,8 @@ const bvh_wide = @import("prepare/bvh/wide.zig");
 const check = @import("prepare/bvh/check.zig");
 const deform = @import("prepare/deform.zig");
 const flatten = @import("prepare/flatten.zig");
+const emitter_lights = @import("prepare/emitter_lights.zig");
+const emitters = @import("prepare/emitters.zig");
 const environment = @import("prepare/environment.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
@@ -87,6 +89,7 @@ pub const ViewSettings = struct {
     background: ?math.Vec3 = null,
     environment: light.EnvironmentSettings = .{},
     floor: choices.Floor = .none,
+    emitters: bool = true,
     /// What primary rays see in its place.
     backdrop: ?light.EnvironmentSettings = null,
 };
@@ -155,13 +158,13 @@ fn visibleInstances(
     return visible.items;
 }
 
-/// What of the vertices the textures ask for.
+/// What of the vertices the materials ask for.
 fn attributesOf(textures: *const texture.TextureSet) flatten.Attributes {
     var attributes: flatten.Attributes = .{};
-    for (textures.lookups) |lookup| {
-        attributes.texcoord_sets[lookup.texcoord_set] = true;
-        if (lookup.slot == .normal) attributes.tangents = true;
-    }
+    for (textures.lookups) |lookup| attributes.texcoord_sets[lookup.texcoord_set] = true;
+    for (textures.materials) |use| if (use.tangents != null) {
+        attributes.tangents = true;
+    };
     return attributes;
 }
 
@@ -220,6 +223,7 @@ pub fn pose(
         arena.allocator(),
         &loaded.parts,
         &loaded.textures,
+        soup.positions,
         soup.triangles,
     );
     const tree_start = Clock.awake.now(io);
@@ -319,11 +323,22 @@ noinline fn chooseView(
     );
     seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };
     seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
+    const shining = if (settings.emitters or from.has_area_lights)
+        try emittersOf(gpa, seen, from)
+    else
+        &.{};
+    if (from.has_area_lights) seen.lights = try std.mem.concat(arena, world.Light, &.{
+        seen.lights, shining,
+    });
     // What shines from everywhere is a light too.
     seen.facts.own_light_count = seen.lights.len;
     const has_map = settings.environment.map != null;
     const lights_are_default = seen.lights.len == 0 and from.ambient == null and !has_map;
     if (lights_are_default) seen.lights = try light.placeRig(arena, &seen.view.camera);
+    seen.facts.emitter_count = if (from.has_area_lights) 0 else shining.len;
+    if (seen.facts.emitter_count > 0) seen.lights = try std.mem.concat(arena, world.Light, &.{
+        seen.lights, shining,
+    });
     seen.environment = light.environment(
         lights_are_default,
         from.ambient,
@@ -341,6 +356,29 @@ noinline fn chooseView(
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
     seen.facts.environment_is_default = settings.environment.is_default;
+}
+
+/// Lights that stand for surfaces which emit: made once for a pose.
+fn emittersOf(
+    gpa: Allocator,
+    seen: *World,
+    from: *const Scene,
+) error{OutOfMemory}![]const world.Light {
+    if (seen.emitters) |made| return made;
+    const pieces = try emitters.find(gpa, &seen.geometry, &seen.materials, &seen.textures);
+    defer gpa.free(pieces);
+    var count: usize = emitter_lights.count_default;
+    if (from.has_area_lights) {
+        count = 0;
+        for (from.materials) |*one| {
+            if (math.vec3.maxComponent(one.emissive) > 0)
+                count += emitter_lights.count_default;
+        }
+        count = @min(count, emitter_lights.count_max);
+    }
+    const arena = seen.arena.allocator();
+    seen.emitters = try emitter_lights.make(gpa, arena, pieces, &seen.geometry, count);
+    return seen.emitters.?;
 }
 
 /// Gives a geometry that has all else a tree of `settings.lanes`, whose memory comes from `arena`.
@@ -1039,6 +1077,7 @@ test {
     _ = alpha;
     _ = check;
     _ = deform;
+    _ = emitter_lights;
     _ = flatten;
     _ = strokes;
     _ = light;
@@ -1046,10 +1085,13 @@ test {
     _ = place_file;
     _ = tangents;
     _ = texture;
+    _ = @import("prepare/layers.zig");
+    _ = @import("prepare/texture_use.zig");
     _ = @import("prepare/pyramid.zig");
     _ = view_file;
     _ = @import("prepare/framing.zig");
     _ = @import("prepare/mikktspace.zig");
+    _ = @import("prepare/volumes.zig");
     _ = @import("prepare/bvh/split.zig");
     _ = bvh_input;
     _ = @import("prepare/bvh/build.zig");

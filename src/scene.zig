@@ -226,8 +226,13 @@ pub const Scene = struct {
     images: []const Image = &.{},
     textures: []const Texture = &.{},
     environment: ?EnvironmentMap = null,
+    /// Names of what the file may be shown as, by the materials of its meshes (which are those of
+    /// the variant that was asked for); empty ones where it gives none.
+    material_variants: []const []const u8 = &.{},
     /// Index of the camera that the file itself would use, `none` without cameras.
     camera_default: u32 = none,
+    /// Surfaces that emit are all of the lights that the file says, each to be lit by in full.
+    has_area_lights: bool = false,
     /// Ambient radiance that the source of the scene asks for; null: by the rules of shading.
     ambient: ?f32 = null,
     /// What is seen where there is nothing, linear RGB; null: by the rules of shading.

@@ -19,6 +19,7 @@ const statistics = @import("statistics.zig");
 const trace = @import("trace.zig");
 const variant = @import("variant.zig");
 const Environment = @import("session/environment.zig").Environment;
+const emission = @import("session/emission.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
 const Film = film_file.Film;
@@ -256,6 +257,7 @@ pub const Session = struct {
             .background = radianceOf(background),
             .environment = environment,
             .floor = choices.floor,
+            .emitters = choices.emitters,
             .backdrop = backdrop,
         }, session.diagnostic, &session.times);
     }
@@ -284,6 +286,7 @@ pub const Session = struct {
         session.rendered = choices;
         session.appearance = null;
         session.metered = null;
+        try session.weighEmitters();
         try session.dimStudio();
         session.traced = try trace.trace(
             session.gpa,
@@ -397,14 +400,24 @@ pub const Session = struct {
     fn meter(session: *Session) trace.Error!output.Metered {
         if (session.metered) |metered| return metered;
         const world = &session.world.?;
-        const whole = world.view;
-        defer world.view = whole;
         const around = world.environment;
         defer world.environment = around;
         if (session.isStudioDimmed()) {
             world.environment.map = null;
             world.environment.is_seen = false;
         }
+        var film = try session.traceSmall();
+        defer film.deinit(session.gpa);
+        const display = if (film.display) |*other| other else null;
+        session.metered = try output.meter(session.gpa, &film.image, display);
+        return session.metered.?;
+    }
+
+    /// The view in a small picture with alpha, which the caller frees.
+    fn traceSmall(session: *Session) trace.Error!Film {
+        const world = &session.world.?;
+        const whole = world.view;
+        defer world.view = whole;
         const longest: f32 = @floatFromInt(@max(whole.width, whole.height));
         const scale = @min(1, @as(f32, meter_side) / longest);
         inline for (.{ &world.view.width, &world.view.height }) |side| {
@@ -413,15 +426,46 @@ pub const Session = struct {
         var layers = session.layersOf();
         layers.insert(.alpha);
         var film: Film = try .init(session.gpa, world.view.width, world.view.height, layers);
-        defer film.deinit(session.gpa);
+        errdefer film.deinit(session.gpa);
         var chosen = session.traceSettings(session.rendered);
         chosen.sample_count = 1;
         chosen.progress = .none;
         const variant_index = session.rendered.variant;
         _ = try trace.trace(session.gpa, variant_index, &world.frame(), &film, chosen);
-        const display = if (film.display) |*other| other else null;
-        session.metered = try output.meter(session.gpa, &film.image, display);
-        return session.metered.?;
+        return film;
+    }
+
+    /// Leaves out the lights of surfaces that emit where they hardly show beside what lights the
+    /// view anyway. Where they are more than half of its light, they are lights of the scene's own,
+    /// in place of the default ones.
+    fn weighEmitters(session: *Session) trace.Error!void {
+        const world = &session.world.?;
+        const facts = &world.facts;
+        if (facts.emitter_count == 0) return;
+        defer facts.emitter_count = 0;
+        const all = world.lights;
+        const others = all[0 .. all.len - facts.emitter_count];
+        world.lights = others;
+        var besides = try session.traceSmall();
+        defer besides.deinit(session.gpa);
+        const around = world.environment;
+        world.environment.map = null;
+        world.environment.ambient = 0;
+        world.lights = &.{};
+        var glow = try session.traceSmall();
+        defer glow.deinit(session.gpa);
+        world.lights = all[others.len..];
+        var lit = try session.traceSmall();
+        defer lit.deinit(session.gpa);
+        world.environment = around;
+        const share = emission.weigh(besides.image.pixels, glow.image.pixels, lit.image.pixels);
+        world.lights = if (share.shows) all else others;
+        if (!share.prevails) return;
+        facts.own_light_count += facts.emitter_count;
+        if (!facts.lights_are_default) return;
+        facts.lights_are_default = false;
+        world.lights = all[others.len..];
+        world.environment.ambient = session.seen.ambient orelse 0;
     }
 
     /// Says so where the picture shows next to nothing, and what may help.

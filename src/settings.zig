@@ -153,9 +153,9 @@ pub const Viewpoint = struct {
 pub const point_size: struct { min: f32, max: f32, default: f32 } =
     .{ .min = 0.1, .max = 100, .default = 1.5 };
 
-/// Which of a file's scenes to read.
-pub const SceneChoice = union(enum) {
-    /// The one that the file shows.
+/// Which of the things to take that a file counts and may name.
+pub const Choice = union(enum) {
+    /// What the file itself shows.
     default,
     index: u32,
     name: []const u8,
@@ -258,7 +258,8 @@ pub const Load = struct {
     tessellation: u32 = tessellation.default,
     /// Within `texture_side`.
     texture_side_max: u32 = texture_side.default,
-    scene: SceneChoice = .default,
+    scene: Choice = .default,
+    material_variant: Choice = .default,
     /// Where it is not y, the scene is turned about x until it is.
     up_axis: UpAxis = .y,
     /// A file that is about to be replaced: a scene that is read from it is refused.
@@ -278,6 +279,9 @@ pub const View = struct {
     ambient: ?f32 = null,
     environment: Environment = .{},
     floor: Floor = .none,
+    /// Surfaces that emit light what is around them, as far as it shows; without it only where the
+    /// file calls them lights.
+    emitters: bool = true,
     background: Background = .default,
     /// Colours of unlit surfaces and of the background are the display's, neither exposed nor tone
     /// mapped; without it, as in the thesis, they are radiance, and the background's default comes

@@ -39,6 +39,7 @@ pub const TreeStatistics = geometry_file.TreeStatistics;
 pub const Triangle = geometry_file.Triangle;
 pub const TrianglePack = geometry_file.TrianglePack;
 pub const View = view_file.View;
+pub const Volume = @import("world/volume.zig").Volume;
 pub const Wrap = textures_file.Wrap;
 pub const cache_line_bytes = geometry_file.cache_line_bytes;
 pub const none = geometry_file.none;
@@ -81,6 +82,9 @@ pub const Facts = struct {
     environment_is_default: bool = false,
     /// Lights of the file that shine.
     own_light_count: usize = 0,
+    /// Lights that stand for surfaces which emit, the last of all: those of them that are not among
+    /// the file's own.
+    emitter_count: usize = 0,
     /// Triangles left out because they have no area or no finite place.
     degenerate_count: u64,
     /// Triangles that points and lines became.
@@ -99,6 +103,8 @@ pub const World = struct {
     /// Made once a scene, by `prepare.load`, as are the lookups of the materials; not owned.
     textures: Textures,
     lights: []const Light = &.{},
+    /// In the place of all surfaces that emit; null: not made yet.
+    emitters: ?[]const Light = null,
     environment: Environment = .{ .ambient = 0, .background = @splat(0) },
     view: View = .nowhere,
     facts: Facts,

@@ -320,6 +320,7 @@ test "mistakes on the command line are usage errors in one line" {
         &.{ "builtin:cornell", "-r8x8", "--camera=no such camera" },
         &.{ "builtin:cornell", "-r8x8", "--camera=99" },
         &.{ "builtin:cornell", "-r8x8", "--scene=1" },
+        &.{ "builtin:cornell", "-r8x8", "--material-variant=0" },
         &.{ "builtin:cornell", "-r8x8", "--up-axis=x" },
         &.{ "builtin:cornell", "-r16385" },
         &.{ "builtin:cornell", "--eye=1,2,nan" },

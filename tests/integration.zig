@@ -13,6 +13,8 @@ test {
     _ = @import("strokes.zig");
     _ = @import("decode.zig");
     _ = @import("environment.zig");
+    _ = @import("glass.zig");
+    _ = @import("gltf_materials.zig");
     _ = @import("gltf_poses.zig");
     _ = @import("gltf_textures.zig");
     _ = @import("malformed.zig");

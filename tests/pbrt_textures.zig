@@ -242,7 +242,6 @@ test "a normal map and a shining picture" {
     try testing.expectEqual(1, scene.textures[material.emissive_texture.?.texture].image);
     try testing.expectEqual([3]f32{ 3, 3, 3 }, material.emissive);
     try testing.expect(scene.meshes[0].texcoords[0] != null);
-    try testing.expectEqual([3]f32{ 1.5, 1.5, 1.5 }, scene.lights[0].color);
 }
 
 test "a shape's alpha blends, or makes holes by a picture's red, in a material of its own" {

@@ -147,7 +147,7 @@ pub fn setUp(
 /// The first light that has a place, or the eye.
 fn lightOf(world: *const World) Vec3 {
     for (world.lights) |light| switch (light.kind) {
-        .point, .spot => return light.position,
+        .point, .spot, .emitter => return light.position,
         .directional => {},
     };
     return world.view.camera.origin;

@@ -205,10 +205,49 @@ pub const cgltf_transmission = extern struct {
     transmission_factor: f32,
 };
 
-/// What is not read of materials consists of textures and numbers.
-fn Textured(comptime texture_count: usize, comptime float_count: usize) type {
-    return extern struct { textures: [texture_count]cgltf_texture_view, floats: [float_count]f32 };
-}
+pub const cgltf_clearcoat = extern struct {
+    clearcoat_texture: cgltf_texture_view,
+    clearcoat_roughness_texture: cgltf_texture_view,
+    clearcoat_normal_texture: cgltf_texture_view,
+    clearcoat_factor: f32,
+    clearcoat_roughness_factor: f32,
+};
+
+pub const cgltf_specular = extern struct {
+    specular_texture: cgltf_texture_view,
+    specular_color_texture: cgltf_texture_view,
+    specular_color_factor: [3]f32,
+    specular_factor: f32,
+};
+
+pub const cgltf_sheen = extern struct {
+    sheen_color_texture: cgltf_texture_view,
+    sheen_color_factor: [3]f32,
+    sheen_roughness_texture: cgltf_texture_view,
+    sheen_roughness_factor: f32,
+};
+
+pub const cgltf_iridescence = extern struct {
+    iridescence_factor: f32,
+    iridescence_texture: cgltf_texture_view,
+    iridescence_ior: f32,
+    iridescence_thickness_min: f32,
+    iridescence_thickness_max: f32,
+    iridescence_thickness_texture: cgltf_texture_view,
+};
+
+pub const cgltf_diffuse_transmission = extern struct {
+    diffuse_transmission_texture: cgltf_texture_view,
+    diffuse_transmission_factor: f32,
+    diffuse_transmission_color_factor: [3]f32,
+    diffuse_transmission_color_texture: cgltf_texture_view,
+};
+
+pub const cgltf_anisotropy = extern struct {
+    anisotropy_strength: f32,
+    anisotropy_rotation: f32,
+    anisotropy_texture: cgltf_texture_view,
+};
 
 pub const cgltf_material = extern struct {
     name: String,
@@ -218,21 +257,25 @@ pub const cgltf_material = extern struct {
     has_transmission: cgltf_bool,
     has_volume: cgltf_bool,
     has_ior: cgltf_bool,
-    has_specular: [2]cgltf_bool,
+    has_specular: cgltf_bool,
+    has_sheen: cgltf_bool,
     has_emissive_strength: cgltf_bool,
-    has_iridescence: [4]cgltf_bool,
+    has_iridescence: cgltf_bool,
+    has_diffuse_transmission: cgltf_bool,
+    has_anisotropy: cgltf_bool,
+    has_dispersion: cgltf_bool,
     pbr_metallic_roughness: cgltf_pbr_metallic_roughness,
     pbr_specular_glossiness: cgltf_pbr_specular_glossiness,
-    clearcoat: Textured(3, 2),
+    clearcoat: cgltf_clearcoat,
     ior: f32,
-    specular: Textured(2, 4),
-    sheen: extern struct { color: Textured(1, 3), roughness: Textured(1, 1) },
+    specular: cgltf_specular,
+    sheen: cgltf_sheen,
     transmission: cgltf_transmission,
     volume: cgltf_volume,
     emissive_strength: f32,
-    iridescence: extern struct { factor: f32, film: Textured(1, 3), thickness: Textured(1, 0) },
-    diffuse_transmission: extern struct { factors: Textured(1, 4), color: Textured(1, 0) },
-    anisotropy: extern struct { strength: [2]f32, texture: Textured(1, 0) },
+    iridescence: cgltf_iridescence,
+    diffuse_transmission: cgltf_diffuse_transmission,
+    anisotropy: cgltf_anisotropy,
     dispersion: f32,
     normal_texture: cgltf_texture_view,
     occlusion_texture: cgltf_texture_view,
@@ -242,8 +285,19 @@ pub const cgltf_material = extern struct {
     alpha_cutoff: f32,
     double_sided: cgltf_bool,
     unlit: cgltf_bool,
-    extras: Tail,
+    extras: Extras,
+    extensions_count: usize,
+    extensions: [*c]cgltf_extension,
 };
+
+/// A material of a primitive in a variant.
+pub const cgltf_material_mapping = extern struct {
+    variant: usize,
+    material: [*c]cgltf_material,
+    extras: Extras,
+};
+
+pub const cgltf_material_variant = extern struct { name: String, extras: Extras };
 
 pub const cgltf_morph_target = extern struct {
     attributes: [*c]cgltf_attribute,
@@ -260,7 +314,10 @@ pub const cgltf_primitive = extern struct {
     targets_count: usize,
     extras: Extras,
     has_draco_mesh_compression: cgltf_bool,
-    draco_mesh_compression: [7]usize,
+    draco_mesh_compression: [3]usize,
+    mappings: [*c]cgltf_material_mapping,
+    mappings_count: usize,
+    extensions_count: [2]usize,
 };
 
 pub const cgltf_mesh = extern struct {
@@ -392,7 +449,9 @@ pub const cgltf_data = extern struct {
     scene: [*c]cgltf_scene,
     animations: ?*anyopaque,
     animations_count: usize,
-    variants: [5]usize,
+    variants: [*c]cgltf_material_variant,
+    variants_count: usize,
+    extras: Extras,
     data_extensions_count: usize,
     data_extensions: [*c]cgltf_extension,
     extensions_used: [*c]String,

@@ -16,6 +16,7 @@ const limits = @import("gltf/limits.zig");
 const nodes = @import("gltf/nodes.zig");
 const scene_data = @import("../scene.zig");
 const schema = @import("gltf/schema.zig");
+const variants = @import("gltf/variants.zig");
 const views = @import("gltf/views.zig");
 const Allocator = std.mem.Allocator;
 const Buffers = @import("gltf/buffers.zig");
@@ -30,7 +31,7 @@ const Source = @import("gltf/source.zig");
 const Textures = @import("gltf/textures.zig");
 
 /// See parse.zig.
-pub const Error = Source.Error || error{SceneUnknown};
+pub const Error = Source.Error || error{ SceneUnknown, MaterialVariantUnknown };
 
 /// Reads a file that is in memory; what it names comes from `resources`.
 pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) Error!Scene {
@@ -97,14 +98,16 @@ fn parseDocument(
 /// Puts the parts of the document into the scene.
 fn fill(source: *Source, resources: *Resources) Error!void {
     const builder = source.builder;
-    const shown = try nodes.choose(source, resources.settings.scene);
+    const settings = &resources.settings;
+    const shown = try nodes.choose(source, settings.scene);
+    const variant = try variants.choose(source, settings.material_variant);
     const origins = try nodes.collect(source, shown);
     defer source.gpa.free(origins);
     var textures: Textures = .init(source, resources);
     defer textures.deinit();
     var materials: Materials = try .init(source, &textures);
     defer materials.deinit();
-    var meshes: Meshes = .{ .source = source, .materials = &materials };
+    var meshes: Meshes = .{ .source = source, .materials = &materials, .variant = variant };
     defer meshes.deinit();
     var skins: Skins = .{ .source = source };
     defer skins.deinit();

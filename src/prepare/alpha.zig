@@ -10,6 +10,7 @@ const std = @import("std");
 const parallel = @import("../parallel.zig");
 const scene = @import("../scene.zig");
 const texture = @import("texture.zig");
+const texture_use = @import("texture_use.zig");
 const world = @import("../world.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
@@ -136,7 +137,8 @@ const Work = struct {
 
     fn alphaLookup(work: *const Work, material: u32) ?*const world.Lookup {
         for (work.set.lookupsOf(material)) |*lookup| {
-            if (lookup.slot == .base_color and lookup.channels[3] != texture.missing) return lookup;
+            if (lookup.slot != .base_color) continue;
+            if (lookup.channels[3] != texture_use.missing) return lookup;
         }
         return null;
     }
@@ -253,7 +255,7 @@ const Building = struct {
         use.alpha = .{};
         for (parts.work.set.lookupsOf(source)) |lookup| {
             var without = lookup;
-            if (lookup.slot == .base_color) without.channels[3] = texture.missing;
+            if (lookup.slot == .base_color) without.channels[3] = texture_use.missing;
             try parts.lookups.append(arena, without);
         }
         try parts.sources.append(arena, source);
@@ -676,7 +678,7 @@ fn loadAndSplit(gpa: Allocator, file: []const u8) !void {
     const after = textures.lookupsOf(2);
     try testing.expectEqual(2, after.len);
     try testing.expectEqual(3, before[0].channels[3]);
-    try testing.expectEqual(texture.missing, after[0].channels[3]);
+    try testing.expectEqual(texture_use.missing, after[0].channels[3]);
     try testing.expectEqual(before[0].texture, after[0].texture);
     try testing.expectEqual(before[1], after[1]);
 }

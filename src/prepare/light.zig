@@ -53,7 +53,7 @@ pub fn place(
 }
 
 /// Rays start from points and spots as long as padding there is less than this part of the scene.
-const source_shift_max = 0x1p-10;
+pub const source_shift_max = 0x1p-10;
 
 fn placeOne(
     light: *const scene.Light,

@@ -1,10 +1,10 @@
 //! Metallic-roughness materials (glTF 2.0, appendix B) as shading wants them.
 //!
-//! In: materials of what is drawn. Out: the world's, one for one.
-//! Further sources: the extensions KHR_materials_ior, _transmission and _volume.
+//! In: materials of what is drawn. Out: the world's, one for one, and their layers where some have
+//! any. Further sources: the extensions KHR_materials_ior, _transmission and _volume.
 
 const std = @import("std");
-const math = @import("../math.zig");
+const layers_file = @import("layers.zig");
 const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const assert = std.debug.assert;
@@ -13,36 +13,50 @@ const AlphaRange = @import("texture.zig").AlphaRange;
 const MaterialUse = @import("texture.zig").MaterialUse;
 const Parts = @import("alpha.zig").Parts;
 const TextureSet = @import("texture.zig").TextureSet;
+const volumes_file = @import("volumes.zig");
 
-/// Darkest attenuation colour: a channel at 0 would absorb without bound.
-const attenuation_color_min = 1e-4;
-
-/// The world's materials in the order of the parts'; `triangles` are the world's.
+/// The world's materials in the order of the parts'; positions and triangles are the world's.
 pub fn place(
     arena: Allocator,
     parts: *const Parts,
     textures: *const TextureSet,
+    positions: []const [3]f32,
     triangles: []const world.Triangle,
 ) error{OutOfMemory}!world.Materials {
     const converted = try arena.alloc(world.Material, parts.materials.len);
     for (parts.materials, textures.materials, converted) |*material, *use, *to| {
         to.* = convert(material, use);
     }
+    const layers = try arena.alloc(world.Layers, parts.materials.len);
+    for (parts.materials, textures.materials, layers) |*material, *use, *to| {
+        to.* = layers_file.convert(material, use.layer_lookup_count > 0);
+    }
+    var has_layers = false;
     var has_transparency = false;
+    var has_transmission = false;
     var has_holes = false;
     for (parts.instances) |instance| {
-        const used = &converted[parts.meshes[instance.mesh].material];
+        const index = parts.meshes[instance.mesh].material;
+        const used = &converted[index];
+        has_layers = has_layers or layers[index].present > 0;
         has_transparency = has_transparency or isTransparent(used);
+        has_transmission = has_transmission or used.transmits();
         has_holes = has_holes or used.alpha_cutoff >= 0;
     }
     const stops_all = !has_transparency and !has_holes;
     return .{
         .all = converted,
+        .layers = if (has_layers) layers else &.{},
         .sources = parts.sources,
         .lookups = textures.lookups,
+        .volumes = try volumes_file.rank(arena, converted, positions, triangles),
+        .has_transmission = has_transmission,
         .has_transparency = has_transparency,
         .has_holes = has_holes,
-        .occluders = if (stops_all) &.{} else try occluders(arena, converted, triangles),
+        .occluders = if (stops_all)
+            &.{}
+        else
+            try occluders(arena, converted, textures.lookups, triangles),
     };
 }
 
@@ -76,7 +90,7 @@ fn convert(from: *const scene.Material, use: *const MaterialUse) world.Material 
         .dielectric_f0 = f0_root * f0_root,
         .ior = from.ior,
         .transmission = from.transmission,
-        .sigma_a = if (from.volume) absorption(from) else .{ 0, 0, 0 },
+        .sigma_a = layers_file.volumeOf(from).sigma_a,
         .alpha_cutoff = if (has_holes) from.alpha_cutoff else -1,
         .blend = flag(blends),
         .double_sided = flag(from.double_sided),
@@ -86,28 +100,15 @@ fn convert(from: *const scene.Material, use: *const MaterialUse) world.Material 
         .occlusion_strength = from.occlusion_strength,
         .first_lookup = use.first_lookup,
         .lookup_count = use.lookup_count,
+        .layer_lookup_count = use.layer_lookup_count,
     };
-}
-
-/// Beer and Lambert: -ln(color) / distance a channel, KHR_materials_volume "Attenuation".
-fn absorption(from: *const scene.Material) math.Vec3 {
-    assert(from.attenuation_distance > 0);
-    var result: math.Vec3 = .{ 0, 0, 0 };
-    if (from.attenuation_distance == std.math.inf(f32)) return result;
-    for (from.attenuation_color, &result) |color, *channel| {
-        const floor: f64 = if (color > attenuation_color_min) color else attenuation_color_min;
-        const share: f64 = if (floor < 1) floor else 1;
-        const exact = -math.elementary.log(share) / from.attenuation_distance;
-        const largest: f64 = std.math.floatMax(f32);
-        channel.* = @floatCast(if (exact < largest) exact else largest);
-    }
-    return result;
 }
 
 /// See `world.Materials.occluders`.
 fn occluders(
     arena: Allocator,
     materials: []const world.Material,
+    lookups: []const world.Lookup,
     triangles: []const world.Triangle,
 ) error{OutOfMemory}![]const u32 {
     const words = try arena.alloc(u32, @divCeil(triangles.len, 32));
@@ -115,7 +116,9 @@ fn occluders(
         word.* = 0;
         const first = 32 * index;
         for (triangles[first..@min(first + 32, triangles.len)], 0..) |*triangle, bit| {
-            const stops = materials[triangle.material].stopsLight();
+            const material = &materials[triangle.material];
+            const own = lookups[material.first_lookup..][0..material.lookup_count];
+            const stops = material.stopsLight(own);
             word.* |= @as(u32, @intFromBool(stops)) << @intCast(bit);
         }
     }
@@ -157,34 +160,19 @@ test "light is stopped where nothing blends, has holes or lets it through" {
         .{ .{ .alpha_mode = .blend }, true },
         .{ .{ .alpha_mode = .mask, .base_color = .{ 1, 1, 1, 0.4 } }, false },
         .{ .{ .alpha_mode = .mask, .base_color = .{ 1, 1, 1, 0.5 } }, true },
-    }) |case| try std.testing.expectEqual(case[1], testConvert(&case[0]).stopsLight());
+    }) |case| try std.testing.expectEqual(case[1], testConvert(&case[0]).stopsLight(&.{}));
+    // Metal by a texture is not metal everywhere.
+    const metal = testConvert(&.{ .transmission = 1, .metallic = 1 });
+    var lookup: world.Lookup = undefined;
+    lookup.slot = .metallic_roughness;
+    try std.testing.expect(!metal.stopsLight(&.{lookup}));
+    lookup.slot = .transmission;
+    try std.testing.expect(metal.stopsLight(&.{lookup}));
 }
 
 test "reflectance of glass and of nothing" {
     try std.testing.expectApproxEqRel(@as(f32, 0.04), testConvert(&.{}).dielectric_f0, 1e-6);
     try std.testing.expectEqual(0, testConvert(&.{ .ior = 1 }).dielectric_f0);
-}
-
-test "white light turns to the attenuation colour after the attenuation distance" {
-    const from: scene.Material = .{
-        .volume = true,
-        .transmission = 1,
-        .attenuation_color = .{ 1, 0.5, 0 },
-        .attenuation_distance = 2,
-    };
-    const result = testConvert(&from);
-    try std.testing.expectEqual(0, result.sigma_a[0]);
-    try std.testing.expectApproxEqRel(@as(f32, 0.34657359), result.sigma_a[1], 1e-6);
-    try std.testing.expectApproxEqRel(@as(f32, 4.6051702), result.sigma_a[2], 1e-6);
-    var thin = from;
-    thin.volume = false;
-    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, testConvert(&thin).sigma_a);
-    var clear = from;
-    clear.attenuation_distance = std.math.inf(f32);
-    try std.testing.expectEqual(math.Vec3{ 0, 0, 0 }, testConvert(&clear).sigma_a);
-    var dense = from;
-    dense.attenuation_distance = std.math.floatMin(f32);
-    try std.testing.expect(math.vec3.isFinite(testConvert(&dense).sigma_a));
 }
 
 test "what is all holes or all clear is seen nowhere" {

@@ -1,9 +1,9 @@
-//! Tangents for meshes that bring none and whose normal texture needs them (glTF 2.0, section
-//! 3.7.2.1), made once of a scene.
+//! Tangents for meshes that bring none and whose material needs them: for normals from textures, of
+//! a coat as well, and for anisotropy (glTF 2.0, section 3.7.2.1), made once of a scene.
 //!
-//! In: a mesh, and how its normal texture is looked up. Out: the mesh with tangents by MikkTSpace.
+//! In: a mesh, and its texture coordinates that count. Out: the mesh with tangents by MikkTSpace.
 //! They belong to corners: a vertex whose corners differ in them becomes several, all at the very
-//! same place, so that surfaces stay closed. The lookup's transform turns tangents as it turns
+//! same place, so that surfaces stay closed. The texture's transform turns tangents as it turns
 //! texture coordinates. Meshes are done by all threads, each on its own.
 
 const std = @import("std");
@@ -11,8 +11,8 @@ const math = @import("../math.zig");
 const mikktspace = @import("mikktspace.zig");
 const parallel = @import("../parallel.zig");
 const scene = @import("../scene.zig");
-const world = @import("../world.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const TangentSource = @import("texture_use.zig").TangentSource;
 const TextureSet = @import("texture.zig").TextureSet;
 const assert = std.debug.assert;
 const vec3 = math.vec3;
@@ -71,25 +71,19 @@ const Work = struct {
         for (instances) |instance| {
             const mesh = &from.meshes[instance.mesh];
             if (is_listed[instance.mesh] or mesh.tangents != null) continue;
-            const lookup = work.normalLookup(mesh) orelse continue;
-            if (mesh.triangles.len == 0 or mesh.texcoords[lookup.texcoord_set] == null) continue;
+            const coordinates = work.textures.materials[mesh.material].tangents orelse continue;
+            const has_none = mesh.texcoords[coordinates.texcoord_set] == null;
+            if (mesh.triangles.len == 0 or has_none) continue;
             is_listed[instance.mesh] = true;
             try work.tasks.append(work.gpa, instance.mesh);
         }
     }
 
-    fn normalLookup(work: *const Work, mesh: *const Mesh) ?*const world.Lookup {
-        for (work.textures.lookupsOf(mesh.material)) |*lookup| {
-            if (lookup.slot == .normal) return lookup;
-        }
-        return null;
-    }
-
     fn run(work: *Work, index: usize, _: usize) void {
         if (work.exhausted.load(.monotonic)) return;
         const mesh = &work.meshes[work.tasks.items[index]];
-        const lookup = work.normalLookup(mesh).?;
-        mesh.* = withTangents(work.gpa, work.arena, mesh, lookup) catch |err| switch (err) {
+        const coordinates = &work.textures.materials[mesh.material].tangents.?;
+        mesh.* = withTangents(work.gpa, work.arena, mesh, coordinates) catch |err| switch (err) {
             error.OutOfMemory => return work.exhausted.store(true, .monotonic),
             error.Unsuitable => {
                 _ = work.unsuitable_count.fetchAdd(1, .monotonic);
@@ -99,21 +93,21 @@ const Work = struct {
     }
 };
 
-/// A mesh of the same triangles with tangents for a lookup.
+/// A mesh of the same triangles with tangents.
 fn withTangents(
     gpa: Allocator,
     arena: Allocator,
     mesh: *const Mesh,
-    lookup: *const world.Lookup,
+    coordinates: *const TangentSource,
 ) mikktspace.Error!Mesh {
     var scratch_state: std.heap.ArenaAllocator = .init(gpa);
     defer scratch_state.deinit();
     const scratch = scratch_state.allocator();
     const tangents = try scratch.alloc([3][4]f32, mesh.triangles.len);
     const input = if (mesh.normals != null)
-        try smoothInput(scratch, mesh, lookup)
+        try smoothInput(scratch, mesh, coordinates)
     else
-        try flatInput(scratch, mesh, lookup);
+        try flatInput(scratch, mesh, coordinates);
     try mikktspace.compute(gpa, input, tangents);
     return split(scratch, arena, mesh, tangents);
 }
@@ -122,14 +116,14 @@ fn withTangents(
 fn smoothInput(
     scratch: Allocator,
     mesh: *const Mesh,
-    lookup: *const world.Lookup,
+    coordinates: *const TangentSource,
 ) error{OutOfMemory}!mikktspace.Mesh {
     const normals = try scratch.dupe(Vec3, mesh.normals.?);
-    const texcoords = try scratch.dupe([2]f32, mesh.texcoords[lookup.texcoord_set].?);
+    const texcoords = try scratch.dupe([2]f32, mesh.texcoords[coordinates.texcoord_set].?);
     for (mesh.triangles) |triangle| for (triangle) |vertex| {
         // Where there is none the triangle's own is seen.
         normals[vertex] = vec3.normalize(mesh.normals.?[vertex]) orelse faceNormal(mesh, triangle);
-        texcoords[vertex] = transformed(mesh, lookup, vertex);
+        texcoords[vertex] = transformed(mesh, coordinates, vertex);
     };
     return .{
         .triangles = mesh.triangles,
@@ -143,7 +137,7 @@ fn smoothInput(
 fn flatInput(
     scratch: Allocator,
     mesh: *const Mesh,
-    lookup: *const world.Lookup,
+    coordinates: *const TangentSource,
 ) error{OutOfMemory}!mikktspace.Mesh {
     const count = 3 * mesh.triangles.len;
     const triangles = try scratch.alloc([3]u32, mesh.triangles.len);
@@ -157,7 +151,7 @@ fn flatInput(
             corner.* = @intCast(at);
             positions[at] = mesh.positions[vertex];
             normals[at] = normal;
-            texcoords[at] = transformed(mesh, lookup, vertex);
+            texcoords[at] = transformed(mesh, coordinates, vertex);
         }
     }
     return .{
@@ -178,9 +172,9 @@ fn faceNormal(mesh: *const Mesh, triangle: [3]u32) Vec3 {
     return vec3.normalize(across) orelse .{ 0, 0, 1 };
 }
 
-fn transformed(mesh: *const Mesh, lookup: *const world.Lookup, vertex: u32) [2]f32 {
-    const at = mesh.texcoords[lookup.texcoord_set].?[vertex];
-    const rows = lookup.transform;
+fn transformed(mesh: *const Mesh, coordinates: *const TangentSource, vertex: u32) [2]f32 {
+    const at = mesh.texcoords[coordinates.texcoord_set].?[vertex];
+    const rows = coordinates.transform;
     return .{
         rows[0][0] * at[0] + rows[0][1] * at[1] + rows[0][2],
         rows[1][0] * at[0] + rows[1][1] * at[1] + rows[1][2],
@@ -313,18 +307,7 @@ const Splitting = struct {
 
 const testing = std.testing;
 
-const identity_lookup: world.Lookup = .{
-    .slot = .normal,
-    .texture = 0,
-    .wrap = @splat(.repeat),
-    .magnify_linear = true,
-    .minify_linear = true,
-    .has_mips = true,
-    .mip_linear = true,
-    .texcoord_set = 0,
-    .transform = .{ .{ 1, 0, 0 }, .{ 0, 1, 0 } },
-    .channels = .{ 0, 1, 2, 255 },
-};
+const identity: TangentSource = .{};
 
 /// Two squares side by side in z = 0, the right one with u mirrored; vertex 0 is nobody's.
 const mirrored: Mesh = .{
@@ -359,7 +342,7 @@ test "a vertex between mirrored halves becomes two at the same place" {
     }
     mesh.morph_targets = &.{ .{}, .{ .positions = &deltas, .normals = &deltas } };
     mesh.joint_sets = &.{.{ .joints = &joints, .weights = mesh.colors.? }};
-    const made = try withTangents(testing.allocator, arena.allocator(), &mesh, &identity_lookup);
+    const made = try withTangents(testing.allocator, arena.allocator(), &mesh, &identity);
     try testing.expectEqual(null, made.morph_targets[0].positions);
     try testing.expectEqual(8, made.positions.len); // Six are used, two of them twice.
     try testing.expectEqual(4, made.material);
@@ -386,25 +369,25 @@ test "without normals each triangle has its own" {
     var mesh = mirrored;
     mesh.normals = null;
     mesh.triangles = mesh.triangles[0..2];
-    const made = try withTangents(testing.allocator, arena.allocator(), &mesh, &identity_lookup);
+    const made = try withTangents(testing.allocator, arena.allocator(), &mesh, &identity);
     try testing.expectEqual(null, made.normals);
     try testing.expectEqual(4, made.positions.len);
     for (made.tangents.?) |tangent| try testing.expectEqual([4]f32{ 1, 0, 0, 1 }, tangent);
     // Normals that are none count as the triangle's own.
     mesh.normals = &@as([7]Vec3, @splat(.{ 0, 0, 0 }));
-    const other = try withTangents(testing.allocator, arena.allocator(), &mesh, &identity_lookup);
+    const other = try withTangents(testing.allocator, arena.allocator(), &mesh, &identity);
     try testing.expectEqualSlices([4]f32, made.tangents.?, other.tangents.?);
 }
 
-test "tangents turn with the transform of the lookup" {
+test "tangents turn with the transform of the texture" {
     var arena: std.heap.ArenaAllocator = .init(testing.allocator);
     defer arena.deinit();
     var mesh = mirrored;
     mesh.triangles = mesh.triangles[0..2];
-    var lookup = identity_lookup;
+    var turned = identity;
     // u' = v, v' = -u: u grows downwards.
-    lookup.transform = .{ .{ 0, 1, 0 }, .{ -1, 0, 0 } };
-    const made = try withTangents(testing.allocator, arena.allocator(), &mesh, &lookup);
+    turned.transform = .{ .{ 0, 1, 0 }, .{ -1, 0, 0 } };
+    const made = try withTangents(testing.allocator, arena.allocator(), &mesh, &turned);
     for (made.tangents.?) |tangent| {
         for ([4]f32{ 0, -1, 0, 1 }, tangent) |a, b| try testing.expectApproxEqAbs(a, b, 1e-6);
     }
@@ -417,6 +400,6 @@ test "numbers that are too large are refused" {
     positions[3][0] = 1e20;
     var mesh = mirrored;
     mesh.positions = &positions;
-    const result = withTangents(testing.allocator, arena.allocator(), &mesh, &identity_lookup);
+    const result = withTangents(testing.allocator, arena.allocator(), &mesh, &identity);
     try testing.expectError(error.Unsuitable, result);
 }

@@ -17,10 +17,15 @@ const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const printable = @import("../diagnostic.zig").printable;
+const texture_use = @import("texture_use.zig");
 const assert = std.debug.assert;
+const channelsOf = texture_use.channelsOf;
+const missing = texture_use.missing;
+const viewOf = texture_use.viewOf;
 const Allocator = std.mem.Allocator;
 const Pyramid = pyramid_file.Pyramid;
 const Texels = decode.Texels;
+const Use = texture_use.Use;
 
 /// How textures are made, and by whom.
 pub const Settings = struct {
@@ -39,9 +44,6 @@ const texture_bytes_max: u64 = 4 << 30;
 /// may be larger. Where all textures take more than twice as much, it is half of that.
 const decode_bytes_max: u64 = 64 << 20;
 
-/// Channel of a lookup that there is not: it counts as 1.
-pub const missing: u8 = 255;
-
 /// The least and the largest that alpha is on a surface.
 pub const AlphaRange = struct {
     least: f32 = 1,
@@ -50,9 +52,12 @@ pub const AlphaRange = struct {
 
 /// How one material looks textures up.
 pub const MaterialUse = struct {
-    /// `TextureSet.lookups[first_lookup..][0..lookup_count]`.
+    /// `TextureSet.lookups[first_lookup..][0..lookup_count]`, and those of slots of layers behind.
     first_lookup: u32 = 0,
     lookup_count: u32 = 0,
+    layer_lookup_count: u32 = 0,
+    /// See `texture_use.tangentSource`.
+    tangents: ?texture_use.TangentSource = null,
     /// Of factor, texture and vertices together, wherever the material is drawn.
     alpha: AlphaRange = .{},
     /// Of the vertices alone; 1 where alpha does not count.
@@ -70,10 +75,10 @@ pub const TextureSet = struct {
     materials: []const MaterialUse,
     byte_count: u64,
 
-    /// Those of one material of the scene.
+    /// Those of one material of the scene, for layers as well.
     pub fn lookupsOf(set: *const TextureSet, material: u32) []const world.Lookup {
         const use = &set.materials[material];
-        return set.lookups[use.first_lookup..][0..use.lookup_count];
+        return set.lookups[use.first_lookup..][0 .. use.lookup_count + use.layer_lookup_count];
     }
 
     /// Frees everything.
@@ -94,6 +99,8 @@ const Request = struct {
     cutoff: ?f32 = null,
     /// What came of it; null: nothing.
     pyramid: ?Pyramid = null,
+    /// The image has none of what is wanted, which counts as 1.
+    is_blank: bool = false,
     /// Where each channel is stored, or `missing`.
     stored: [4]u8 = @splat(missing),
     channel_count: u8 = 0,
@@ -271,8 +278,8 @@ const Work = struct {
             const size = pyramid_file.sizeWithin(info.width, info.height, work.side_max);
             for (requests) |index| {
                 if (index == scene.none) continue;
-                const wanted = work.requests.items[index].wanted;
-                const count = storedChannels(info.channel_count, wanted, true).count;
+                const request = &work.requests.items[index];
+                const count = storedChannels(info.channel_count, request, true).count;
                 total += pyramid_file.byteCount(size[0], size[1], count);
             }
             try work.tasks.append(work.gpa, .{
@@ -321,9 +328,13 @@ const Work = struct {
         for (task.requests, 0..) |index, use| {
             if (index == scene.none) continue;
             const request = &work.requests.items[index];
-            if (request.pyramid != null) continue;
+            if (request.pyramid != null or request.is_blank) continue;
             // The last to come may take the texels over.
-            const image = try store(work.gpa, &texels, request, !both or use == 1);
+            const may_take = !both or use == 1;
+            const image = try store(work.gpa, &texels, request, may_take) orelse {
+                request.is_blank = true;
+                continue;
+            };
             request.pyramid = try pyramid_file.build(
                 work.gpa,
                 image,
@@ -335,7 +346,9 @@ const Work = struct {
 
     fn isDone(work: *const Work, task: *const Task) bool {
         for (task.requests) |index| {
-            if (index != scene.none and work.requests.items[index].pyramid == null) return false;
+            if (index == scene.none) continue;
+            const request = &work.requests.items[index];
+            if (request.pyramid == null and !request.is_blank) return false;
         }
         return true;
     }
@@ -390,6 +403,7 @@ const Work = struct {
         lookups: *std.ArrayList(world.Lookup),
     ) error{OutOfMemory}!MaterialUse {
         const first = lookups.items.len;
+        var layer_count: u32 = 0;
         const material = &work.from.materials[index];
         if (!work.is_drawn[index]) return .{};
         var alpha = product(work.vertex_alpha[index], material.base_color[3]);
@@ -400,16 +414,22 @@ const Work = struct {
             const request = &work.requests.items[request_index];
             if (request.pyramid == null) continue;
             const lookup = lookupOf(material, use, texture, request);
+            // The image has nothing of what is wanted, which counts as 1.
+            if (std.mem.allEqual(u8, &lookup.channels, missing)) continue;
             if (use == .alpha) alpha.least = 0; // Nobody has looked at the red.
             if (use == .base_color and lookup.channels[3] != missing) alpha = .{
                 .least = alpha.least * request.alpha.least,
                 .largest = alpha.largest * request.alpha.largest,
             };
             try lookups.append(arena, lookup);
+            if (lookup.slot.isOfLayers()) layer_count += 1;
         }
+        const all = lookups.items[first..];
         return .{
             .first_lookup = @intCast(first),
-            .lookup_count = @intCast(lookups.items.len - first),
+            .lookup_count = @intCast(all.len - layer_count),
+            .layer_lookup_count = layer_count,
+            .tangents = texture_use.tangentSource(material, all),
             .alpha = alpha,
             .vertex_alpha = work.vertex_alpha[index],
         };
@@ -429,59 +449,6 @@ fn join(a: AlphaRange, b: AlphaRange) AlphaRange {
 
 fn product(range: AlphaRange, factor: f32) AlphaRange {
     return .{ .least = range.least * factor, .largest = range.largest * factor };
-}
-
-/// What a material has textures for.
-const Use = enum {
-    base_color,
-    alpha,
-    metallic_roughness,
-    normal,
-    occlusion,
-    emissive,
-
-    fn slot(use: Use) world.Slot {
-        return switch (use) {
-            .base_color, .alpha => .base_color,
-            .metallic_roughness => .metallic_roughness,
-            .normal => .normal,
-            .occlusion => .occlusion,
-            .emissive => .emissive,
-        };
-    }
-
-    /// Whether its colours are light, by the sRGB curve.
-    fn isLight(use: Use) bool {
-        return use == .base_color or use == .emissive;
-    }
-};
-
-/// The texture for a use, null where there is none or it has no say.
-fn viewOf(material: *const scene.Material, use: Use) ?scene.TextureView {
-    if (material.unlit and use.slot() != .base_color) return null;
-    return switch (use) {
-        .base_color => material.base_color_texture,
-        .alpha => if (material.alpha_mode == .@"opaque") null else material.alpha_texture,
-        .metallic_roughness => material.metallic_roughness_texture,
-        .normal => if (material.normal_scale == 0) null else material.normal_texture,
-        .occlusion => if (material.occlusion_strength == 0) null else material.occlusion_texture,
-        .emissive => if (std.mem.eql(f32, &material.emissive, &.{ 0, 0, 0 }))
-            null
-        else
-            material.emissive_texture,
-    };
-}
-
-/// Which channels of an image are the first, second, ... of a slot (glTF 2.0, section 3.9).
-fn channelsOf(material: *const scene.Material, use: Use) [4]u8 {
-    const has_alpha = material.alpha_mode != .@"opaque";
-    return switch (use) {
-        .base_color => .{ 0, 1, 2, if (has_alpha) 3 else missing },
-        .alpha => .{ missing, missing, missing, 0 },
-        .metallic_roughness => .{ 1, 2, missing, missing },
-        .normal, .emissive => .{ 0, 1, 2, missing },
-        .occlusion => .{ 0, missing, missing, missing },
-    };
 }
 
 fn lookupOf(
@@ -533,14 +500,15 @@ const Stored = struct {
     at: [4]u8 = @splat(missing),
 };
 
-/// Gray is red, green and blue in one, but beside alpha, whose place is the fourth.
-fn storedChannels(channel_count: u8, wanted: [4]bool, has_alpha: bool) Stored {
+/// Gray is red, green and blue in one, but beside the alpha of light, whose place is the fourth.
+fn storedChannels(channel_count: u8, request: *const Request, has_alpha: bool) Stored {
     var stored: Stored = .{};
     const is_gray = channel_count <= 2;
-    const keeps_alpha = wanted[3] and has_alpha and channel_count % 2 == 0;
+    const keeps_alpha = request.wanted[3] and has_alpha and channel_count % 2 == 0;
+    const stretches = keeps_alpha and request.is_srgb;
     for (0..3) |channel| {
-        if (!wanted[channel]) continue;
-        if (is_gray and !keeps_alpha) {
+        if (!request.wanted[channel]) continue;
+        if (is_gray and !stretches) {
             stored.at[channel] = 0;
             stored.sources[0] = 0;
             stored.count = 1;
@@ -551,25 +519,26 @@ fn storedChannels(channel_count: u8, wanted: [4]bool, has_alpha: bool) Stored {
         }
     }
     if (keeps_alpha) {
-        assert(stored.count == 3); // Only base colours have alpha, and they have all.
-        stored.at[3] = 3;
-        stored.sources[3] = channel_count - 1;
-        stored.count = 4;
+        assert(!request.is_srgb or stored.count == 3); // Base colours have alpha, and have all.
+        stored.at[3] = stored.count;
+        stored.sources[stored.count] = channel_count - 1;
+        stored.count += 1;
     }
     return stored;
 }
 
-/// The channels of decoded texels that are wanted, as the finest level. Takes the texels over where
-/// they are just that and the caller allows it.
+/// The channels of decoded texels that are wanted, as the finest level; null where there are none.
+/// Takes the texels over where they are just that and the caller allows it.
 fn store(
     gpa: Allocator,
     texels: *?Texels,
     request: *Request,
     may_take: bool,
-) error{OutOfMemory}!pyramid_file.Image {
+) error{OutOfMemory}!?pyramid_file.Image {
     const from = &texels.*.?;
     const alpha = alphaRange(from);
-    const stored = storedChannels(from.channel_count, request.wanted, alpha.least < 1);
+    const stored = storedChannels(from.channel_count, request, alpha.least < 1);
+    if (stored.count == 0) return null;
     request.stored = stored.at;
     request.channel_count = stored.count;
     if (stored.at[3] != missing) request.alpha = alpha;
@@ -834,8 +803,8 @@ test "channels that no material uses are not kept" {
         try testing.expectEqual(case[1].slot(), set.lookups[0].slot);
         try testing.expectEqual(case[3], set.lookups[0].channels);
         try testing.expectEqual(MaterialUse{
-            .first_lookup = 0,
             .lookup_count = 1,
+            .tangents = if (case[1] == .normal) .{} else null,
             .alpha = switch (case[0].alpha_mode) {
                 .blend => .{ .least = 40.0 / 255.0, .largest = 40.0 / 255.0 },
                 .mask => .{ .least = 0 },
@@ -847,6 +816,147 @@ test "channels that no material uses are not kept" {
         try testing.expectEqual(case[2].len, texture.channel_count);
         try testing.expectEqual(case[1].isLight(), texture.is_srgb);
         try testing.expectEqual(case[2].len, set.byte_count);
+    }
+}
+
+/// A material whose layers all have a say, each use with the texture of its number.
+fn layeredMaterial(view: scene.TextureView) scene.Material {
+    var material: scene.Material = .{
+        .metallic = 0,
+        .roughness = 0.5,
+        .emissive = .{ 1, 1, 1 },
+        .transmission = 1,
+        .volume = true,
+        .attenuation_color = .{ 0.5, 0.5, 0.5 },
+        .attenuation_distance = 1,
+        .specular_color = .{ 2, 2, 2 },
+        .clearcoat = 1,
+        .clearcoat_roughness = 1,
+        .sheen_color = .{ 1, 1, 1 },
+        .sheen_roughness = 1,
+        .iridescence = 1,
+        .anisotropy = 1,
+        .diffuse_transmission = 1,
+        .multiscatter_color = .{ 0.5, 0.5, 0.5 },
+    };
+    inline for (scene.texture_fields) |field| @field(material, field) = view;
+    return material;
+}
+
+test "layers' textures: which channels are kept, as light or as numbers" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const file = try TestImage.png(files.allocator(), 1, 1, 4, &.{ 10, 20, 30, 40 });
+    const colors = [_]u8{ 10, 20, 30 };
+    const Case = struct { Use, []const u8 };
+    const cases = [_]Case{
+        .{ .transmission, &.{10} },          .{ .specular, &.{40} },
+        .{ .specular_color, &colors },       .{ .glossiness, &.{40} },
+        .{ .clearcoat, &.{10} },             .{ .clearcoat_roughness, &.{20} },
+        .{ .clearcoat_normal, &colors },     .{ .sheen_color, &colors },
+        .{ .sheen_roughness, &.{40} },       .{ .iridescence, &.{10} },
+        .{ .iridescence_thickness, &.{20} }, .{ .anisotropy, &colors },
+        .{ .diffuse_transmission, &.{40} },  .{ .diffuse_transmission_color, &colors },
+        .{ .multiscatter_color, &colors },
+    };
+    try testing.expectEqual(world.Slot.count - world.Slot.base_count, cases.len);
+    const uses = std.enums.values(Use);
+    for (cases, uses[uses.len - cases.len ..]) |case, expected_use| {
+        try testing.expectEqual(expected_use, case[0]);
+        const all = layeredMaterial(.{ .texture = 0 });
+        var material = all;
+        inline for (scene.texture_fields) |field| @field(material, field) = null;
+        switch (case[0]) {
+            inline else => |use| {
+                const field = @tagName(use) ++ "_texture";
+                @field(material, field) = @field(all, field);
+            },
+        }
+        var from = try testScene(testing.allocator, &.{file}, &.{material});
+        defer from.deinit();
+        var diagnostic: Diagnostic = .{};
+        var set = try testLoad(&from, 1, &diagnostic);
+        defer set.deinit();
+        try testing.expectEqual(MaterialUse{
+            .layer_lookup_count = 1,
+            .tangents = .{}, // For the anisotropy.
+        }, set.materials[0]);
+        try testing.expectEqual(case[0].slot(), set.lookups[0].slot);
+        const texture = &set.textures.all[0];
+        try testing.expectEqualSlices(u8, case[1], texture.levels[0].texels);
+        try testing.expectEqual(case[0].isLight(), texture.is_srgb);
+        for (set.lookups[0].channels, 0..) |channel, index| {
+            const wanted: u8 = if (index < case[1].len) @intCast(index) else missing;
+            try testing.expectEqual(wanted, channel);
+        }
+    }
+}
+
+test "lookups of a material: base slots first, those of layers directly behind" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const file = try TestImage.png(files.allocator(), 1, 1, 4, &.{ 10, 20, 30, 40 });
+    const all = layeredMaterial(.{ .texture = 0, .texcoord_set = 3 });
+    var unlit = all;
+    unlit.unlit = true;
+    var plain: scene.Material = .{};
+    inline for (scene.texture_fields) |field| @field(plain, field) = @field(all, field);
+    var from = try testScene(testing.allocator, &.{file}, &.{ all, unlit, plain });
+    defer from.deinit();
+    var diagnostic: Diagnostic = .{};
+    var set = try testLoad(&from, 1, &diagnostic);
+    defer set.deinit();
+    const use = set.materials[0];
+    try testing.expectEqual(world.Slot.base_count, use.lookup_count);
+    try testing.expectEqual(world.Slot.count - world.Slot.base_count, use.layer_lookup_count);
+    for (set.lookupsOf(0), 0..) |lookup, index| {
+        try testing.expectEqual(index, @backingInt(lookup.slot));
+        try testing.expectEqual(index >= use.lookup_count, lookup.slot.isOfLayers());
+    }
+    try testing.expectEqual(3, use.tangents.?.texcoord_set);
+    // One texture of light and one of numbers, which has all channels for all who want some.
+    try testing.expectEqual(2, set.textures.all.len);
+    try testing.expectEqual(1, set.lookupsOf(1).len);
+    try testing.expectEqual(.base_color, set.lookupsOf(1)[0].slot);
+    // Without factors only those of the base are left; emissive is not, for it is 0.
+    try testing.expectEqual(world.Slot.base_count - 1, set.materials[2].lookup_count);
+    const kept = set.lookupsOf(2)[set.materials[2].lookup_count..];
+    try testing.expectEqual(2, kept.len);
+    for (kept, [_]world.Slot{ .specular, .specular_color }) |lookup, slot| {
+        try testing.expectEqual(slot, lookup.slot);
+    }
+}
+
+test "alpha as a number: alone, beside gray, and where there is none" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const view: scene.TextureView = .{ .texture = 0 };
+    const Case = struct { u8, []const u8, []const u8, ?u8 };
+    for ([_]Case{
+        .{ 2, &.{ 50, 60 }, &.{ 50, 60 }, 1 },
+        .{ 4, &.{ 10, 20, 30, 60 }, &.{ 20, 30, 60 }, 2 },
+        .{ 4, &.{ 10, 20, 30, 255 }, &.{ 20, 30 }, null },
+        .{ 3, &.{ 10, 20, 30 }, &.{ 20, 30 }, null },
+    }) |case| {
+        const file = try TestImage.png(files.allocator(), 1, 1, case[0], case[1]);
+        var from = try testScene(testing.allocator, &.{ file, file }, &.{
+            .{ .metallic_roughness_texture = view, .specular_texture = view },
+            .{ .metallic = 0, .specular = 0.5, .specular_texture = .{ .texture = 1 } },
+        });
+        defer from.deinit();
+        var diagnostic: Diagnostic = .{};
+        var set = try testLoad(&from, 1, &diagnostic);
+        defer set.deinit();
+        try testing.expectEqual(0, diagnostic.warning_count);
+        const lookups = set.lookupsOf(0);
+        const texels = set.textures.all[lookups[0].texture].levels[0].texels;
+        try testing.expectEqualSlices(u8, case[2], texels);
+        // An image that has nothing of what is wanted is no texture.
+        const alpha_count: usize = if (case[3] == null) 0 else 1;
+        if (case[3]) |channel| try testing.expectEqual(channel, lookups[1].channels[0]);
+        try testing.expectEqual(1 + alpha_count, lookups.len);
+        try testing.expectEqual(alpha_count, set.lookupsOf(1).len);
+        try testing.expectEqual(1 + alpha_count, set.textures.all.len);
     }
 }
 
@@ -1017,7 +1127,9 @@ test "threads change nothing, batches neither" {
 }
 
 test "floats become the nearest codes" {
-    const stored = storedChannels(3, .{ true, true, true, false }, false);
+    const wanted: [4]bool = .{ true, true, true, false };
+    const request: Request = .{ .image = 0, .is_srgb = true, .wanted = wanted };
+    const stored = storedChannels(3, &request, false);
     var codes: [3]u8 = undefined;
     pickFloats(3, &.{ 0.5, 2, 0 }, &stored, true, &codes);
     try testing.expectEqual([3]u8{ 188, 255, 0 }, codes);

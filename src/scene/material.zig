@@ -63,9 +63,9 @@ pub const Material = struct {
     diffuse_transmission: f32 = 0,
     diffuse_transmission_color: Vec3 = .{ 1, 1, 1 },
     /// Albedo of what fills the volume, light scattered many times included
-    /// (KHR_materials_volume_scatter), linear RGB below 1; 0: nothing does.
+    /// (KHR_materials_volume_scatter), linear RGB 0..1; 0: nothing does.
     multiscatter_color: Vec3 = .{ 0, 0, 0 },
-    /// Mean cosine of the angle that it is scattered by, -1..1 exclusive.
+    /// Mean cosine of the angle that it is scattered by, between -1 and 1.
     scatter_anisotropy: f32 = 0,
     /// Red, green, blue (sRGB) and alpha, multiplied with `base_color`.
     base_color_texture: ?TextureView = null,

@@ -1,5 +1,5 @@
-//! What the extensions of glTF's materials add to the metallic-roughness model, in f32 throughout so
-//! that lanes can gather any of their fields.
+//! What the extensions of glTF's materials add to the metallic-roughness model, in f32 throughout
+//! so that lanes can gather any of their fields.
 
 const math = @import("../math.zig");
 const Vec3 = math.Vec3;

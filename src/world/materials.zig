@@ -4,6 +4,7 @@ const math = @import("../math.zig");
 const Vec3 = math.Vec3;
 const Layers = @import("layers.zig").Layers;
 const Lookup = @import("textures.zig").Lookup;
+const Volume = @import("volume.zig").Volume;
 
 /// The metallic-roughness model of glTF 2.0 with transmission and volume.
 pub const Material = struct {
@@ -28,6 +29,8 @@ pub const Material = struct {
     unlit: f32,
     /// 1: bounds a volume, rays bend; 0: thin, they go straight on.
     volume: f32,
+    /// Index into `Materials.volumes` of what it bounds, `Volume.air` where that is nothing.
+    volume_rank: u16 = Volume.air,
     /// Multiplies x and y of normals from a texture.
     normal_scale: f32 = 1,
     /// How much of the occlusion texture counts.
@@ -38,10 +41,19 @@ pub const Material = struct {
     /// Those of slots of layers: that many, directly behind them.
     layer_lookup_count: u32 = 0,
 
-    /// Whether no light passes, wherever a surface of it is hit.
-    pub fn stopsLight(material: *const Material) bool {
-        const clear = material.transmission * (1 - material.metallic);
-        return clear == 0 and material.blend == 0 and material.alpha_cutoff < 0;
+    /// Whether no light passes, wherever a surface of it is hit. Its textures are `lookups`.
+    pub fn stopsLight(material: *const Material, lookups: []const Lookup) bool {
+        if (material.blend > 0 or material.alpha_cutoff >= 0) return false;
+        var is_metal = material.metallic == 1;
+        for (lookups) |*lookup| {
+            if (lookup.slot == .metallic_roughness) is_metal = false; // Not everywhere.
+        }
+        return is_metal or material.transmission == 0;
+    }
+
+    /// Whether light goes through, by refraction or straight on.
+    pub fn transmits(material: *const Material) bool {
+        return material.transmission * (1 - material.metallic) > 0 and material.unlit == 0;
     }
 };
 
@@ -55,6 +67,10 @@ pub const Materials = struct {
     sources: []const u32 = &.{},
     /// Of all materials, one after the other.
     lookups: []const Lookup = &.{},
+    /// What drawn materials bound, by priority.
+    volumes: []const Volume = &.{},
+    /// Some drawn material transmits.
+    has_transmission: bool = false,
     /// Some drawn material lets shadow rays through in part (blend or transmission).
     has_transparency: bool,
     /// Some drawn material has holes (mask).

@@ -8,9 +8,9 @@ const std = @import("std");
 const c = @import("../cgltf.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
+const text = @import("extension_text.zig");
 const Source = @import("source.zig");
 const Textures = @import("textures.zig");
-const Allocator = std.mem.Allocator;
 const Error = Source.Error;
 
 const extension_name = "EXT_lights_image_based";
@@ -24,7 +24,7 @@ const Light = struct {
 /// Surrounds the scene with the light that the shown one names, if it does.
 pub fn read(source: *Source, textures: *Textures, shown: *const c.cgltf_scene) Error!void {
     const list = Source.slice(shown.extensions, shown.extensions_count);
-    const reference = find(list) orelse return;
+    const reference = text.find(list, extension_name) orelse return;
     var arena_state: std.heap.ArenaAllocator = .init(source.gpa);
     defer arena_state.deinit();
     const arena = arena_state.allocator();
@@ -32,8 +32,10 @@ pub fn read(source: *Source, textures: *Textures, shown: *const c.cgltf_scene) E
     const Lights = struct { lights: []const Light };
     const data = source.data;
     const all = Source.slice(data.data_extensions, data.data_extensions_count);
-    const use = try parse(Use, arena, reference) orelse return leaveOut(source, "has no light");
-    const lights = try parse(Lights, arena, find(all) orelse "") orelse
+    const use = try text.parse(Use, arena, reference) orelse
+        return leaveOut(source, "has no light");
+    const described = text.find(all, extension_name) orelse "";
+    const lights = try text.parse(Lights, arena, described) orelse
         return leaveOut(source, "is not as it should be");
     if (use.light >= lights.lights.len) return leaveOut(source, "names a light that is not there");
     const light = &lights.lights[use.light];
@@ -61,24 +63,6 @@ pub fn read(source: *Source, textures: *Textures, shown: *const c.cgltf_scene) E
 
 fn leaveOut(source: *const Source, comptime reason: []const u8) void {
     source.warn(extension_name ++ " " ++ reason ++ ", left out", .{});
-}
-
-/// The text of the extension; null where there is none.
-fn find(list: []const c.cgltf_extension) ?[]const u8 {
-    for (list) |*extension| {
-        if (extension.name == null or extension.data == null) continue;
-        const name = std.mem.span(@as([*:0]const u8, extension.name));
-        if (std.mem.eql(u8, name, extension_name)) return std.mem.span(extension.data);
-    }
-    return null;
-}
-
-fn parse(comptime T: type, arena: Allocator, text: []const u8) error{OutOfMemory}!?T {
-    const options: std.json.ParseOptions = .{ .ignore_unknown_fields = true };
-    return std.json.parseFromSliceLeaky(T, arena, text, options) catch |err| switch (err) {
-        error.OutOfMemory => |failure| return failure,
-        else => return null,
-    };
 }
 
 /// From the world's directions to the cube's: the inverse of the light's rotation.

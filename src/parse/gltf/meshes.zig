@@ -15,6 +15,7 @@ const accessors = @import("../accessor.zig");
 const attributes = @import("attributes.zig");
 const Materials = @import("materials.zig");
 const Source = @import("source.zig");
+const variants = @import("variants.zig");
 const Accessor = accessors.Accessor;
 const Error = Source.Error;
 const Vec3 = math.Vec3;
@@ -23,6 +24,8 @@ const assert = std.debug.assert;
 
 source: *Source,
 materials: *Materials,
+/// The variant of materials that is shown.
+variant: ?u32,
 /// Index in the scene of a glTF mesh's first primitive, and how many are drawn.
 ranges: std.AutoHashMapUnmanaged(u32, Range) = .empty,
 positions: std.AutoHashMapUnmanaged(u32, []const Vec3) = .empty,
@@ -194,9 +197,7 @@ fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Er
             null,
         .colors = if (used.color) |index| try meshes.decodeColors(index) else null,
         .triangles = &.{},
-        .material = if (primitive.material) |material|
-            Source.indexOf(source.data.materials, material)
-        else
+        .material = variants.materialOf(source, primitive, meshes.variant) orelse
             try meshes.materials.useDefault(),
     };
     try meshes.connect(&mesh, primitive, mode, place);
@@ -230,12 +231,39 @@ fn decodeForTextures(
             }
         }
     };
-    const normal_texture = material.normal_texture orelse return;
-    if (mesh.texcoords[normal_texture.texcoord_set] == null) {
-        mesh.material = try meshes.materials.useSmooth(mesh.material);
-    } else if (mesh.normals != null) { // Without, they count for nothing.
-        if (used.tangent) |index| mesh.tangents = try meshes.decodeTangents(index);
+    try meshes.decodeForTangents(mesh, used, material);
+}
+
+/// What bends normals, or has a direction along the surface, needs tangents, or coordinates to make
+/// them of; without these it counts for nothing.
+fn decodeForTangents(
+    meshes: *Meshes,
+    mesh: *scene.Mesh,
+    used: *const attributes.Used,
+    material: *const scene.Material,
+) Error!void {
+    var lacks: Materials.Lacks = .{};
+    var needed = false;
+    inline for (.{ "normal_texture", "clearcoat_normal_texture" }) |field| {
+        if (@field(material, field)) |view| {
+            if (mesh.texcoords[view.texcoord_set] == null)
+                @field(lacks, field) = true
+            else
+                needed = true;
+        }
     }
+    const has_tangents = mesh.normals != null and used.tangent != null; // See below.
+    if (material.anisotropy > 0) {
+        const set = if (material.anisotropy_texture) |view| view.texcoord_set else 0;
+        if (!needed and !has_tangents) if (used.texcoords[set]) |index| {
+            mesh.texcoords[set] = try meshes.floats(2, &meshes.texcoords, index);
+        };
+        lacks.anisotropy = !needed and !has_tangents and mesh.texcoords[set] == null;
+        if (!lacks.anisotropy) needed = true;
+    }
+    if (lacks.any()) mesh.material = try meshes.materials.useWithout(mesh.material, lacks);
+    // Tangents of a mesh without normals count for nothing (glTF 2.0, section 3.7.2.1).
+    if (needed and has_tangents) mesh.tangents = try meshes.decodeTangents(used.tangent.?);
 }
 
 fn floats(

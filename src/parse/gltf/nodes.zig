@@ -8,9 +8,8 @@ const std = @import("std");
 const json = @import("../json.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
-const escapes = @import("../json/escapes.zig");
-const quote = @import("../../diagnostic.zig").quote;
-const Choice = @import("../../settings.zig").SceneChoice;
+const choice = @import("choice.zig");
+const Choice = @import("../../settings.zig").Choice;
 const c = @import("../cgltf.zig");
 const Source = @import("source.zig");
 const schema = @import("schema.zig");
@@ -86,56 +85,15 @@ pub fn reach(source: *const Source, places: []u32, origin: u32) Error!u32 {
 /// one; null: the file has none, and none is asked for.
 pub fn choose(
     source: *const Source,
-    choice: Choice,
+    wanted: Choice,
 ) error{ OutOfMemory, SceneUnknown }!?*const c.cgltf_scene {
     const data = source.data;
     const list = Source.slice(data.scenes, data.scenes_count);
-    switch (choice) {
-        .default => return if (data.scene != null)
-            Source.item(data.scene, 0)
-        else if (list.len > 0)
-            &list[0]
-        else
-            null,
-        .index => |index| if (index < list.len) return &list[index],
-        .name => |wanted| for (list) |*candidate| {
-            if (candidate.name == null) continue;
-            const name = try escapes.decodeString(source.gpa, std.mem.span(candidate.name));
-            defer source.gpa.free(name);
-            if (std.mem.eql(u8, name, wanted)) return candidate;
-        },
-    }
-    const known: SceneList = .{ .gpa = source.gpa, .scenes = list };
-    return switch (choice) {
-        .default => unreachable, // Has been answered.
-        inline else => |wanted| source.diagnostic.fail(
-            error.SceneUnknown,
-            if (@TypeOf(wanted) == u32) "no scene {d}; {f}" else "no scene {f}; {f}",
-            .{ if (@TypeOf(wanted) == u32) wanted else quote(wanted), known },
-        ),
-    };
+    if (try choice.find(source, list, wanted, "scene", error.SceneUnknown)) |index|
+        return &list[index];
+    if (data.scene != null) return Source.item(data.scene, 0);
+    return if (list.len > 0) &list[0] else null;
 }
-
-/// Prints the scenes of a file: index and name, if any.
-const SceneList = struct {
-    gpa: std.mem.Allocator,
-    scenes: []const c.cgltf_scene,
-
-    /// Called by `{f}`.
-    pub fn format(list: SceneList, writer: *std.Io.Writer) std.Io.Writer.Error!void {
-        if (list.scenes.len == 0) return writer.writeAll("the file has none");
-        try writer.writeAll("the file has ");
-        for (list.scenes, 0..) |*entry, index| {
-            if (index > 0) try writer.writeAll(", ");
-            try writer.print("{d}", .{index});
-            if (entry.name == null) continue;
-            const name = escapes.decodeString(list.gpa, std.mem.span(entry.name)) catch
-                continue; // An index alone will do.
-            defer list.gpa.free(name);
-            try writer.print(" {f}", .{quote(name)});
-        }
-    }
-};
 
 /// The roots of the shown scene, the first on top.
 fn pushRoots(

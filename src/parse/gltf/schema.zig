@@ -347,6 +347,12 @@ const material_extensions = [_]Field{
         optional("diffuseTransmissionColorFactor", .{ .vector = 3 }),
         optional("diffuseTransmissionColorTexture", texture_use),
     })),
+    optional("KHR_materials_volume_scatter", object(&.{
+        optional("multiscatterColorFactor", .{ .vector = 3 }),
+        optional("multiscatterColor", .{ .vector = 3 }),
+        optional("multiscatterColorTexture", texture_use),
+        optional("scatterAnisotropy", .number),
+    })),
     optional("KHR_materials_anisotropy", object(&.{
         optional("anisotropyStrength", .number),
         optional("anisotropyRotation", .number),

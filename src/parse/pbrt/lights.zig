@@ -1,16 +1,9 @@
-//! Light sources, and shapes that shine as a number of points.
+//! Light sources.
 //!
-//! In: the parameters of a LightSource; emitting shapes with their places. Out: point, spot and
-//! directional lights, the radiance of the sky, or a map of it. An emitting shape becomes
-//! `points_per_shape` spots on its surface, in even shares of its area, the same ones each time: by
-//! the R2 sequence of Roberts ("The unreasonable effectiveness of quasirandom sequences", 2018)
-//! within triangles.
-//! Each shines as much as its share of the area. A Lambertian source falls off with the cosine;
-//! our spots fall off with the square of a ramp, here from cosine 0 to 0.75, which has the same
-//! flux: (1 - 0.75) + 0.75 / 3 = 1 / 2.
+//! In: the parameters of a LightSource. Out: point, spot and directional lights, the radiance of
+//! the sky, or a map of it. Shapes that shine are surfaces that emit.
 
 const std = @import("std");
-const limits = @import("limits.zig");
 const math = @import("../../math.zig");
 const quote = @import("../../diagnostic.zig").quote;
 const scene = @import("../../scene.zig");
@@ -26,20 +19,13 @@ const Error = Input.Error;
 const Vec3 = math.Vec3;
 const Vector = math.Vec3d;
 
-/// Points that a shining shape becomes, where there are not too many of them.
-pub const points_per_shape = 16;
 /// Radiance of a sky whose map is not read, where other lights shine; without any, the scene gets
 /// the lights of scenes without lights.
 pub const unknown_sky = 0.35;
-/// Points of all shapes together, one for each at the least.
-pub const point_count_aim = 256;
 
 /// Radiance beyond which a sky is no brighter.
 const sky_max = 1e30;
 const emission_max = 1e30;
-
-/// Cosine from which the spots of emitters shine in full.
-const emitter_cosine = 0.75;
 
 /// Directive and place of a light that is being read.
 pub const Source = struct {
@@ -273,97 +259,4 @@ pub fn areaOf(geometry: *const Tessellator.Geometry, place: *const Transform) f6
         ));
     }
     return area;
-}
-
-/// Makes lights of all shapes that shine.
-pub fn placeEmitters(builder: *SceneBuilder) Error!void {
-    const emitters = builder.emitters.items;
-    if (emitters.len == 0) return;
-    const share = @max(1, point_count_aim / emitters.len);
-    const count: u32 = @intCast(@min(points_per_shape, share));
-    for (emitters) |*emitter| try placeEmitter(builder, emitter, count);
-}
-
-/// Twice the area of a triangle in the world, and its normal of that length.
-fn facing(emitter: *const SceneBuilder.Emitter, triangle: [3]u32) Vector {
-    var corners: [3]Vector = undefined;
-    for (&corners, triangle) |*corner, vertex| corner.* = cornerAt(emitter, vertex);
-    const normal = vec3d.cross(
-        vec3d.sub(corners[1], corners[0]),
-        vec3d.sub(corners[2], corners[0]),
-    );
-    // Normals do not turn where the place mirrors.
-    return if (emitter.place.determinant() < 0) vec3d.scale(normal, -1) else normal;
-}
-
-fn cornerAt(emitter: *const SceneBuilder.Emitter, vertex: u32) Vector {
-    const position = emitter.geometry.positions[vertex];
-    return emitter.place.point(.{ position[0], position[1], position[2] });
-}
-
-fn placeEmitter(
-    builder: *SceneBuilder,
-    emitter: *const SceneBuilder.Emitter,
-    count: u32,
-) Error!void {
-    var area: f64 = 0;
-    for (emitter.geometry.triangles) |triangle| {
-        const normal = facing(emitter, triangle);
-        area += 0.5 * vec3d.length(normal);
-    }
-    if (!(area > 0 and area < 1e30)) return;
-    const step = area / @as(f64, @floatFromInt(count));
-    // Off the surface, so that it does not shade its own light.
-    const lift = 1e-3 * @sqrt(area);
-    var passed: f64 = 0;
-    var made: u32 = 0;
-    for (emitter.geometry.triangles) |triangle| {
-        const normal = facing(emitter, triangle);
-        const doubled = vec3d.length(normal);
-        passed += 0.5 * doubled;
-        while (made < count and (@as(f64, @floatFromInt(made)) + 0.5) * step < passed) {
-            const at = pointWithin(emitter, triangle, made);
-            made += 1;
-            const unit = vec3d.normalize(normal) orelse continue;
-            try addPoint(builder, emitter, at, vec3d.scale(unit, lift), step);
-        }
-    }
-}
-
-/// The point of the sequence's number `index` in a triangle.
-fn pointWithin(emitter: *const SceneBuilder.Emitter, triangle: [3]u32, index: u32) Vector {
-    const number: f64 = @floatFromInt(index + 1);
-    var u = number * 0.7548776662466927;
-    var v = number * 0.5698402909980532;
-    u -= @floor(u);
-    v -= @floor(v);
-    if (u + v > 1) {
-        u = 1 - u;
-        v = 1 - v;
-    }
-    const a = cornerAt(emitter, triangle[0]);
-    const b = vec3d.sub(cornerAt(emitter, triangle[1]), a);
-    const c = vec3d.sub(cornerAt(emitter, triangle[2]), a);
-    return vec3d.add(a, vec3d.add(vec3d.scale(b, u), vec3d.scale(c, v)));
-}
-
-fn addPoint(
-    builder: *SceneBuilder,
-    emitter: *const SceneBuilder.Emitter,
-    at: Vector,
-    lift: Vector,
-    area: f64,
-) Error!void {
-    const sides: usize = if (emitter.two_sided) 2 else 1;
-    for (0..sides) |side| {
-        const way = if (side == 0) lift else vec3d.scale(lift, -1);
-        try builder.addLight(vec3d.add(at, way), way, .{
-            .kind = .spot,
-            .node = undefined,
-            .color = emitter.radiance,
-            .intensity = @floatCast(area),
-            .inner_cone_rad = std.math.acos(@as(f32, emitter_cosine)),
-            .outer_cone_rad = std.math.pi / 2.0,
-        });
-    }
 }

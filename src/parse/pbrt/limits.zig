@@ -14,8 +14,6 @@ pub const attribute_depth_max = 1 << 16;
 pub const parameter_count_max = 256;
 /// Instances of meshes in a scene.
 pub const instance_count_max: u64 = 1 << 24;
-/// Shapes that emit light.
-pub const emitter_count_max = 4096;
 /// Times that a control mesh is subdivided; more is taken as this.
 pub const subdivision_count_max = 8;
 /// Largest order of a NURBS.

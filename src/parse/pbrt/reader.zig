@@ -661,18 +661,7 @@ fn addAreaLight(
         const mesh = try builder.addMesh(back, try builder.scene.addMaterial(plain));
         try builder.instantiate(mesh, place);
     }
-    if (builder.emitters.items.len >= limits.emitter_count_max) return reader.input.warnHere(
-        "emitters",
-        "Shape: over {d} shapes shine, the others are bright but give no light",
-        .{limits.emitter_count_max},
-    );
-    try builder.emitters.append(reader.input.gpa, .{
-        .geometry = geometry,
-        .place = place.*,
-        // The mean of a picture that nobody has looked at.
-        .radiance = if (area_light.picture != null) lights.scaled(radiance, 0.5) else radiance,
-        .two_sided = area_light.two_sided,
-    });
+    builder.scene.scene.has_area_lights = true;
 }
 
 /// Completes the scene with what is known at the end of the text.
@@ -692,16 +681,16 @@ pub fn finish(reader: *Reader) Error!void {
     const projection = try view.projection(reader.input);
     if (!transforms.fitsSingle(&view.place.?))
         return reader.input.fail(0, "the camera's screen is too far away", .{});
-    try lights.placeEmitters(builder);
     scene.resolution = view.size;
     scene.sample_count = reader.sample_count;
     scene.depth = reader.depth;
-    if (builder.has_unknown_sky and builder.sky == null and builder.scene.lights.items.len > 0)
+    const has_lights = builder.scene.lights.items.len > 0 or scene.has_area_lights;
+    if (builder.has_unknown_sky and builder.sky == null and has_lights)
         builder.sky = @splat(lights.unknown_sky);
     if (builder.sky) |sky| {
         if (scene.environment == null) scene.background = sky;
         scene.ambient = spectra.luminance(sky);
-    } else if (builder.scene.lights.items.len > 0) {
+    } else if (has_lights) {
         // The file says all the light that there is.
         scene.ambient = 0;
     }

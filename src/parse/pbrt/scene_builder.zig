@@ -20,14 +20,6 @@ const Vec3 = math.Vec3;
 
 const SceneBuilder = @This();
 
-/// An area light, to become point lights once all of them are known.
-pub const Emitter = struct {
-    geometry: Geometry,
-    place: Transform,
-    radiance: Vec3,
-    two_sided: bool,
-};
-
 /// A mesh within an object, in the space of its definition.
 const Part = struct { mesh: u32, place: Transform };
 
@@ -38,7 +30,6 @@ gpa: Allocator,
 input: *Input,
 /// What has been added so far.
 scene: *scene_data.Builder,
-emitters: std.ArrayList(Emitter) = .empty,
 parts: std.ArrayList(Part) = .empty,
 /// Radiance from everywhere, of all infinite lights that shine evenly.
 sky: ?Vec3 = null,
@@ -58,7 +49,6 @@ pub fn init(input: *Input, scene: *scene_data.Builder) Allocator.Error!SceneBuil
 
 /// Frees all but the scene.
 pub fn deinit(builder: *SceneBuilder) void {
-    builder.emitters.deinit(builder.gpa);
     builder.parts.deinit(builder.gpa);
     builder.* = undefined;
 }
@@ -69,9 +59,9 @@ pub fn clear(builder: *SceneBuilder) void {
     builder.scene.meshes.clearRetainingCapacity();
     builder.scene.instances.clearRetainingCapacity();
     builder.scene.lights.clearRetainingCapacity();
-    builder.emitters.clearRetainingCapacity();
     builder.parts.clearRetainingCapacity();
     builder.scene.scene.environment = null;
+    builder.scene.scene.has_area_lights = false;
     builder.sky = null;
     builder.has_unknown_sky = false;
     builder.last_node = null;

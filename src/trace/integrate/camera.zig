@@ -25,17 +25,28 @@ pub fn primaryRays(
     const end_column: F32 = .splat(@floatFromInt(rectangle.x1));
     const end_row: F32 = .splat(@floatFromInt(rectangle.y1));
     for (&bundle.groups, 0..) |*ray, group| {
-        const first_column: f32 = @floatFromInt(rectangle.x0 + Kernel.pixelX(group, 0));
-        const first_row: f32 = @floatFromInt(rectangle.y0 + Kernel.pixelY(group, 0));
-        // Integers, which floats hold exactly.
-        const column = F32.fromArray(Kernel.lane_x).add(.splat(first_column));
-        const row = F32.fromArray(Kernel.lane_y).add(.splat(first_row));
+        const column, const row = pixels(Kernel, rectangle, group);
         const inside = column.lt(end_column).bitAnd(row.lt(end_row));
         const x = column.add(.splat(offset.x));
         const y = row.add(.splat(offset.y));
         const line = generate(Kernel.Rays, view, x, y);
         ray.* = .endless(line, .splat(ray_file.no_primitive), inside);
     }
+}
+
+/// Column and row of the pixels of a group, which floats hold exactly.
+pub inline fn pixels(
+    comptime Kernel: type,
+    rectangle: Rectangle,
+    group: usize,
+) [2]Kernel.Rays.F32 {
+    const F32 = Kernel.Rays.F32;
+    const first_column: f32 = @floatFromInt(rectangle.x0 + Kernel.pixelX(group, 0));
+    const first_row: f32 = @floatFromInt(rectangle.y0 + Kernel.pixelY(group, 0));
+    return .{
+        F32.fromArray(Kernel.lane_x).add(.splat(first_column)),
+        F32.fromArray(Kernel.lane_y).add(.splat(first_row)),
+    };
 }
 
 /// Which sample of which pixels.

@@ -15,19 +15,18 @@ const bundle_file = @import("../traverse/bundle.zig");
 const dispatch = @import("../traverse/dispatch.zig");
 const bsdf_file = @import("../shade/bsdf.zig");
 const environment_file = @import("../shade/environment.zig");
+const environment_layers = @import("environment_layers.zig");
 const lights_file = @import("environment_lights.zig");
 const path_file = @import("path.zig");
 const ray_file = @import("../traverse/ray.zig");
 const sample_file = @import("sample.zig");
 const visibility_file = @import("visibility.zig");
+const openness = environment_layers.openness;
 const EnvironmentLight = lights_file.EnvironmentLight;
 const EnvironmentLights = lights_file.EnvironmentLights;
 
 /// See `bounce`.
 const bounce_share = 1.4;
-
-/// Square of GGX's alpha of the narrowest lobe that lights are weighed by.
-const lobe_alpha_squared_min = 0.2;
 
 /// How a bundle's vertices are lit.
 pub fn Vertices(comptime Kernel: type) type {
@@ -36,6 +35,8 @@ pub fn Vertices(comptime Kernel: type) type {
         all: *const [Kernel.group_count]path_file.Vertex(Kernel.Rays),
         /// Lanes whose reflection is traced: only the diffuse part is missing.
         traced: *const [Kernel.group_count]Kernel.Rays.Mask,
+        /// The same of a coat's reflection.
+        coat_traced: *const [Kernel.group_count]Kernel.Rays.Mask,
         /// No rays go on from here.
         is_end: bool,
     };
@@ -156,10 +157,17 @@ pub fn addLight(
     for (lights.ofSample(sample)) |part| for (part) |*light| {
         ray_count += addShadow(Kernel, visibility, light, vertices, coherence, &receivers);
     };
-    for (&receivers, vertices.all, vertices.traced, radiance) |*receiver, *vertex, traced, *sum| {
+    for (&receivers, vertices.all, radiance, 0..) |*receiver, *vertex, *sum, group| {
         if (receiver.lit.none()) continue;
         const is_end = vertices.is_end;
-        const scattered = receiver.scatter(environment, lights.mean, vertex, traced, is_end);
+        const traced = vertices.traced[group];
+        var scattered = receiver.scatter(environment, lights.mean, vertex, traced, is_end);
+        if (vertex.bsdf.layered) {
+            const coat_traced = vertices.coat_traced[group];
+            const further = &receiver.further;
+            scattered = scattered
+                .add(further.scatter(environment, vertex, receiver.lit, coat_traced));
+        }
         const none: Kernel.Rays.Vec3 = .splat(.{ 0, 0, 0 });
         const seen = vertex.throughput.mul(scattered);
         sum.* = sum.add(.select(receiver.lit, seen, none));
@@ -184,11 +192,18 @@ fn addShadow(
         facing.* = .splat(false);
         ray.active = facing.*;
         if (receiver.lit.none()) continue;
-        const point = &vertices.all[group].point;
+        const vertex = &vertices.all[group];
+        const point = &vertex.point;
         facing.* = receiver.lit.bitAnd(isFacing(Rays, point, .splat(light.to_light)));
+        var away = point.normal_geometric;
+        if (vertex.bsdf.layered) {
+            const behind = receiver.lit.bitAnd(vertex.bsdf.isBehind(point, .splat(light.to_light)));
+            facing.* = facing.bitOr(behind);
+            away = .select(behind, away.neg(), away);
+        }
         if (facing.none()) continue;
         const primitive = vertices.path.bundle.groups[group].closest.primitive;
-        const end = point.offsetOrigin(point.normal_geometric, .zero());
+        const end = point.offsetOrigin(away, .zero());
         ray.* = visibility_file.shadowRay(Rays, &light.source, end, primitive, facing.*);
         ray_count += facing.popCount();
     }
@@ -201,7 +216,16 @@ fn addShadow(
         const white: Rays.Vec3 = .splat(.{ 1, 1, 1 });
         const hidden: Rays.Vec3 = .select(facing, white.sub(transmittance), none);
         const counted = hidden.scale(.splat(light.weight));
-        receiver.addLight(&receiver.hidden, &vertices.all[group], light, counted);
+        const vertex = &vertices.all[group];
+        if (!vertex.bsdf.layered) {
+            receiver.addLight(&receiver.hidden, vertex, light, counted);
+            continue;
+        }
+        const front = isFacing(Rays, &vertex.point, .splat(light.to_light));
+        const in_front: Rays.Vec3 = .select(front, counted, none);
+        receiver.addLight(&receiver.hidden, vertex, light, in_front);
+        const further = &receiver.further;
+        further.addLight(&further.hidden, vertex, light, in_front, counted.sub(in_front));
     }
     return ray_count;
 }
@@ -226,6 +250,8 @@ fn ReceiverOf(comptime Lanes: type) type {
         /// Of all lights, and of those that are hidden.
         whole: Sums,
         hidden: Sums,
+        /// Of vertices with further lobes.
+        further: environment_layers.Receiver(Lanes),
 
         const Self = @This();
 
@@ -261,28 +287,25 @@ fn ReceiverOf(comptime Lanes: type) type {
             const point = &vertex.point;
             receiver.lit = vertex.seen.andNot(point.material.unlit);
             const alpha = point.material.roughness.mul(point.material.roughness);
-            receiver.lobe = dominant(point, alpha);
-            const squared = alpha.mul(alpha).max(.splat(lobe_alpha_squared_min));
+            receiver.lobe = environment_layers
+                .dominant(Lanes, point.normal, bsdf_file.reflect(Lanes, point), alpha);
+            const squared = alpha.mul(alpha).max(.splat(environment_layers.lobe_alpha_squared_min));
             receiver.alpha_term = squared.sub(.splat(1));
             receiver.whole = .zero;
             receiver.hidden = .zero;
             const white: Vec3 = .splat(.{ 1, 1, 1 });
+            const none: Vec3 = .splat(.{ 0, 0, 0 });
+            if (vertex.bsdf.layered) receiver.further.start(vertex);
             for (all) |*light| {
                 const facing = isFacing(Lanes, point, .splat(light.to_light));
-                const share: Vec3 = .select(facing, white, .splat(.{ 0, 0, 0 }));
+                const share: Vec3 = .select(facing, white, none);
                 receiver.addLight(&receiver.whole, vertex, light, share);
+                if (!vertex.bsdf.layered) continue;
+                const behind = vertex.bsdf.isBehind(point, .splat(light.to_light));
+                const further = &receiver.further;
+                const back: Vec3 = .select(behind, white, none);
+                further.addLight(&further.whole, vertex, light, share, back);
             }
-        }
-
-        /// Where light that a rough surface sends to the view mostly comes from: rather from above
-        /// than where a mirror would have it from (Lagarde and de Rousiers 2014, Moving Frostbite
-        /// to Physically Based Rendering, section 4.9.3).
-        fn dominant(point: anytype, alpha: F32) Vec3 {
-            const one: F32 = .splat(1);
-            const mirrored = bsdf_file.reflect(Lanes, point);
-            const smoothness = one.sub(alpha).max(.zero());
-            const share = smoothness.mul(smoothness.sqrt().add(alpha));
-            return point.normal.add(mirrored.sub(point.normal).scale(share)).normalize();
         }
 
         /// Adds some of what a light gives.
@@ -297,10 +320,8 @@ fn ReceiverOf(comptime Lanes: type) type {
             const to_light: Vec3 = .splat(light.to_light);
             const solid_angle: F32 = .splat(light.solid_angle);
             const cosine = receiver.lobe.dot(to_light).max(.splat(-1)).min(.splat(1));
-            const half = cosine.add(.splat(1)).mul(.splat(0.5));
-            const slope = half.mul(receiver.alpha_term).add(.splat(1));
             const diffuse = point.normal.dot(to_light);
-            const glossy = F32.splat(1).div(slope.mul(slope));
+            const glossy = environment_layers.glossyWeight(Lanes, cosine, receiver.alpha_term);
             const irradiance = share.mul(.splat(light.irradiance));
             const sky = share.y.mul(solid_angle);
             sums.diffuse = sums.diffuse.add(irradiance.scale(diffuse));
@@ -334,16 +355,18 @@ fn ReceiverOf(comptime Lanes: type) type {
             const bounced = around.mul(.splat(mean));
             const irradiance = environment_file
                 .irradiance(Lanes, environment, point.normal, receiver.lit)
-                .mul(openness(whole.diffuse, hidden.diffuse))
+                .mul(openness(Lanes, whole.diffuse, hidden.diffuse))
                 .add(bounced.scale(bounce(hidden.diffuse_sky, whole.diffuse_sky)));
             // Where lights tell what arrives, a texture would tell it again.
             const occlusion = if (has_lights) F32.splat(1) else point.material.occlusion;
             var sum = bsdf.diffuse_albedo.mul(irradiance).scale(occlusion);
+            if (bsdf.layered)
+                sum = sum.add(bsdf.coating.sheen_albedo.mul(irradiance).scale(occlusion));
             const untraced = receiver.lit.andNot(traced);
             if (untraced.any()) {
                 const smooth = environment_file
                     .radiance(Lanes, environment, receiver.lobe, roughness, .zero(), untraced);
-                const lobe = smooth.mul(openness(whole.glossy, hidden.glossy))
+                const lobe = smooth.mul(openness(Lanes, whole.glossy, hidden.glossy))
                     .add(bounced.scale(bounce(hidden.glossy_sky, whole.glossy_sky)));
                 const tail = whole.tail.sub(hidden.tail);
                 const counted = whole.tail_sky.min(bsdf.specular_albedo.scale(.splat(0.5)));
@@ -358,27 +381,11 @@ fn ReceiverOf(comptime Lanes: type) type {
             return sum.add(bsdf.mirror.transmitted.mul(through));
         }
 
-        /// Of the light that would arrive, the share that does; all of it where no light tells.
-        inline fn openness(whole: Vec3, hidden: Vec3) Vec3 {
-            const one: F32 = .splat(1);
-            return .{
-                .x = one.sub(shareOf(hidden.x, whole.x)),
-                .y = one.sub(shareOf(hidden.y, whole.y)),
-                .z = one.sub(shareOf(hidden.z, whole.z)),
-            };
-        }
-
-        inline fn shareOf(hidden: F32, whole: F32) F32 {
-            const known = whole.gt(.splat(1e-12));
-            const share = hidden.div(F32.select(known, whole, .splat(1)));
-            return F32.select(known, share, .zero());
-        }
-
         /// Radiance of what hides the sky, as a share of the mean, where it is white: it sees the
         /// sky itself, unless that is hidden all over.
         inline fn bounce(hidden: F32, whole: F32) F32 {
             const one: F32 = .splat(1);
-            const closed = shareOf(hidden, whole).max(.zero()).min(one);
+            const closed = environment_layers.shareOf(Lanes, hidden, whole).max(.zero()).min(one);
             return closed.mul(one.sub(closed.mul(closed))).mul(.splat(bounce_share));
         }
     };

@@ -8,7 +8,9 @@ const bundle_file = @import("../traverse/bundle.zig");
 const ray_file = @import("../traverse/ray.zig");
 const bsdf_file = @import("../shade/bsdf.zig");
 const interaction_file = @import("../shade/interaction.zig");
+const layers_file = @import("../shade/layers.zig");
 const exponential = @import("../shade/exponential.zig");
+const Nesting = @import("../shade/volumes.zig").Nesting;
 const ray_cone = @import("../shade/ray_cone.zig");
 const camera = @import("camera.zig");
 const visibility = @import("visibility.zig");
@@ -29,6 +31,8 @@ pub fn PathState(comptime Kernel: type) type {
         throughput: [Kernel.group_count]Vec3,
         /// Absorption coefficient of what the ray travels in, per metre.
         sigma_a: [Kernel.group_count]Vec3,
+        /// The volumes that it is in; none in frames without.
+        nestings: [Kernel.group_count][Kernel.ray_count]Nesting,
         /// Of the roughest surface on the way: how far the environment is spread.
         roughness: [Kernel.group_count]Kernel.Rays.F32,
         /// Ray cones (`ray_cone.zig`): width at the origin in metres, and its growth by distance;
@@ -44,6 +48,7 @@ pub fn PathState(comptime Kernel: type) type {
         pub fn start(path: *@This()) void {
             path.throughput = @splat(.splat(.{ 1, 1, 1 }));
             path.sigma_a = @splat(.splat(.{ 0, 0, 0 }));
+            path.nestings = @splat(@splat(.air));
             path.roughness = @splat(.zero());
         }
 
@@ -85,29 +90,37 @@ pub fn PathState(comptime Kernel: type) type {
             point: *const Interaction,
         ) void {
             const material = &point.material;
-            const eta = F32.select(point.back, material.ior, F32.splat(1).div(material.ior));
             const spread = before.cone_spread[group];
             const width = point.cone_width;
             const bent =
-                ray_cone.refracted(Kernel.Rays, spread, width, point.curvature, eta);
+                ray_cone.refracted(Kernel.Rays, spread, width, point.curvature, point.eta);
             path.cone_width[group] = width;
             path.cone_spread[group] = .select(material.volume, bent, spread);
         }
 
-        /// Starts the active rays of a group off a surface, on the side that `away` points to.
+        /// How rays leave a surface.
+        pub const Departure = struct {
+            point: *const Interaction,
+            /// The geometric normal on the side that they go to.
+            away: Vec3,
+            direction: Vec3,
+            /// Of the lobe around the direction.
+            roughness: F32,
+        };
+
+        /// Starts the active rays of a group off a surface.
         pub fn leave(
             path: *@This(),
             before: *const @This(),
             group: usize,
-            point: *const Interaction,
-            away: Vec3,
-            direction: Vec3,
+            departure: *const Departure,
         ) void {
-            const origin = point.offsetOrigin(away, .zero());
+            const origin = departure.point.offsetOrigin(departure.away, .zero());
             const from = before.bundle.groups[group].closest.primitive;
-            path.roughness[group] = before.roughness[group].max(point.material.roughness);
+            path.roughness[group] = before.roughness[group].max(departure.roughness);
+            path.nestings[group] = before.nestings[group];
             const ray = &path.bundle.groups[group];
-            ray.* = .endless(.init(origin, direction), from, ray.active);
+            ray.* = .endless(.init(origin, departure.direction), from, ray.active);
         }
 
         /// Takes rays of a group through a surface, into what it bounds or out of it.
@@ -117,10 +130,11 @@ pub fn PathState(comptime Kernel: type) type {
             group: usize,
             point: *const Interaction,
         ) void {
-            const material = &point.material;
-            const outside: Vec3 = .splat(.{ 0, 0, 0 });
-            const beyond: Vec3 = .select(point.back, outside, material.sigma_a);
-            path.sigma_a[group] = .select(material.volume, beyond, before.sigma_a[group]);
+            const bounds = point.material.volume;
+            path.sigma_a[group] = before.sigma_a[group];
+            if (bounds.none()) return;
+            path.sigma_a[group] = .select(bounds, point.sigma_beyond, path.sigma_a[group]);
+            path.nestings[group] = point.beyond;
         }
 
         /// Lanes of paths that go straight on behind their vertices, by group; null: none does.
@@ -178,8 +192,9 @@ pub fn PathStack(comptime Kernel: type) type {
         states: [states_max]PathState(Kernel),
         count: usize,
 
-        /// At each depth a ray leaves at most the rest of itself, a refraction and a reflection.
-        const states_max = 3 * (depth_limit + 1);
+        /// At each depth a ray leaves at most the rest of itself, a refraction for all channels and
+        /// one for each, and reflections by the base and by a coat.
+        const states_max = 7 * (depth_limit + 1);
 
         /// Room for rays of the given depth; the caller fills in the rest.
         pub fn push(
@@ -195,8 +210,8 @@ pub fn PathStack(comptime Kernel: type) type {
             return path;
         }
 
-        /// Pushes what of a path goes straight on behind holes, culled backs and blended surfaces,
-        /// if any does.
+        /// Pushes what of a path goes straight on behind holes, culled backs, blended surfaces and
+        /// hidden boundaries, if any does.
         pub fn pushRest(
             stack: *@This(),
             path: *const PathState(Kernel),
@@ -207,6 +222,7 @@ pub fn PathStack(comptime Kernel: type) type {
             const rest = stack.push(path.depth, path.transparency_depth + 1);
             rest.bundle = path.bundle;
             rest.sigma_a = path.sigma_a;
+            rest.nestings = path.nestings;
             rest.keepCones(path);
             rest.roughness = path.roughness;
             for (&rest.bundle.groups, masks, vertices, 0..) |*ray, mask, *vertex, group| {
@@ -215,6 +231,11 @@ pub fn PathStack(comptime Kernel: type) type {
                 ray.tnear = ray.closest;
                 ray.closest = .before(.splat(std.math.inf(f32)));
                 rest.throughput[group] = path.restThroughput(vertex, group);
+                var hidden = mask.bitAnd(vertex.point.hidden).bits();
+                while (hidden != 0) : (hidden &= hidden - 1) {
+                    const lane = @ctz(hidden);
+                    rest.nestings[group][lane] = vertex.point.beyond[lane];
+                }
             }
         }
 
@@ -232,6 +253,8 @@ pub fn Vertex(comptime Lanes: type) type {
     return struct {
         point: interaction_file.Interaction(Lanes),
         bsdf: bsdf_file.Bsdf(Lanes),
+        /// Undefined where the bsdf has no layers.
+        layers: layers_file.Layers(Lanes),
         /// Lanes that have a vertex.
         seen: Lanes.Mask,
         /// Throughput of the path up to here, opacity included.
@@ -243,18 +266,35 @@ pub fn Vertex(comptime Lanes: type) type {
         }
 
         /// Where the rays of a group end. Where none hit anything, all but `seen` is undefined.
-        pub fn find(vertex: *@This(), frame: *const Frame, path: anytype, group: usize) void {
+        pub fn find(vertex: *@This(), seer: anytype, path: anytype, group: usize) void {
+            const frame: *const Frame = seer.frame;
             const ray = &path.bundle.groups[group];
             vertex.seen = .splat(false);
             const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
             if (ray.active.andNot(missed).none()) return;
             const point = &vertex.point;
             visibility.findInteraction(Lanes, frame, path, group, point);
+            if (frame.materials.volumes.len > 0) seer.boundaries[group].apply(point);
             point.opacity = Lanes.F32.select(point.culled, .zero(), point.opacity);
-            vertex.bsdf.become(point);
+            if (frame.hasLayers()) vertex.findLayers(frame, path, group) else vertex.bsdf.become(point);
             vertex.seen = point.hit.bitAnd(point.opacity.gt(.zero()));
             const throughput = path.throughputAt(group, point.distance).scale(point.opacity);
             vertex.throughput = .select(vertex.seen, throughput, .splat(.{ 0, 0, 0 }));
+        }
+
+        /// Finds the BSDF in frames in which some have further lobes.
+        noinline fn findLayers(
+            vertex: *@This(),
+            frame: *const Frame,
+            path: anytype,
+            group: usize,
+        ) void {
+            const ray = &path.bundle.groups[group];
+            visibility.findLayers(Lanes, frame, ray, &vertex.point, &vertex.layers);
+            if (vertex.layers.present.any())
+                vertex.bsdf.becomeLayered(&vertex.point, &vertex.layers)
+            else
+                vertex.bsdf.become(&vertex.point);
         }
     };
 }

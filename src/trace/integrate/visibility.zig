@@ -10,10 +10,14 @@ const world_file = @import("../../world.zig");
 const statistics = @import("../../statistics.zig");
 const ray_file = @import("../traverse/ray.zig");
 const bundle_file = @import("../traverse/bundle.zig");
+const boundaries_file = @import("boundaries.zig");
+const passage_file = @import("passage.zig");
+const path_file = @import("path.zig");
 const dispatch = @import("../traverse/dispatch.zig");
 const multi_hit = @import("../traverse/multi_hit.zig");
 const triangle = @import("../traverse/triangle.zig");
 const interaction_file = @import("../shade/interaction.zig");
+const layers_file = @import("../shade/layers.zig");
 const material_file = @import("../shade/material.zig");
 const texturing = @import("../shade/texturing.zig");
 const Grid = @import("../traverse/beam/grid.zig").Grid;
@@ -48,6 +52,10 @@ pub fn Visibility(comptime Kernel: type) type {
         frame: *const Frame,
         tests: statistics.TestCounts,
         hits: multi_hit.HitLists(Kernel),
+        /// By group, of the path under way; undefined in frames without volumes.
+        boundaries: [group_count]boundaries_file.Boundaries(Kernel),
+        /// By group, of the shadow rays under way; undefined in frames where nothing transmits.
+        passages: [group_count]passage_file.Passage(Kernel),
 
         const Self = @This();
 
@@ -59,11 +67,20 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility.hits.materials = frame.materials;
         }
 
-        /// Finds what the rays of a bundle see first. A grid says that they are primary ones.
+        /// Finds what the rays of a path see first. A grid says that they are primary ones.
         /// Returns those whose hits are near to each other.
-        pub fn closest(visibility: *Self, bundle: *Bundle, grid: ?*const Grid) Coherence {
-            const geometry = visibility.frame.geometry;
-            return dispatch.closestHit(Kernel, geometry, bundle, grid, &visibility.tests);
+        pub fn closest(
+            visibility: *Self,
+            path: *path_file.PathState(Kernel),
+            grid: ?*const Grid,
+        ) Coherence {
+            const frame = visibility.frame;
+            const tests = &visibility.tests;
+            const coherence =
+                dispatch.closestHit(Kernel, frame.geometry, &path.bundle, grid, tests);
+            if (frame.materials.volumes.len > 0)
+                boundaries_file.search(Kernel, visibility, path);
+            return coherence;
         }
 
         /// Transmittance of shadow rays (`shadowRay`) of this light to vertices, in the lanes of
@@ -110,13 +127,30 @@ pub fn Visibility(comptime Kernel: type) type {
             coherence: Coherence,
             transmittances: *[group_count]Vec3,
         ) void {
-            const none: Vec3 = .splat(.{ 0, 0, 0 });
             transmittances.* = @splat(.splat(.{ 1, 1, 1 }));
-            const limit = shadowLimit(Rays, light);
             visibility.occlusionPrepass(bundle, light, coherence, transmittances);
+            const frame = visibility.frame;
+            const passages = &visibility.passages;
+            const transmits = frame.materials.has_transmission;
+            if (transmits) for (passages) |*passage| passage.start(frame);
+            visibility.weaken(bundle, light, vertices, transmittances);
+            if (transmits and frame.materials.volumes.len > 0)
+                passage_file.absorb(Kernel, passages, bundle, shadowEnd(light), transmittances);
+        }
+
+        /// By surfaces.
+        fn weaken(
+            visibility: *Self,
+            bundle: *Bundle,
+            light: *const Light,
+            vertices: anytype,
+            transmittances: *[group_count]Vec3,
+        ) void {
+            const none: Vec3 = .splat(.{ 0, 0, 0 });
             var weakened_counts: [group_count]F32 = @splat(.zero());
             for (0..transparency_depth_max / multi_hit.hits_max) |_| {
-                for (&bundle.groups) |*ray| ray.closest = limit;
+                for (&bundle.groups) |*ray|
+                    ray.closest = shadowLimit(Rays, light, ray.line.direction);
                 visibility.hits.trace(bundle, &visibility.tests);
                 var any_left = false;
                 for (&bundle.groups, transmittances, 0..) |*ray, *value, group| {
@@ -166,7 +200,7 @@ pub fn Visibility(comptime Kernel: type) type {
         /// Takes shadow rays of a group through the surfaces that they hit; those that stay active
         /// go on.
         fn attenuate(
-            visibility: *const Self,
+            visibility: *Self,
             ray: *ray_file.Ray(Rays),
             light: *const Light,
             point: *const Interaction,
@@ -179,12 +213,18 @@ pub fn Visibility(comptime Kernel: type) type {
             const stopped: Mask = .fromBits(visibility.hits.stopped[group]);
             value.* = .select(stopped.bitAnd(ray.active), none, value.*);
             ray.active = ray.active.andNot(stopped);
+            const passage = &visibility.passages[group];
+            const transmits = visibility.frame.materials.has_transmission;
+            if (transmits)
+                passage.take(&visibility.hits, group, ray.line.direction, ray.active);
             for (0..multi_hit.hits_max) |index| {
                 const next = visibility.hits.at(group, index, ray.active);
                 ray.active = ray.active.andNot(next.primitive.eq(.splat(ray_file.no_primitive)));
                 if (ray.active.none()) return;
                 ray.tnear = next;
-                const through = visibility.attenuationAt(ray, light, point, next);
+                const passing: F32 = if (transmits) .fromArray(passage.passing[index]) else one;
+                var through = visibility.attenuationAt(ray, light, point, next, passing);
+                if (transmits) through.hide(.fromBits(passage.hidden[index]));
                 value.* = .select(ray.active, value.mul(through.share), value.*);
                 weakened_count.* =
                     weakened_count.add(F32.select(through.weakens, one, .zero()));
@@ -203,6 +243,7 @@ pub fn Visibility(comptime Kernel: type) type {
             light: *const Light,
             point: *const Interaction,
             hit: ray_file.Hit(Rays),
+            passing: F32,
         ) material_file.Attenuation(Rays) {
             const Corners = interaction_file.Corners(Rays);
             const frame = visibility.frame;
@@ -211,7 +252,7 @@ pub fn Visibility(comptime Kernel: type) type {
             // Without vertex colours and textures it is the material's alone.
             if (geometry.colors.len == 0 and !frame.hasTextures()) {
                 const numbers = Corners.materialsOf(geometry, hit.primitive, ray.active);
-                return .of(&.of(all, numbers, ray.active), .white);
+                return .of(&.of(all, numbers, ray.active), .white, passing);
             }
             const corners: Corners = .of(geometry, hit.primitive, ray.active);
             const weights = triangle.edgeFunctionsOf(Rays, corners.position, ray.line);
@@ -219,7 +260,7 @@ pub fn Visibility(comptime Kernel: type) type {
             const materials: material_file.Materials(Rays) =
                 .of(all, corners.material, ray.active);
             const color = corners.colorAt(geometry, barycentrics);
-            if (!frame.hasTextures()) return .of(&materials, color);
+            if (!frame.hasTextures()) return .of(&materials, color, passing);
             // As wide as what the shadow falls on is seen; a cone with its apex in the light.
             const share: F32 = if (light.kind == .directional)
                 .splat(1)
@@ -227,7 +268,7 @@ pub fn Visibility(comptime Kernel: type) type {
                 F32.splat(1).sub(hit.t)
             else
                 hit.t;
-            return .of(&materials, texturing.colored(Rays, frame, &materials, &.{
+            const place: texturing.Place(Rays) = .{
                 .asked = ray.active,
                 .primitive = hit.primitive,
                 .barycentrics = barycentrics,
@@ -236,7 +277,10 @@ pub fn Visibility(comptime Kernel: type) type {
                     ray.line.direction.normalize(),
                     point.cone_width.mul(share),
                 ),
-            }, color));
+            };
+            const colored = texturing.colored(Rays, frame, &materials, &place, color);
+            const clear = texturing.transmission(Rays, frame, &materials, &place);
+            return .of(&materials, colored, passing.mul(clear));
         }
     };
 }
@@ -262,7 +306,8 @@ pub fn findInteraction(
     addFootprint(Lanes, frame, ray, cone, point);
 }
 
-inline fn hitOf(
+/// A group's hits in these lanes.
+pub inline fn hitOf(
     comptime Lanes: type,
     ray: *const ray_file.Ray(Lanes),
     corners: *const interaction_file.Corners(Lanes),
@@ -293,6 +338,24 @@ noinline fn addFootprint(
     texturing.apply(Lanes, frame, &corners, &hit, primitive, cone, point);
 }
 
+/// The further lobes at points (`findInteraction`), in frames in which materials have some.
+pub fn findLayers(
+    comptime Lanes: type,
+    frame: *const Frame,
+    ray: *const ray_file.Ray(Lanes),
+    point: *interaction_file.Interaction(Lanes),
+    layers: *layers_file.Layers(Lanes),
+) void {
+    const primitive = ray.closest.primitive;
+    const corners: interaction_file.Corners(Lanes) = .of(frame.geometry, primitive, point.hit);
+    const hit = hitOf(Lanes, ray, &corners, point.hit);
+    layers_file.find(Lanes, frame, &.{
+        .corners = &corners,
+        .hit = &hit,
+        .primitive = primitive,
+    }, point, layers);
+}
+
 /// The shadow rays of points off surfaces (`Interaction.offsetOrigin`), which never hit the
 /// triangle whose surface it is. Those of point and spot lights run from the light, so that all of
 /// them share an origin, but for those of `Light.from_receiver`.
@@ -304,21 +367,35 @@ pub fn shadowRay(
     active: Lanes.Mask,
 ) ray_file.Ray(Lanes) {
     const source: Lanes.Vec3 = .splat(light.position);
+    const line: ray_file.Line(Lanes) = if (light.kind == .directional)
+        .init(point, Lanes.Vec3.splat(light.direction).neg())
+    else if (light.from_receiver)
+        .init(point, source.sub(point))
+    else
+        .init(source, point.sub(source));
     return .{
-        .line = if (light.kind == .directional)
-            .init(point, Lanes.Vec3.splat(light.direction).neg())
-        else if (light.from_receiver)
-            .init(point, source.sub(point))
-        else
-            .init(source, point.sub(source)),
+        .line = line,
         .tnear = .start(),
-        .closest = shadowLimit(Lanes, light),
+        .closest = shadowLimit(Lanes, light, line.direction),
         .skip = primitive,
         .active = active,
     };
 }
 
-/// Where shadow rays end.
-fn shadowLimit(comptime Lanes: type, light: *const Light) ray_file.Hit(Lanes) {
-    return .before(.splat(if (light.kind == .directional) std.math.inf(f32) else 1));
+/// Where shadow rays leave what they go through, at the latest.
+fn shadowEnd(light: *const Light) f32 {
+    return if (light.kind == .directional) std.math.inf(f32) else 1;
+}
+
+/// Where shadow rays end: those with a light of some radius run from what they light.
+fn shadowLimit(
+    comptime Lanes: type,
+    light: *const Light,
+    direction: Lanes.Vec3,
+) ray_file.Hit(Lanes) {
+    if (light.kind == .directional) return .before(.splat(std.math.inf(f32)));
+    if (light.radius == 0) return .before(.splat(1));
+    std.debug.assert(light.from_receiver);
+    const length = direction.length().max(.splat(1e-20));
+    return .before(Lanes.F32.splat(1).sub(Lanes.F32.splat(light.radius).div(length)).max(.zero()));
 }

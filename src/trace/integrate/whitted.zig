@@ -9,7 +9,7 @@ const std = @import("std");
 const world_file = @import("../../world.zig");
 const statistics = @import("../../statistics.zig");
 const dispatch = @import("../traverse/dispatch.zig");
-const bsdf_file = @import("../shade/bsdf.zig");
+const bounces_file = @import("bounces.zig");
 const camera = @import("camera.zig");
 const direct = @import("direct.zig");
 const environment_light = @import("environment.zig");
@@ -25,14 +25,10 @@ const Rectangle = @import("../../film.zig").Rectangle;
 const assert = std.debug.assert;
 const Frame = world_file.Frame;
 
-/// A path whose throughput has fallen below this is not worth a reflection ray.
-const reflection_throughput_min = 1.0 / 256.0;
-
 /// One thread's integrator.
 pub fn Whitted(comptime Kernel: type) type {
     const Rays = Kernel.Rays;
     const F32 = Rays.F32;
-    const Mask = Rays.Mask;
     const group_count = Kernel.group_count;
     const PathState = path_file.PathState(Kernel);
     const Vertex = path_file.Vertex(Rays);
@@ -63,8 +59,7 @@ pub fn Whitted(comptime Kernel: type) type {
         /// Of the step under way.
         path: PathState,
         vertices: [group_count]Vertex,
-        /// Lanes whose reflection is traced.
-        reflected: [group_count]Mask,
+        bounces: bounces_file.Bounces(Kernel),
 
         /// To be freed by `deinit`.
         pub fn init(
@@ -104,6 +99,7 @@ pub fn Whitted(comptime Kernel: type) type {
         ) void {
             for (first_sample..first_sample + sample_count) |sample| {
                 whitted.sample.start(@intCast(sample), film.layers);
+                whitted.bounces.start(whitted.frame, rectangle, @intCast(sample));
                 whitted.pushPrimary(rectangle);
                 while (whitted.stack.pop()) |path| {
                     // A copy: what the step pushes takes its place.
@@ -131,7 +127,7 @@ pub fn Whitted(comptime Kernel: type) type {
             const path = &whitted.path;
             const primary = path.depth == 0 and path.transparency_depth == 0;
             const grid = if (primary and whitted.grid != null) &whitted.grid.? else null;
-            const beams = whitted.visibility.closest(&path.bundle, grid);
+            const beams = whitted.visibility.closest(path, grid);
             const coherence: dispatch.Coherence = if (path.depth == 0) .all else beams;
             if (path.depth == 0) whitted.rays.shadow += floor.lightShare(
                 Kernel,
@@ -156,8 +152,8 @@ pub fn Whitted(comptime Kernel: type) type {
             const around = whitted.frame.environment;
             environment_light.endRest(Kernel, around, path, &whitted.vertices, &whitted.sample);
             if (!any_seen or whitted.isEnd()) return;
-            whitted.pushRefraction();
-            whitted.pushReflection();
+            const rays = &whitted.rays.secondary;
+            rays.* += whitted.bounces.push(path, &whitted.vertices, &whitted.stack);
         }
 
         /// No rays go on from where the path's do.
@@ -168,18 +164,17 @@ pub fn Whitted(comptime Kernel: type) type {
         /// Finds the points that rays of a group see, and adds what these emit and the ambient
         /// light that they scatter.
         fn find(whitted: *Self, group: usize, vertex: *Vertex) void {
-            vertex.find(whitted.frame, &whitted.path, group);
-            const reflected = &whitted.reflected[group];
-            reflected.* = .splat(false);
+            vertex.find(&whitted.visibility, &whitted.path, group);
+            whitted.bounces.choose(group, vertex, whitted.isEnd());
             if (vertex.seen.none()) return;
-            reflected.* = whitted.reflects(vertex);
             const environment = whitted.frame.environment;
             var glow = vertex.point.material.emissive;
+            if (vertex.bsdf.layered) glow = glow.scale(vertex.bsdf.coating.below_coat);
             if (environment.map == null) glow = glow.add(environment_light.scatterAmbient(
                 Rays,
                 environment,
                 vertex,
-                reflected.*,
+                whitted.bounces.reflected[group],
                 whitted.isEnd(),
             ));
             whitted.sample.addSurface(group, vertex, glow, whitted.path.depth);
@@ -187,7 +182,6 @@ pub fn Whitted(comptime Kernel: type) type {
 
         /// Adds what the points that rays see scatter of the light that arrives.
         fn addLights(whitted: *Self, coherence: dispatch.Coherence) void {
-            const path = &whitted.path;
             const radiance = &whitted.sample.radiance;
             whitted.rays.shadow += environment_light.addLight(
                 Kernel,
@@ -195,9 +189,10 @@ pub fn Whitted(comptime Kernel: type) type {
                 &whitted.environment_lights,
                 whitted.sample.number,
                 &.{
-                    .path = path,
+                    .path = &whitted.path,
                     .all = &whitted.vertices,
-                    .traced = &whitted.reflected,
+                    .traced = &whitted.bounces.reflected,
+                    .coat_traced = &whitted.bounces.coat_reflected,
                     .is_end = whitted.isEnd(),
                 },
                 coherence,
@@ -207,75 +202,12 @@ pub fn Whitted(comptime Kernel: type) type {
                 Kernel,
                 &whitted.visibility,
                 light,
-                path,
+                &whitted.path,
                 &whitted.vertices,
+                &whitted.bounces.reflected,
                 coherence,
                 radiance,
             );
-        }
-
-        /// Lanes whose reflection is traced.
-        fn reflects(whitted: *const Self, vertex: *const Vertex) Mask {
-            if (whitted.isEnd()) return .splat(false);
-            const mirror = &vertex.bsdf.mirror;
-            const worth = vertex.throughput.mul(mirror.reflected);
-            const largest = worth.x.max(worth.y).max(worth.z);
-            const material = &vertex.point.material;
-            const smooth = material.roughness.le(.splat(bsdf_file.mirror_roughness_max));
-            return vertex.seen.bitAnd(smooth.bitOr(mirror.total))
-                .bitAnd(largest.gt(.splat(reflection_throughput_min)))
-                .andNot(material.unlit);
-        }
-
-        fn pushReflection(whitted: *Self) void {
-            const next = whitted.pushBounce(&whitted.reflected) orelse return;
-            for (whitted.reflected, &whitted.vertices, 0..) |mask, *vertex, group| {
-                if (mask.none()) continue;
-                // As long as before: what a plane mirror sends back stays linear in the pixel.
-                const length = whitted.path.bundle.groups[group].line.direction.length();
-                const point = &vertex.point;
-                const direction = bsdf_file.reflect(Rays, point).scale(length);
-                next.leave(&whitted.path, group, point, point.normal_geometric, direction);
-                next.throughput[group] = vertex.throughput.mul(vertex.bsdf.mirror.reflected);
-                next.sigma_a[group] = whitted.path.sigma_a[group];
-                if (whitted.frame.needsFootprints())
-                    next.reflectCones(&whitted.path, group, point);
-            }
-        }
-
-        fn pushRefraction(whitted: *Self) void {
-            var masks: [group_count]Mask = undefined;
-            for (&masks, &whitted.vertices) |*mask, *vertex| {
-                mask.* = .splat(false);
-                if (vertex.seen.none()) continue;
-                const worth = vertex.throughput.mul(vertex.bsdf.mirror.transmitted);
-                const largest = worth.x.max(worth.y).max(worth.z);
-                mask.* = vertex.seen.bitAnd(largest.gt(.zero()))
-                    .andNot(vertex.point.material.unlit);
-            }
-            const next = whitted.pushBounce(&masks) orelse return;
-            for (masks, &whitted.vertices, 0..) |mask, *vertex, group| {
-                if (mask.none()) continue;
-                const mirror = &vertex.bsdf.mirror;
-                const point = &vertex.point;
-                const away = point.normal_geometric.neg();
-                next.leave(&whitted.path, group, point, away, mirror.refraction);
-                next.throughput[group] = vertex.throughput.mul(mirror.transmitted);
-                next.cross(&whitted.path, group, point);
-                if (whitted.frame.needsFootprints())
-                    next.refractCones(&whitted.path, group, point);
-            }
-        }
-
-        /// Room for the rays of the next depth in these lanes, counted; null if there are none.
-        fn pushBounce(whitted: *Self, masks: *const [group_count]Mask) ?*PathState {
-            var count: u64 = 0;
-            for (masks) |mask| count += mask.popCount();
-            if (count == 0) return null;
-            whitted.rays.secondary += count;
-            const next = whitted.stack.push(whitted.path.depth + 1, 0);
-            for (&next.bundle.groups, masks) |*ray, mask| ray.active = mask;
-            return next;
         }
     };
 }

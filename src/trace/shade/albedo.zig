@@ -17,7 +17,7 @@ const simd = @import("../../simd.zig");
 const microfacet = @import("microfacet.zig");
 
 /// Least cosine that has an albedo; the fits are quotients of zeros at grazing and smooth at once.
-const cosine_least = 1e-4;
+pub const cosine_least = 1e-4;
 
 /// Least share of light that is counted as scattered more than once, in the mean over cosines:
 /// the fits know less of surfaces so smooth.
@@ -86,12 +86,17 @@ pub fn Albedo(comptime Lanes: type) type {
             const bounded = cosine.max(.splat(cosine_least)).min(one);
             const missing = horner(bounded, albedo.missing_above).mul(bounded)
                 .div(horner(bounded, albedo.missing_below));
-            const bent = horner(bounded, albedo.m_above).div(horner(bounded, albedo.m_below));
-            const m = bounded.add(bent).max(.zero()).min(one);
             return .{
                 .missing = missing.max(.zero()).min(one),
-                .schlick = microfacet.power5(Lanes, one.sub(m)),
+                .schlick = microfacet.power5(Lanes, one.sub(albedo.schlickCosine(bounded))),
             };
+        }
+
+        /// The cosine for which Schlick's weight is its mean over the lobe towards a direction at
+        /// this cosine to the normal, 1e-4..1.
+        pub inline fn schlickCosine(albedo: *const @This(), cosine: F32) F32 {
+            const bent = horner(cosine, albedo.m_above).div(horner(cosine, albedo.m_below));
+            return cosine.add(bent).max(.zero()).min(.splat(1));
         }
 
         /// `lowest` is the power of the first coefficient.

@@ -13,7 +13,11 @@ const std = @import("std");
 const simd = @import("../../simd.zig");
 const albedo_file = @import("albedo.zig");
 const microfacet = @import("microfacet.zig");
+const interface_file = @import("interface.zig");
+const transmission_file = @import("transmission.zig");
+const Coating = @import("coating.zig").Coating;
 const Interaction = @import("interaction.zig").Interaction;
+const Layers = @import("layers.zig").Layers;
 
 /// Least roughness of the lobe that lights without size and samples see: below it a highlight would
 /// be a spike of some thousandths of a steradian and some ten thousand times the light, which no
@@ -23,7 +27,7 @@ pub const highlight_roughness_least = 0.05;
 /// At grazing angles a boundary reflects all light (f90 = 1), unless it reflects less than 2 % at
 /// normal incidence, as no material does: down to an index of 1, which is no boundary, f90 falls to
 /// 0 (Lagarde and de Rousiers 2014, "Moving Frostbite to Physically Based Rendering").
-const f90_per_f0 = 50;
+pub const f90_per_f0 = 50;
 
 /// Up to this roughness reflections are traced; rougher surfaces see the ambient term instead.
 pub const mirror_roughness_max = 0.25;
@@ -56,10 +60,23 @@ pub fn Bsdf(comptime Lanes: type) type {
         diffuse: Vec3,
         /// Share of light that the base below the specular lobe does not see even so.
         multiple_base: F32,
+        /// Reflectance of the dielectric part at normal and at grazing incidence.
+        base_f0: F32,
+        base_f90: F32,
+        /// Share of light that comes to what is below the dielectric's boundary.
+        open: F32,
         mirror: Mirror(Lanes),
+        /// Share of white light from everywhere behind that leaves diffusely on this side.
+        back_albedo: Vec3,
+        /// Some lane scatters light from behind.
+        sees_behind: bool,
+        /// Some lane has further lobes: what follows is defined then.
+        layered: bool,
+        coating: Coating(Lanes),
 
         const Self = @This();
         const F32 = Lanes.F32;
+        const Mask = Lanes.Mask;
         const Vec3 = Lanes.Vec3;
         const inverse_pi: F32 = .splat(1.0 / std.math.pi);
 
@@ -75,13 +92,66 @@ pub fn Bsdf(comptime Lanes: type) type {
         /// before, what depends on the roughness alone stays where that is the same in all lanes,
         /// as it mostly is in neighbours: a fourth of the work.
         pub fn become(bsdf: *Self, point: *const Interaction(Lanes)) void {
+            const f0 = point.material.dielectric_f0;
+            bsdf.layered = false;
+            bsdf.back_albedo = .splat(.{ 0, 0, 0 });
+            bsdf.setBase(point, &.{ .f0 = f0, .f90 = grazingOf(Lanes, f0), .colors = null });
+        }
+
+        /// The same of points some of which have further lobes.
+        pub noinline fn becomeLayered(
+            bsdf: *Self,
+            point: *const Interaction(Lanes),
+            layers: *const Layers(Lanes),
+        ) void {
+            const interface: interface_file.Interface(Lanes) = .of(point, layers);
+            bsdf.setBase(point, &.{
+                .f0 = interface.dielectric_f0,
+                .f90 = interface.dielectric_f90,
+                .colors = &interface,
+            });
+            bsdf.layered = true;
+            bsdf.coating = .of(point, layers);
+            const one: F32 = .splat(1);
+            const share = F32.select(layers.present, layers.diffuse_transmission, .zero());
+            const open = bsdf.open.sub(bsdf.open.mul(point.material.transmission));
+            bsdf.back_albedo = layers.diffuse_transmission_color.min(.splat(.{ 1, 1, 1 }))
+                .scale(open.mul(share).mul(bsdf.coating.below));
+            bsdf.weaken(bsdf.coating.below, bsdf.coating.below.mul(one.sub(share)));
+        }
+
+        /// What lies above the base leaves these shares to its specular and to its diffuse part.
+        fn weaken(bsdf: *Self, specular: F32, diffuse: F32) void {
+            bsdf.specular_albedo = bsdf.specular_albedo.scale(specular);
+            bsdf.diffuse_albedo = bsdf.diffuse_albedo.scale(diffuse);
+            // Schlick's approximation is linear in both.
+            bsdf.f0 = bsdf.f0.scale(specular);
+            bsdf.f90 = bsdf.f90.mul(specular);
+            bsdf.multiple = bsdf.multiple.scale(specular);
+            bsdf.diffuse = bsdf.diffuse.scale(diffuse);
+            bsdf.mirror.reflected = bsdf.mirror.reflected.scale(specular);
+            bsdf.mirror.transmitted = bsdf.mirror.transmitted.scale(specular);
+        }
+
+        /// The dielectric's reflectance, and where channels differ the whole's.
+        const Reflectance = struct {
+            f0: F32,
+            f90: F32,
+            colors: ?*const interface_file.Interface(Lanes),
+        };
+
+        inline fn setBase(
+            bsdf: *Self,
+            point: *const Interaction(Lanes),
+            reflectance: *const Reflectance,
+        ) void {
             const one: F32 = .splat(1);
             const white: Vec3 = .splat(.{ 1, 1, 1 });
             const material = &point.material;
             const dielectric = one.sub(material.metallic);
             const base = material.base_color.min(white);
-            const base_f0 = material.dielectric_f0;
-            const base_f90 = grazingOf(base_f0);
+            const base_f0 = reflectance.f0;
+            const base_f90 = reflectance.f90;
             const cos_view = point.normal.dot(point.view).max(.splat(1e-4)).min(one);
             const boundary: Boundary(Lanes) = .of(point, cos_view);
             const albedo = &bsdf.albedo;
@@ -94,10 +164,12 @@ pub fn Bsdf(comptime Lanes: type) type {
             bsdf.f90 = base_f90;
             var scatter = splat3(Lanes, scatter_base);
             var specular = splat3(Lanes, specularOf(directional, scatter_base, base_f0, base_f90));
-            // Without metal all channels are those of the base.
-            if (!material.metallic.eq(.zero()).all()) {
-                const f0 = splat3(Lanes, base_f0.mul(dielectric))
-                    .add(base.scale(material.metallic));
+            // Without metal and colours all channels are those of the base.
+            if (reflectance.colors != null or !material.metallic.eq(.zero()).all()) {
+                const f0 = if (reflectance.colors) |colors|
+                    colors.f0
+                else
+                    splat3(Lanes, base_f0.mul(dielectric)).add(base.scale(material.metallic));
                 const f90 = base_f90.mul(dielectric).add(material.metallic);
                 inline for (.{ "x", "y", "z" }) |channel| {
                     const many = multipleOf(albedo, @field(f0, channel), f90);
@@ -113,6 +185,7 @@ pub fn Bsdf(comptime Lanes: type) type {
                 .sub(scatter_base.mul(directional.missing)).max(.zero());
             const open = F32.select(boundary.total, .zero(), below.mul(dielectric));
             const passing = open.mul(material.transmission);
+            bsdf.open = open;
             bsdf.specular_albedo = specular;
             bsdf.diffuse_albedo = base.scale(open.sub(passing));
             const rough = roughness.max(.splat(highlight_roughness_least));
@@ -124,6 +197,10 @@ pub fn Bsdf(comptime Lanes: type) type {
             const below_mean = belowMean(albedo, base_f0, base_f90, scatter_base);
             bsdf.diffuse = bsdf.diffuse_albedo.scale(inverse_pi.div(below_mean));
             bsdf.multiple_base = scatter_base;
+            bsdf.sees_behind = reflectance.colors != null or
+                material.transmission.gt(.zero()).andNot(material.volume).any();
+            bsdf.base_f0 = base_f0;
+            bsdf.base_f90 = base_f90;
             bsdf.mirror = .{
                 .reflected = specular,
                 .transmitted = base.scale(passing),
@@ -163,13 +240,50 @@ pub fn Bsdf(comptime Lanes: type) type {
             const single = schlickOf(bsdf.f0, bsdf.f90, schlick).scale(density);
             const way_in = bsdf.albedo.at(cos_light);
             const multiple = bsdf.multiple.scale(way_in.missing);
-            const base_f0 = point.material.dielectric_f0;
-            const below = one.sub(way_in.single(base_f0, grazingOf(base_f0)))
+            const below = one.sub(way_in.single(bsdf.base_f0, bsdf.base_f90))
                 .sub(bsdf.multiple_base.mul(way_in.missing)).max(.zero());
-            return .{
+            var lobes: Lobes = .{
                 .diffuse = bsdf.diffuse.scale(below.mul(cos_light)),
                 .specular = single.add(multiple).scale(cos_light),
             };
+            if (bsdf.layered) bsdf.addCoating(point, to_light, &lobes);
+            return lobes;
+        }
+
+        /// Lanes that light from a direction reaches from behind, and that send it to the view.
+        pub fn isBehind(bsdf: *const Self, point: *const Interaction(Lanes), to_light: Vec3) Mask {
+            const zero: F32 = .zero();
+            const back = bsdf.back_albedo.add(bsdf.mirror.transmitted);
+            return point.normal.dot(to_light).lt(zero)
+                .bitAnd(point.normal_geometric.dot(to_light).lt(zero))
+                .bitAnd(back.x.max(back.y).max(back.z).gt(zero));
+        }
+
+        /// `eval` of light from behind: diffusely, and through panes. Volumes bend light on its way
+        /// in and out, which lights by themselves cannot follow.
+        pub noinline fn evalBehind(
+            bsdf: *const Self,
+            point: *const Interaction(Lanes),
+            to_light: Vec3,
+        ) Vec3 {
+            const cosine = point.normal.dot(to_light).neg().max(.zero());
+            const diffuse = bsdf.back_albedo.scale(cosine.mul(inverse_pi));
+            const boundary = transmission_file.boundaryOf(Lanes, point, bsdf.alpha, point.eta);
+            const density = boundary.pdf(to_light);
+            const pane = F32.select(point.material.volume, .zero(), density);
+            return diffuse.add(bsdf.mirror.transmitted.scale(pane));
+        }
+
+        noinline fn addCoating(
+            bsdf: *const Self,
+            point: *const Interaction(Lanes),
+            to_light: Vec3,
+            lobes: *Lobes,
+        ) void {
+            const coat = bsdf.coating.evalCoat(point, to_light);
+            lobes.specular = lobes.specular.add(splat3(Lanes, coat));
+            const fibres = bsdf.coating.evalSheen(point, bsdf.cos_view, to_light);
+            lobes.diffuse = lobes.diffuse.add(fibres);
         }
 
         /// A unit vector towards light for three numbers in 0..1, with the density `pdf`: a visible
@@ -190,12 +304,12 @@ pub fn Bsdf(comptime Lanes: type) type {
             const disc = microfacet.disc(Lanes, .{ numbers[1], numbers[2] });
             const half = microfacet.visibleNormal(Lanes, view, bsdf.alpha, disc);
             const twice = view.dot(half).mul(.splat(2));
-            const mirrored = half.scale(twice).sub(view);
+            const reflected = half.scale(twice).sub(view);
             const height = F32.splat(1).sub(disc[0].mul(disc[0])).sub(disc[1].mul(disc[1]));
             const cosine = height.max(.zero()).sqrt();
             const scattered: Vec3 = .{ .x = disc[0], .y = disc[1], .z = cosine };
             const is_specular = numbers[0].lt(bsdf.specularShare());
-            const chosen: Vec3 = .select(is_specular, mirrored, scattered);
+            const chosen: Vec3 = .select(is_specular, reflected, scattered);
             return across[0].scale(chosen.x).add(across[1].scale(chosen.y))
                 .add(point.normal.scale(chosen.z)).normalize();
         }
@@ -223,10 +337,6 @@ pub fn Bsdf(comptime Lanes: type) type {
         /// Reflectance for Schlick's weight (1 - cosine)^5.
         inline fn schlickOf(f0: Vec3, f90: F32, weight: F32) Vec3 {
             return f0.add(splat3(Lanes, f90).sub(f0).scale(weight));
-        }
-
-        inline fn grazingOf(f0: F32) F32 {
-            return f0.mul(.splat(f90_per_f0)).min(.splat(1));
         }
 
         /// Light that microfacets send on more than once, as a share of what has not left after the
@@ -300,23 +410,27 @@ fn Boundary(comptime Lanes: type) type {
                 .cos_fresnel = cos_view,
                 .refraction = point.view.neg(),
             };
-            const eta = F32.select(point.back, material.ior, one.div(material.ior));
-            const sin_squared = one.sub(cos_view.mul(cos_view));
-            const cos_squared = one.sub(eta.mul(eta).mul(sin_squared));
-            const cos_inside = cos_squared.max(.zero()).sqrt();
-            const along = point.view.neg();
-            const turned = point.normal.scale(eta.mul(cos_view).sub(cos_inside));
-            const bent = along.scale(eta).add(turned);
+            const eta = point.eta;
+            const bent = transmission_file.refract(Lanes, point.view, point.normal, eta);
             // A shading normal far from the triangle's can bend light back to the same side.
-            const through = bent.dot(point.normal_geometric).lt(.zero());
-            const leaving = material.volume.bitAnd(point.back);
+            const through = bent.direction.dot(point.normal_geometric).lt(.zero());
+            const leaving = material.volume.bitAnd(eta.gt(one));
             return .{
-                .total = material.volume.bitAnd(cos_squared.lt(.zero())),
-                .cos_fresnel = F32.select(leaving, cos_inside, cos_view),
-                .refraction = .select(material.volume.bitAnd(through), bent, along),
+                .total = material.volume.bitAnd(bent.total),
+                .cos_fresnel = F32.select(leaving, bent.cos_beyond, cos_view),
+                .refraction = .select(
+                    material.volume.bitAnd(through),
+                    bent.direction,
+                    point.view.neg(),
+                ),
             };
         }
     };
+}
+
+/// Reflectance at grazing incidence for that at normal incidence, see `f90_per_f0`.
+pub inline fn grazingOf(comptime Lanes: type, f0: Lanes.F32) Lanes.F32 {
+    return f0.mul(.splat(f90_per_f0)).min(.splat(1));
 }
 
 inline fn splat3(comptime Lanes: type, value: Lanes.F32) Lanes.Vec3 {
@@ -325,9 +439,39 @@ inline fn splat3(comptime Lanes: type, value: Lanes.F32) Lanes.Vec3 {
 
 /// Unit direction of the mirror reflection; never into the point.
 pub fn reflect(comptime Lanes: type, point: *const Interaction(Lanes)) Lanes.Vec3 {
-    const mirrored = mirror(Lanes, point.view, point.normal);
-    const below = mirrored.dot(point.normal_geometric).le(.zero());
-    return .select(below, mirror(Lanes, point.view, point.normal_geometric), mirrored);
+    return mirrored(Lanes, point, point.normal);
+}
+
+/// The same about another normal.
+pub fn mirrored(
+    comptime Lanes: type,
+    point: *const Interaction(Lanes),
+    normal: Lanes.Vec3,
+) Lanes.Vec3 {
+    const direction = mirror(Lanes, point.view, normal);
+    const below = direction.dot(point.normal_geometric).le(.zero());
+    return .select(below, mirror(Lanes, point.view, point.normal_geometric), direction);
+}
+
+/// The same about a normal of microfacets of GGX's alpha that the view sees, by two numbers in
+/// 0..1.
+pub fn mirroredRough(
+    comptime Lanes: type,
+    point: *const Interaction(Lanes),
+    normal: Lanes.Vec3,
+    alpha: Lanes.F32,
+    numbers: [2]Lanes.F32,
+) Lanes.Vec3 {
+    const across = microfacet.tangents(Lanes, normal);
+    const local: Lanes.Vec3 = .{
+        .x = across[0].dot(point.view),
+        .y = across[1].dot(point.view),
+        .z = normal.dot(point.view).max(.splat(1e-4)),
+    };
+    const view = local.normalize();
+    const half = microfacet.visibleNormal(Lanes, view, alpha, microfacet.disc(Lanes, numbers));
+    return mirrored(Lanes, point, across[0].scale(half.x).add(across[1].scale(half.y))
+        .add(normal.scale(half.z)));
 }
 
 inline fn mirror(comptime Lanes: type, view: Lanes.Vec3, normal: Lanes.Vec3) Lanes.Vec3 {
@@ -353,6 +497,10 @@ fn testPoint(view: [3]f32) Interaction(Single) {
         .offset_max = .zero(),
         .cone_width = .zero(),
         .curvature = .zero(),
+        .hidden = .splat(false),
+        .eta = .splat(1.0 / 1.5),
+        .sigma_beyond = .splat(.{ 0, 0, 0 }),
+        .beyond = @splat(.air),
         .material = .{
             .base_color = .splat(.{ 1, 1, 1 }),
             .emissive = .splat(.{ 0, 0, 0 }),
@@ -589,6 +737,7 @@ test "no energy is made: reflected, transmitted and diffuse shares sum to 1 at m
                 point.material.transmission = .splat(transmission);
                 point.material.volume = .splat(transmission > 0);
                 point.back = .splat(back);
+                point.eta = .splat(if (back) 1.5 else 1.0 / 1.5);
                 const bsdf: Bsdf(Single) = .of(&point);
                 const shares = [_]Single.Vec3{
                     bsdf.specular_albedo, bsdf.diffuse_albedo, bsdf.mirror.transmitted,
@@ -665,6 +814,7 @@ test "Snell's law, total internal reflection and the thin wall" {
     try std.testing.expectApproxEqRel(-0.6 / 1.5, entering.mirror.refraction.x.lane(0), 1e-5);
     try std.testing.expect(!entering.mirror.total.lane(0));
     point.back = .splat(true);
+    point.eta = .splat(1.5);
     const leaving = Bsdf(Single).of(&point); // sin 0.6 * 1.5 = 0.9
     try std.testing.expectApproxEqRel(@as(f32, -0.9), leaving.mirror.refraction.x.lane(0), 1e-5);
     point.view = .splat(.{ 0.8, 0.6, 0 }); // sin 0.8 * 1.5 > 1

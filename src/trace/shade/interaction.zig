@@ -8,6 +8,7 @@
 const world_file = @import("../../world.zig");
 const material_file = @import("material.zig");
 const offset = @import("offset.zig");
+const Nesting = @import("volumes.zig").Nesting;
 const Unique = @import("unique.zig").Unique;
 const Frame = world_file.Frame;
 const Geometry = world_file.Geometry;
@@ -55,6 +56,14 @@ pub fn Interaction(comptime Lanes: type) type {
         /// bulges towards the ray, see `ray_cone.zig`; undefined in frames without footprints.
         cone_width: Lanes.F32,
         curvature: Lanes.F32,
+        /// Where the boundary of a volume has the same volume on both sides: it is not there.
+        hidden: Lanes.Mask,
+        /// At boundaries of volumes: the index of refraction on the side of the view over that
+        /// beyond, what light loses beyond per metre, and the volumes that are there; undefined in
+        /// frames without volumes.
+        eta: Lanes.F32,
+        sigma_beyond: Lanes.Vec3,
+        beyond: [Lanes.count]Nesting,
         material: material_file.Material(Lanes),
 
         /// The position off the surface by what rounding may do, on the side that `away`, the
@@ -196,6 +205,10 @@ pub inline fn resolve(
             .mul(.splat(offset.pads_max)),
         .cone_width = undefined,
         .curvature = undefined,
+        .hidden = .splat(false),
+        .eta = undefined,
+        .sigma_beyond = undefined,
+        .beyond = undefined,
         .material = material,
     };
 }
@@ -232,7 +245,7 @@ pub inline fn unit(comptime Lanes: type, vector: Lanes.Vec3) Lanes.Vec3 {
 
 /// The interpolated normal at unit length, on the side of the geometric one; that one itself where
 /// the vertices have none (zero).
-fn shadingNormal(
+pub fn shadingNormal(
     comptime Lanes: type,
     smooth: Lanes.Vec3,
     normal_geometric: Lanes.Vec3,

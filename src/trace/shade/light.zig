@@ -1,7 +1,8 @@
-//! Punctual lights (KHR_lights_punctual) at points in lanes, before anything stands in the way.
+//! Lights at points in lanes, before anything stands in the way.
 //!
-//! In: a light source, points. Out: the direction to it and the irradiance across that direction
-//! (inverse square, range window, cone).
+//! In: a light source, points. Out: the direction to it and the irradiance across that direction:
+//! of punctual lights (KHR_lights_punctual) by inverse square, range window and cone; of emitters
+//! by their lobe, and as a disk has it on its axis, I / (d^2 + r^2).
 
 const world_file = @import("../../world.zig");
 const Interaction = @import("interaction.zig").Interaction;
@@ -39,6 +40,15 @@ pub fn arrive(
     const reach = distance_squared.mul(.splat(light.range_inv_squared));
     const window = one.sub(reach.mul(reach)).max(.zero());
     const cosine = Lanes.Vec3.splat(light.direction).dot(to_light).neg();
+    if (light.kind == .emitter) {
+        const lobe = cosine.mul(.splat(light.cone_scale)).add(.splat(light.cone_offset));
+        const spread = distance_squared.add(.splat(light.disk));
+        return .{
+            .to_light = to_light,
+            .irradiance = Lanes.Vec3.splat(light.intensity).scale(lobe.max(.zero()).div(spread)),
+            .distance = distance,
+        };
+    }
     const cone = cosine.mul(.splat(light.cone_scale)).add(.splat(light.cone_offset))
         .max(.zero()).min(one);
     const factor = window.mul(cone.mul(cone)).div(distance_squared);

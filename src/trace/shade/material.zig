@@ -35,17 +35,22 @@ pub fn Color(comptime Lanes: type) type {
     };
 }
 
-/// Some of a scene's materials, put into lanes a field at a time: mostly there is one for all.
+/// Some of a scene's materials in lanes.
 pub fn Materials(comptime Lanes: type) type {
+    return Records(Lanes, world_file.Material);
+}
+
+/// Some records of floats, put into lanes a field at a time: mostly there is one for all.
+pub fn Records(comptime Lanes: type, comptime Record: type) type {
     return struct {
-        all: []const world_file.Material,
+        all: []const Record,
         used: Unique(Lanes),
 
         const Self = @This();
 
         /// Those with these numbers in the lanes asked for.
         pub inline fn of(
-            all: []const world_file.Material,
+            all: []const Record,
             numbers: Lanes.I32,
             asked: Lanes.Mask,
         ) Self {
@@ -64,6 +69,11 @@ pub fn Materials(comptime Lanes: type) type {
                 .y = materials.pick(name, 1),
                 .z = materials.pick(name, 2),
             };
+        }
+
+        /// A field of two floats.
+        pub inline fn pair(materials: *const Self, comptime name: []const u8) [2]Lanes.F32 {
+            return .{ materials.pick(name, 0), materials.pick(name, 1) };
         }
 
         /// A field, or a component of one.
@@ -138,17 +148,30 @@ pub fn Attenuation(comptime Lanes: type) type {
         /// Lanes where the surface is there at all: not in holes.
         weakens: Lanes.Mask,
 
-        /// Past what alpha leaves open, and in the base colour through what transmits.
-        pub inline fn of(materials: *const Materials(Lanes), color: Color(Lanes)) @This() {
+        /// Past what alpha leaves open, and in the base colour through what transmits, by a share
+        /// that textures and reflection leave of it.
+        pub inline fn of(
+            materials: *const Materials(Lanes),
+            color: Color(Lanes),
+            passing: Lanes.F32,
+        ) @This() {
             const one: Lanes.F32 = .splat(1);
             const stopped = opacity(Lanes, materials, color.alpha);
-            const base = materials.color("base_color").mul(color.rgb);
-            const clear = materials.float("transmission").mul(one.sub(materials.float("metallic")));
+            const white: Lanes.Vec3 = .splat(.{ 1, 1, 1 });
+            const base = materials.color("base_color").mul(color.rgb).min(white);
+            const clear = materials.float("transmission")
+                .mul(one.sub(materials.float("metallic"))).mul(passing);
             const rest = one.sub(stopped);
             return .{
                 .share = base.scale(clear.mul(stopped)).add(.{ .x = rest, .y = rest, .z = rest }),
                 .weakens = stopped.gt(.zero()),
             };
+        }
+
+        /// Surfaces in these lanes are not there.
+        pub inline fn hide(attenuation: *@This(), lanes: Lanes.Mask) void {
+            attenuation.share = .select(lanes, .splat(.{ 1, 1, 1 }), attenuation.share);
+            attenuation.weakens = attenuation.weakens.andNot(lanes);
         }
     };
 }

@@ -61,19 +61,32 @@ pub inline fn visibleNormal(
     alpha: Lanes.F32,
     point: [2]Lanes.F32,
 ) Lanes.Vec3 {
+    return visibleNormalOf(Lanes, view, .{ alpha, alpha }, point);
+}
+
+/// `visibleNormal` for an alpha along x and one along y.
+pub inline fn visibleNormalOf(
+    comptime Lanes: type,
+    view: Lanes.Vec3,
+    alphas: [2]Lanes.F32,
+    point: [2]Lanes.F32,
+) Lanes.Vec3 {
     const one: Lanes.F32 = .splat(1);
     // The hemisphere of which a stretched one is the surface sees the cap that its mirror images
     // towards the view fill.
-    const stretched = (Lanes.Vec3{ .x = view.x.mul(alpha), .y = view.y.mul(alpha), .z = view.z })
-        .normalize();
+    const stretched = (Lanes.Vec3{
+        .x = view.x.mul(alphas[0]),
+        .y = view.y.mul(alphas[1]),
+        .z = view.z,
+    }).normalize();
     const squared = point[0].mul(point[0]).add(point[1].mul(point[1])).min(one);
     // Lambert's equal-area projection: heights fall with the square of the radius.
     const height = one.add(stretched.z);
     const z = one.sub(squared.mul(height));
     const scale = height.mul(one.add(one).sub(squared.mul(height))).max(.zero()).sqrt();
     const half: Lanes.Vec3 = .{
-        .x = point[0].mul(scale).add(stretched.x).mul(alpha),
-        .y = point[1].mul(scale).add(stretched.y).mul(alpha),
+        .x = point[0].mul(scale).add(stretched.x).mul(alphas[0]),
+        .y = point[1].mul(scale).add(stretched.y).mul(alphas[1]),
         .z = z.add(stretched.z).max(.zero()),
     };
     const squares = half.dot(half);

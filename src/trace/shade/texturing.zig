@@ -28,6 +28,21 @@ pub fn Place(comptime Lanes: type) type {
     };
 }
 
+/// The lookups of a material for some slots.
+pub inline fn lookupsOf(
+    comptime slots: lookups_file.Slots,
+    materials: *const world_file.Materials,
+    number: u32,
+) []const Lookup {
+    const material = &materials.all[number];
+    const first = material.first_lookup;
+    return switch (slots) {
+        .base => materials.lookups[first..][0..material.lookup_count],
+        .layers => materials
+            .lookups[first + material.lookup_count ..][0..material.layer_lookup_count],
+    };
+}
+
 /// What textures say: by slot, channel and lane, 1 where there is none.
 pub fn Texels(comptime Lanes: type, comptime slots: lookups_file.Slots) type {
     return struct {
@@ -55,8 +70,8 @@ pub fn Texels(comptime Lanes: type, comptime slots: lookups_file.Slots) type {
             };
             const used = &materials.used;
             for (used.numbers[0..used.count], used.lanes[0..used.count]) |number, lanes| {
-                const lookups = lookupsOf(frame.materials, number);
-                if (lookups.len == 0) continue;
+                const lookups = lookupsOf(slots, frame.materials, number);
+                if (lookups.len == 0 and slots == .base) continue;
                 var bits = lanes.bitAnd(place.asked).bits();
                 while (bits != 0) : (bits &= bits - 1) {
                     const lane = @ctz(bits);
@@ -74,21 +89,11 @@ pub fn Texels(comptime Lanes: type, comptime slots: lookups_file.Slots) type {
                     else
                         lookups_file.sample(slots, frame, lookups, &point, &values);
                     texels.put(lane, &values);
-                    if (slot == null and lookups_file.has(lookups, .normal))
+                    if (slot == null and (slots == .layers or lookups_file.has(lookups, .normal)))
                         texels.putTangent(lane, lookups_file.tangentAt(frame.geometry, &point));
                 }
             }
             return texels;
-        }
-
-        inline fn lookupsOf(materials: *const world_file.Materials, number: u32) []const Lookup {
-            const material = &materials.all[number];
-            const first = material.first_lookup;
-            return switch (slots) {
-                .base => materials.lookups[first..][0..material.lookup_count],
-                .layers => materials
-                    .lookups[first + material.lookup_count ..][0..material.layer_lookup_count],
-            };
         }
 
         fn put(texels: *Self, lane: usize, values: *const lookups_file.Values(slots)) void {
@@ -106,7 +111,7 @@ pub fn Texels(comptime Lanes: type, comptime slots: lookups_file.Slots) type {
         }
 
         /// Tangents between the corners.
-        inline fn tangent(texels: *const Self) Lanes.Vec3 {
+        pub inline fn tangent(texels: *const Self) Lanes.Vec3 {
             const components = &texels.tangents;
             return .{
                 .x = .fromArray(components[0]),
@@ -148,6 +153,21 @@ pub fn colored(
         .rgb = color.rgb.mul(texels.vector(.base_color)),
         .alpha = color.alpha.mul(texels.float(.base_color, 3)),
     };
+}
+
+/// What textures leave of transmission.
+pub fn transmission(
+    comptime Lanes: type,
+    frame: *const Frame,
+    materials: *const material_file.Materials(Lanes),
+    place: *const Place(Lanes),
+) Lanes.F32 {
+    const used = &materials.used;
+    for (used.numbers[0..used.count]) |number| {
+        if (frame.materials.all[number].layer_lookup_count > 0) break;
+    } else return .splat(1);
+    const texels: Texels(Lanes, .layers) = .find(frame, materials, place, .transmission);
+    return texels.float(.transmission, 0);
 }
 
 /// Gives points their footprints, and what the textures of their materials say. `cone` is the

@@ -101,6 +101,12 @@ pub fn HitLists(comptime Kernel: type) type {
             return .{ .t = .fromArray(t), .primitive = .fromArray(primitive) };
         }
 
+        /// The hits of an active ray in order; none if it is stopped.
+        pub fn of(lists: *const Self, group: usize, lane: usize) []const Hit {
+            if (lists.stopped[group] >> @intCast(lane) & 1 != 0) return &.{};
+            return lists.hits[group][lane][0..lists.counts[group][lane]];
+        }
+
         /// Of the lanes asked for, a bit each, those whose triangle lets no light pass.
         pub fn stopping(lists: *const Self, primitive: Rays.I32, asked: Rays.Mask) u32 {
             const numbers = primitive.toArray();

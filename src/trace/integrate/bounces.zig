@@ -1,0 +1,329 @@
+//! Rays that go on from the vertices of paths: reflections and refractions.
+//!
+//! In: vertices. Out: rays on a stack. Smooth surfaces send one ray each way. Rays of rough ones
+//! are spread over the samples of a pixel: half of the lobe's variance, for the microfacets that
+//! they meet; the other half is left to prefiltered textures and environment, which know no noise.
+//! Glass that disperses light sends a ray for each channel.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const bsdf_file = @import("../shade/bsdf.zig");
+const camera = @import("camera.zig");
+const numbers_file = @import("numbers.zig");
+const path_file = @import("path.zig");
+const transmission = @import("../shade/transmission.zig");
+const Frame = world_file.Frame;
+const Rectangle = @import("../../film.zig").Rectangle;
+
+/// A path whose throughput has fallen below this is not worth a reflection ray.
+const reflection_throughput_min = 1.0 / 256.0;
+
+/// Up to this roughness reflections that are worth more than `rough_throughput_min` are traced, in
+/// frames with an environment map.
+const rough_traced_max = 0.5;
+
+/// See `rough_traced_max`.
+const rough_throughput_min = 1.0 / 8.0;
+
+/// Rougher lobes are spread over the samples.
+const spread_roughness_min = 0.04;
+
+/// Share of a lobe's variance that the samples are spread by; the other half is prefiltered.
+const sampled_alpha = @sqrt(0.5);
+
+/// Roughness of the prefiltered half.
+const prefiltered_roughness = @sqrt(@sqrt(0.5));
+
+/// The rays of one step of an integrator.
+pub fn Bounces(comptime Kernel: type) type {
+    const Rays = Kernel.Rays;
+    const F32 = Rays.F32;
+    const Vec3 = Rays.Vec3;
+    const Mask = Rays.Mask;
+    const group_count = Kernel.group_count;
+    const PathState = path_file.PathState(Kernel);
+    const PathStack = path_file.PathStack(Kernel);
+    const Vertex = path_file.Vertex(Rays);
+    return struct {
+        frame: *const Frame,
+        rectangle: Rectangle,
+        sample: u32,
+        /// Rough lobes are spread over the samples: there is more than light of no size to see.
+        spreads: bool,
+        /// Lanes whose reflection is traced, and those whose coat's is.
+        reflected: [group_count]Mask,
+        coat_reflected: [group_count]Mask,
+
+        const Self = @This();
+        const Vertices = [group_count]Vertex;
+
+        /// A sample of a bundle's pixels begins.
+        pub fn start(
+            bounces: *Self,
+            frame: *const Frame,
+            rectangle: Rectangle,
+            sample: u32,
+        ) void {
+            bounces.frame = frame;
+            bounces.rectangle = rectangle;
+            bounces.sample = sample;
+            bounces.spreads = frame.environment.map != null;
+        }
+
+        /// Chooses the lanes of a group whose reflections are traced; none where paths end.
+        pub fn choose(bounces: *Self, group: usize, vertex: *const Vertex, is_end: bool) void {
+            const none: Mask = .splat(false);
+            bounces.reflected[group] = none;
+            bounces.coat_reflected[group] = none;
+            if (is_end or vertex.seen.none()) return;
+            const bsdf = &vertex.bsdf;
+            const material = &vertex.point.material;
+            const lit = vertex.seen.andNot(material.unlit);
+            const worth = largest(vertex.throughput.mul(bsdf.mirror.reflected));
+            const roughness = material.roughness;
+            var traced = roughness.le(.splat(bsdf_file.mirror_roughness_max))
+                .bitOr(bsdf.mirror.total);
+            if (bounces.spreads) traced = traced.bitOr(roughness.le(.splat(rough_traced_max))
+                .bitAnd(worth.gt(.splat(rough_throughput_min))));
+            bounces.reflected[group] = lit.bitAnd(traced)
+                .bitAnd(worth.gt(.splat(reflection_throughput_min)));
+            if (!bsdf.layered) return;
+            const coating = &bsdf.coating;
+            const coat_worth = largest(vertex.throughput.scale(coating.albedo));
+            bounces.coat_reflected[group] = lit
+                .bitAnd(coating.roughness.le(.splat(bsdf_file.mirror_roughness_max)))
+                .bitAnd(coat_worth.gt(.splat(reflection_throughput_min)));
+        }
+
+        inline fn largest(color: Vec3) F32 {
+            return color.x.max(color.y).max(color.z);
+        }
+
+        /// Pushes what goes on, the last to be traced first: refractions, the coat's reflections,
+        /// reflections. Returns how many rays these are.
+        pub fn push(
+            bounces: *const Self,
+            path: *const PathState,
+            vertices: *const Vertices,
+            stack: *PathStack,
+        ) u64 {
+            const step: Step(Kernel) = .{
+                .bounces = bounces,
+                .path = path,
+                .vertices = vertices,
+                .stack = stack,
+            };
+            var count = step.pushRefractions();
+            for (bounces.coat_reflected) |mask| if (mask.any()) {
+                count += step.pushReflections(.coat);
+                break;
+            };
+            return count + step.pushReflections(.base);
+        }
+    };
+}
+
+/// One step's rays.
+fn Step(comptime Kernel: type) type {
+    const Rays = Kernel.Rays;
+    const F32 = Rays.F32;
+    const Vec3 = Rays.Vec3;
+    const Mask = Rays.Mask;
+    const group_count = Kernel.group_count;
+    const PathState = path_file.PathState(Kernel);
+    const Vertex = path_file.Vertex(Rays);
+    return struct {
+        bounces: *const Bounces(Kernel),
+        path: *const PathState,
+        vertices: *const [group_count]Vertex,
+        stack: *path_file.PathStack(Kernel),
+
+        const Self = @This();
+        const Lobe = enum { base, coat };
+
+        fn pushReflections(step: *const Self, comptime lobe: Lobe) u64 {
+            const bounces = step.bounces;
+            const masks = switch (lobe) {
+                .base => &bounces.reflected,
+                .coat => &bounces.coat_reflected,
+            };
+            const next, const count = step.room(masks) orelse return 0;
+            for (masks, step.vertices, 0..) |mask, *vertex, group| {
+                if (mask.none()) continue;
+                const point = &vertex.point;
+                const bsdf = &vertex.bsdf;
+                const roughness = switch (lobe) {
+                    .coat => bsdf.coating.roughness,
+                    else => point.material.roughness,
+                };
+                const spread = step.spreadOf(roughness);
+                const mirrored = switch (lobe) {
+                    .coat => bsdf_file.mirrored(Rays, point, bsdf.coating.normal),
+                    else => bsdf_file.reflect(Rays, point),
+                };
+                var direction = mirrored;
+                if (spread.any()) {
+                    const normal = if (lobe == .coat) bsdf.coating.normal else point.normal;
+                    const alpha = roughness.mul(roughness).mul(.splat(sampled_alpha));
+                    const found = bsdf_file
+                        .mirroredRough(Rays, point, normal, alpha, step.numbers(group));
+                    direction = .select(spread, found, mirrored);
+                }
+                // As long as before: what a plane mirror sends back stays linear in the pixel.
+                const length = step.path.bundle.groups[group].line.direction.length();
+                next.leave(step.path, group, &.{
+                    .point = point,
+                    .away = point.normal_geometric,
+                    .direction = direction.scale(length),
+                    .roughness = step.roughnessLeft(roughness, spread),
+                });
+                const share = switch (lobe) {
+                    .coat => Vec3{
+                        .x = bsdf.coating.albedo,
+                        .y = bsdf.coating.albedo,
+                        .z = bsdf.coating.albedo,
+                    },
+                    else => bsdf.mirror.reflected,
+                };
+                next.throughput[group] = vertex.throughput.mul(share);
+                next.sigma_a[group] = step.path.sigma_a[group];
+                if (bounces.frame.needsFootprints()) next.reflectCones(step.path, group, point);
+            }
+            return count;
+        }
+
+        /// Lanes whose lobe is spread over the samples.
+        inline fn spreadOf(step: *const Self, roughness: F32) Mask {
+            if (!step.bounces.spreads) return .splat(false);
+            return roughness.gt(.splat(spread_roughness_min));
+        }
+
+        /// Roughness of what is not spread over the samples.
+        inline fn roughnessLeft(_: *const Self, roughness: F32, spread: Mask) F32 {
+            return .select(spread, roughness.mul(.splat(prefiltered_roughness)), roughness);
+        }
+
+        /// Two numbers in 0..1 for the pixels of a group.
+        fn numbers(step: *const Self, group: usize) [2]F32 {
+            const bounces = step.bounces;
+            const pixels = camera.pixels(Kernel, bounces.rectangle, group);
+            return numbers_file.at(Rays, pixels, bounces.sample, step.path.depth);
+        }
+
+        fn pushRefractions(step: *const Self) u64 {
+            var plain: [group_count]Mask = undefined;
+            var dispersed: [group_count]Mask = undefined;
+            var any_dispersed = false;
+            for (&plain, &dispersed, step.vertices) |*mask, *split, *vertex| {
+                mask.* = .splat(false);
+                split.* = .splat(false);
+                if (vertex.seen.none()) continue;
+                const worth = vertex.throughput.mul(vertex.bsdf.mirror.transmitted);
+                mask.* = vertex.seen.bitAnd(worth.x.max(worth.y).max(worth.z).gt(.zero()))
+                    .andNot(vertex.point.material.unlit);
+                if (!vertex.bsdf.layered) continue;
+                const layers = &vertex.layers;
+                split.* = mask.bitAnd(layers.present).bitAnd(layers.dispersion.gt(.zero()))
+                    .bitAnd(vertex.point.material.volume);
+                mask.* = mask.andNot(split.*);
+                any_dispersed = any_dispersed or split.any();
+            }
+            var count = step.pushRefraction(&plain, null);
+            if (!any_dispersed) return count;
+            inline for (.{ "x", "y", "z" }, 0..) |name, channel| {
+                var masks: [group_count]Mask = undefined;
+                for (&masks, dispersed, step.vertices) |*mask, split, *vertex| {
+                    mask.* = split;
+                    if (split.none()) continue;
+                    const worth = vertex.throughput.mul(vertex.bsdf.mirror.transmitted);
+                    mask.* = split.bitAnd(@field(worth, name).gt(.zero()));
+                }
+                count += step.pushRefraction(&masks, channel);
+            }
+            return count;
+        }
+
+        /// Of all channels, or of one with its own index.
+        fn pushRefraction(
+            step: *const Self,
+            masks: *const [group_count]Mask,
+            comptime channel: ?usize,
+        ) u64 {
+            const next, const count = step.room(masks) orelse return 0;
+            for (masks, step.vertices, 0..) |mask, *vertex, group| {
+                if (mask.none()) continue;
+                const point = &vertex.point;
+                const passing = step.refracted(vertex, group, channel);
+                next.leave(step.path, group, &.{
+                    .point = point,
+                    .away = point.normal_geometric.neg(),
+                    .direction = passing.direction,
+                    .roughness = passing.roughness,
+                });
+                var share = vertex.bsdf.mirror.transmitted;
+                inline for (.{ "x", "y", "z" }, 0..) |name, index| {
+                    if (channel) |one| if (one != index) {
+                        @field(share, name) = .zero();
+                    };
+                }
+                next.throughput[group] = vertex.throughput.mul(share);
+                next.cross(step.path, group, point);
+                if (step.bounces.frame.needsFootprints())
+                    next.refractCones(step.path, group, point);
+            }
+            return count;
+        }
+
+        /// Light that goes through: where from, and what roughness reflections as wide would have.
+        fn refracted(
+            step: *const Self,
+            vertex: *const Vertex,
+            group: usize,
+            comptime channel: ?usize,
+        ) struct { direction: Vec3, roughness: F32 } {
+            const point = &vertex.point;
+            const material = &point.material;
+            const thick = material.volume;
+            var eta = point.eta;
+            var direction = vertex.bsdf.mirror.refraction;
+            if (channel) |index| {
+                const iors = transmission
+                    .dispersedIors(Rays, material.ior, vertex.layers.dispersion);
+                const stretch = iors[index].div(material.ior);
+                eta = .select(eta.gt(.splat(1)), eta.mul(stretch), eta.div(stretch));
+                const bent = transmission.refract(Rays, point.view, point.normal, eta).direction;
+                const through = bent.dot(point.normal_geometric).lt(.zero());
+                direction = .select(through, bent, direction);
+            }
+            const alpha = material.roughness.mul(material.roughness);
+            const equal: F32 = .select(
+                thick,
+                transmission.equalAlpha(Rays, alpha, eta),
+                transmission.thinAlpha(Rays, alpha, material.ior),
+            );
+            const roughness = equal.max(.zero()).sqrt();
+            const spread = step.spreadOf(material.roughness);
+            if (spread.any()) {
+                const sampled = alpha.mul(.splat(sampled_alpha));
+                const found = transmission.boundaryOf(Rays, point, sampled, eta)
+                    .sample(step.numbers(group));
+                direction = .select(spread, found.to_light, direction);
+            }
+            return .{ .direction = direction, .roughness = step.roughnessLeft(roughness, spread) };
+        }
+
+        /// Room for the rays of the next depth in these lanes, and how many they are; null if there
+        /// are none.
+        fn room(
+            step: *const Self,
+            masks: *const [group_count]Mask,
+        ) ?struct { *PathState, u64 } {
+            var count: u64 = 0;
+            for (masks) |mask| count += mask.popCount();
+            if (count == 0) return null;
+            const next = step.stack.push(step.path.depth + 1, 0);
+            for (&next.bundle.groups, masks) |*ray, mask| ray.active = mask;
+            return .{ next, count };
+        }
+    };
+}
