@@ -84,7 +84,7 @@ pub fn Bounces(comptime Kernel: type) type {
             const material = &vertex.point.material;
             const lit = vertex.seen.andNot(material.unlit);
             const worth = largest(vertex.throughput.mul(bsdf.mirror.reflected));
-            const roughness = material.roughness;
+            const roughness = bsdf_file.widest(Rays, bsdf, material.roughness);
             var traced = roughness.le(.splat(bsdf_file.mirror_roughness_max))
                 .bitOr(bsdf.mirror.total);
             if (bounces.spreads) traced = traced.bitOr(roughness.le(.splat(rough_traced_max))
@@ -158,7 +158,7 @@ fn Step(comptime Kernel: type) type {
                 const bsdf = &vertex.bsdf;
                 const roughness = switch (lobe) {
                     .coat => bsdf.coating.roughness,
-                    else => point.material.roughness,
+                    else => bsdf_file.widest(Rays, bsdf, point.material.roughness),
                 };
                 const spread = step.spreadOf(roughness);
                 const mirrored = switch (lobe) {
@@ -172,6 +172,12 @@ fn Step(comptime Kernel: type) type {
                     const found = bsdf_file
                         .mirroredRough(Rays, point, normal, alpha, step.numbers(group, null));
                     direction = .select(spread, found, mirrored);
+                    if (lobe == .base and bsdf.layered and bsdf.stretch.lanes.any()) {
+                        const stretched = bsdf.stretch
+                            .mirrored(point, sampled_alpha, step.numbers(group, null));
+                        direction =
+                            .select(spread.bitAnd(bsdf.stretch.lanes), stretched, direction);
+                    }
                 }
                 // As long as before: what a plane mirror sends back stays linear in the pixel.
                 const length = step.path.bundle.groups[group].line.direction.length();
