@@ -97,8 +97,8 @@ test "a range ends light by a smooth window, as KHR_lights_punctual has it" {
 }
 
 test "a spot is full within its inner cone and ends at the outer one" {
-    const cosine_inner = 0.9;
-    const cosine_outer = 0.5;
+    const cosine_inner: f32 = 0.9;
+    const cosine_outer: f32 = 0.5;
     const scale = 1 / (cosine_inner - cosine_outer);
     const light: Light = .{
         .kind = .spot,
