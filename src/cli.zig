@@ -186,8 +186,8 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--point-size PIXELS",
-            .help = comptimePrint("width of points and lines where the automatic view looks\n" ++
-                "at, {d} to {d} (default: {d})", .{
+            .help = comptimePrint("width of points and lines in the automatic view,\n" ++
+                "{d} to {d} (default: {d})", .{
                 settings.point_size.min,     settings.point_size.max,
                 settings.point_size.default,
             }),
@@ -1015,6 +1015,15 @@ test outputName {
     const pfm = try outputName(gpa, &.{ .scene = "a.glb", .write = .{ .format = .pfm } });
     defer gpa.free(pfm);
     try std.testing.expectEqualStrings("a.pfm", pfm);
+}
+
+test "points and lines are as wide as they may be" {
+    try std.testing.expectEqual(1.5, (try optionsForTest(&.{})).view.point_size);
+    const wide = try optionsForTest(&.{"--point-size=4.25"});
+    try std.testing.expectEqual(4.25, wide.view.point_size);
+    for ([_][:0]const u8{ "0", "-1", "101", "nan", "" }) |text| {
+        try std.testing.expectEqual(null, pointSizeOf(text));
+    }
 }
 
 test "the help fits a screen and says what flags take and may be" {

@@ -103,8 +103,8 @@ pub const Skin = struct {
     inverse_bind_maps: []const AffineD,
 };
 
-/// Triangles with one material, or points, or segments of lines, in the space of the node that shows
-/// them.
+/// Triangles with one material, or points, or segments of lines, in the space of the node that
+/// shows them.
 pub const Mesh = struct {
     positions: []const Vec3,
     /// One a vertex, not necessarily of unit length; null: the faces are flat.

@@ -207,3 +207,99 @@ test "surfaces that do not close, and more volumes than are kept, do no harm in 
     };
     try variants.expectAllVariants(&scene, options, image.hash());
 }
+
+/// A slab from -3 to -5 that bends no light and scatters some.
+const fog_color = [3]f32{ 0.8, 0.4, 0.1 };
+const fog_albedo = [3]f32{ 0.3, 0.9, 0.6 };
+
+fn fog(color: [3]f32, albedo: [3]f32, anisotropy: f32) Material {
+    var material = clear(1, color);
+    material.multiscatter_color = albedo;
+    material.scatter_anisotropy = anisotropy;
+    return material;
+}
+
+/// Henyey and Greenstein's phase function of a cosine of 1 or -1.
+fn phaseOf(cosine: f64, g: f64) f64 {
+    return (1 - g * g) / (4 * std.math.pi * std.math.pow(f64, 1 + g * g - 2 * g * cosine, 1.5));
+}
+
+/// What the slab scatters to the eye of light of irradiance 1 along the axis, by the midpoint rule:
+/// once, and the octaves that stand for the rest.
+fn scatteredBySlab(channel: usize, g: f64, is_forward: bool) f64 {
+    const sigma_t = -@log(@as(f64, fog_color[channel]));
+    const multi: f64 = fog_albedo[channel];
+    const root = @sqrt(9.59217 + 41.6808 * multi + 17.7126 * multi * multi);
+    const albedo = 1 - std.math.pow(f64, 4.09712 + 4.20863 * multi - root, 2);
+    const steps = 2000;
+    var sum: f64 = 0;
+    for (0..steps) |step| {
+        const s = (@as(f64, @floatFromInt(step)) + 0.5) * 2 / steps;
+        const cosine: f64 = if (is_forward) 1 else -1;
+        const depth = sigma_t * if (is_forward) 2 - s else s;
+        var arriving = @exp(-depth) * phaseOf(cosine, g);
+        var weight: f64 = 1;
+        for (1..5) |octave| {
+            const half = std.math.pow(f64, 0.5, @floatFromInt(octave));
+            weight *= albedo;
+            const gained = @exp(-depth * half) - @exp(-depth * 2 * half);
+            arriving += weight * gained * phaseOf(cosine, g * half);
+        }
+        sum += @exp(-sigma_t * s) * sigma_t * albedo * arriving * 2 / steps;
+    }
+    return sum;
+}
+
+test "a slab that scatters light from before or behind it: an integral over its depth" {
+    for ([_]f32{ 0, 0.5 }) |g| for ([_]bool{ false, true }) |is_forward| {
+        var builder: Builder = try .init();
+        try addSlab(&builder, fog(fog_color, fog_albedo, g), -3, -5);
+        const turn: [4]f32 = if (is_forward) .{ 0, 1, 0, 0 } else .{ 0, 0, 0, 1 };
+        const node = try builder.addNode(.fromTrs(.{ 0, 0, 0 }, turn, .{ 1, 1, 1 }));
+        try builder.scene.addLight(.{ .kind = .directional, .node = node, .intensity = 10 });
+        try builder.addCamera(.{ 0, 0, 0 }, 1e-3);
+        var scene = try builder.finish();
+        defer scene.deinit();
+        var image = try fixture.render(&scene, .{
+            .width = 3,
+            .height = 3,
+            .ambient = 0,
+            .depth_max = 2,
+            .sample_count = 256,
+        });
+        defer image.deinit(gpa);
+        for (0..3) |channel| {
+            var mean: f32 = 0;
+            for (image.pixels) |pixel| mean += pixel[channel] / 9;
+            const expected: f32 = @floatCast(10 * scatteredBySlab(channel, g, is_forward));
+            errdefer std.debug.print("g {d}, {}, channel {d}\n", .{ g, is_forward, channel });
+            try std.testing.expectApproxEqRel(expected, mean, 5e-3);
+        }
+    };
+}
+
+test "furnace: what scatters all light cannot be seen in light from everywhere" {
+    for ([_]f32{ 1, 0.5 }) |albedo| {
+        var builder: Builder = try .init();
+        const material = fog(@splat(0.3), @splat(albedo), -0.5);
+        try builder.addSphere(material, .{ 0, 0, -5 }, 2, 12);
+        try builder.addPointLight(.{ 0, 0, 0 }, 0);
+        try builder.addCamera(.{ 0, 0, 0 }, 0.5);
+        var scene = try builder.finish();
+        defer scene.deinit();
+        const options: fixture.Options = .{
+            .width = 16,
+            .height = 16,
+            .ambient = 1,
+            .background = .{ 1, 1, 1 },
+        };
+        var image = try fixture.render(&scene, options);
+        defer image.deinit(gpa);
+        for (image.pixels) |pixel| for (pixel) |channel| {
+            try std.testing.expect(channel > 0 and channel < 1.0001);
+            if (albedo == 1) try std.testing.expectApproxEqAbs(1, channel, 1e-4);
+        };
+        try std.testing.expect(albedo == 1 or image.at(8, 8).*[2] < 0.95);
+        try variants.expectAllVariants(&scene, options, image.hash());
+    }
+}

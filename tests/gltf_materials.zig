@@ -300,15 +300,15 @@ test "what is out of range is clamped, what makes no sense is left out, each wit
             "sheenColorFactor 2 is not in 0..1, clamped",
             .{ .sheen_color = .{ 0, 0, 1 } },
         },
-        .{ "dispersion\":{\"dispersion\":-1}", "dispersion -1 is below 0, clamped", .{} },
+        .{ "dispersion\":{\"dispersion\":-1}", "dispersion -1 is not in 0..1000000, clamped", .{} },
         .{
             "iridescence\":{\"iridescenceIor\":0.5}",
-            "iridescenceIor 0.5 is below 1, clamped",
+            "iridescenceIor 0.5 is not in 1..1000000, clamped",
             .{ .iridescence_ior = 1 },
         },
         .{
             "iridescence\":{\"iridescenceThicknessMinimum\":-5}",
-            "iridescenceThicknessMinimum -5 is below 0, clamped",
+            "iridescenceThicknessMinimum -5 is not in 0..1000000, clamped",
             .{ .iridescence_thickness_min_nm = 0 },
         },
         .{

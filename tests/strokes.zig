@@ -10,7 +10,7 @@ const gpa = std.testing.allocator;
 
 const side = 64;
 
-/// A picture of `side` pixels squared of one mesh at a node, its colours as radiance, without light.
+/// A picture of `side` pixels squared of one mesh at a node, its colours as radiance.
 fn render(mesh: raylane.scene.Mesh, scale: [3]f64, view: View) !raylane.image.Image {
     var builder: fixture.Builder = try .init();
     const node = try builder.scene.addNode(
@@ -32,7 +32,7 @@ fn render(mesh: raylane.scene.Mesh, scale: [3]f64, view: View) !raylane.image.Im
     try session.view(seen);
     try session.render(.{ .sample_count = 16 });
     const image = session.film.?.image;
-    var copy: raylane.image.Image = try .init(gpa, image.width, image.height);
+    const copy: raylane.image.Image = try .init(gpa, image.width, image.height);
     @memcpy(copy.pixels, image.pixels);
     return copy;
 }

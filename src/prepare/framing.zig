@@ -1,11 +1,12 @@
 //! Automatic framing: a camera with all of the scene in its picture, as large as a margin allows.
 //!
-//! In: the triangles, their materials and the picture's aspect; points and lines by their vertices. Out: a camera, or the direction,
-//! the middle and the distance for one that is placed otherwise. What is transparent everywhere
-//! does not count. A flat model is seen from its front, others in a three-quarter view, unless
-//! hardly a front would be seen from there; the position is the nearest that has every vertex
-//! within the frame, found on the vertices themselves, not on a box or ball around them. f64
-//! throughout, and a margin far above the rounding of the result to f32.
+//! In: the triangles, their materials and the picture's aspect; points and lines count by their
+//! vertices. Out: a camera, or the direction, the middle and the distance for one that is placed
+//! otherwise. What is transparent everywhere does not count. A flat model is seen from its front,
+//! others in a three-quarter view, unless hardly a front would be seen from there; the position is
+//! the nearest that has every vertex within the frame, found on the vertices themselves, not on a
+//! box or ball around them. f64 throughout, and a margin far above the rounding of the result to
+//! f32.
 
 const std = @import("std");
 const math = @import("../math.zig");
@@ -486,8 +487,8 @@ fn chooseBasis(shown: *const Shown, bounds: math.Box3) Basis {
     return .ofDirection(chooseDirection(shown, &turned));
 }
 
-/// The axes to look along at points and lines alone: straight at those that lie in a plane across an
-/// axis of the world.
+/// The axes to look along at points and lines alone: straight at those that lie in a plane across
+/// an axis of the world.
 fn strokeBasis(bounds: math.Box3) Basis {
     const extent = bounds.extent();
     const longest = vec3.maxComponent(extent);

@@ -33,7 +33,7 @@ pub const Effects = struct {
         const is_metal = from.metallic == 1 and from.metallic_roughness_texture == null;
         const is_tinted = from.specular != 1 or !isAll(from.specular_color, 1) or
             from.specular_texture != null or from.specular_color_texture != null;
-        // A film of no thickness is none.
+        // A film of no thickness, or of the index of air, is none.
         const film_max_nm = if (from.iridescence_thickness_texture == null)
             from.iridescence_thickness_max_nm
         else
@@ -47,7 +47,7 @@ pub const Effects = struct {
             .clearcoat = from.clearcoat > 0,
             .sheen = !isAll(from.sheen_color, 0),
             .dispersion = from.dispersion > 0 and from.volume and transmission,
-            .iridescence = from.iridescence > 0 and film_max_nm > 0,
+            .iridescence = from.iridescence > 0 and from.iridescence_ior > 1 and film_max_nm > 0,
             .anisotropy = from.anisotropy > 0,
             .diffuse_transmission = diffuse_transmission,
             .scattering = is_filled and (transmission or diffuse_transmission),
@@ -153,7 +153,8 @@ test "layers without effect are none" {
     cases[0] = .{};
     cases[1].clearcoat_roughness = 0.5;
     cases[2].sheen_roughness = 0.5;
-    cases[3].iridescence_ior = 2;
+    cases[3].iridescence = 1;
+    cases[3].iridescence_ior = 1;
     cases[4].iridescence = 1;
     cases[4].iridescence_thickness_max_nm = 0;
     cases[5].anisotropy_rotation_rad = 1;

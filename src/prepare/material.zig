@@ -43,13 +43,17 @@ pub fn place(
         has_transmission = has_transmission or used.transmits();
         has_holes = has_holes or used.alpha_cutoff >= 0;
     }
+    const volumes = try volumes_file.rank(arena, converted, layers, positions, triangles);
+    var has_scattering = false;
+    for (volumes) |*volume| has_scattering = has_scattering or volume.scatters();
     const stops_all = !has_transparency and !has_holes;
     return .{
         .all = converted,
         .layers = if (has_layers) layers else &.{},
         .sources = parts.sources,
         .lookups = textures.lookups,
-        .volumes = try volumes_file.rank(arena, converted, positions, triangles),
+        .volumes = volumes,
+        .has_scattering = has_scattering,
         .has_transmission = has_transmission,
         .has_transparency = has_transparency,
         .has_holes = has_holes,

@@ -8,6 +8,7 @@
 const std = @import("std");
 const math = @import("../math.zig");
 const world = @import("../world.zig");
+const vec3 = math.vec3;
 const vec3d = math.vec3d;
 const Allocator = std.mem.Allocator;
 const Material = world.Material;
@@ -21,6 +22,7 @@ const open_share_max = 1e-3;
 pub fn rank(
     arena: Allocator,
     materials: []Material,
+    layers: []const world.Layers,
     positions: []const [3]f32,
     triangles: []const world.Triangle,
 ) error{OutOfMemory}![]const Volume {
@@ -29,62 +31,71 @@ pub fn rank(
         if (material.volume > 0) try numbers.append(arena, @intCast(number));
     }
     if (numbers.items.len == 0) return &.{};
-    const all: []const Material = materials;
-    std.mem.sort(u32, numbers.items, all, isLess);
+    const all: Fillings = .{ .materials = materials, .layers = layers };
+    std.mem.sort(u32, numbers.items, all, Fillings.isLess);
     // The first of those that are filled with the same.
     var leaders: std.ArrayList(u32) = .empty;
     for (numbers.items, 0..) |number, index| {
-        if (index > 0 and compare(all, numbers.items[index - 1], number) == .eq) continue;
+        if (index > 0 and all.compare(numbers.items[index - 1], number) == .eq) continue;
         try leaders.append(arena, number);
     }
-    std.mem.sort(u32, leaders.items, all, comesFirst);
+    std.mem.sort(u32, leaders.items, all, Fillings.comesFirst);
     const volumes = try arena.alloc(Volume, @min(leaders.items.len, Volume.air));
     for (leaders.items, 0..) |number, index| {
         const material = &materials[number];
         const place = @min(index, volumes.len - 1);
         material.volume_rank = @intCast(place);
+        const scattering = &layers[number];
         if (index == place) volumes[place] = .{
             .ior = material.ior,
-            .sigma_t = material.sigma_a,
+            .sigma_t = vec3.add(material.sigma_a, scattering.sigma_s),
+            .sigma_s = scattering.sigma_s,
+            .scatter_anisotropy = scattering.scatter_anisotropy,
             .nests = material.transmits(),
         };
     }
     for (numbers.items[1..], 1..) |number, index| {
         const before = numbers.items[index - 1];
-        if (compare(all, before, number) == .eq)
+        if (all.compare(before, number) == .eq)
             materials[number].volume_rank = materials[before].volume_rank;
     }
     const are_drawn = try findOpen(arena, volumes, materials, positions, triangles);
     return if (are_drawn) volumes else &.{};
 }
 
-/// By what fills them, then by number.
-fn isLess(materials: []const Material, a: u32, b: u32) bool {
-    return switch (compare(materials, a, b)) {
-        .lt => true,
-        .eq => a < b,
-        .gt => false,
-    };
-}
+/// What tells volumes apart.
+const Fillings = struct {
+    materials: []const Material,
+    layers: []const world.Layers,
 
-fn compare(materials: []const Material, a: u32, b: u32) std.math.Order {
-    const first = keyOf(&materials[a]);
-    const second = keyOf(&materials[b]);
-    for (first, second) |x, y| if (x != y) return if (x < y) .lt else .gt;
-    return .eq;
-}
+    fn keyOf(all: Fillings, number: u32) [9]f32 {
+        const material = &all.materials[number];
+        const layers = &all.layers[number];
+        const transmits: f32 = if (material.transmits()) 1 else 0;
+        return [1]f32{material.ior} ++ material.sigma_a ++ layers.sigma_s ++
+            [2]f32{ layers.scatter_anisotropy, transmits };
+    }
 
-fn keyOf(material: *const Material) [5]f32 {
-    const sigma = material.sigma_a;
-    const transmits: f32 = if (material.transmits()) 1 else 0;
-    return .{ material.ior, sigma[0], sigma[1], sigma[2], transmits };
-}
+    fn compare(all: Fillings, a: u32, b: u32) std.math.Order {
+        for (all.keyOf(a), all.keyOf(b)) |x, y| if (x != y) return if (x < y) .lt else .gt;
+        return .eq;
+    }
 
-fn comesFirst(materials: []const Material, a: u32, b: u32) bool {
-    const first = materials[a].ior;
-    const second = materials[b].ior;
-    return if (first == second) a < b else first > second;
-}
+    /// By what fills them, then by number.
+    fn isLess(all: Fillings, a: u32, b: u32) bool {
+        return switch (all.compare(a, b)) {
+            .lt => true,
+            .eq => a < b,
+            .gt => false,
+        };
+    }
+
+    fn comesFirst(all: Fillings, a: u32, b: u32) bool {
+        const first = all.materials[a].ior;
+        const second = all.materials[b].ior;
+        return if (first == second) a < b else first > second;
+    }
+};
 
 /// Closed surfaces have no area as a vector, but for rounding: of others a ray may leave what it
 /// has never entered, so that those do not nest. Returns whether there are any surfaces.
@@ -139,7 +150,9 @@ const test_material: Material = .{
 test "the denser one first, among equals the lower number, the same only once" {
     var arena: std.heap.ArenaAllocator = .init(std.testing.allocator);
     defer arena.deinit();
-    var materials: [7]Material = @splat(test_material);
+    var materials: [8]Material = @splat(test_material);
+    var layers: [8]world.Layers = @splat(.{});
+    layers[7].sigma_s = .{ 0.5, 0, 0 };
     materials[0].ior = 1.33;
     materials[1].volume = 0;
     materials[2].sigma_a = .{ 9, 0, 0 };
@@ -147,25 +160,29 @@ test "the denser one first, among equals the lower number, the same only once" {
     materials[6].metallic = 1;
     materials[6].sigma_a = .{ 0, 0, 0 };
     const positions = [_][3]f32{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } };
-    const volumes = try rank(arena.allocator(), &materials, &positions, &.{
+    const volumes = try rank(arena.allocator(), &materials, &layers, &positions, &.{
         .{ .corner = .{ 0, 1, 2 }, .material = 0 },
     });
-    const expected = [_]u16{ 4, Volume.air, 1, 2, 0, 2, 3 };
+    const expected = [_]u16{ 5, Volume.air, 1, 2, 0, 2, 3, 4 };
     for (expected, materials) |place, material| {
         try std.testing.expectEqual(place, material.volume_rank);
     }
-    try std.testing.expectEqual(5, volumes.len);
-    try std.testing.expectEqual(1.33, Volume.iorOf(volumes, 4));
+    try std.testing.expectEqual(6, volumes.len);
+    try std.testing.expectEqual(1.33, Volume.iorOf(volumes, 5));
     try std.testing.expectEqual(1, Volume.iorOf(volumes, Volume.air));
     try std.testing.expectEqual([3]f32{ 1, 2, 3 }, Volume.sigmaOf(volumes, 2));
+    try std.testing.expectEqual([3]f32{ 1.5, 2, 3 }, Volume.sigmaOf(volumes, 4));
+    try std.testing.expect(volumes[4].scatters() and !volumes[2].scatters());
     try std.testing.expect(volumes[0].nests and !volumes[3].nests);
-    try std.testing.expectEqual(0, (try rank(arena.allocator(), &materials, &.{}, &.{})).len);
+    const undrawn = try rank(arena.allocator(), &materials, &layers, &.{}, &.{});
+    try std.testing.expectEqual(0, undrawn.len);
 }
 
 test "surfaces that do not close, and those that light does not enter, do not nest" {
     var arena: std.heap.ArenaAllocator = .init(std.testing.allocator);
     defer arena.deinit();
     var materials: [2]Material = @splat(test_material);
+    const layers: [2]world.Layers = @splat(.{});
     materials[1].sigma_a = .{ 0, 0, 0 };
     const positions = [_][3]f32{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 }, .{ 0, 0, 1 } };
     var triangles: [8]world.Triangle = undefined;
@@ -173,8 +190,8 @@ test "surfaces that do not close, and those that light does not enter, do not ne
         triangles[at] = .{ .corner = corner, .material = 0 };
         triangles[at + 4] = .{ .corner = corner, .material = 1 };
     }
-    const closed = try rank(arena.allocator(), &materials, &positions, &triangles);
+    const closed = try rank(arena.allocator(), &materials, &layers, &positions, &triangles);
     try std.testing.expect(closed[0].nests and closed[1].nests);
-    const open = try rank(arena.allocator(), &materials, &positions, triangles[0..7]);
+    const open = try rank(arena.allocator(), &materials, &layers, &positions, triangles[0..7]);
     try std.testing.expect(open[0].nests and !open[1].nests);
 }

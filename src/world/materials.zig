@@ -69,6 +69,8 @@ pub const Materials = struct {
     lookups: []const Lookup = &.{},
     /// What drawn materials bound, by priority.
     volumes: []const Volume = &.{},
+    /// Some of these scatter light.
+    has_scattering: bool = false,
     /// Some drawn material transmits.
     has_transmission: bool = false,
     /// Some drawn material lets shadow rays through in part (blend or transmission).

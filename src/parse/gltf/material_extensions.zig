@@ -18,6 +18,10 @@ const Textures = @import("textures.zig");
 /// Index of refraction that stands for KHR_materials_ior's 0, "Fresnel's term is 1".
 const ior_total = 1e6;
 
+/// Films of more nanometres show no colours, nor does dispersion beyond it anything that is one.
+const thickness_max_nm = 1e6;
+const dispersion_max = 1e6;
+
 /// Reflectance at normal incidence of the default index of refraction, 1.5.
 const default_f0 = 0.04;
 
@@ -55,7 +59,7 @@ pub fn readFactors(
     }
     if (raw.has_volume != 0) readVolume(factors, &raw.volume, material);
     if (raw.has_dispersion != 0)
-        material.dispersion = factors.clamp("dispersion", raw.dispersion, 0, Factors.endless);
+        material.dispersion = factors.clamp("dispersion", raw.dispersion, 0, dispersion_max);
     if (raw.has_iridescence != 0) readIridescence(factors, &raw.iridescence, material);
     if (raw.has_anisotropy != 0) readAnisotropy(factors, &raw.anisotropy, material);
     if (raw.has_diffuse_transmission != 0) {
@@ -106,15 +110,15 @@ fn readIridescence(
     raw: *const c.cgltf_iridescence,
     material: *scene.Material,
 ) void {
-    const endless = Factors.endless;
+    const most = thickness_max_nm;
     material.iridescence = factors.unit("iridescenceFactor", raw.iridescence_factor);
-    material.iridescence_ior = factors.clamp("iridescenceIor", raw.iridescence_ior, 1, endless);
+    material.iridescence_ior = factors.clamp("iridescenceIor", raw.iridescence_ior, 1, ior_total);
     const least = raw.iridescence_thickness_min;
     material.iridescence_thickness_min_nm =
-        factors.clamp("iridescenceThicknessMinimum", least, 0, endless);
+        factors.clamp("iridescenceThicknessMinimum", least, 0, most);
     const largest = raw.iridescence_thickness_max;
     material.iridescence_thickness_max_nm =
-        factors.clamp("iridescenceThicknessMaximum", largest, 0, endless);
+        factors.clamp("iridescenceThicknessMaximum", largest, 0, most);
 }
 
 fn readAnisotropy(

@@ -109,7 +109,9 @@ pub fn useUnlit(materials: *Materials, index: u32, has_colors: bool) Error!u32 {
         .unlit = true,
     };
     if (!has_colors and lit.base_color_texture == null and lit.emissive_texture == null) {
-        for (material.base_color[0..3], lit.emissive) |*channel, emitted| channel.* += emitted;
+        for (material.base_color[0..3], lit.emissive) |*channel, emitted| {
+            channel.* = @min(channel.* + emitted, 1);
+        }
     }
     const shown = try materials.add(material);
     try materials.unlit.put(materials.source.gpa, .{ index, has_colors }, shown);

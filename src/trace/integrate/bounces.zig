@@ -186,7 +186,7 @@ fn Step(comptime Kernel: type) type {
                     else => bsdf.mirror.reflected,
                 };
                 next.throughput[group] = vertex.throughput.mul(share);
-                next.sigma_a[group] = step.path.sigma_a[group];
+                next.sigma_t[group] = step.path.sigma_t[group];
                 if (bounces.frame.needsFootprints()) next.reflectCones(step.path, group, point);
             }
             return count;

@@ -133,6 +133,7 @@ pub fn Boundaries(comptime Kernel: type) type {
                 const lane = @ctz(bits);
                 const bit = @as(u32, 1) << @intCast(lane);
                 const direction = laneOf(directions, lane);
+                boundaries.putAlone(frame, lane, @intCast(primitives[lane]), direction);
                 var crossings: [multi_hit.hits_max + 1]Crossing = undefined;
                 crossings[0] = crossingAt(frame, @intCast(primitives[lane]), direction) orelse
                     continue;
@@ -167,27 +168,42 @@ pub fn Boundaries(comptime Kernel: type) type {
             ray.closest = .{ .t = .fromArray(ts), .primitive = .fromArray(primitives) };
         }
 
-        /// Tells the points of the hits, whose materials are as in air by themselves.
+        /// Tells the points of the hits.
         pub fn apply(
             boundaries: *const Self,
             point: *interaction_file.Interaction(Rays),
         ) void {
             const material = &point.material;
-            const met = boundaries.met;
-            const alone = F32.select(point.back, material.ior, F32.splat(1).div(material.ior));
-            point.eta = .select(met, .fromArray(boundaries.eta), alone);
-            const sigma: Vec3 = .{
+            point.eta = .fromArray(boundaries.eta);
+            point.sigma_beyond = .{
                 .x = .fromArray(boundaries.sigma_t[0]),
                 .y = .fromArray(boundaries.sigma_t[1]),
                 .z = .fromArray(boundaries.sigma_t[2]),
             };
-            const inside: Vec3 = .select(point.back, .splat(.{ 0, 0, 0 }), material.sigma_a);
-            point.sigma_beyond = .select(met, sigma, inside);
             point.beyond = boundaries.beyond;
             point.hidden = boundaries.hidden;
             point.opacity = .select(boundaries.hidden, .zero(), point.opacity);
             const f0: F32 = .fromArray(boundaries.f0);
             material.dielectric_f0 = .select(boundaries.is_between, f0, material.dielectric_f0);
+        }
+
+        /// Of a volume that does not nest.
+        fn putAlone(
+            boundaries: *Self,
+            frame: *const Frame,
+            lane: usize,
+            primitive: u32,
+            direction: [3]f32,
+        ) void {
+            const volumes = frame.materials.volumes;
+            const triangle = &frame.geometry.triangles[primitive];
+            const rank = frame.materials.all[triangle.material].volume_rank;
+            if (rank >= volumes.len or volumes[rank].nests) return;
+            const ior = volumes[rank].ior;
+            const is_leaving = vec3.dot(planeOf(frame.geometry, primitive), direction) > 0;
+            boundaries.eta[lane] = if (is_leaving) ior else 1 / ior;
+            if (is_leaving) return;
+            for (&boundaries.sigma_t, volumes[rank].sigma_t) |*to, channel| to[lane] = channel;
         }
 
         fn arraysOf(vector: Vec3) [3][Kernel.ray_count]f32 {

@@ -83,7 +83,7 @@ pub fn Passage(comptime Kernel: type) type {
         }
 
         /// The share of light that volumes leave, of rays that end at `t` if that is finite.
-        fn left(passage: *Self, t: f32, direction: Vec3) Vec3 {
+        pub noinline fn left(passage: *Self, t: f32, direction: Vec3) Vec3 {
             if (t < std.math.inf(f32)) for (0..Kernel.ray_count) |lane| passage.advance(lane, t);
             const length = direction.length().neg();
             return .{

@@ -29,8 +29,8 @@ pub fn PathState(comptime Kernel: type) type {
         bundle: bundle_file.Bundle(Kernel),
         /// Share of what the ray sees that reaches the pixel.
         throughput: [Kernel.group_count]Vec3,
-        /// Absorption coefficient of what the ray travels in, per metre.
-        sigma_a: [Kernel.group_count]Vec3,
+        /// Extinction coefficient of what the ray travels in, per metre.
+        sigma_t: [Kernel.group_count]Vec3,
         /// The volumes that it is in; none in frames without.
         nestings: [Kernel.group_count][Kernel.ray_count]Nesting,
         /// Of the roughest surface on the way: how far the environment is spread.
@@ -47,7 +47,7 @@ pub fn PathState(comptime Kernel: type) type {
         /// Nothing on the way yet.
         pub fn start(path: *@This()) void {
             path.throughput = @splat(.splat(.{ 1, 1, 1 }));
-            path.sigma_a = @splat(.splat(.{ 0, 0, 0 }));
+            path.sigma_t = @splat(.splat(.{ 0, 0, 0 }));
             path.nestings = @splat(@splat(.air));
             path.roughness = @splat(.zero());
         }
@@ -131,9 +131,9 @@ pub fn PathState(comptime Kernel: type) type {
             point: *const Interaction,
         ) void {
             const bounds = point.material.volume;
-            path.sigma_a[group] = before.sigma_a[group];
+            path.sigma_t[group] = before.sigma_t[group];
             if (bounds.none()) return;
-            path.sigma_a[group] = .select(bounds, point.sigma_beyond, path.sigma_a[group]);
+            path.sigma_t[group] = .select(bounds, point.sigma_beyond, path.sigma_t[group]);
             path.nestings[group] = point.beyond;
         }
 
@@ -172,15 +172,15 @@ pub fn PathState(comptime Kernel: type) type {
         ) Vec3 {
             const Rays = Kernel.Rays;
             const throughput = path.throughput[group];
-            const sigma_a = path.sigma_a[group];
+            const sigma_t = path.sigma_t[group];
             const zero: Rays.F32 = .zero();
-            const clear = sigma_a.x.eq(zero).bitAnd(sigma_a.y.eq(zero)).bitAnd(sigma_a.z.eq(zero));
+            const clear = sigma_t.x.eq(zero).bitAnd(sigma_t.y.eq(zero)).bitAnd(sigma_t.z.eq(zero));
             if (clear.all()) return throughput;
             const way = distance.neg();
             return throughput.mul(.{
-                .x = exponential.expNegative(Rays, sigma_a.x.mul(way)),
-                .y = exponential.expNegative(Rays, sigma_a.y.mul(way)),
-                .z = exponential.expNegative(Rays, sigma_a.z.mul(way)),
+                .x = exponential.expNegative(Rays, sigma_t.x.mul(way)),
+                .y = exponential.expNegative(Rays, sigma_t.y.mul(way)),
+                .z = exponential.expNegative(Rays, sigma_t.z.mul(way)),
             });
         }
     };
@@ -221,7 +221,7 @@ pub fn PathStack(comptime Kernel: type) type {
             const masks = path.restLanes(vertices) orelse return;
             const rest = stack.push(path.depth, path.transparency_depth + 1);
             rest.bundle = path.bundle;
-            rest.sigma_a = path.sigma_a;
+            rest.sigma_t = path.sigma_t;
             rest.nestings = path.nestings;
             rest.keepCones(path);
             rest.roughness = path.roughness;

@@ -383,7 +383,7 @@ pub fn shadowRay(
 }
 
 /// Where shadow rays leave what they go through, at the latest.
-fn shadowEnd(light: *const Light) f32 {
+pub fn shadowEnd(light: *const Light) f32 {
     return if (light.kind == .directional) std.math.inf(f32) else 1;
 }
 

@@ -14,6 +14,7 @@ const camera = @import("camera.zig");
 const direct = @import("direct.zig");
 const environment_light = @import("environment.zig");
 const floor = @import("floor.zig");
+const medium_file = @import("medium.zig");
 const path_file = @import("path.zig");
 const sample_file = @import("sample.zig");
 const tiles = @import("tiles.zig");
@@ -56,6 +57,8 @@ pub fn Whitted(comptime Kernel: type) type {
         stack: path_file.PathStack(Kernel),
         /// Under way.
         sample: Sample,
+        /// Undefined in frames where no volume scatters light.
+        medium: medium_file.Medium(Kernel),
         /// Of the step under way.
         path: PathState,
         vertices: [group_count]Vertex,
@@ -146,6 +149,7 @@ pub fn Whitted(comptime Kernel: type) type {
                 whitted.find(group, vertex);
                 any_seen = any_seen or vertex.seen.any();
             }
+            if (whitted.frame.materials.has_scattering) whitted.addScattered();
             if (any_seen) whitted.addLights(coherence);
             // The last pushed is traced first: reflection, refraction, the ray's own rest.
             whitted.stack.pushRest(path, &whitted.vertices);
@@ -178,6 +182,17 @@ pub fn Whitted(comptime Kernel: type) type {
                 whitted.isEnd(),
             ));
             whitted.sample.addSurface(group, vertex, glow, whitted.path.depth);
+        }
+
+        /// Adds what volumes scatter that rays go through.
+        fn addScattered(whitted: *Self) void {
+            whitted.rays.shadow += whitted.medium.addLight(
+                &whitted.visibility,
+                &whitted.environment_lights,
+                &whitted.path,
+                .{ .rectangle = whitted.bounces.rectangle, .sample = whitted.sample.number },
+                &whitted.sample.radiance,
+            );
         }
 
         /// Adds what the points that rays see scatter of the light that arrives.

@@ -155,7 +155,7 @@ const Single = simd.Lanes(.scalar, 1);
 /// What the lobe sends to a view: its integral over light dense at the horizon and around the
 /// view's azimuth.
 fn integrate(cosine: f32, roughness: f32) f64 {
-    const steps = 72;
+    const steps = 44;
     const sine = @sqrt(1 - cosine * cosine);
     var sum: f64 = 0;
     for (0..steps) |i| for (0..steps) |j| {
@@ -219,8 +219,8 @@ fn exactCurve(x: f64, share: f64) f64 {
 }
 
 test "the albedo is the integral of the lobe, to 1 %, and 1 at most" {
-    for ([_]f32{ 0, 0.05, 0.08, 0.13, 0.2, 0.3, 0.45, 0.6, 0.8, 1 }) |roughness| {
-        for ([_]f32{ 0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1 }) |cosine| {
+    for ([_]f32{ 0, 0.08, 0.15, 0.25, 0.5, 1 }) |roughness| {
+        for ([_]f32{ 0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1 }) |cosine| {
             const wanted = integrate(cosine, roughness);
             const found = albedo(Single, .splat(cosine), .splat(roughness)).lane(0);
             errdefer std.debug.print("cosine {d}, roughness {d}\n", .{ cosine, roughness });

@@ -111,9 +111,19 @@ pub const Boundary = struct {
     }
 };
 
+fn testVolume(ior: f32) Volume {
+    return .{
+        .ior = ior,
+        .sigma_t = @splat(1),
+        .sigma_s = @splat(0),
+        .scatter_anisotropy = 0,
+        .nests = true,
+    };
+}
+
 const test_volumes = [_]Volume{
-    .{ .ior = 1.5, .sigma_t = @splat(1), .nests = true },
-    .{ .ior = 1.25, .sigma_t = @splat(2), .nests = true },
+    testVolume(1.5),
+    testVolume(1.25),
 };
 const glass_in: Crossing = .{ .rank = 0, .is_leaving = false };
 const glass_out: Crossing = .{ .rank = 0, .is_leaving = true };
