@@ -95,8 +95,8 @@ const Cluster = struct {
         return if (axis < 3) cluster.middle[axis] else cluster.normal[axis - 3];
     }
 
-    /// What a point in its place gets wrong; negative where it need not be cut: where it is no wider
-    /// than a part of the scene's size, and if it shines to all sides, than `round_point`.
+    /// What a point in its place gets wrong; negative where it need not be cut: where it is no
+    /// wider than a part of the scene's size, and if it shines to all sides, than `round_point`.
     fn cost(
         cluster: *const Cluster,
         flux_min: f64,

@@ -25,6 +25,11 @@ const rough_traced_max = 0.5;
 /// See `rough_traced_max`.
 const rough_throughput_min = 1.0 / 8.0;
 
+/// Highlights of emitters are those of the lights that stand for them where surfaces are rougher
+/// and lobes spread: few samples meet a small bright lamp, and show it as noise. Smoother ones
+/// mirror it.
+const emitter_roughness_max = 0.1;
+
 /// Rougher lobes are spread over the samples.
 const spread_roughness_min = 0.04;
 
@@ -57,6 +62,10 @@ pub fn Bounces(comptime Kernel: type) type {
         /// Lanes whose reflection is traced, and those whose coat's is.
         reflected: [group_count]Mask,
         coat_reflected: [group_count]Mask,
+        /// Those of the former that see emitters, and have no highlights of them.
+        emitters_reflected: [group_count]Mask,
+        /// Lights stand for emitters, and lobes are spread.
+        splits_emitters: bool,
 
         const Self = @This();
         const Vertices = [group_count]Vertex;
@@ -72,6 +81,9 @@ pub fn Bounces(comptime Kernel: type) type {
             bounces.rectangle = rectangle;
             bounces.sample = sample;
             bounces.spreads = frame.environment.map != null;
+            bounces.splits_emitters = bounces.spreads and for (frame.lights) |*light| {
+                if (light.kind == .emitter) break true;
+            } else false;
         }
 
         /// Chooses the lanes of a group whose reflections are traced; none where paths end.
@@ -79,6 +91,7 @@ pub fn Bounces(comptime Kernel: type) type {
             const none: Mask = .splat(false);
             bounces.reflected[group] = none;
             bounces.coat_reflected[group] = none;
+            bounces.emitters_reflected[group] = none;
             if (is_end or vertex.seen.none()) return;
             const bsdf = &vertex.bsdf;
             const material = &vertex.point.material;
@@ -91,6 +104,9 @@ pub fn Bounces(comptime Kernel: type) type {
                 .bitAnd(worth.gt(.splat(rough_throughput_min))));
             bounces.reflected[group] = lit.bitAnd(traced)
                 .bitAnd(worth.gt(.splat(reflection_throughput_min)));
+            bounces.emitters_reflected[group] = bounces.reflected[group];
+            if (bounces.splits_emitters) bounces.emitters_reflected[group] =
+                bounces.reflected[group].bitAnd(roughness.le(.splat(emitter_roughness_max)));
             if (!bsdf.layered) return;
             const coating = &bsdf.coating;
             const coat_worth = largest(vertex.throughput.scale(coating.albedo));
@@ -186,6 +202,10 @@ fn Step(comptime Kernel: type) type {
                     .away = point.normal_geometric,
                     .direction = direction.scale(length),
                     .roughness = step.roughnessLeft(roughness, spread),
+                    .emission = if (lobe == .coat)
+                        .splat(1)
+                    else
+                        .select(bounces.emitters_reflected[group], .splat(1), .zero()),
                 });
                 const share = switch (lobe) {
                     .coat => Vec3{
@@ -299,6 +319,7 @@ fn Step(comptime Kernel: type) type {
                     .away = point.normal_geometric.neg(),
                     .direction = passing.direction,
                     .roughness = passing.roughness,
+                    .emission = .splat(1),
                 });
                 var share = vertex.bsdf.mirror.transmitted;
                 inline for (.{ "x", "y", "z" }, 0..) |name, index| {

@@ -15,7 +15,7 @@ const path_file = @import("path.zig");
 const visibility_file = @import("visibility.zig");
 
 /// Adds the light of one source, as far as it arrives. Vertices of coherent rays are near to each
-/// other; of `traced` ones the reflection is traced. Returns how many shadow rays it took.
+/// other; the reflection of `traced` ones sees emitters. Returns how many shadow rays it took.
 pub fn addLight(
     comptime Kernel: type,
     visibility: *visibility_file.Visibility(Kernel),

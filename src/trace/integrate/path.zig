@@ -36,6 +36,8 @@ pub fn PathState(comptime Kernel: type) type {
         nestings: [Kernel.group_count][Kernel.ray_count]Nesting,
         /// Of the roughest surface on the way: how far the environment is spread.
         roughness: [Kernel.group_count]Kernel.Rays.F32,
+        /// Share that the ray sees of what surfaces emit: 1, or 0 where lights stand for them.
+        emission: [Kernel.group_count]Kernel.Rays.F32,
         /// Ray cones (`ray_cone.zig`): width at the origin in metres, and its growth by distance;
         /// undefined in frames without footprints.
         cone_width: [Kernel.group_count]F32,
@@ -51,6 +53,7 @@ pub fn PathState(comptime Kernel: type) type {
             path.sigma_t = @splat(.splat(.{ 0, 0, 0 }));
             path.nestings = @splat(@splat(.air));
             path.roughness = @splat(.zero());
+            path.emission = @splat(.splat(1));
         }
 
         /// Gives primary rays their cones.
@@ -107,6 +110,8 @@ pub fn PathState(comptime Kernel: type) type {
             direction: Vec3,
             /// Of the lobe around the direction.
             roughness: F32,
+            /// See `PathState.emission`.
+            emission: F32,
         };
 
         /// Starts the active rays of a group off a surface.
@@ -119,6 +124,7 @@ pub fn PathState(comptime Kernel: type) type {
             const origin = departure.point.offsetOrigin(departure.away, .zero());
             const from = before.bundle.groups[group].closest.primitive;
             path.roughness[group] = before.roughness[group].max(departure.roughness);
+            path.emission[group] = departure.emission;
             path.nestings[group] = before.nestings[group];
             const ray = &path.bundle.groups[group];
             ray.* = .endless(.init(origin, departure.direction), from, ray.active);
@@ -226,6 +232,7 @@ pub fn PathStack(comptime Kernel: type) type {
             rest.nestings = path.nestings;
             rest.keepCones(path);
             rest.roughness = path.roughness;
+            rest.emission = path.emission;
             for (&rest.bundle.groups, masks, vertices, 0..) |*ray, mask, *vertex, group| {
                 ray.active = mask;
                 if (mask.none()) continue;

@@ -172,7 +172,7 @@ pub fn Whitted(comptime Kernel: type) type {
             whitted.bounces.choose(group, vertex, whitted.isEnd());
             if (vertex.seen.none()) return;
             const environment = whitted.frame.environment;
-            var glow = vertex.point.material.emissive;
+            var glow = vertex.point.material.emissive.scale(whitted.path.emission[group]);
             if (vertex.bsdf.layered) glow = glow.scale(vertex.bsdf.coating.below_coat);
             if (environment.map == null) glow = glow.add(environment_light.scatterAmbient(
                 Rays,
@@ -219,7 +219,7 @@ pub fn Whitted(comptime Kernel: type) type {
                 light,
                 &whitted.path,
                 &whitted.vertices,
-                &whitted.bounces.reflected,
+                &whitted.bounces.emitters_reflected,
                 coherence,
                 radiance,
             );

@@ -97,9 +97,9 @@ test "a range ends light by a smooth window, as KHR_lights_punctual has it" {
 }
 
 test "a spot is full within its inner cone and ends at the outer one" {
-    const cosine_inner = 0.9;
-    const cosine_outer = 0.5;
-    const scale = 1.0 / (cosine_inner - cosine_outer);
+    const cosine_inner: f32 = 0.9;
+    const cosine_outer: f32 = 0.5;
+    const scale = 1 / (cosine_inner - cosine_outer);
     const light: Light = .{
         .kind = .spot,
         .from_receiver = false,
