@@ -73,8 +73,8 @@ const slopes = slopes: {
     break :slopes list;
 };
 
-/// What a stretched lobe sees, in its lanes; `even` in others: mirror images about normals along the
-/// tangent, each as rough as the lobe is across.
+/// What a stretched lobe sees, in its lanes; `even` in others: mirror images about normals along
+/// the tangent, each as rough as the lobe is across.
 pub noinline fn stretched(
     comptime Lanes: type,
     environment: *const world_file.Environment,

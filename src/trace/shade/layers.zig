@@ -82,8 +82,15 @@ inline fn load(
     layers: *Layers(Lanes),
 ) void {
     inline for (.{
-        "specular",    "clearcoat",       "clearcoat_roughness", "sheen_roughness",      "dispersion",
-        "iridescence", "iridescence_ior", "anisotropy",          "diffuse_transmission",
+        "specular",
+        "clearcoat",
+        "clearcoat_roughness",
+        "sheen_roughness",
+        "dispersion",
+        "iridescence",
+        "iridescence_ior",
+        "anisotropy",
+        "diffuse_transmission",
     }) |name| @field(layers, name) = all.float(name);
     inline for (.{ "specular_color", "sheen_color", "diffuse_transmission_color" }) |name| {
         @field(layers, name) = all.color(name);

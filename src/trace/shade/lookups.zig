@@ -83,7 +83,8 @@ pub fn sample(
         texture_file.sample(textures[0..count], &rest[0], &footprint, &texels);
         for (rest[0..count], texels[0..count]) |*lookup, texel| {
             const channels = channelsOf(lookup, texel);
-            for (&values[slots.indexOf(lookup.slot)], channels) |*value, channel| value.* *= channel;
+            const slot = &values[slots.indexOf(lookup.slot)];
+            for (slot, channels) |*value, channel| value.* *= channel;
         }
         rest = rest[count..];
     }

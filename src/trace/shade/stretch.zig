@@ -1,5 +1,5 @@
-//! The stretched specular lobe of a base at points in lanes (KHR_materials_anisotropy): GGX with two
-//! alphas (`anisotropy.zig`) along the tangents of layers.
+//! The stretched specular lobe of a base at points in lanes (KHR_materials_anisotropy): GGX with
+//! two alphas (`anisotropy.zig`) along the tangents of layers.
 //!
 //! In: points, parameters of layers. Out: density and mirror directions of the lanes that have such
 //! a lobe; others keep theirs.

@@ -366,6 +366,40 @@ test "every slot multiplies its factor, its channels where the lookup says" {
     }
 }
 
+test "a transmission texture leaves its red of what shadow rays keep" {
+    var geometry: world_file.Geometry = .empty;
+    geometry.triangles = &.{.{ .corner = .{ 0, 1, 2 }, .material = 0 }};
+    var material = test_factors;
+    const lookups = [_]Lookup{ testLookup(.emissive, 0), testLookup(.transmission, 0) };
+    material.lookup_count = 1;
+    for ([_]u32{ 1, 0 }, [_]f32{ 0.2, 1 }) |count, expected| {
+        material.layer_lookup_count = count;
+        const frame: Frame = .{
+            .geometry = &geometry,
+            .materials = &.{
+                .all = (&material)[0..1],
+                .lookups = &lookups,
+                .has_transparency = true,
+                .has_holes = false,
+                .occluders = &.{},
+            },
+            .textures = &.{ .all = &.{Texel(.{ 51, 255 }).texture} },
+            .lights = &.{},
+            .environment = undefined,
+            .view = undefined,
+        };
+        const materials: material_file.Materials(Single) =
+            .of(frame.materials.all, .splat(0), .splat(true));
+        const left = transmission(Single, &frame, &materials, &.{
+            .asked = .splat(true),
+            .primitive = .splat(0),
+            .barycentrics = @splat(.splat(0)),
+            .axes = .{ .weights = @splat(@splat(.zero())) },
+        });
+        try std.testing.expectApproxEqRel(expected, left.lane(0), 1e-6);
+    }
+}
+
 test "coordinates lie between those of the corners, transformed, and no number does no harm" {
     // Sixteen texels, each of its own number; the point is in column 1, row 3 - 1.
     const texels: [16]u8 = std.simd.iota(u8, 16);
