@@ -144,6 +144,9 @@ test {
     _ = @import("trace/shade/bsdf.zig");
     _ = @import("trace/shade/chi_squared.zig");
     _ = @import("trace/shade/microfacet.zig");
+    _ = @import("trace/shade/coating.zig");
+    _ = @import("trace/shade/interface.zig");
+    _ = @import("trace/shade/sampling.zig");
     _ = @import("trace/shade/sheen.zig");
     _ = @import("trace/shade/phase.zig");
     _ = @import("trace/shade/transmission.zig");

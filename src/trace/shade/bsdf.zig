@@ -12,8 +12,9 @@
 const std = @import("std");
 const simd = @import("../../simd.zig");
 const albedo_file = @import("albedo.zig");
-const anisotropy = @import("anisotropy.zig");
+const energy = @import("energy.zig");
 const microfacet = @import("microfacet.zig");
+const sampling = @import("sampling.zig");
 const interface_file = @import("interface.zig");
 const transmission_file = @import("transmission.zig");
 const Coating = @import("coating.zig").Coating;
@@ -121,34 +122,7 @@ pub fn Bsdf(comptime Lanes: type) type {
             const open = bsdf.open.sub(bsdf.open.mul(point.material.transmission));
             bsdf.back_albedo = layers.diffuse_transmission_color.min(.splat(.{ 1, 1, 1 }))
                 .scale(open.mul(share).mul(bsdf.coating.below));
-            bsdf.weaken(bsdf.coating.below, bsdf.coating.below.mul(one.sub(share)));
-        }
-
-        /// Of the lanes that have a stretched lobe, that of it.
-        noinline fn stretchedAlbedo(
-            bsdf: *const Self,
-            even: albedo_file.Directional(Lanes),
-        ) albedo_file.Directional(Lanes) {
-            const stretch = &bsdf.stretch;
-            const found =
-                anisotropy.directional(Lanes, &bsdf.albedo, stretch.view, stretch.alphas);
-            return .{
-                .missing = .select(stretch.lanes, found.missing, even.missing),
-                .schlick = .select(stretch.lanes, found.schlick, even.schlick),
-            };
-        }
-
-        /// What lies above the base leaves these shares to its specular and to its diffuse part.
-        fn weaken(bsdf: *Self, specular: F32, diffuse: F32) void {
-            bsdf.specular_albedo = bsdf.specular_albedo.scale(specular);
-            bsdf.diffuse_albedo = bsdf.diffuse_albedo.scale(diffuse);
-            // Schlick's approximation is linear in both.
-            bsdf.f0 = bsdf.f0.scale(specular);
-            bsdf.f90 = bsdf.f90.mul(specular);
-            bsdf.multiple = bsdf.multiple.scale(specular);
-            bsdf.diffuse = bsdf.diffuse.scale(diffuse);
-            bsdf.mirror.reflected = bsdf.mirror.reflected.scale(specular);
-            bsdf.mirror.transmitted = bsdf.mirror.transmitted.scale(specular);
+            energy.weaken(Lanes, bsdf, bsdf.coating.below, bsdf.coating.below.mul(one.sub(share)));
         }
 
         /// The dielectric's reflectance, and where channels differ the whole's.
@@ -176,19 +150,16 @@ pub fn Bsdf(comptime Lanes: type) type {
             const roughness = material.roughness;
             var squared = roughness.mul(roughness);
             const stretched = reflectance.colors != null and bsdf.stretch.lanes.any();
-            if (stretched) squared = .select(
-                bsdf.stretch.lanes,
-                anisotropy.effectiveAlpha(Lanes, bsdf.stretch.alphas),
-                squared,
-            );
+            if (stretched) squared = bsdf.stretch.effective(squared);
             if (!albedo.alpha.eq(squared).all()) albedo.* = .of(squared);
             var directional = albedo.at(boundary.cos_fresnel);
-            if (stretched) directional = bsdf.stretchedAlbedo(directional);
-            const scatter_base = multipleOf(albedo, base_f0, base_f90);
+            if (stretched) directional = bsdf.stretch.directional(albedo, directional);
+            const scatter_base = energy.multipleOf(Lanes, albedo, base_f0, base_f90);
             bsdf.f0 = splat3(Lanes, base_f0);
             bsdf.f90 = base_f90;
             var scatter = splat3(Lanes, scatter_base);
-            var specular = splat3(Lanes, specularOf(directional, scatter_base, base_f0, base_f90));
+            const even = energy.specularOf(Lanes, directional, scatter_base, base_f0, base_f90);
+            var specular = splat3(Lanes, even);
             // Without metal and colours all channels are those of the base.
             if (reflectance.colors != null or !material.metallic.eq(.zero()).all()) {
                 const f0 = if (reflectance.colors) |colors|
@@ -197,10 +168,10 @@ pub fn Bsdf(comptime Lanes: type) type {
                     splat3(Lanes, base_f0.mul(dielectric)).add(base.scale(material.metallic));
                 const f90 = base_f90.mul(dielectric).add(material.metallic);
                 inline for (.{ "x", "y", "z" }) |channel| {
-                    const many = multipleOf(albedo, @field(f0, channel), f90);
+                    const many = energy.multipleOf(Lanes, albedo, @field(f0, channel), f90);
                     @field(scatter, channel) = many;
                     @field(specular, channel) =
-                        specularOf(directional, many, @field(f0, channel), f90);
+                        energy.specularOf(Lanes, directional, many, @field(f0, channel), f90);
                 }
                 bsdf.f0 = f0;
                 bsdf.f90 = f90;
@@ -219,7 +190,7 @@ pub fn Bsdf(comptime Lanes: type) type {
             bsdf.smith_view = microfacet.smith(Lanes, cos_view, bsdf.alpha.mul(bsdf.alpha));
             bsdf.multiple = scatter
                 .scale(directional.missing.div(albedo.missing_mean).mul(inverse_pi));
-            const below_mean = belowMean(albedo, base_f0, base_f90, scatter_base);
+            const below_mean = energy.belowMean(Lanes, albedo, base_f0, base_f90, scatter_base);
             bsdf.diffuse = bsdf.diffuse_albedo.scale(inverse_pi.div(below_mean));
             bsdf.multiple_base = scatter_base;
             bsdf.sees_behind = reflectance.colors != null or
@@ -266,7 +237,7 @@ pub fn Bsdf(comptime Lanes: type) type {
                 density = .select(bsdf.stretch.lanes, stretched, density);
             }
             const schlick = microfacet.power5(Lanes, one.sub(cos_view_half));
-            const single = schlickOf(bsdf.f0, bsdf.f90, schlick).scale(density);
+            const single = energy.schlickOf(Lanes, bsdf.f0, bsdf.f90, schlick).scale(density);
             const way_in = bsdf.albedo.at(cos_light);
             const multiple = bsdf.multiple.scale(way_in.missing);
             const below = one.sub(way_in.single(bsdf.base_f0, bsdf.base_f90))
@@ -275,7 +246,7 @@ pub fn Bsdf(comptime Lanes: type) type {
                 .diffuse = bsdf.diffuse.scale(below.mul(cos_light)),
                 .specular = single.add(multiple).scale(cos_light),
             };
-            if (bsdf.layered) bsdf.addCoating(point, to_light, &lobes);
+            if (bsdf.layered) bsdf.coating.addTo(&lobes, point, bsdf.cos_view, to_light);
             return lobes;
         }
 
@@ -303,103 +274,14 @@ pub fn Bsdf(comptime Lanes: type) type {
             return diffuse.add(bsdf.mirror.transmitted.scale(pane));
         }
 
-        noinline fn addCoating(
-            bsdf: *const Self,
-            point: *const Interaction(Lanes),
-            to_light: Vec3,
-            lobes: *Lobes,
-        ) void {
-            const coat = bsdf.coating.evalCoat(point, to_light);
-            lobes.specular = lobes.specular.add(splat3(Lanes, coat));
-            const fibres = bsdf.coating.evalSheen(point, bsdf.cos_view, to_light);
-            lobes.diffuse = lobes.diffuse.add(fibres);
+        /// See `sampling.sample`.
+        pub fn sample(bsdf: *const Self, point: *const Interaction(Lanes), numbers: [3]F32) Vec3 {
+            return sampling.sample(Lanes, bsdf, point, numbers);
         }
 
-        /// A unit vector towards light for three numbers in 0..1, with the density `pdf`: a visible
-        /// normal's mirror image of the view, or a direction by the cosine. Those below the surface
-        /// bring nothing.
-        pub fn sample(
-            bsdf: *const Self,
-            point: *const Interaction(Lanes),
-            numbers: [3]F32,
-        ) Vec3 {
-            const across = microfacet.tangents(Lanes, point.normal);
-            const local: Vec3 = .{
-                .x = across[0].dot(point.view),
-                .y = across[1].dot(point.view),
-                .z = bsdf.cos_view,
-            };
-            const view = local.normalize();
-            const disc = microfacet.disc(Lanes, .{ numbers[1], numbers[2] });
-            const half = microfacet.visibleNormal(Lanes, view, bsdf.alpha, disc);
-            const twice = view.dot(half).mul(.splat(2));
-            const reflected = half.scale(twice).sub(view);
-            const height = F32.splat(1).sub(disc[0].mul(disc[0])).sub(disc[1].mul(disc[1]));
-            const cosine = height.max(.zero()).sqrt();
-            const scattered: Vec3 = .{ .x = disc[0], .y = disc[1], .z = cosine };
-            const is_specular = numbers[0].lt(bsdf.specularShare());
-            const chosen: Vec3 = .select(is_specular, reflected, scattered);
-            return across[0].scale(chosen.x).add(across[1].scale(chosen.y))
-                .add(point.normal.scale(chosen.z)).normalize();
-        }
-
-        /// Density of `sample` by solid angle, per steradian, on the whole sphere.
+        /// See `sampling.pdf`.
         pub fn pdf(bsdf: *const Self, point: *const Interaction(Lanes), to_light: Vec3) F32 {
-            const half = point.view.add(to_light).normalize();
-            const cos_half = point.normal.dot(half).min(.splat(1));
-            const a = bsdf.alpha.mul(bsdf.alpha);
-            const seen = bsdf.cos_view.add(bsdf.smith_view);
-            const visible = microfacet.distribution(Lanes, cos_half, a).div(seen.add(seen));
-            const specular = F32.select(cos_half.gt(.zero()), visible, .zero());
-            const diffuse = point.normal.dot(to_light).max(.zero()).mul(inverse_pi);
-            const share = bsdf.specularShare();
-            return specular.mul(share).add(diffuse.mul(F32.splat(1).sub(share)));
-        }
-
-        /// How many of the samples are of the specular lobe, 0..1.
-        inline fn specularShare(bsdf: *const Self) F32 {
-            const ones: Vec3 = .splat(.{ 1, 1, 1 });
-            const specular = bsdf.specular_albedo.dot(ones);
-            return specular.div(specular.add(bsdf.diffuse_albedo.dot(ones)).max(.splat(1e-12)));
-        }
-
-        /// Reflectance for Schlick's weight (1 - cosine)^5.
-        inline fn schlickOf(f0: Vec3, f90: F32, weight: F32) Vec3 {
-            return f0.add(splat3(Lanes, f90).sub(f0).scale(weight));
-        }
-
-        /// Light that microfacets send on more than once, as a share of what has not left after the
-        /// first time (Kulla and Conty 2017, with the loss at each of the reflections).
-        inline fn multipleOf(albedo: *const albedo_file.Albedo(Lanes), f0: F32, f90: F32) F32 {
-            const one: F32 = .splat(1);
-            // The mean of Schlick's approximation over the hemisphere.
-            const mean = f0.add(f90.sub(f0).mul(.splat(1.0 / 21.0)));
-            const lost = one.sub(mean.mul(albedo.missing_mean));
-            return mean.mul(mean).mul(one.sub(albedo.missing_mean)).div(lost);
-        }
-
-        /// Directional albedo of the specular lobe, what is scattered more than once included.
-        inline fn specularOf(
-            directional: albedo_file.Directional(Lanes),
-            scatter: F32,
-            f0: F32,
-            f90: F32,
-        ) F32 {
-            return directional.single(f0, f90).add(scatter.mul(directional.missing));
-        }
-
-        /// Mean over the hemisphere, weighted by the cosine, of what the specular lobe leaves to
-        /// the base below it.
-        inline fn belowMean(
-            albedo: *const albedo_file.Albedo(Lanes),
-            f0: F32,
-            f90: F32,
-            scatter: F32,
-        ) F32 {
-            const one: F32 = .splat(1);
-            const mean = f0.add(f90.sub(f0).mul(albedo.schlick_mean));
-            const single = mean.mul(one.sub(albedo.missing_mean));
-            return one.sub(single).sub(scatter.mul(albedo.missing_mean)).max(.splat(1e-3));
+            return sampling.pdf(Lanes, bsdf, point, to_light);
         }
     };
 }

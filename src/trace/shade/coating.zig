@@ -77,6 +77,19 @@ pub fn Coating(comptime Lanes: type) type {
             return coating;
         }
 
+        /// Adds what both send to the view to the lobes of the base.
+        pub noinline fn addTo(
+            coating: *const Self,
+            lobes: *bsdf_file.Bsdf(Lanes).Lobes,
+            point: *const Interaction(Lanes),
+            cos_view: F32,
+            to_light: Vec3,
+        ) void {
+            const coat = coating.evalCoat(point, to_light);
+            lobes.specular = lobes.specular.add(.{ .x = coat, .y = coat, .z = coat });
+            lobes.diffuse = lobes.diffuse.add(coating.evalSheen(point, cos_view, to_light));
+        }
+
         /// What the coat sends to the view of a unit of irradiance across the way of light.
         pub fn evalCoat(
             coating: *const Self,

@@ -5,6 +5,7 @@
 //! a lobe; others keep theirs.
 
 const bsdf_file = @import("bsdf.zig");
+const albedo_file = @import("albedo.zig");
 const anisotropy = @import("anisotropy.zig");
 const microfacet = @import("microfacet.zig");
 const Interaction = @import("interaction.zig").Interaction;
@@ -74,6 +75,35 @@ pub fn Stretch(comptime Lanes: type) type {
             const visibility = F32.splat(0.5).div(view_term.add(light_term).max(.splat(1e-12)));
             return anisotropy.distribution(Lanes, stretch.into(point, half), alphas)
                 .mul(visibility);
+        }
+
+        /// Density of mirror images about visible normals of highlights, by their half vector.
+        pub fn visible(stretch: *const Self, point: *const Interaction(Lanes), half: Vec3) F32 {
+            const alphas = stretch.highlights();
+            const local = stretch.into(point, half);
+            const seen = stretch.view.z.add(anisotropy.smith(Lanes, stretch.view, alphas));
+            const found = anisotropy.distribution(Lanes, local, alphas).div(seen.add(seen));
+            return .select(local.z.gt(.zero()), found, .zero());
+        }
+
+        /// `anisotropy.effectiveAlpha` in the lanes that have a stretched lobe, else this one.
+        pub inline fn effective(stretch: *const Self, alpha: F32) F32 {
+            const mean = anisotropy.effectiveAlpha(Lanes, stretch.alphas);
+            return .select(stretch.lanes, mean, alpha);
+        }
+
+        /// Albedos towards the view in the lanes that have a stretched lobe, for that of
+        /// `effective`; in others those of an even one.
+        pub noinline fn directional(
+            stretch: *const Self,
+            albedo: *const albedo_file.Albedo(Lanes),
+            even: albedo_file.Directional(Lanes),
+        ) albedo_file.Directional(Lanes) {
+            const found = anisotropy.directional(Lanes, albedo, stretch.view, stretch.alphas);
+            return .{
+                .missing = .select(stretch.lanes, found.missing, even.missing),
+                .schlick = .select(stretch.lanes, found.schlick, even.schlick),
+            };
         }
 
         /// The mirror direction about a normal of microfacets that the view sees, whose alphas are
