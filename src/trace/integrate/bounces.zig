@@ -1,7 +1,7 @@
 //! Rays that go on from the vertices of paths: reflections and refractions.
 //!
 //! In: vertices. Out: rays on a stack. Smooth surfaces send one ray each way. Rays of rough ones
-//! are spread over the samples of a pixel: a quarter of the lobe's variance; the rest is left to
+//! are spread over the samples of a pixel: half of the lobe's variance; the rest is left to
 //! prefiltered textures and environment, which know no noise.
 //! Glass that disperses light sends a ray for each channel.
 
@@ -37,9 +37,13 @@ const spread_roughness_min = 0.04;
 /// anything, and is all that is seen of it.
 pub const rough_split = 4;
 
-/// GGX's alpha of what the samples are spread by, as a share of the lobe's: a quarter of its
+/// GGX's alpha of what the samples are spread by, as a share of the lobe's: half of its
 /// variance, so that few samples do.
-const sampled_alpha = 0.5;
+const sampled_alpha = @sqrt(0.5);
+
+/// Of the disc that microfacets are drawn from, the radius that is: its rim stands for the long
+/// tail of the lobe, which a few samples would show as dots.
+const inner_share = 0.9;
 
 /// Roughness of the prefiltered rest, as a share of the lobe's.
 const prefiltered_roughness = @sqrt(@sqrt(1 - sampled_alpha * sampled_alpha));
@@ -241,7 +245,13 @@ fn Step(comptime Kernel: type) type {
             const bounces = step.bounces;
             const pixels = camera.pixels(Kernel, bounces.rectangle, group);
             const sample = if (part) |one| bounces.sample *% rough_split +% one else bounces.sample;
-            return numbers_file.at(Rays, pixels, sample, step.path.depth);
+            const drawn = numbers_file.at(Rays, pixels, sample, step.path.depth);
+            const half: F32 = .splat(0.5);
+            var inner: [2]F32 = undefined;
+            for (&inner, drawn) |*number, one| {
+                number.* = one.sub(half).mul(.splat(inner_share)).add(half);
+            }
+            return inner;
         }
 
         fn pushRefractions(step: *const Self) u64 {
