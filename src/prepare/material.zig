@@ -5,6 +5,7 @@
 
 const std = @import("std");
 const layers_file = @import("layers.zig");
+const math = @import("../math.zig");
 const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const assert = std.debug.assert;
@@ -75,7 +76,7 @@ pub fn isVisible(from: *const scene.Material, use: *const MaterialUse) bool {
 
 /// Whether light passes surfaces of this material in part.
 fn isTransparent(material: *const world.Material) bool {
-    return material.blend > 0 or material.transmission > 0;
+    return material.blend > 0 or material.isClear();
 }
 
 /// Alpha counts where the mode says so, and some place of the material is not all there.
@@ -94,6 +95,10 @@ fn convert(from: *const scene.Material, use: *const MaterialUse) world.Material 
         .dielectric_f0 = f0_root * f0_root,
         .ior = from.ior,
         .transmission = from.transmission,
+        .diffuse_through = math.vec3.scale(
+            from.diffuse_transmission_color,
+            from.diffuse_transmission,
+        ),
         .sigma_a = layers_file.volumeOf(from).sigma_a,
         .alpha_cutoff = if (has_holes) from.alpha_cutoff else -1,
         .blend = flag(blends),

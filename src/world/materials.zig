@@ -27,6 +27,9 @@ pub const Material = struct {
     double_sided: f32,
     /// 1: shown without light.
     unlit: f32,
+    /// Share of light that comes out on the other side of a thin surface that is not smooth
+    /// (KHR_materials_diffuse_transmission), by channel.
+    diffuse_through: Vec3 = .{ 0, 0, 0 },
     /// 1: bounds a volume, rays bend; 0: thin, they go straight on.
     volume: f32,
     /// Index into `Materials.volumes` of what it bounds, `Volume.air` where that is nothing.
@@ -48,7 +51,13 @@ pub const Material = struct {
         for (lookups) |*lookup| {
             if (lookup.slot == .metallic_roughness) is_metal = false; // Not everywhere.
         }
-        return is_metal or material.transmission == 0;
+        return is_metal or !material.isClear();
+    }
+
+    /// Whether light goes through where there is no metal.
+    pub fn isClear(material: *const Material) bool {
+        const through = material.diffuse_through;
+        return material.transmission > 0 or @max(through[0], through[1], through[2]) > 0;
     }
 
     /// Whether light goes through, by refraction or straight on.

@@ -1,14 +1,15 @@
 //! Rays that go on from the vertices of paths: reflections and refractions.
 //!
 //! In: vertices. Out: rays on a stack. Smooth surfaces send one ray each way. Rays of rough ones
-//! are spread over the samples of a pixel: half of the lobe's variance, for the microfacets that
-//! they meet; the other half is left to prefiltered textures and environment, which know no noise.
+//! are spread over the samples of a pixel: a quarter of the lobe's variance; the rest is left to
+//! prefiltered textures and environment, which know no noise.
 //! Glass that disperses light sends a ray for each channel.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
 const bsdf_file = @import("../shade/bsdf.zig");
 const camera = @import("camera.zig");
+const environment_layers = @import("environment_layers.zig");
 const numbers_file = @import("numbers.zig");
 const path_file = @import("path.zig");
 const transmission = @import("../shade/transmission.zig");
@@ -37,11 +38,12 @@ const spread_roughness_min = 0.04;
 /// anything, and is all that is seen of it.
 pub const rough_split = 4;
 
-/// Share of a lobe's variance that the samples are spread by; the other half is prefiltered.
-const sampled_alpha = @sqrt(0.5);
+/// GGX's alpha of what the samples are spread by, as a share of the lobe's: a quarter of its
+/// variance, so that few samples do.
+const sampled_alpha = 0.5;
 
-/// Roughness of the prefiltered half.
-const prefiltered_roughness = @sqrt(@sqrt(0.5));
+/// Roughness of the prefiltered rest, as a share of the lobe's.
+const prefiltered_roughness = @sqrt(@sqrt(1 - sampled_alpha * sampled_alpha));
 
 /// The rays of one step of an integrator.
 pub fn Bounces(comptime Kernel: type) type {
@@ -181,9 +183,9 @@ fn Step(comptime Kernel: type) type {
                     .coat => bsdf_file.mirrored(Rays, point, bsdf.coating.normal),
                     else => bsdf_file.reflect(Rays, point),
                 };
+                const normal = if (lobe == .coat) bsdf.coating.normal else point.normal;
                 var direction = mirrored;
                 if (spread.any()) {
-                    const normal = if (lobe == .coat) bsdf.coating.normal else point.normal;
                     const alpha = roughness.mul(roughness).mul(.splat(sampled_alpha));
                     const found = bsdf_file
                         .mirroredRough(Rays, point, normal, alpha, step.numbers(group, null));
@@ -195,6 +197,8 @@ fn Step(comptime Kernel: type) type {
                             .select(spread.bitAnd(bsdf.stretch.lanes), stretched, direction);
                     }
                 }
+                const middle = environment_layers
+                    .dominant(Rays, normal, mirrored, roughness.mul(roughness));
                 // As long as before: what a plane mirror sends back stays linear in the pixel.
                 const length = step.path.bundle.groups[group].line.direction.length();
                 next.leave(step.path, group, &.{
@@ -202,6 +206,8 @@ fn Step(comptime Kernel: type) type {
                     .away = point.normal_geometric,
                     .direction = direction.scale(length),
                     .roughness = step.roughnessLeft(roughness, spread),
+                    .lobe = .select(spread, middle, direction),
+                    .lobe_roughness = roughness,
                     .emission = if (lobe == .coat)
                         .splat(1)
                     else
@@ -319,6 +325,8 @@ fn Step(comptime Kernel: type) type {
                     .away = point.normal_geometric.neg(),
                     .direction = passing.direction,
                     .roughness = passing.roughness,
+                    .lobe = passing.direction,
+                    .lobe_roughness = passing.roughness,
                     .emission = .splat(1),
                 });
                 var share = vertex.bsdf.mirror.transmitted;

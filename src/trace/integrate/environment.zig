@@ -109,8 +109,8 @@ fn seenBy(
     return environment_file.radiance(
         Kernel.Rays,
         environment,
-        path.bundle.groups[group].line.direction,
-        path.roughness[group],
+        if (path.depth == 0) path.bundle.groups[group].line.direction else path.lobe[group],
+        if (path.depth == 0) .zero() else path.lobe_roughness[group],
         if (has_cones) path.cone_spread[group].abs() else .zero(),
         asked,
     );

@@ -82,6 +82,7 @@ pub fn Records(comptime Lanes: type, comptime Record: type) type {
             comptime name: []const u8,
             comptime component: ?usize,
         ) Lanes.F32 {
+            @setEvalBranchQuota(20_000);
             const used = &materials.used;
             var value: Lanes.F32 = .splat(materials.one(used.numbers[0], name, component));
             for (used.numbers[1..used.count], used.lanes[1..used.count]) |number, lanes| {
@@ -162,8 +163,13 @@ pub fn Attenuation(comptime Lanes: type) type {
             const clear = materials.float("transmission")
                 .mul(one.sub(materials.float("metallic"))).mul(passing);
             const rest = one.sub(stopped);
+            // Scattered, but as much of it, which is taken to go straight on.
+            const solid = one.sub(materials.float("transmission"))
+                .mul(one.sub(materials.float("metallic")));
+            const diffuse = materials.color("diffuse_through").scale(solid);
+            const through = base.scale(clear).add(diffuse);
             return .{
-                .share = base.scale(clear.mul(stopped)).add(.{ .x = rest, .y = rest, .z = rest }),
+                .share = through.scale(stopped).add(.{ .x = rest, .y = rest, .z = rest }),
                 .weakens = stopped.gt(.zero()),
             };
         }
