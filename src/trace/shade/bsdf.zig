@@ -148,8 +148,7 @@ pub fn Bsdf(comptime Lanes: type) type {
             const cos_view = point.normal.dot(point.view).max(.splat(1e-4)).min(one);
             const boundary: Boundary(Lanes) = .of(point, cos_view);
             const albedo = &bsdf.albedo;
-            const roughness = material.roughness;
-            var squared = roughness.mul(roughness);
+            var squared = material.roughness.mul(material.roughness);
             const stretched = reflectance.colors != null and bsdf.stretch.lanes.any();
             if (stretched) squared = bsdf.stretch.effective(squared);
             if (!albedo.alpha.eq(squared).all()) albedo.* = .of(squared);
@@ -163,10 +162,9 @@ pub fn Bsdf(comptime Lanes: type) type {
             var specular = splat3(Lanes, even);
             // Without metal and colours all channels are those of the base.
             if (reflectance.colors != null or !material.metallic.eq(.zero()).all()) {
-                const f0 = if (reflectance.colors) |colors|
-                    colors.f0
-                else
-                    splat3(Lanes, base_f0.mul(dielectric)).add(base.scale(material.metallic));
+                const metal = base.scale(material.metallic);
+                const mixed = splat3(Lanes, base_f0.mul(dielectric)).add(metal);
+                const f0 = if (reflectance.colors) |colors| colors.f0 else mixed;
                 const f90 = base_f90.mul(dielectric).add(material.metallic);
                 inline for (.{ "x", "y", "z" }) |channel| {
                     const many = energy.multipleOf(Lanes, albedo, @field(f0, channel), f90);
@@ -185,7 +183,7 @@ pub fn Bsdf(comptime Lanes: type) type {
             bsdf.open = open;
             bsdf.specular_albedo = specular;
             bsdf.diffuse_albedo = base.scale(open.sub(passing));
-            const rough = roughness.max(.splat(highlight_roughness_least));
+            const rough = material.roughness.max(.splat(highlight_roughness_least));
             bsdf.alpha = rough.mul(rough);
             bsdf.cos_view = cos_view;
             bsdf.smith_view = microfacet.smith(Lanes, cos_view, bsdf.alpha.mul(bsdf.alpha));
