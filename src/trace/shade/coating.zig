@@ -189,10 +189,10 @@ test "the coat's albedo is the integral of its lobe, to 1 %" {
 }
 
 test "the fibres' albedo is the integral of their lobe, to 1 %, below a coat as well" {
-    for ([_]f32{ 0.3, 0.6, 1 }) |roughness| for (cosines) |cosine| for ([_]f32{ 0, 1 }) |coat| {
+    for ([_]f32{ 0.3, 1 }) |roughness| for (cosines) |cosine| {
         const point = test_surface.pointAt(Single, test_surface.viewAt(cosine).lane(0));
         var layers = test_surface.layersOf(Single);
-        layers.clearcoat = .splat(coat);
+        layers.clearcoat = .splat(1);
         layers.sheen_color = .splat(.{ 1, 0.5, 0 });
         layers.sheen_roughness = .splat(roughness);
         const coating: Coating(Single) = .of(&point, &layers);

@@ -303,11 +303,15 @@ const Surface = struct {
 };
 
 const changes = [_]Surface.Change{
-    .{ .coat = 1 },
-    .{ .metallic = 1, .roughness = 0.6, .sheen = 1, .anisotropy = 0.6 },
-    .{ .diffuse_transmission = 0.5, .sheen = 0.5 },
+    .{ .metallic = 0.5, .roughness = 0.6, .sheen = 1, .anisotropy = 0.6 },
     // A pane so smooth that its microfacets scatter next to nothing.
-    .{ .coat = 0.5, .transmission = 0.5, .diffuse_transmission = 0.5, .roughness = 0.28 },
+    .{
+        .roughness = 0.28,
+        .transmission = 0.5,
+        .coat = 1,
+        .sheen = 0.5,
+        .diffuse_transmission = 0.5,
+    },
 };
 
 test "samples of layered surfaces have their density, by chi-squared" {
@@ -318,7 +322,7 @@ test "samples of layered surfaces have their density, by chi-squared" {
 }
 
 test "the mean weight of samples is the albedo of all lobes" {
-    const count = 4096;
+    const count = 2048;
     const scattering: Surface.Change = .{ .coat = 0.5, .transmission = 0.6, .sheen = 0.5 };
     for (changes ++ .{scattering}) |change| {
         const surface: Surface = .of(change);
@@ -344,6 +348,7 @@ test "the mean weight of samples is the albedo of all lobes" {
 test "every lobe is chosen by its share of the albedo" {
     const all: Surface.Change = .{
         .coat = 1,
+        .sheen = 0.5,
         .transmission = 0.5,
         .diffuse_transmission = 0.5,
     };
@@ -360,7 +365,7 @@ test "every lobe is chosen by its share of the albedo" {
         shares.to_pane.sub(shares.to_behind),
         Single.F32.splat(1).sub(shares.to_pane),
     };
-    const diffuse = surface.bsdf.diffuse_albedo.x.lane(0);
+    const diffuse = surface.bsdf.diffuse_albedo.add(surface.bsdf.coating.sheen_albedo).x.lane(0);
     for (found, [_]f32{ coat, behind, pane, diffuse }) |share, part| {
         try std.testing.expectApproxEqAbs(part / whole, share.lane(0), 1e-5);
     }
