@@ -9,7 +9,6 @@ const std = @import("std");
 const world_file = @import("../../world.zig");
 const bsdf_file = @import("../shade/bsdf.zig");
 const camera = @import("camera.zig");
-const environment_layers = @import("environment_layers.zig");
 const numbers_file = @import("numbers.zig");
 const path_file = @import("path.zig");
 const transmission = @import("../shade/transmission.zig");
@@ -145,6 +144,11 @@ pub fn Bounces(comptime Kernel: type) type {
     };
 }
 
+/// Roughness of what is not spread over the samples.
+inline fn roughnessLeft(comptime Lanes: type, roughness: Lanes.F32, spread: Lanes.Mask) Lanes.F32 {
+    return .select(spread, roughness.mul(.splat(prefiltered_roughness)), roughness);
+}
+
 /// One step's rays.
 fn Step(comptime Kernel: type) type {
     const Rays = Kernel.Rays;
@@ -197,17 +201,15 @@ fn Step(comptime Kernel: type) type {
                             .select(spread.bitAnd(bsdf.stretch.lanes), stretched, direction);
                     }
                 }
-                const middle = environment_layers
-                    .dominant(Rays, normal, mirrored, roughness.mul(roughness));
                 // As long as before: what a plane mirror sends back stays linear in the pixel.
                 const length = step.path.bundle.groups[group].line.direction.length();
                 next.leave(step.path, group, &.{
                     .point = point,
                     .away = point.normal_geometric,
                     .direction = direction.scale(length),
-                    .roughness = step.roughnessLeft(roughness, spread),
-                    .lobe = .select(spread, middle, direction),
-                    .lobe_roughness = roughness,
+                    .roughness = roughnessLeft(Rays, roughness, spread),
+                    .lobe = direction,
+                    .lobe_roughness = roughnessLeft(Rays, roughness, spread),
                     .emission = if (lobe == .coat)
                         .splat(1)
                     else
@@ -232,11 +234,6 @@ fn Step(comptime Kernel: type) type {
         inline fn spreadOf(step: *const Self, roughness: F32) Mask {
             if (!step.bounces.spreads) return .splat(false);
             return roughness.gt(.splat(spread_roughness_min));
-        }
-
-        /// Roughness of what is not spread over the samples.
-        inline fn roughnessLeft(_: *const Self, roughness: F32, spread: Mask) F32 {
-            return .select(spread, roughness.mul(.splat(prefiltered_roughness)), roughness);
         }
 
         /// Two numbers in 0..1 for the pixels of a group.
@@ -379,7 +376,7 @@ fn Step(comptime Kernel: type) type {
                     .sample(step.numbers(group, which.part));
                 direction = .select(spread, found.to_light, direction);
             }
-            return .{ .direction = direction, .roughness = step.roughnessLeft(roughness, spread) };
+            return .{ .direction = direction, .roughness = roughnessLeft(Rays, roughness, spread) };
         }
 
         /// Room for the rays of the next depth in these lanes, and how many they are; null if there

@@ -162,8 +162,8 @@ pub fn Bsdf(comptime Lanes: type) type {
             var specular = splat3(Lanes, even);
             // Without metal and colours all channels are those of the base.
             if (reflectance.colors != null or !material.metallic.eq(.zero()).all()) {
-                const metal = base.scale(material.metallic);
-                const mixed = splat3(Lanes, base_f0.mul(dielectric)).add(metal);
+                const mixed = splat3(Lanes, base_f0.mul(dielectric))
+                    .add(base.scale(material.metallic));
                 const f0 = if (reflectance.colors) |colors| colors.f0 else mixed;
                 const f90 = base_f90.mul(dielectric).add(material.metallic);
                 inline for (.{ "x", "y", "z" }) |channel| {
@@ -183,8 +183,7 @@ pub fn Bsdf(comptime Lanes: type) type {
             bsdf.open = open;
             bsdf.specular_albedo = specular;
             bsdf.diffuse_albedo = base.scale(open.sub(passing));
-            const rough = material.roughness.max(.splat(highlight_roughness_least));
-            bsdf.alpha = rough.mul(rough);
+            bsdf.alpha = highlightAlpha(Lanes, material.roughness);
             bsdf.cos_view = cos_view;
             bsdf.smith_view = microfacet.smith(Lanes, cos_view, bsdf.alpha.mul(bsdf.alpha));
             bsdf.multiple = scatter
@@ -336,6 +335,12 @@ fn Boundary(comptime Lanes: type) type {
             };
         }
     };
+}
+
+/// GGX's alpha of what lights without size and samples see.
+pub inline fn highlightAlpha(comptime Lanes: type, roughness: Lanes.F32) Lanes.F32 {
+    const rough = roughness.max(.splat(highlight_roughness_least));
+    return rough.mul(rough);
 }
 
 /// Reflectance at grazing incidence for that at normal incidence, see `f90_per_f0`.

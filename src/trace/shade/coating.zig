@@ -57,10 +57,9 @@ pub fn Coating(comptime Lanes: type) type {
             const rough = layers.clearcoat_roughness;
             const squared = rough.mul(rough);
             const directional = albedo_file.Albedo(Lanes).of(squared).at(cosine);
-            const highlight = rough.max(.splat(bsdf_file.highlight_roughness_least));
             coating.normal = normal;
             coating.roughness = rough;
-            coating.alpha = highlight.mul(highlight);
+            coating.alpha = bsdf_file.highlightAlpha(Lanes, rough);
             coating.cos_view = cosine;
             const alpha_squared = coating.alpha.mul(coating.alpha);
             coating.smith_view = microfacet.smith(Lanes, cosine, alpha_squared);
