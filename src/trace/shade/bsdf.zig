@@ -15,6 +15,7 @@ const albedo_file = @import("albedo.zig");
 const energy = @import("energy.zig");
 const microfacet = @import("microfacet.zig");
 const sampling = @import("sampling.zig");
+const test_surface = @import("test_surface.zig");
 const interface_file = @import("interface.zig");
 const transmission_file = @import("transmission.zig");
 const Coating = @import("coating.zig").Coating;
@@ -147,8 +148,7 @@ pub fn Bsdf(comptime Lanes: type) type {
             const cos_view = point.normal.dot(point.view).max(.splat(1e-4)).min(one);
             const boundary: Boundary(Lanes) = .of(point, cos_view);
             const albedo = &bsdf.albedo;
-            const roughness = material.roughness;
-            var squared = roughness.mul(roughness);
+            var squared = material.roughness.mul(material.roughness);
             const stretched = reflectance.colors != null and bsdf.stretch.lanes.any();
             if (stretched) squared = bsdf.stretch.effective(squared);
             if (!albedo.alpha.eq(squared).all()) albedo.* = .of(squared);
@@ -183,7 +183,7 @@ pub fn Bsdf(comptime Lanes: type) type {
             bsdf.open = open;
             bsdf.specular_albedo = specular;
             bsdf.diffuse_albedo = base.scale(open.sub(passing));
-            bsdf.alpha = highlightAlpha(Lanes, roughness);
+            bsdf.alpha = highlightAlpha(Lanes, material.roughness);
             bsdf.cos_view = cos_view;
             bsdf.smith_view = microfacet.smith(Lanes, cos_view, bsdf.alpha.mul(bsdf.alpha));
             bsdf.multiple = scatter
@@ -405,46 +405,10 @@ inline fn mirror(comptime Lanes: type, view: Lanes.Vec3, normal: Lanes.Vec3) Lan
 }
 
 const Single = simd.Lanes(.scalar, 1);
+const viewAt = test_surface.viewAt;
 
 fn testPoint(view: [3]f32) Interaction(Single) {
-    const up: Single.Vec3 = .splat(.{ 0, 1, 0 });
-    return .{
-        .hit = .splat(true),
-        .position = .splat(.{ 0, 0, 0 }),
-        .normal_geometric = up,
-        .normal = up,
-        .view = .splat(view),
-        .distance = .splat(1),
-        .back = .splat(false),
-        .culled = .splat(false),
-        .opacity = .splat(1),
-        .error_ulps = .zero(),
-        .offset_max = .zero(),
-        .cone_width = .zero(),
-        .curvature = .zero(),
-        .hidden = .splat(false),
-        .eta = .splat(1.0 / 1.5),
-        .sigma_beyond = .splat(.{ 0, 0, 0 }),
-        .beyond = @splat(.air),
-        .material = .{
-            .base_color = .splat(.{ 1, 1, 1 }),
-            .emissive = .splat(.{ 0, 0, 0 }),
-            .metallic = .splat(0),
-            .roughness = .splat(1),
-            .dielectric_f0 = .splat(0.04),
-            .ior = .splat(1.5),
-            .transmission = .splat(0),
-            .sigma_a = .splat(.{ 0, 0, 0 }),
-            .occlusion = .splat(1),
-            .unlit = .splat(false),
-            .volume = .splat(false),
-        },
-    };
-}
-
-/// A view in the plane of x and y, whose normal is y.
-fn viewAt(cosine: f32) Single.Vec3 {
-    return .splat(.{ @sqrt(1 - cosine * cosine), cosine, 0 });
+    return test_surface.pointAt(Single, view);
 }
 
 fn setRough(point: *Interaction(Single), metallic: f32, roughness: f32) void {

@@ -9,7 +9,10 @@
 //! of Veach and Guibas 1995). Everything is + - * / sqrt in a fixed order.
 
 const std = @import("std");
+const simd = @import("../../simd.zig");
+const chi_squared = @import("chi_squared.zig");
 const microfacet = @import("microfacet.zig");
+const test_surface = @import("test_surface.zig");
 const transmission = @import("transmission.zig");
 const Bsdf = @import("bsdf.zig").Bsdf;
 const Interaction = @import("interaction.zig").Interaction;
@@ -223,4 +226,200 @@ inline fn turn(
 ) Lanes.Vec3 {
     return across[0].scale(way.x).add(across[1].scale(way.y))
         .add(normal.scale(way.z)).normalize();
+}
+
+const Single = simd.Lanes(.scalar, 1);
+
+/// A surface of all lobes that are asked for, off the axes so that frames are in it.
+const Surface = struct {
+    point: Interaction(Single),
+    bsdf: Bsdf(Single),
+
+    const Change = struct {
+        cosine: f32 = 0.8,
+        metallic: f32 = 0,
+        roughness: f32 = 0.7,
+        transmission: f32 = 0,
+        coat: f32 = 0,
+        sheen: f32 = 0,
+        anisotropy: f32 = 0,
+        diffuse_transmission: f32 = 0,
+    };
+
+    fn of(change: Change) Surface {
+        const axes = [3]Single.Vec3{
+            .splat(.{ 0.8, -0.6, 0 }), .splat(.{ 0.36, 0.48, -0.8 }), .splat(.{ 0.48, 0.64, 0.6 }),
+        };
+        var surface: Surface = undefined;
+        const point = &surface.point;
+        point.* = test_surface.pointAt(Single, .{ 0, 1, 0 });
+        point.normal = axes[1];
+        point.normal_geometric = axes[1];
+        const sine = @sqrt(1 - change.cosine * change.cosine);
+        point.view = axes[0].scale(.splat(sine)).add(axes[1].scale(.splat(change.cosine)));
+        point.material.metallic = .splat(change.metallic);
+        point.material.roughness = .splat(change.roughness);
+        point.material.transmission = .splat(change.transmission);
+        var layers = test_surface.layersOf(Single);
+        layers.clearcoat = .splat(change.coat);
+        layers.clearcoat_roughness = .splat(0.5);
+        layers.clearcoat_normal = axes[1].add(axes[2].scale(.splat(0.3))).normalize();
+        layers.sheen_color = .splat(@splat(change.sheen));
+        layers.sheen_roughness = .splat(0.6);
+        layers.anisotropy = .splat(change.anisotropy);
+        layers.tangent = axes[2];
+        layers.diffuse_transmission = .splat(change.diffuse_transmission);
+        surface.bsdf.albedo = .unknown;
+        surface.bsdf.becomeLayered(point, &layers);
+        return surface;
+    }
+
+    pub fn sample(surface: *const Surface, numbers: [3]f32) [3]f32 {
+        const lanes: [3]Single.F32 = .{
+            .splat(numbers[0]), .splat(numbers[1]), .splat(numbers[2]),
+        };
+        return surface.bsdf.sample(&surface.point, lanes).lane(0);
+    }
+
+    pub fn pdf(surface: *const Surface, to_light: [3]f32) f32 {
+        return surface.bsdf.pdf(&surface.point, .splat(to_light)).lane(0);
+    }
+
+    fn eval(surface: *const Surface, to_light: [3]f32) f32 {
+        const way: Single.Vec3 = .splat(to_light);
+        const behind = surface.bsdf.isBehind(&surface.point, way).lane(0);
+        const seen = if (behind)
+            surface.bsdf.evalBehind(&surface.point, way)
+        else
+            surface.bsdf.eval(&surface.point, way);
+        return seen.x.lane(0);
+    }
+
+    fn albedo(surface: *const Surface) f32 {
+        const bsdf = &surface.bsdf;
+        return bsdf.specular_albedo.add(bsdf.diffuse_albedo).add(bsdf.coating.sheen_albedo)
+            .add(bsdf.back_albedo).add(bsdf.mirror.transmitted).x.add(bsdf.coating.albedo).lane(0);
+    }
+};
+
+const changes = [_]Surface.Change{
+    .{ .metallic = 0.5, .roughness = 0.6, .sheen = 1, .anisotropy = 0.6 },
+    // A pane so smooth that its microfacets scatter next to nothing.
+    .{
+        .roughness = 0.28,
+        .transmission = 0.5,
+        .coat = 1,
+        .sheen = 0.5,
+        .diffuse_transmission = 0.5,
+    },
+};
+
+test "samples of layered surfaces have their density, by chi-squared" {
+    for (changes) |change| {
+        errdefer std.debug.print("{any}\n", .{change});
+        try chi_squared.expectDistributed(&Surface.of(change));
+    }
+}
+
+test "the mean weight of samples is the albedo of all lobes" {
+    const count = 2048;
+    const scattering: Surface.Change = .{ .coat = 0.5, .transmission = 0.6, .sheen = 0.5 };
+    for (changes ++ .{scattering}) |change| {
+        const surface: Surface = .of(change);
+        var sum: f64 = 0;
+        for (0..count) |index| {
+            // Points spread evenly by powers of one number
+            // (Roberts 2018, "The Unreasonable Effectiveness of Quasirandom Sequences").
+            var numbers: [3]f32 = undefined;
+            for (&numbers, [_]f64{ 0.8191725134, 0.6710436067, 0.5497004779 }) |*number, step| {
+                const whole = 0.5 + step * @as(f64, @floatFromInt(index));
+                number.* = @floatCast(@min(whole - @floor(whole), 0.999999));
+            }
+            const way = surface.sample(numbers);
+            const density = surface.pdf(way);
+            try std.testing.expect(density > 0);
+            sum += surface.eval(way) / density / count;
+        }
+        errdefer std.debug.print("{any}\n", .{change});
+        try std.testing.expectApproxEqRel(surface.albedo(), sum, 0.03);
+    }
+}
+
+test "every lobe is chosen by its share of the albedo" {
+    const all: Surface.Change = .{
+        .coat = 1,
+        .sheen = 0.5,
+        .transmission = 0.5,
+        .diffuse_transmission = 0.5,
+    };
+    const surface: Surface = .of(all);
+    const shares: Shares(Single) = .of(&surface.bsdf, &surface.point);
+    const whole = surface.albedo();
+    const coat = surface.bsdf.coating.albedo.lane(0);
+    const behind = surface.bsdf.back_albedo.x.lane(0);
+    const pane = surface.bsdf.mirror.transmitted.x.lane(0);
+    try std.testing.expect(coat > 0 and behind > 0 and pane > 0);
+    const found = [_]Single.F32{
+        shares.to_coat.sub(shares.specular),
+        shares.to_behind.sub(shares.to_coat),
+        shares.to_pane.sub(shares.to_behind),
+        Single.F32.splat(1).sub(shares.to_pane),
+    };
+    const diffuse = surface.bsdf.diffuse_albedo.add(surface.bsdf.coating.sheen_albedo).x.lane(0);
+    for (found, [_]f32{ coat, behind, pane, diffuse }) |share, part| {
+        try std.testing.expectApproxEqAbs(part / whole, share.lane(0), 1e-5);
+    }
+}
+
+const Four = simd.Lanes(.scalar, 4);
+
+test "a lane without layers has the bits of the plain BSDF beside one with all" {
+    for ([_]f32{ 0, 0.4, 1 }) |metallic| for ([_]f32{ 0, 0.5 }) |clear| {
+        var point = test_surface.pointAt(Four, .{ 0.6, 0.8, 0 });
+        point.material.base_color = .splat(.{ 0.9, 0.3, 0.5 });
+        point.material.metallic = .splat(metallic);
+        point.material.roughness = .splat(0.4);
+        point.material.transmission = .splat(clear);
+        var layers = test_surface.layersOf(Four);
+        layers.present = Four.F32.iota().lt(.splat(2));
+        inline for (.{
+            "clearcoat",   "clearcoat_roughness", "sheen_roughness",
+            "iridescence", "anisotropy",          "diffuse_transmission",
+        }) |name| @field(layers, name) = .splat(0.7);
+        layers.specular = .splat(0.3);
+        layers.specular_color = .splat(.{ 1, 0.2, 0.1 });
+        layers.sheen_color = .splat(.{ 1, 1, 1 });
+        var mixed: Bsdf(Four) = undefined;
+        mixed.albedo = .unknown;
+        mixed.becomeLayered(&point, &layers);
+        const plain: Bsdf(Four) = .of(&point);
+        const behind: Four.Vec3 = .splat(.{ 0.36, -0.8, 0.48 });
+        const light: Four.Vec3 = .splat(.{ -0.48, 0.8, 0.36 });
+        const numbers: [3]Four.F32 = .{ .splat(0.9), .splat(0.3), .splat(0.2) };
+        const pairs = [_][2]Four.Vec3{
+            .{ plain.specular_albedo, mixed.specular_albedo },
+            .{ plain.diffuse_albedo, mixed.diffuse_albedo },
+            .{ plain.mirror.reflected, mixed.mirror.reflected },
+            .{ plain.mirror.transmitted, mixed.mirror.transmitted },
+            .{ plain.back_albedo, mixed.back_albedo },
+            .{ plain.evalLobes(&point, light).diffuse, mixed.evalLobes(&point, light).diffuse },
+            .{ plain.evalLobes(&point, light).specular, mixed.evalLobes(&point, light).specular },
+            .{ plain.evalBehind(&point, behind), mixed.evalBehind(&point, behind) },
+            .{ plain.sample(&point, numbers), mixed.sample(&point, numbers) },
+        };
+        for (pairs, 0..) |pair, index| {
+            errdefer std.debug.print("pair {d}\n", .{index});
+            try std.testing.expectEqual(bitsOf(pair[0].lane(3)), bitsOf(pair[1].lane(3)));
+        }
+        for ([_]Four.Vec3{ light, behind }) |way| {
+            const density = plain.pdf(&point, way).lane(3);
+            try std.testing.expectEqual(density, mixed.pdf(&point, way).lane(3));
+        }
+        // The other lanes are something else.
+        try std.testing.expect(pairs[0][0].x.lane(1) != pairs[0][1].x.lane(1));
+    };
+}
+
+fn bitsOf(components: [3]f32) [3]u32 {
+    return @bitCast(components);
 }
