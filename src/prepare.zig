@@ -939,6 +939,47 @@ test "texture coordinates and tangents are placed where a texture asks for them"
     try std.testing.expectEqual(0, result.materials.all[1].lookup_count);
 }
 
+test "layers are there where a drawn material has some, and tangents for what has a direction" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    from.materials = &.{ .{ .clearcoat_roughness = 1 }, .{ .anisotropy = 0.5 } };
+    var meshes: [2]scene.Mesh = @splat(from.meshes[0]);
+    meshes[1].material = 1;
+    for (&meshes) |*mesh| mesh.texcoords[0] = &.{ .{ 0, 0 }, .{ 1, 0 }, .{ 0, 1 } };
+    from.meshes = &meshes;
+    const instances = [_]scene.Instance{ .{ .mesh = 0, .node = 0 }, .{ .mesh = 1, .node = 0 } };
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    for (1..3) |drawn_count| {
+        from.instances = instances[0..drawn_count];
+        from.check();
+        var diagnostic: Diagnostic = .{};
+        var times: StageTimes = .{};
+        const io = std.testing.io;
+        var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
+        defer loaded.deinit();
+        const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
+        var result = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
+        defer result.deinit();
+        const layers = result.materials.layers;
+        if (drawn_count == 1) {
+            try std.testing.expectEqual(0, layers.len);
+            try std.testing.expectEqual(0, result.geometry.tangents.len);
+            continue;
+        }
+        try std.testing.expectEqual(world.Layers{}, layers[0]);
+        try std.testing.expectEqual(world.Layers{ .present = 1, .anisotropy = 0.5 }, layers[1]);
+        for (result.geometry.tangents[0..3]) |none| {
+            try std.testing.expectEqual([4]f32{ 0, 0, 0, 1 }, none);
+        }
+        // Of TEXCOORD_0, whose v grows downwards in textures, upwards here.
+        for (result.geometry.tangents[3..6]) |tangent| {
+            try std.testing.expectEqual([4]f32{ 1, 0, 0, -1 }, tangent);
+        }
+    }
+}
+
 test "loading that runs out of memory is an error that leaks nothing" {
     const gpa = std.testing.allocator;
     var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});

@@ -33,6 +33,10 @@ const emitter_roughness_max = 0.1;
 /// Rougher lobes are spread over the samples.
 const spread_roughness_min = 0.04;
 
+/// Rays through the first rough surface for each sample of a pixel: what is behind it may be
+/// anything, and is all that is seen of it.
+pub const rough_split = 4;
+
 /// Share of a lobe's variance that the samples are spread by; the other half is prefiltered.
 const sampled_alpha = @sqrt(0.5);
 
@@ -93,7 +97,7 @@ pub fn Bounces(comptime Kernel: type) type {
             const material = &vertex.point.material;
             const lit = vertex.seen.andNot(material.unlit);
             const worth = largest(vertex.throughput.mul(bsdf.mirror.reflected));
-            const roughness = material.roughness;
+            const roughness = bsdf_file.widest(Rays, bsdf, material.roughness);
             var traced = roughness.le(.splat(bsdf_file.mirror_roughness_max))
                 .bitOr(bsdf.mirror.total);
             if (bounces.spreads) traced = traced.bitOr(roughness.le(.splat(rough_traced_max))
@@ -170,7 +174,7 @@ fn Step(comptime Kernel: type) type {
                 const bsdf = &vertex.bsdf;
                 const roughness = switch (lobe) {
                     .coat => bsdf.coating.roughness,
-                    else => point.material.roughness,
+                    else => bsdf_file.widest(Rays, bsdf, point.material.roughness),
                 };
                 const spread = step.spreadOf(roughness);
                 const mirrored = switch (lobe) {
@@ -182,8 +186,14 @@ fn Step(comptime Kernel: type) type {
                     const normal = if (lobe == .coat) bsdf.coating.normal else point.normal;
                     const alpha = roughness.mul(roughness).mul(.splat(sampled_alpha));
                     const found = bsdf_file
-                        .mirroredRough(Rays, point, normal, alpha, step.numbers(group));
+                        .mirroredRough(Rays, point, normal, alpha, step.numbers(group, null));
                     direction = .select(spread, found, mirrored);
+                    if (lobe == .base and bsdf.layered and bsdf.stretch.lanes.any()) {
+                        const stretched = bsdf.stretch
+                            .mirrored(point, sampled_alpha, step.numbers(group, null));
+                        direction =
+                            .select(spread.bitAnd(bsdf.stretch.lanes), stretched, direction);
+                    }
                 }
                 // As long as before: what a plane mirror sends back stays linear in the pixel.
                 const length = step.path.bundle.groups[group].line.direction.length();
@@ -224,10 +234,11 @@ fn Step(comptime Kernel: type) type {
         }
 
         /// Two numbers in 0..1 for the pixels of a group.
-        fn numbers(step: *const Self, group: usize) [2]F32 {
+        fn numbers(step: *const Self, group: usize, part: ?u32) [2]F32 {
             const bounces = step.bounces;
             const pixels = camera.pixels(Kernel, bounces.rectangle, group);
-            return numbers_file.at(Rays, pixels, bounces.sample, step.path.depth);
+            const sample = if (part) |one| bounces.sample *% rough_split +% one else bounces.sample;
+            return numbers_file.at(Rays, pixels, sample, step.path.depth);
         }
 
         fn pushRefractions(step: *const Self) u64 {
@@ -248,7 +259,7 @@ fn Step(comptime Kernel: type) type {
                 mask.* = mask.andNot(split.*);
                 any_dispersed = any_dispersed or split.any();
             }
-            var count = step.pushRefraction(&plain, null);
+            var count = step.pushPlainRefractions(&plain);
             if (!any_dispersed) return count;
             inline for (.{ "x", "y", "z" }, 0..) |name, channel| {
                 var masks: [group_count]Mask = undefined;
@@ -258,22 +269,51 @@ fn Step(comptime Kernel: type) type {
                     const worth = vertex.throughput.mul(vertex.bsdf.mirror.transmitted);
                     mask.* = split.bitAnd(@field(worth, name).gt(.zero()));
                 }
-                count += step.pushRefraction(&masks, channel);
+                count += step.pushRefraction(&masks, .{ .channel = channel });
             }
             return count;
         }
 
-        /// Of all channels, or of one with its own index.
+        /// Of all channels; several rays each through the first rough surface that is seen.
+        fn pushPlainRefractions(step: *const Self, plain: *const [group_count]Mask) u64 {
+            if (step.path.depth > 0) return step.pushRefraction(plain, .{});
+            var sharp: [group_count]Mask = undefined;
+            var rough: [group_count]Mask = undefined;
+            var any_rough = false;
+            for (&sharp, &rough, plain, step.vertices) |*one, *several, mask, *vertex| {
+                one.* = mask;
+                several.* = .splat(false);
+                if (mask.none()) continue;
+                several.* = mask.bitAnd(step.spreadOf(vertex.point.material.roughness));
+                one.* = mask.andNot(several.*);
+                any_rough = any_rough or several.any();
+            }
+            var count = step.pushRefraction(&sharp, .{});
+            if (!any_rough) return count;
+            for (0..rough_split) |part| {
+                count += step.pushRefraction(&rough, .{ .part = @intCast(part) });
+            }
+            return count;
+        }
+
+        /// Which rays of a surface.
+        const Part = struct {
+            /// One channel with its own index; null: all.
+            channel: ?usize = null,
+            /// One of `rough_split`; null: the only one.
+            part: ?u32 = null,
+        };
+
         fn pushRefraction(
             step: *const Self,
             masks: *const [group_count]Mask,
-            comptime channel: ?usize,
+            which: Part,
         ) u64 {
             const next, const count = step.room(masks) orelse return 0;
             for (masks, step.vertices, 0..) |mask, *vertex, group| {
                 if (mask.none()) continue;
                 const point = &vertex.point;
-                const passing = step.refracted(vertex, group, channel);
+                const passing = step.refracted(vertex, group, which);
                 next.leave(step.path, group, &.{
                     .point = point,
                     .away = point.normal_geometric.neg(),
@@ -283,10 +323,11 @@ fn Step(comptime Kernel: type) type {
                 });
                 var share = vertex.bsdf.mirror.transmitted;
                 inline for (.{ "x", "y", "z" }, 0..) |name, index| {
-                    if (channel) |one| if (one != index) {
+                    if (which.channel) |one| if (one != index) {
                         @field(share, name) = .zero();
                     };
                 }
+                if (which.part != null) share = share.scale(.splat(1.0 / @as(f32, rough_split)));
                 next.throughput[group] = vertex.throughput.mul(share);
                 next.cross(step.path, group, point);
                 if (step.bounces.frame.needsFootprints())
@@ -300,14 +341,14 @@ fn Step(comptime Kernel: type) type {
             step: *const Self,
             vertex: *const Vertex,
             group: usize,
-            comptime channel: ?usize,
+            which: Part,
         ) struct { direction: Vec3, roughness: F32 } {
             const point = &vertex.point;
             const material = &point.material;
             const thick = material.volume;
             var eta = point.eta;
             var direction = vertex.bsdf.mirror.refraction;
-            if (channel) |index| {
+            if (which.channel) |index| {
                 const iors = transmission
                     .dispersedIors(Rays, material.ior, vertex.layers.dispersion);
                 const stretch = iors[index].div(material.ior);
@@ -327,7 +368,7 @@ fn Step(comptime Kernel: type) type {
             if (spread.any()) {
                 const sampled = alpha.mul(.splat(sampled_alpha));
                 const found = transmission.boundaryOf(Rays, point, sampled, eta)
-                    .sample(step.numbers(group));
+                    .sample(step.numbers(group, which.part));
                 direction = .select(spread, found.to_light, direction);
             }
             return .{ .direction = direction, .roughness = step.roughnessLeft(roughness, spread) };

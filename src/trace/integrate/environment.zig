@@ -364,8 +364,10 @@ fn ReceiverOf(comptime Lanes: type) type {
                 sum = sum.add(bsdf.coating.sheen_albedo.mul(irradiance).scale(occlusion));
             const untraced = receiver.lit.andNot(traced);
             if (untraced.any()) {
-                const smooth = environment_file
+                var smooth = environment_file
                     .radiance(Lanes, environment, receiver.lobe, roughness, .zero(), untraced);
+                if (bsdf.layered and bsdf.stretch.lanes.any()) smooth =
+                    environment_layers.stretched(Lanes, environment, vertex, untraced, smooth);
                 const lobe = smooth.mul(openness(Lanes, whole.glossy, hidden.glossy))
                     .add(bounced.scale(bounce(hidden.glossy_sky, whole.glossy_sky)));
                 const tail = whole.tail.sub(hidden.tail);

@@ -29,7 +29,7 @@ pub fn dominant(
     return normal.add(mirrored.sub(normal).scale(share)).normalize();
 }
 
-/// Weight of a light in a lobe around a direction; `alpha_term` is the square of GGX's alpha less 1.
+/// Weight of a light in a lobe around a direction; `alpha_term` is GGX's alpha squared less 1.
 pub inline fn glossyWeight(
     comptime Lanes: type,
     cosine: Lanes.F32,
@@ -60,6 +60,47 @@ pub inline fn shareOf(comptime Lanes: type, part: Lanes.F32, whole: Lanes.F32) L
     const known = whole.gt(.splat(1e-12));
     const share = part.div(F32.select(known, whole, .splat(1)));
     return F32.select(known, share, .zero());
+}
+
+/// Slopes that divide GGX's along one direction into equal parts, in units of alpha: its marginal
+/// distribution up to a slope x is 1/2 + x / (2 sqrt(1 + x^2)). One side; the others mirror them.
+const slopes = slopes: {
+    var list: [4]f32 = undefined;
+    for (&list, 0..) |*slope, part| {
+        const share = (@as(f64, @floatFromInt(part)) + 0.5) / @as(f64, list.len);
+        slope.* = @floatCast(share / @sqrt(1 - share * share));
+    }
+    break :slopes list;
+};
+
+/// What a stretched lobe sees, in its lanes; `even` in others: mirror images about normals along the
+/// tangent, each as rough as the lobe is across.
+pub noinline fn stretched(
+    comptime Lanes: type,
+    environment: *const world_file.Environment,
+    vertex: *const path_file.Vertex(Lanes),
+    asked: Lanes.Mask,
+    even: Lanes.Vec3,
+) Lanes.Vec3 {
+    const stretch = &vertex.bsdf.stretch;
+    const lanes = stretch.lanes.bitAnd(asked);
+    if (lanes.none()) return even;
+    const point = &vertex.point;
+    // Across the lobe, and between two neighbours along it.
+    const step = stretch.alphas[0].mul(.splat(0.5 / @as(f32, slopes.len)));
+    const alpha = stretch.alphas[1].max(step);
+    const roughness = alpha.max(.zero()).sqrt();
+    var sum: Lanes.Vec3 = .splat(.{ 0, 0, 0 });
+    inline for (slopes) |slope| inline for (.{ -1, 1 }) |side| {
+        const lean = stretch.alphas[0].mul(.splat(slope * side));
+        const normal = point.normal.add(stretch.tangent.scale(lean)).normalize();
+        const mirrored = bsdf_file.mirrored(Lanes, point, normal);
+        const direction = dominant(Lanes, normal, mirrored, alpha);
+        sum = sum.add(environment_file
+            .radiance(Lanes, environment, direction, roughness, .zero(), lanes));
+    };
+    const mean = sum.scale(.splat(0.5 / @as(f32, slopes.len)));
+    return .select(lanes, mean, even);
 }
 
 /// What the further lobes of a group get of the lights.

@@ -12,6 +12,7 @@ const layers_file = @import("../shade/layers.zig");
 const exponential = @import("../shade/exponential.zig");
 const Nesting = @import("../shade/volumes.zig").Nesting;
 const ray_cone = @import("../shade/ray_cone.zig");
+const bounces = @import("bounces.zig");
 const camera = @import("camera.zig");
 const visibility = @import("visibility.zig");
 const assert = std.debug.assert;
@@ -200,7 +201,7 @@ pub fn PathStack(comptime Kernel: type) type {
 
         /// At each depth a ray leaves at most the rest of itself, a refraction for all channels and
         /// one for each, and reflections by the base and by a coat.
-        const states_max = 7 * (depth_limit + 1);
+        const states_max = 7 * (depth_limit + 1) + bounces.rough_split;
 
         /// Room for rays of the given depth; the caller fills in the rest.
         pub fn push(
@@ -283,7 +284,10 @@ pub fn Vertex(comptime Lanes: type) type {
             visibility.findInteraction(Lanes, frame, path, group, point);
             if (frame.materials.volumes.len > 0) seer.boundaries[group].apply(point);
             point.opacity = Lanes.F32.select(point.culled, .zero(), point.opacity);
-            if (frame.hasLayers()) vertex.findLayers(frame, path, group) else vertex.bsdf.become(point);
+            if (frame.hasLayers())
+                vertex.findLayers(frame, path, group)
+            else
+                vertex.bsdf.become(point);
             vertex.seen = point.hit.bitAnd(point.opacity.gt(.zero()));
             const throughput = path.throughputAt(group, point.distance).scale(point.opacity);
             vertex.throughput = .select(vertex.seen, throughput, .splat(.{ 0, 0, 0 }));

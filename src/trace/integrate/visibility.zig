@@ -302,7 +302,11 @@ pub fn findInteraction(
         .of(frame.geometry, ray.closest.primitive, hit);
     point.* = interaction_file.resolve(Lanes, frame, &corners, &hitOf(Lanes, ray, &corners, hit));
     if (!frame.needsFootprints()) return;
-    const cone = [2]Lanes.F32{ path.cone_width[group], path.cone_spread[group] };
+    // What rough surfaces on the way blur, textures are looked up as wide.
+    const rough = path.roughness[group].mul(path.roughness[group]);
+    const spread = path.cone_spread[group];
+    const widened = spread.add(rough.copySign(spread));
+    const cone = [2]Lanes.F32{ path.cone_width[group], widened };
     addFootprint(Lanes, frame, ray, cone, point);
 }
 

@@ -12,12 +12,14 @@
 const std = @import("std");
 const simd = @import("../../simd.zig");
 const albedo_file = @import("albedo.zig");
+const anisotropy = @import("anisotropy.zig");
 const microfacet = @import("microfacet.zig");
 const interface_file = @import("interface.zig");
 const transmission_file = @import("transmission.zig");
 const Coating = @import("coating.zig").Coating;
 const Interaction = @import("interaction.zig").Interaction;
 const Layers = @import("layers.zig").Layers;
+const Stretch = @import("stretch.zig").Stretch;
 
 /// Least roughness of the lobe that lights without size and samples see: below it a highlight would
 /// be a spike of some thousandths of a steradian and some ten thousand times the light, which no
@@ -73,6 +75,7 @@ pub fn Bsdf(comptime Lanes: type) type {
         /// Some lane has further lobes: what follows is defined then.
         layered: bool,
         coating: Coating(Lanes),
+        stretch: Stretch(Lanes),
 
         const Self = @This();
         const F32 = Lanes.F32;
@@ -105,6 +108,7 @@ pub fn Bsdf(comptime Lanes: type) type {
             layers: *const Layers(Lanes),
         ) void {
             const interface: interface_file.Interface(Lanes) = .of(point, layers);
+            bsdf.stretch = .of(point, layers);
             bsdf.setBase(point, &.{
                 .f0 = interface.dielectric_f0,
                 .f90 = interface.dielectric_f90,
@@ -118,6 +122,20 @@ pub fn Bsdf(comptime Lanes: type) type {
             bsdf.back_albedo = layers.diffuse_transmission_color.min(.splat(.{ 1, 1, 1 }))
                 .scale(open.mul(share).mul(bsdf.coating.below));
             bsdf.weaken(bsdf.coating.below, bsdf.coating.below.mul(one.sub(share)));
+        }
+
+        /// Of the lanes that have a stretched lobe, that of it.
+        noinline fn stretchedAlbedo(
+            bsdf: *const Self,
+            even: albedo_file.Directional(Lanes),
+        ) albedo_file.Directional(Lanes) {
+            const stretch = &bsdf.stretch;
+            const found =
+                anisotropy.directional(Lanes, &bsdf.albedo, stretch.view, stretch.alphas);
+            return .{
+                .missing = .select(stretch.lanes, found.missing, even.missing),
+                .schlick = .select(stretch.lanes, found.schlick, even.schlick),
+            };
         }
 
         /// What lies above the base leaves these shares to its specular and to its diffuse part.
@@ -156,9 +174,16 @@ pub fn Bsdf(comptime Lanes: type) type {
             const boundary: Boundary(Lanes) = .of(point, cos_view);
             const albedo = &bsdf.albedo;
             const roughness = material.roughness;
-            const squared = roughness.mul(roughness);
+            var squared = roughness.mul(roughness);
+            const stretched = reflectance.colors != null and bsdf.stretch.lanes.any();
+            if (stretched) squared = .select(
+                bsdf.stretch.lanes,
+                anisotropy.effectiveAlpha(Lanes, bsdf.stretch.alphas),
+                squared,
+            );
             if (!albedo.alpha.eq(squared).all()) albedo.* = .of(squared);
-            const directional = albedo.at(boundary.cos_fresnel);
+            var directional = albedo.at(boundary.cos_fresnel);
+            if (stretched) directional = bsdf.stretchedAlbedo(directional);
             const scatter_base = multipleOf(albedo, base_f0, base_f90);
             bsdf.f0 = splat3(Lanes, base_f0);
             bsdf.f90 = base_f90;
@@ -235,7 +260,11 @@ pub fn Bsdf(comptime Lanes: type) type {
             const light_term = microfacet.smith(Lanes, cos_light, a).mul(bsdf.cos_view);
             // Both terms vanish together only where the light grazes: cos_light is 0 as well.
             const visibility = F32.splat(0.5).div(view_term.add(light_term).max(.splat(1e-12)));
-            const density = microfacet.distribution(Lanes, cos_half, a).mul(visibility);
+            var density = microfacet.distribution(Lanes, cos_half, a).mul(visibility);
+            if (bsdf.layered and bsdf.stretch.lanes.any()) {
+                const stretched = bsdf.stretch.density(point, to_light, half);
+                density = .select(bsdf.stretch.lanes, stretched, density);
+            }
             const schlick = microfacet.power5(Lanes, one.sub(cos_view_half));
             const single = schlickOf(bsdf.f0, bsdf.f90, schlick).scale(density);
             const way_in = bsdf.albedo.at(cos_light);
@@ -431,6 +460,16 @@ fn Boundary(comptime Lanes: type) type {
 /// Reflectance at grazing incidence for that at normal incidence, see `f90_per_f0`.
 pub inline fn grazingOf(comptime Lanes: type, f0: Lanes.F32) Lanes.F32 {
     return f0.mul(.splat(f90_per_f0)).min(.splat(1));
+}
+
+/// Roughness of an even lobe that is as wide as the specular one where that is widest.
+pub inline fn widest(
+    comptime Lanes: type,
+    bsdf: *const Bsdf(Lanes),
+    roughness: Lanes.F32,
+) Lanes.F32 {
+    if (!bsdf.layered or bsdf.stretch.lanes.none()) return roughness;
+    return bsdf.stretch.widest(roughness);
 }
 
 inline fn splat3(comptime Lanes: type, value: Lanes.F32) Lanes.Vec3 {

@@ -157,7 +157,8 @@ fn texture(
     const base = &point.material;
     base.transmission = base.transmission.mul(texels.float(.transmission, 0));
     const gloss = one.sub(base.roughness).mul(texels.float(.glossiness, 0));
-    base.roughness = .select(layers.present, one.sub(gloss), base.roughness);
+    const glossy = lanesWith(Lanes, frame, &materials.used, .glossiness).bitAnd(layers.present);
+    base.roughness = .select(glossy, one.sub(gloss), base.roughness);
     bent.tangent = texels.tangent();
     bent.bitangent_sign = .fromArray(texels.tangents[3]);
     const turned = lanesWith(Lanes, frame, &materials.used, .anisotropy).bitAnd(layers.present);
