@@ -18,8 +18,8 @@ const goldens = [_]Golden{
     .{ .scene = "builtin:nave", .size = .{ 53, 40 }, .hash = 0xcd21067183881a92 },
     .{ .scene = "builtin:handles", .size = .{ 40, 53 }, .hash = 0xc16bfb558bb29068 },
     .{ .scene = "tests/pictures/solids.gltf", .size = .{ 50, 40 }, .hash = 0x1a9903d7c36e67a6 },
-    .{ .scene = "tests/pictures/shapes.pbrt", .size = .{ 60, 40 }, .hash = 0xed6048e7433f63a0 },
-    .{ .scene = "tests/pictures/view.pbrt", .size = .{ 48, 32 }, .hash = 0xe5cf96a86efd13e0 },
+    .{ .scene = "tests/pictures/shapes.pbrt", .size = .{ 60, 40 }, .hash = 0x3cf369b8ee6a1e03 },
+    .{ .scene = "tests/pictures/view.pbrt", .size = .{ 48, 32 }, .hash = 0xb0da97f9580dcf43 },
 };
 
 fn parse(name: []const u8) !raylane.scene.Scene {
