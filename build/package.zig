@@ -169,7 +169,8 @@ fn kernel(package: Package, variant: Variant, is_counting: bool) *Compile {
     const root = package.moduleOf("src/kernel.zig");
     const own: []const Variant = &.{variant};
     root.addImport("config", package.configOf(own, if (is_counting) own else &.{}, false));
-    root.strip = package.optimize == .fast;
+    // What LLVM does for a debugger is two fifths of its time.
+    root.strip = package.optimize != .debug;
     const suffix = if (is_counting) "-counting" else "";
     const name = b.fmt("kernel-{s}{s}", .{ variant.name(b.allocator), suffix });
     const object = package.archive(name, root);
