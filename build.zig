@@ -224,6 +224,8 @@ const TestPackages = struct {
         const target = resolve(b, query);
         const is_here = target.result.cpu.arch == b.graph.host.result.cpu.arch;
         var options = packages.options;
+        // Traces of the stack are of the first target; -Dtarget= makes another one it.
+        options.is_stripped = list.items.len != 0;
         // ARMv7 has AArch64's variants of the same code: two of them show that the bits agree.
         const is_second_arm = target.result.cpu.arch == .arm and !is_here;
         if (is_second_arm and options.extent == .all) options.extent = .few;

@@ -19,6 +19,7 @@ owner: *std.Build,
 target: std.Build.ResolvedTarget,
 optimize: std.lang.Optimize,
 headers: LazyPath,
+is_stripped: bool,
 /// The library, `@import("raylane")`.
 raylane: *Module,
 shows_searches: bool,
@@ -39,6 +40,8 @@ pub const Options = struct {
     extent: variants.Extent,
     /// Whether kernels show their searches, for tests of traversal.
     shows_searches: bool = false,
+    /// Whether its programs do without what debuggers and traces of the stack read.
+    is_stripped: bool = false,
 };
 
 const own_c_flags: []const []const u8 = &.{
@@ -65,6 +68,7 @@ pub fn init(
         .target = target,
         .optimize = optimize,
         .headers = headers,
+        .is_stripped = options.is_stripped,
         .shows_searches = options.shows_searches,
         .held = held,
         .counting = counting,
@@ -97,6 +101,7 @@ fn moduleOf(package: Package, root: []const u8) *Module {
         .target = package.target,
         .optimize = package.optimize,
         .link_libc = true,
+        .strip = if (package.is_stripped) true else null,
         // A failed test tells where its error came from, in safe mode too.
         .error_tracing = if (package.optimize == .safe) true else null,
         .omit_frame_pointer = if (package.optimize == .fast) true else null,
@@ -169,7 +174,8 @@ fn kernel(package: Package, variant: Variant, is_counting: bool) *Compile {
     const root = package.moduleOf("src/kernel.zig");
     const own: []const Variant = &.{variant};
     root.addImport("config", package.configOf(own, if (is_counting) own else &.{}, false));
-    root.strip = package.optimize == .fast;
+    // What LLVM does for a debugger is two fifths of its time.
+    root.strip = package.optimize != .debug;
     const suffix = if (is_counting) "-counting" else "";
     const name = b.fmt("kernel-{s}{s}", .{ variant.name(b.allocator), suffix });
     const object = package.archive(name, root);
@@ -212,7 +218,7 @@ pub fn addProgram(package: Package, name: []const u8, root: []const u8) *Compile
         .root_source_file = b.path(root),
         .target = package.target,
         .optimize = package.optimize,
-        .strip = package.optimize == .fast,
+        .strip = package.is_stripped or package.optimize == .fast,
         .omit_frame_pointer = if (package.optimize == .fast) true else null,
         .imports = &.{.{ .name = "raylane", .module = package.raylane }},
     }) });

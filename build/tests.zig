@@ -173,6 +173,7 @@ fn integrationProgram(tests: Tests, target: Target) *Compile {
         .target = target.package.target,
         .optimize = target.package.optimize,
         .error_tracing = target.package.raylane.error_tracing,
+        .strip = target.package.raylane.strip,
         .imports = &.{.{ .name = "raylane", .module = target.package.raylane }},
     });
     libraries.stb_image_of_tests.addTo(root, target.package.headers);
