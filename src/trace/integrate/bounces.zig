@@ -37,16 +37,47 @@ const spread_roughness_min = 0.04;
 /// anything, and is all that is seen of it.
 pub const rough_split = 4;
 
-/// GGX's alpha of what the samples are spread by, as a share of the lobe's: half of its
-/// variance, so that few samples do.
-const sampled_alpha = @sqrt(0.5);
+/// What of a lobe the samples are spread by; the rest is left to what is prefiltered.
+fn Spread(comptime Lanes: type) type {
+    const F32 = Lanes.F32;
+    return struct {
+        /// Lanes whose lobe is spread over the samples.
+        lanes: Lanes.Mask,
+        /// GGX's alpha of the samples, as a share of the lobe's.
+        alpha: F32,
+        /// Of the disc that microfacets are drawn from, the radius that is: its rim stands for the
+        /// long tail of the lobe, which few samples show as dots where it is narrow.
+        radius: F32,
+        /// Roughness of the rest, as a share of the lobe's: variances add.
+        rest: F32,
 
-/// Of the disc that microfacets are drawn from, the radius that is: its rim stands for the long
-/// tail of the lobe, which a few samples would show as dots.
-const inner_share = 0.9;
+        /// For a lobe of some roughness; the wider `other` is, the more of it is other surfaces.
+        fn of(lanes: Lanes.Mask, other: F32) @This() {
+            const wide = other.sub(.splat(0.3)).mul(.splat(5)).max(.zero()).min(.splat(1));
+            const alpha = wide.mul(.splat(0.2)).add(.splat(0.5));
+            return .{
+                .lanes = lanes,
+                .alpha = alpha,
+                .radius = wide.mul(.splat(0.2)).add(.splat(0.8)),
+                .rest = F32.splat(1).sub(alpha.mul(alpha)).sqrt().sqrt(),
+            };
+        }
 
-/// Roughness of the prefiltered rest, as a share of the lobe's.
-const prefiltered_roughness = @sqrt(@sqrt(1 - sampled_alpha * sampled_alpha));
+        /// Roughness of what is not spread over the samples.
+        fn left(spread: *const @This(), roughness: F32) F32 {
+            return .select(spread.lanes, roughness.mul(spread.rest), roughness);
+        }
+
+        /// Numbers in 0..1 for points of the disc within the radius.
+        fn within(spread: *const @This(), numbers: [2]F32) [2]F32 {
+            const half: F32 = .splat(0.5);
+            return .{
+                numbers[0].sub(half).mul(spread.radius).add(half),
+                numbers[1].sub(half).mul(spread.radius).add(half),
+            };
+        }
+    };
+}
 
 /// The rays of one step of an integrator.
 pub fn Bounces(comptime Kernel: type) type {
@@ -148,11 +179,6 @@ pub fn Bounces(comptime Kernel: type) type {
     };
 }
 
-/// Roughness of what is not spread over the samples.
-inline fn roughnessLeft(comptime Lanes: type, roughness: Lanes.F32, spread: Lanes.Mask) Lanes.F32 {
-    return .select(spread, roughness.mul(.splat(prefiltered_roughness)), roughness);
-}
-
 /// One step's rays.
 fn Step(comptime Kernel: type) type {
     const Rays = Kernel.Rays;
@@ -186,23 +212,23 @@ fn Step(comptime Kernel: type) type {
                     .coat => bsdf.coating.roughness,
                     else => bsdf_file.widest(Rays, bsdf, point.material.roughness),
                 };
-                const spread = step.spreadOf(roughness);
+                const spread: Spread(Rays) = .of(step.spreadOf(roughness), roughness);
                 const mirrored = switch (lobe) {
                     .coat => bsdf_file.mirrored(Rays, point, bsdf.coating.normal),
                     else => bsdf_file.reflect(Rays, point),
                 };
                 const normal = if (lobe == .coat) bsdf.coating.normal else point.normal;
                 var direction = mirrored;
-                if (spread.any()) {
-                    const alpha = roughness.mul(roughness).mul(.splat(sampled_alpha));
-                    const found = bsdf_file
-                        .mirroredRough(Rays, point, normal, alpha, step.numbers(group, null));
-                    direction = .select(spread, found, mirrored);
+                if (spread.lanes.any()) {
+                    const numbers = spread.within(step.numbersOf(group, null));
+                    const alpha = roughness.mul(roughness).mul(spread.alpha);
+                    const found =
+                        bsdf_file.mirroredRough(Rays, point, normal, alpha, numbers);
+                    direction = .select(spread.lanes, found, mirrored);
                     if (lobe == .base and bsdf.layered and bsdf.stretch.lanes.any()) {
-                        const stretched = bsdf.stretch
-                            .mirrored(point, sampled_alpha, step.numbers(group, null));
-                        direction =
-                            .select(spread.bitAnd(bsdf.stretch.lanes), stretched, direction);
+                        const stretched = bsdf.stretch.mirrored(point, spread.alpha, numbers);
+                        const lanes = spread.lanes.bitAnd(bsdf.stretch.lanes);
+                        direction = .select(lanes, stretched, direction);
                     }
                 }
                 // As long as before: what a plane mirror sends back stays linear in the pixel.
@@ -211,9 +237,9 @@ fn Step(comptime Kernel: type) type {
                     .point = point,
                     .away = point.normal_geometric,
                     .direction = direction.scale(length),
-                    .roughness = roughnessLeft(Rays, roughness, spread),
+                    .roughness = spread.left(roughness),
                     .lobe = direction,
-                    .lobe_roughness = roughnessLeft(Rays, roughness, spread),
+                    .lobe_roughness = spread.left(roughness),
                     .emission = if (lobe == .coat)
                         .splat(1)
                     else
@@ -241,17 +267,11 @@ fn Step(comptime Kernel: type) type {
         }
 
         /// Two numbers in 0..1 for the pixels of a group.
-        fn numbers(step: *const Self, group: usize, part: ?u32) [2]F32 {
+        fn numbersOf(step: *const Self, group: usize, part: ?u32) [2]F32 {
             const bounces = step.bounces;
             const pixels = camera.pixels(Kernel, bounces.rectangle, group);
             const sample = if (part) |one| bounces.sample *% rough_split +% one else bounces.sample;
-            const drawn = numbers_file.at(Rays, pixels, sample, step.path.depth);
-            const half: F32 = .splat(0.5);
-            var inner: [2]F32 = undefined;
-            for (&inner, drawn) |*number, one| {
-                number.* = one.sub(half).mul(.splat(inner_share)).add(half);
-            }
-            return inner;
+            return numbers_file.at(Rays, pixels, sample, step.path.depth);
         }
 
         fn pushRefractions(step: *const Self) u64 {
@@ -379,14 +399,14 @@ fn Step(comptime Kernel: type) type {
                 transmission.thinAlpha(Rays, alpha, material.ior),
             );
             const roughness = equal.max(.zero()).sqrt();
-            const spread = step.spreadOf(material.roughness);
-            if (spread.any()) {
-                const sampled = alpha.mul(.splat(sampled_alpha));
+            const spread: Spread(Rays) = .of(step.spreadOf(material.roughness), .zero());
+            if (spread.lanes.any()) {
+                const sampled = alpha.mul(spread.alpha);
                 const found = transmission.boundaryOf(Rays, point, sampled, eta)
-                    .sample(step.numbers(group, which.part));
-                direction = .select(spread, found.to_light, direction);
+                    .sample(spread.within(step.numbersOf(group, which.part)));
+                direction = .select(spread.lanes, found.to_light, direction);
             }
-            return .{ .direction = direction, .roughness = roughnessLeft(Rays, roughness, spread) };
+            return .{ .direction = direction, .roughness = spread.left(roughness) };
         }
 
         /// Room for the rays of the next depth in these lanes, and how many they are; null if there

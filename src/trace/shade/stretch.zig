@@ -111,11 +111,11 @@ pub fn Stretch(comptime Lanes: type) type {
         pub fn mirrored(
             stretch: *const Self,
             point: *const Interaction(Lanes),
-            share: f32,
+            share: F32,
             numbers: [2]F32,
         ) Vec3 {
             const alphas = [2]F32{
-                stretch.alphas[0].mul(.splat(share)), stretch.alphas[1].mul(.splat(share)),
+                stretch.alphas[0].mul(share), stretch.alphas[1].mul(share),
             };
             const disc = microfacet.disc(Lanes, numbers);
             const half = microfacet.visibleNormalOf(Lanes, stretch.view, alphas, disc);
