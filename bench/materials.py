@@ -29,6 +29,14 @@ CLEAR = {"metallicFactor": 0, "roughnessFactor": 0}
 CLOTH = {"baseColorFactor": [0.05, 0.02, 0.1, 1], "metallicFactor": 0, "roughnessFactor": 1}
 
 
+def place(column, row, columns, rows):
+    """Of a vertex of the unit sphere: the same at the seam and at the poles, so that it is closed."""
+    down = math.pi * row / rows
+    turn = 2 * math.pi * (column % columns / columns - 0.5)
+    ring = math.sin(down) if 0 < row < rows else 0
+    return (ring * math.sin(turn), math.cos(down), ring * math.cos(turn))
+
+
 class File:
     """A glTF document under way."""
 
@@ -104,18 +112,17 @@ class File:
         """Attributes and indices of a unit sphere, its tangents to the right."""
         normals, tangents, places, indices = [], [], [], []
         for row in range(rows + 1):
-            down = math.pi * row / rows
             for column in range(columns + 1):
                 turn = 2 * math.pi * (column / columns - 0.5)
-                normals.append((math.sin(down) * math.sin(turn), math.cos(down),
-                                math.sin(down) * math.cos(turn)))
+                normals.append(place(column, row, columns, rows))
                 tangents.append((math.cos(turn), 0, -math.sin(turn), 1))
                 places.append((column / columns, row / rows))
         for row in range(rows):
             for column in range(columns):
                 a = row * (columns + 1) + column
                 b = a + columns + 1
-                indices += [a, b, b + 1] if row == rows - 1 else [a, b, b + 1, a, b + 1, a + 1]
+                indices += [a, b, b + 1] if row < rows - 1 else []
+                indices += [a, b + 1, a + 1] if row > 0 else []
         position = self.accessor(normals, "VEC3")
         return {"attributes": {
             "POSITION": position, "NORMAL": position, "TANGENT": self.accessor(tangents, "VEC4"),
@@ -325,15 +332,14 @@ def inwards(columns, rows):
         for column in range(columns):
             a = row * (columns + 1) + column
             b = a + columns + 1
-            indices += [a, b + 1, b, a, a + 1, b + 1]
+            indices += [a, b + 1, b] if row < rows - 1 else []
+            indices += [a, a + 1, b + 1] if row > 0 else []
     return indices
 
 
 def inward_normals(columns, rows):
     """Those that belong to `inwards`."""
-    return [(-math.sin(math.pi * row / rows) * math.sin(2 * math.pi * (column / columns - 0.5)),
-             -math.cos(math.pi * row / rows),
-             -math.sin(math.pi * row / rows) * math.cos(2 * math.pi * (column / columns - 0.5)))
+    return [tuple(-x for x in place(column, row, columns, rows))
             for row in range(rows + 1) for column in range(columns + 1)]
 
 
