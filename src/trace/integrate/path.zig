@@ -206,12 +206,27 @@ pub fn PathState(comptime Kernel: type) type {
 /// Paths that wait, a depth-first order.
 pub fn PathStack(comptime Kernel: type) type {
     return struct {
-        states: [states_max]PathState(Kernel),
+        states: []PathState(Kernel),
         count: usize,
 
-        /// At each depth a ray leaves at most the rest of itself, a refraction for all channels and
-        /// one for each, and reflections by the base and by a coat.
-        const states_max = 7 * (depth_limit + 1) + bounces.rough_split;
+        /// Room for all that may wait where paths have so many bounces at most: at each depth a ray
+        /// leaves at most the rest of itself, a refraction and a reflection; with further lobes
+        /// one more refraction for each channel, and a coat's reflection. To be freed by `deinit`.
+        pub fn init(
+            gpa: std.mem.Allocator,
+            depth_max: usize,
+            has_layers: bool,
+        ) error{OutOfMemory}!@This() {
+            const most: usize = if (has_layers) 7 else 3;
+            const room = most * (depth_max + 1) + bounces.rough_split;
+            return .{ .states = try gpa.alloc(PathState(Kernel), room), .count = 0 };
+        }
+
+        /// Frees everything.
+        pub fn deinit(stack: *@This(), gpa: std.mem.Allocator) void {
+            gpa.free(stack.states);
+            stack.* = undefined;
+        }
 
         /// Room for rays of the given depth; the caller fills in the rest.
         pub fn push(
@@ -219,7 +234,7 @@ pub fn PathStack(comptime Kernel: type) type {
             depth: u32,
             transparency_depth: u32,
         ) *PathState(Kernel) {
-            assert(stack.count < states_max);
+            assert(stack.count < stack.states.len);
             const path = &stack.states[stack.count];
             stack.count += 1;
             path.depth = depth;

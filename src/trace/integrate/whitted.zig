@@ -72,18 +72,20 @@ pub fn Whitted(comptime Kernel: type) type {
         ) error{OutOfMemory}!*Self {
             assert(settings.depth_max <= path_file.depth_limit);
             const whitted = try gpa.create(Self);
+            errdefer gpa.destroy(whitted);
+            whitted.stack = try .init(gpa, settings.depth_max, frame.hasLayers());
             whitted.frame = frame;
             whitted.settings = settings;
             whitted.rays = .{};
             whitted.visibility.init(frame);
             whitted.environment_lights = .init(frame.environment, settings.sample_count);
-            whitted.stack.count = 0;
             for (&whitted.vertices) |*vertex| vertex.init();
             return whitted;
         }
 
         /// Frees everything.
         pub fn deinit(whitted: *Self, gpa: std.mem.Allocator) void {
+            whitted.stack.deinit(gpa);
             gpa.destroy(whitted);
         }
 
