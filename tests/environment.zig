@@ -267,14 +267,15 @@ test "around lights of the scene there is a tenth of the studio, as the exposure
     var surrounded = try expose(null, studio);
     defer surrounded.image.deinit(gpa);
     var ev_before: f32 = undefined;
-    for ([_]f32{ 0.5, 50 }) |intensity| {
+    for ([_]f32{ 0.5, 50 }, 0..) |intensity, turn| {
         var lit = try expose(.{ .intensity = intensity }, dark);
         defer lit.image.deinit(gpa);
         var hash: ?u64 = null;
-        for (0..raylane.variant.compiled.len) |variant| for ([_]usize{ 1, 3 }) |thread_count| {
+        for (0..raylane.variant.compiled.len) |variant| {
             var options = studio;
             options.variant = variant;
-            options.thread_count = thread_count;
+            // One thread and three by turns: the meter's picture depends on neither.
+            options.thread_count = if ((variant + turn) % 2 == 0) 1 else 3;
             var both = try expose(.{ .intensity = intensity }, options);
             defer both.image.deinit(gpa);
             try std.testing.expectEqual(hash orelse both.image.hash(), both.image.hash());
@@ -290,7 +291,7 @@ test "around lights of the scene there is a tenth of the studio, as the exposure
                     try std.testing.expectApproxEqAbs(expected, seen, 1e-4 * (expected + share));
                 }
             }
-        };
+        }
         // The middle of the mirror, where the light is not.
         try std.testing.expectEqual([4]f32{ 0, 0, 0, 1 }, lit.image.at(37, 24).*);
     }
