@@ -152,7 +152,6 @@ test {
     _ = @import("trace/shade/transmission.zig");
     _ = @import("trace/shade/unique.zig");
     _ = @import("trace/shade/volumes.zig");
-    _ = @import("trace/shade/phase.zig");
     _ = @import("trace/shade/texture.zig");
     _ = @import("trace/shade/ray_cone.zig");
     _ = @import("trace/shade/lookups.zig");

@@ -8,6 +8,7 @@ const fixture = @import("fixture.zig");
 const raylane = @import("raylane");
 const Builder = fixture.Builder;
 const Image = raylane.image.Image;
+const Session = raylane.session.Session;
 const expect = std.testing.expect;
 const gpa = std.testing.allocator;
 
@@ -243,17 +244,24 @@ fn spheres(lamp: ?Lamp) !raylane.scene.Scene {
     return builder.finish();
 }
 
-/// The picture of spheres, and the exposure for it.
-fn expose(lamp: ?Lamp, options: fixture.Options) !struct { image: Image, ev: f32 } {
+/// A picture, and the exposure for it.
+const Exposed = struct { image: Image, ev: f32 };
+
+/// The picture of spheres.
+fn expose(lamp: ?Lamp, options: fixture.Options) !Exposed {
+    var diagnostic: raylane.diagnostic.Diagnostic = .{};
+    var session: Session = .init(gpa, std.testing.io, options.thread_count, &diagnostic);
+    defer session.deinit();
+    return exposeIn(&session, lamp, options);
+}
+
+/// The same in a session, which keeps its environment.
+fn exposeIn(session: *Session, lamp: ?Lamp, options: fixture.Options) !Exposed {
     var scene = try spheres(lamp);
     defer scene.deinit();
-    var diagnostic: raylane.diagnostic.Diagnostic = .{};
-    var session: raylane.session.Session =
-        .init(gpa, std.testing.io, options.thread_count, &diagnostic);
-    defer session.deinit();
     const lanes = raylane.variant.compiled[options.variant].lanes;
-    try fixture.view(&session, &scene, lanes, options);
-    const image = (try fixture.trace(&session, options)).*;
+    try fixture.view(session, &scene, lanes, options);
+    const image = (try fixture.trace(session, options)).*;
     session.film = null; // The caller's now.
     return .{ .image = image, .ev = if (session.metered) |metered| metered.ev else 0 };
 }
@@ -267,16 +275,19 @@ test "around lights of the scene there is a tenth of the studio, as the exposure
     var surrounded = try expose(null, studio);
     defer surrounded.image.deinit(gpa);
     var ev_before: f32 = undefined;
-    for ([_]f32{ 0.5, 50 }, 0..) |intensity, turn| {
+    var diagnostic: raylane.diagnostic.Diagnostic = .{};
+    var sessions = [2]Session{
+        .init(gpa, std.testing.io, 1, &diagnostic), .init(gpa, std.testing.io, 3, &diagnostic),
+    };
+    defer for (&sessions) |*session| session.deinit();
+    for ([_]f32{ 0.5, 50 }) |intensity| {
         var lit = try expose(.{ .intensity = intensity }, dark);
         defer lit.image.deinit(gpa);
         var hash: ?u64 = null;
-        for (0..raylane.variant.compiled.len) |variant| {
+        for (0..raylane.variant.compiled.len) |variant| for (&sessions) |*session| {
             var options = studio;
             options.variant = variant;
-            // One thread and three by turns: the meter's picture depends on neither.
-            options.thread_count = if ((variant + turn) % 2 == 0) 1 else 3;
-            var both = try expose(.{ .intensity = intensity }, options);
+            var both = try exposeIn(session, .{ .intensity = intensity }, options);
             defer both.image.deinit(gpa);
             try std.testing.expectEqual(hash orelse both.image.hash(), both.image.hash());
             if (hash == null and intensity == 50)
@@ -291,7 +302,7 @@ test "around lights of the scene there is a tenth of the studio, as the exposure
                     try std.testing.expectApproxEqAbs(expected, seen, 1e-4 * (expected + share));
                 }
             }
-        }
+        };
         // The middle of the mirror, where the light is not.
         try std.testing.expectEqual([4]f32{ 0, 0, 0, 1 }, lit.image.at(37, 24).*);
     }

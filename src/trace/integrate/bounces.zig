@@ -1,8 +1,8 @@
 //! Rays that go on from the vertices of paths: reflections and refractions.
 //!
 //! In: vertices. Out: rays on a stack. Smooth surfaces send one ray each way. Rays of rough ones
-//! are spread over the samples of a pixel: half of the lobe's variance; the rest is left to
-//! prefiltered textures and environment, which know no noise.
+//! are spread over the samples of a pixel, by a quarter of the lobe's variance, of wide reflections
+//! by half of it; the rest is left to prefiltered textures and environment, which know no noise.
 //! Glass that disperses light sends a ray for each channel.
 
 const std = @import("std");
@@ -51,9 +51,10 @@ fn Spread(comptime Lanes: type) type {
         /// Roughness of the rest, as a share of the lobe's: variances add.
         rest: F32,
 
-        /// For a lobe of some roughness; the wider `other` is, the more of it is other surfaces.
-        fn of(lanes: Lanes.Mask, other: F32) @This() {
-            const wide = other.sub(.splat(0.3)).mul(.splat(5)).max(.zero()).min(.splat(1));
+        /// For a lobe of some roughness, 0 for what is seen through a surface: the wider a
+        /// reflection, the more of it is other surfaces.
+        fn of(lanes: Lanes.Mask, roughness: F32) @This() {
+            const wide = roughness.sub(.splat(0.3)).mul(.splat(5)).max(.zero()).min(.splat(1));
             const alpha = wide.mul(.splat(0.2)).add(.splat(0.5));
             return .{
                 .lanes = lanes,
@@ -106,20 +107,19 @@ pub fn Bounces(comptime Kernel: type) type {
         const Self = @This();
         const Vertices = [group_count]Vertex;
 
-        /// A sample of a bundle's pixels begins.
-        pub fn start(
-            bounces: *Self,
-            frame: *const Frame,
-            rectangle: Rectangle,
-            sample: u32,
-        ) void {
+        /// Of a frame; `start` has to come before any vertex.
+        pub fn init(bounces: *Self, frame: *const Frame) void {
             bounces.frame = frame;
-            bounces.rectangle = rectangle;
-            bounces.sample = sample;
             bounces.spreads = frame.environment.map != null;
             bounces.splits_emitters = bounces.spreads and for (frame.lights) |*light| {
                 if (light.kind == .emitter) break true;
             } else false;
+        }
+
+        /// A sample of a bundle's pixels begins.
+        pub fn start(bounces: *Self, rectangle: Rectangle, sample: u32) void {
+            bounces.rectangle = rectangle;
+            bounces.sample = sample;
         }
 
         /// Chooses the lanes of a group whose reflections are traced; none where paths end.
@@ -238,8 +238,6 @@ fn Step(comptime Kernel: type) type {
                     .away = point.normal_geometric,
                     .direction = direction.scale(length),
                     .roughness = spread.left(roughness),
-                    .lobe = direction,
-                    .lobe_roughness = spread.left(roughness),
                     .emission = if (lobe == .coat)
                         .splat(1)
                     else
@@ -352,8 +350,6 @@ fn Step(comptime Kernel: type) type {
                     .away = point.normal_geometric.neg(),
                     .direction = passing.direction,
                     .roughness = passing.roughness,
-                    .lobe = passing.direction,
-                    .lobe_roughness = passing.roughness,
                     .emission = .splat(1),
                 });
                 var share = vertex.bsdf.mirror.transmitted;

@@ -9,20 +9,29 @@
 const world_file = @import("../../world.zig");
 const bundle_file = @import("../traverse/bundle.zig");
 const dispatch = @import("../traverse/dispatch.zig");
+const bsdf_file = @import("../shade/bsdf.zig");
 const light_file = @import("../shade/light.zig");
 const microfacet = @import("../shade/microfacet.zig");
 const path_file = @import("path.zig");
 const visibility_file = @import("visibility.zig");
 
+/// Lanes whose traced rays see emitters, which are not to be seen in highlights again.
+pub fn Traced(comptime Kernel: type) type {
+    return struct {
+        base: *const [Kernel.group_count]Kernel.Rays.Mask,
+        coat: *const [Kernel.group_count]Kernel.Rays.Mask,
+    };
+}
+
 /// Adds the light of one source, as far as it arrives. Vertices of coherent rays are near to each
-/// other; the reflection of `traced` ones sees emitters. Returns how many shadow rays it took.
+/// other. Returns how many shadow rays it took.
 pub fn addLight(
     comptime Kernel: type,
     visibility: *visibility_file.Visibility(Kernel),
     light: *const world_file.Light,
     path: *const path_file.PathState(Kernel),
     vertices: *const [Kernel.group_count]path_file.Vertex(Kernel.Rays),
-    traced: *const [Kernel.group_count]Kernel.Rays.Mask,
+    traced: *const Traced(Kernel),
     coherence: dispatch.Coherence,
     radiance: *[Kernel.group_count]Kernel.Rays.Vec3,
 ) u64 {
@@ -43,19 +52,30 @@ pub fn addLight(
             .bitAnd(point.normal_geometric.dot(arrival.to_light).gt(zero));
         var lit = front;
         var away = point.normal_geometric;
+        // Through panes rays see the emitters themselves.
+        const passing: Vec3 = if (light.kind == .emitter)
+            .splat(.{ 0, 0, 0 })
+        else
+            vertex.bsdf.mirror.transmitted;
+        var behind: Rays.Mask = .splat(false);
         if (vertex.bsdf.sees_behind) {
-            const behind = vertex.bsdf.isBehind(point, arrival.to_light);
+            const albedo = vertex.bsdf.back_albedo.add(passing);
+            behind = bsdf_file.behind(Rays, point, arrival.to_light, albedo);
             lit = front.bitOr(behind);
             away = .select(behind, away.neg(), away);
         }
         lit = lit.bitAnd(vertex.seen).andNot(point.material.unlit);
         if (lit.none()) continue;
         var response = if (light.kind == .emitter)
-            toEmitter(Rays, vertex, light.disk, &arrival, traced[group])
+            toEmitter(Rays, vertex, light.disk, &arrival, .{
+                traced.base[group], traced.coat[group],
+            })
         else
             vertex.bsdf.eval(point, arrival.to_light);
-        if (vertex.bsdf.sees_behind)
-            response = .select(front, response, vertex.bsdf.evalBehind(point, arrival.to_light));
+        if (behind.any()) {
+            const through = vertex.bsdf.evalBehind(point, arrival.to_light, passing);
+            response = .select(front, response, through);
+        }
         const worth = vertex.throughput.mul(response).mul(arrival.irradiance);
         unshadowed[group] = worth;
         const shines = worth.x.gt(zero).bitOr(worth.y.gt(zero)).bitOr(worth.z.gt(zero));
@@ -76,18 +96,31 @@ pub fn addLight(
     return ray_count;
 }
 
-/// The BSDF times cosine for light of an emitter.
+/// The BSDF times cosine for light of an emitter, but for the lobes of base and coat that are
+/// traced.
 fn toEmitter(
     comptime Lanes: type,
     vertex: *const path_file.Vertex(Lanes),
     disk: f32,
     arrival: *const light_file.Arrival(Lanes),
-    traced: Lanes.Mask,
+    traced: [2]Lanes.Mask,
 ) Lanes.Vec3 {
+    const F32 = Lanes.F32;
+    const none: Lanes.Vec3 = .splat(.{ 0, 0, 0 });
     var wide = vertex.bsdf;
-    const tangent = Lanes.F32.splat(@sqrt(disk)).div(arrival.distance);
-    wide.alpha = wide.alpha.add(tangent.mul(.splat(0.5))).min(.splat(1));
+    const grown = F32.splat(0.5 * @sqrt(disk)).div(arrival.distance);
+    wide.alpha = wide.alpha.add(grown).min(.splat(1));
     wide.smith_view = microfacet.smith(Lanes, wide.cos_view, wide.alpha.mul(wide.alpha));
-    const lobes = wide.evalLobes(&vertex.point, arrival.to_light);
-    return lobes.diffuse.add(.select(traced, .splat(.{ 0, 0, 0 }), lobes.specular));
+    wide.f0 = .select(traced[0], none, wide.f0);
+    wide.f90 = .select(traced[0], .zero(), wide.f90);
+    wide.multiple = .select(traced[0], none, wide.multiple);
+    if (wide.layered) {
+        const coating = &wide.coating;
+        coating.alpha = coating.alpha.add(grown).min(.splat(1));
+        const squared = coating.alpha.mul(coating.alpha);
+        coating.smith_view = microfacet.smith(Lanes, coating.cos_view, squared);
+        coating.weight = .select(traced[1], .zero(), coating.weight);
+        for (&wide.stretch.alphas) |*alpha| alpha.* = alpha.add(grown).min(.splat(1));
+    }
+    return wide.eval(&vertex.point, arrival.to_light);
 }

@@ -109,8 +109,8 @@ fn seenBy(
     return environment_file.radiance(
         Kernel.Rays,
         environment,
-        if (path.depth == 0) path.bundle.groups[group].line.direction else path.lobe[group],
-        if (path.depth == 0) .zero() else path.lobe_roughness[group],
+        path.bundle.groups[group].line.direction,
+        path.roughness[group],
         if (has_cones) path.cone_spread[group].abs() else .zero(),
         asked,
     );
@@ -197,7 +197,10 @@ fn addShadow(
         facing.* = receiver.lit.bitAnd(isFacing(Rays, point, .splat(light.to_light)));
         var away = point.normal_geometric;
         if (vertex.bsdf.layered) {
-            const behind = receiver.lit.bitAnd(vertex.bsdf.isBehind(point, .splat(light.to_light)));
+            const back = vertex.bsdf.back_albedo;
+            const to_light: Rays.Vec3 = .splat(light.to_light);
+            const behind =
+                receiver.lit.bitAnd(bsdf_file.behind(Rays, point, to_light, back));
             facing.* = facing.bitOr(behind);
             away = .select(behind, away.neg(), away);
         }
@@ -301,7 +304,9 @@ fn ReceiverOf(comptime Lanes: type) type {
                 const share: Vec3 = .select(facing, white, none);
                 receiver.addLight(&receiver.whole, vertex, light, share);
                 if (!vertex.bsdf.layered) continue;
-                const behind = vertex.bsdf.isBehind(point, .splat(light.to_light));
+                const back_albedo = vertex.bsdf.back_albedo;
+                const behind = bsdf_file
+                    .behind(Lanes, point, .splat(light.to_light), back_albedo);
                 const further = &receiver.further;
                 const back: Vec3 = .select(behind, white, none);
                 further.addLight(&further.whole, vertex, light, share, back);

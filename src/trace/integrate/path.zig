@@ -36,10 +36,6 @@ pub fn PathState(comptime Kernel: type) type {
         nestings: [Kernel.group_count][Kernel.ray_count]Nesting,
         /// Of the roughest surface on the way: how far the environment is spread.
         roughness: [Kernel.group_count]Kernel.Rays.F32,
-        /// Of rays that left a surface: what they see of the environment if they meet nothing, the
-        /// middle of a lobe and its roughness.
-        lobe: [Kernel.group_count]Vec3,
-        lobe_roughness: [Kernel.group_count]F32,
         /// Share that the ray sees of what surfaces emit: 1, or 0 where lights stand for them.
         emission: [Kernel.group_count]Kernel.Rays.F32,
         /// Ray cones (`ray_cone.zig`): width at the origin in metres, and its growth by distance;
@@ -114,9 +110,6 @@ pub fn PathState(comptime Kernel: type) type {
             direction: Vec3,
             /// Of the lobe around the direction.
             roughness: F32,
-            /// Middle and roughness of the lobe that the direction is one of.
-            lobe: Vec3,
-            lobe_roughness: F32,
             /// See `PathState.emission`.
             emission: F32,
         };
@@ -130,10 +123,7 @@ pub fn PathState(comptime Kernel: type) type {
         ) void {
             const origin = departure.point.offsetOrigin(departure.away, .zero());
             const from = before.bundle.groups[group].closest.primitive;
-            const rough = before.roughness[group];
-            path.roughness[group] = rough.max(departure.roughness);
-            path.lobe[group] = departure.lobe;
-            path.lobe_roughness[group] = rough.max(departure.lobe_roughness);
+            path.roughness[group] = before.roughness[group].max(departure.roughness);
             path.emission[group] = departure.emission;
             path.nestings[group] = before.nestings[group];
             const ray = &path.bundle.groups[group];
@@ -257,8 +247,6 @@ pub fn PathStack(comptime Kernel: type) type {
             rest.nestings = path.nestings;
             rest.keepCones(path);
             rest.roughness = path.roughness;
-            rest.lobe = path.lobe;
-            rest.lobe_roughness = path.lobe_roughness;
             rest.emission = path.emission;
             for (&rest.bundle.groups, masks, vertices, 0..) |*ray, mask, *vertex, group| {
                 ray.active = mask;

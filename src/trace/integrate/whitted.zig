@@ -78,6 +78,7 @@ pub fn Whitted(comptime Kernel: type) type {
             whitted.settings = settings;
             whitted.rays = .{};
             whitted.visibility.init(frame);
+            whitted.bounces.init(frame);
             whitted.environment_lights = .init(frame.environment, settings.sample_count);
             for (&whitted.vertices) |*vertex| vertex.init();
             return whitted;
@@ -104,7 +105,7 @@ pub fn Whitted(comptime Kernel: type) type {
         ) void {
             for (first_sample..first_sample + sample_count) |sample| {
                 whitted.sample.start(@intCast(sample), film.layers);
-                whitted.bounces.start(whitted.frame, rectangle, @intCast(sample));
+                whitted.bounces.start(rectangle, @intCast(sample));
                 whitted.pushPrimary(rectangle);
                 while (whitted.stack.pop()) |path| {
                     // A copy: what the step pushes takes its place.
@@ -221,7 +222,10 @@ pub fn Whitted(comptime Kernel: type) type {
                 light,
                 &whitted.path,
                 &whitted.vertices,
-                &whitted.bounces.emitters_reflected,
+                &.{
+                    .base = &whitted.bounces.emitters_reflected,
+                    .coat = &whitted.bounces.coat_reflected,
+                },
                 coherence,
                 radiance,
             );

@@ -33,7 +33,8 @@ pub const highlight_roughness_least = 0.05;
 /// 0 (Lagarde and de Rousiers 2014, "Moving Frostbite to Physically Based Rendering").
 pub const f90_per_f0 = 50;
 
-/// Up to this roughness reflections are traced; rougher surfaces see the ambient term instead.
+/// Up to this roughness reflections are traced in any case; rougher ones where
+/// `integrate/bounces.zig` says so.
 pub const mirror_roughness_max = 0.25;
 
 /// The parts of a surface's BSDF: a diffuse and a glossy one, which lights are seen by, and those
@@ -248,28 +249,21 @@ pub fn Bsdf(comptime Lanes: type) type {
             return lobes;
         }
 
-        /// Lanes that light from a direction reaches from behind, and that send it to the view.
-        pub fn isBehind(bsdf: *const Self, point: *const Interaction(Lanes), to_light: Vec3) Mask {
-            const zero: F32 = .zero();
-            const back = bsdf.back_albedo.add(bsdf.mirror.transmitted);
-            return point.normal.dot(to_light).lt(zero)
-                .bitAnd(point.normal_geometric.dot(to_light).lt(zero))
-                .bitAnd(back.x.max(back.y).max(back.z).gt(zero));
-        }
-
         /// `eval` of light from behind: diffusely, and through panes. Volumes bend light on its way
-        /// in and out, which lights by themselves cannot follow.
+        /// in and out, which lights by themselves cannot follow. `passing` is the share that comes
+        /// through panes.
         pub noinline fn evalBehind(
             bsdf: *const Self,
             point: *const Interaction(Lanes),
             to_light: Vec3,
+            passing: Vec3,
         ) Vec3 {
             const cosine = point.normal.dot(to_light).neg().max(.zero());
             const diffuse = bsdf.back_albedo.scale(cosine.mul(inverse_pi));
             const boundary = transmission_file.boundaryOf(Lanes, point, bsdf.alpha, point.eta);
             const density = boundary.pdf(to_light);
             const pane = F32.select(point.material.volume, .zero(), density);
-            return diffuse.add(bsdf.mirror.transmitted.scale(pane));
+            return diffuse.add(passing.scale(pane));
         }
 
         /// See `sampling.sample`.
@@ -346,6 +340,19 @@ pub inline fn highlightAlpha(comptime Lanes: type, roughness: Lanes.F32) Lanes.F
 /// Reflectance at grazing incidence for that at normal incidence, see `f90_per_f0`.
 pub inline fn grazingOf(comptime Lanes: type, f0: Lanes.F32) Lanes.F32 {
     return f0.mul(.splat(f90_per_f0)).min(.splat(1));
+}
+
+/// Lanes that light from a direction reaches from behind, and that send a share of it to the view.
+pub inline fn behind(
+    comptime Lanes: type,
+    point: *const Interaction(Lanes),
+    to_light: Lanes.Vec3,
+    albedo: Lanes.Vec3,
+) Lanes.Mask {
+    const zero: Lanes.F32 = .zero();
+    return point.normal.dot(to_light).lt(zero)
+        .bitAnd(point.normal_geometric.dot(to_light).lt(zero))
+        .bitAnd(albedo.x.max(albedo.y).max(albedo.z).gt(zero));
 }
 
 /// Roughness of an even lobe that is as wide as the specular one where that is widest.

@@ -16,7 +16,6 @@ pub fn Material(comptime Lanes: type) type {
         dielectric_f0: Lanes.F32,
         ior: Lanes.F32,
         transmission: Lanes.F32,
-        sigma_a: Lanes.Vec3,
         /// Share of the light from all sides that arrives.
         occlusion: Lanes.F32,
         unlit: Lanes.Mask,
@@ -118,7 +117,6 @@ pub inline fn load(
         .dielectric_f0 = materials.float("dielectric_f0"),
         .ior = materials.float("ior"),
         .transmission = materials.float("transmission"),
-        .sigma_a = materials.color("sigma_a"),
         .occlusion = .splat(1),
         .unlit = materials.float("unlit").gt(zero),
         .volume = materials.float("volume").gt(zero),

@@ -287,9 +287,10 @@ const Surface = struct {
 
     fn eval(surface: *const Surface, to_light: [3]f32) f32 {
         const way: Single.Vec3 = .splat(to_light);
-        const behind = surface.bsdf.isBehind(&surface.point, way).lane(0);
+        const behind = bsdf_file.behind(Single, &surface.point, way, surface.bsdf.back_albedo
+            .add(surface.bsdf.mirror.transmitted)).lane(0);
         const seen = if (behind)
-            surface.bsdf.evalBehind(&surface.point, way)
+            surface.bsdf.evalBehind(&surface.point, way, surface.bsdf.mirror.transmitted)
         else
             surface.bsdf.eval(&surface.point, way);
         return seen.x.lane(0);
@@ -404,7 +405,10 @@ test "a lane without layers has the bits of the plain BSDF beside one with all" 
             .{ plain.back_albedo, mixed.back_albedo },
             .{ plain.evalLobes(&point, light).diffuse, mixed.evalLobes(&point, light).diffuse },
             .{ plain.evalLobes(&point, light).specular, mixed.evalLobes(&point, light).specular },
-            .{ plain.evalBehind(&point, behind), mixed.evalBehind(&point, behind) },
+            .{
+                plain.evalBehind(&point, behind, plain.mirror.transmitted),
+                mixed.evalBehind(&point, behind, mixed.mirror.transmitted),
+            },
             .{ plain.sample(&point, numbers), mixed.sample(&point, numbers) },
         };
         for (pairs, 0..) |pair, index| {

@@ -42,7 +42,6 @@ pub fn pointAt(comptime Lanes: type, view: [3]f32) Interaction(Lanes) {
             .dielectric_f0 = .splat(0.04),
             .ior = .splat(1.5),
             .transmission = .splat(0),
-            .sigma_a = .splat(.{ 0, 0, 0 }),
             .occlusion = .splat(1),
             .unlit = .splat(false),
             .volume = .splat(false),
