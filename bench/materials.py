@@ -457,7 +457,7 @@ def main():
             ROWS[name](file)
             file.write(folder / f"{name}.gltf")
             command = [arguments.program, folder / f"{name}.gltf", "-r", f"{WIDTH}x{HEIGHT}",
-                       "--spp", "32", "-o", arguments.to / f"{name}.jpg", "--stats", "none",
+                       "--spp", "16", "-o", arguments.to / f"{name}.jpg", "--stats", "none",
                        "--background", "#555", "--jpeg-quality", "85", *OPTIONS.get(name, [])]
             done = subprocess.run(command, check=False)
             if done.returncode != 0:
