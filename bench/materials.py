@@ -30,7 +30,7 @@ CLOTH = {"baseColorFactor": [0.05, 0.02, 0.1, 1], "metallicFactor": 0, "roughnes
 
 
 def place(column, row, columns, rows):
-    """Of a vertex of the unit sphere: the same at the seam and at the poles, so that it is closed."""
+    """Of a vertex of the unit sphere, the same at seam and poles, so that it is closed."""
     down = math.pi * row / rows
     turn = 2 * math.pi * (column % columns / columns - 0.5)
     ring = math.sin(down) if 0 < row < rows else 0
@@ -138,7 +138,8 @@ class File:
 
     def wall(self):
         """Coloured squares behind the row."""
-        colors = ((230, 230, 220, 255), (20, 90, 160, 255), (230, 230, 220, 255), (220, 90, 20, 255))
+        white = (230, 230, 220, 255)
+        colors = (white, (20, 90, 160, 255), white, (220, 90, 20, 255))
         squares = self.texture(4, 2, lambda x, y: colors[(x + y) % 4])
         material = self.material({"baseColorTexture": {"index": squares}, "metallicFactor": 0})
         corners = [(-4, -2, -1.2), (4, -2, -1.2), (4, 2, -1.2), (-4, 2, -1.2)]
