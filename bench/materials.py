@@ -30,7 +30,7 @@ CLOTH = {"baseColorFactor": [0.05, 0.02, 0.1, 1], "metallicFactor": 0, "roughnes
 
 
 def place(column, row, columns, rows):
-    """A vertex of the unit sphere, the same at seam and poles, so that the sphere is closed."""
+    """Of a vertex of the unit sphere, the same at seam and poles, so that it is closed."""
     down = math.pi * row / rows
     turn = 2 * math.pi * (column % columns / columns - 0.5)
     ring = math.sin(down) if 0 < row < rows else 0
@@ -138,8 +138,8 @@ class File:
 
     def wall(self):
         """Coloured squares behind the row."""
-        pale = (230, 230, 220, 255)
-        colors = (pale, (20, 90, 160, 255), pale, (220, 90, 20, 255))
+        white = (230, 230, 220, 255)
+        colors = (white, (20, 90, 160, 255), white, (220, 90, 20, 255))
         squares = self.texture(4, 2, lambda x, y: colors[(x + y) % 4])
         material = self.material({"baseColorTexture": {"index": squares}, "metallicFactor": 0})
         corners = [(-4, -2, -1.2), (4, -2, -1.2), (4, 2, -1.2), (-4, 2, -1.2)]
@@ -458,7 +458,7 @@ def main():
             ROWS[name](file)
             file.write(folder / f"{name}.gltf")
             command = [arguments.program, folder / f"{name}.gltf", "-r", f"{WIDTH}x{HEIGHT}",
-                       "--spp", "32", "-o", arguments.to / f"{name}.jpg", "--stats", "none",
+                       "--spp", "16", "-o", arguments.to / f"{name}.jpg", "--stats", "none",
                        "--background", "#555", "--jpeg-quality", "85", *OPTIONS.get(name, [])]
             done = subprocess.run(command, check=False)
             if done.returncode != 0:
