@@ -442,13 +442,15 @@ pub const Session = struct {
         const world = &session.world.?;
         const facts = &world.facts;
         if (facts.emitter_count == 0) return;
-        defer facts.emitter_count = 0;
+        const count = facts.emitter_count;
         const all = world.lights;
-        const others = all[0 .. all.len - facts.emitter_count];
+        errdefer world.lights = all;
+        const others = all[0 .. all.len - count];
         world.lights = others;
         var besides = try session.traceSmall();
         defer besides.deinit(session.gpa);
         const around = world.environment;
+        errdefer world.environment = around;
         world.environment.map = null;
         world.environment.ambient = 0;
         world.lights = &.{};
@@ -460,8 +462,9 @@ pub const Session = struct {
         world.environment = around;
         const share = emission.weigh(besides.image.pixels, glow.image.pixels, lit.image.pixels);
         world.lights = if (share.shows) all else others;
+        facts.emitter_count = 0;
         if (!share.prevails) return;
-        facts.own_light_count += facts.emitter_count;
+        facts.own_light_count += count;
         if (!facts.lights_are_default) return;
         facts.lights_are_default = false;
         world.lights = all[others.len..];

@@ -12,6 +12,8 @@
 
 const std = @import("std");
 const math = @import("../math.zig");
+const light_file = @import("light.zig");
+const pose = @import("pose.zig");
 const world = @import("../world.zig");
 const emitters = @import("emitters.zig");
 const Allocator = std.mem.Allocator;
@@ -194,10 +196,9 @@ fn lightOf(cluster: *const Cluster, geometry: *const world.Geometry) world.Light
     for (&intensity, flux) |*to, lumens|
         to.* = @floatCast(@min(lumens / std.math.pi, std.math.floatMax(f32)));
     const lobe = lobeOf(flatness);
-    const shift = geometry.padding.ofBox(.{ .lower = position, .upper = position });
     return .{
         .kind = .emitter,
-        .from_receiver = !is_flat or shift > geometry.size * @import("light.zig").source_shift_max,
+        .from_receiver = !is_flat or light_file.isCoarseAt(geometry, position),
         .position = position,
         .direction = vec3d.toSingle(direction),
         .intensity = intensity,
@@ -234,15 +235,15 @@ fn bodyOf(cluster: *const Cluster, direction: Vec3d) Body {
     }
     var body: Body = .{ .middle = .{ 0, 0, 0 }, .radius = 0, .height = 0 };
     for (pieces) |*piece| {
-        const place = vec3d.scale(widened(piece.position), piece.luminance());
+        const place = vec3d.scale(pose.widen(piece.position), piece.luminance());
         body.middle = vec3d.add(body.middle, place);
     }
     body.middle = vec3d.scale(body.middle, 1 / fluxOf(pieces));
     for (pieces) |*piece| {
-        const off = vec3d.sub(widened(piece.position), body.middle);
+        const off = vec3d.sub(pose.widen(piece.position), body.middle);
         body.radius = @max(body.radius, vec3d.length(off) + piece.radius);
         // A piece that is tilted reaches farther forward than its middle.
-        const across = vec3d.cross(widened(piece.normal), direction);
+        const across = vec3d.cross(pose.widen(piece.normal), direction);
         const tilt = piece.radius * vec3d.length(across);
         body.height = @max(body.height, vec3d.dot(off, direction) + tilt);
     }
@@ -275,10 +276,6 @@ fn gapIn(pieces: []const Piece, axis: usize) ?usize {
         end = if (index == 0) place + piece.radius else @max(end, place + piece.radius);
     }
     return result;
-}
-
-fn widened(vector: math.Vec3) Vec3d {
-    return .{ vector[0], vector[1], vector[2] };
 }
 
 /// Emitters for tests: rectangles in a row, each a material of its own.
@@ -355,10 +352,10 @@ const TestEmitters = struct {
 fn irradiance(lights: []const world.Light, point: Vec3d, normal: Vec3d) f64 {
     var sum: f64 = 0;
     for (lights) |*light| {
-        const way = vec3d.sub(widened(light.position), point);
+        const way = vec3d.sub(pose.widen(light.position), point);
         const squared = vec3d.dot(way, way);
         const unit = vec3d.scale(way, 1 / @sqrt(squared));
-        const cosine = -vec3d.dot(unit, widened(light.direction));
+        const cosine = -vec3d.dot(unit, pose.widen(light.direction));
         const lobe = @max(0, cosine * light.cone_scale + light.cone_offset);
         const facing = @max(0, vec3d.dot(unit, normal));
         sum += facing * lobe * light.intensity[0] / (squared + light.disk);

@@ -173,7 +173,8 @@ const Finder = struct {
         const doubled = facingOf(&corners);
         const normal = vec3d.normalize(doubled) orelse return;
         const area = 0.5 * vec3d.length(doubled);
-        const share = area * luminanceOf(finder.emitted(triangle, &whole)) / total;
+        const all = finder.emitted(triangle, &whole);
+        const share = area * luminanceOf(all) / total;
         if (!(share > triangle_share_min)) return;
         var step_count: usize = 1;
         while (step_count < step_count_max) : (step_count += 1) {
@@ -189,7 +190,8 @@ const Finder = struct {
             const middle = vec3d.scale(sum, 1.0 / 3.0);
             var radius: f64 = 0;
             for (places) |place| radius = @max(radius, vec3d.length(vec3d.sub(place, middle)));
-            const flux = vec3d.scale(finder.emitted(triangle, &part), area / count);
+            const mean = if (step_count == 1) all else finder.emitted(triangle, &part);
+            const flux = vec3d.scale(mean, area / count);
             if (!(luminanceOf(flux) > 0 and std.math.isFinite(luminanceOf(flux)))) continue;
             for (0..if (is_two_sided) 2 else 1) |side| try finder.pieces.append(finder.gpa, .{
                 .position = vec3d.toSingle(middle),

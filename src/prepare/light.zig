@@ -53,7 +53,13 @@ pub fn place(
 }
 
 /// Rays start from points and spots as long as padding there is less than this part of the scene.
-pub const source_shift_max = 0x1p-10;
+const source_shift_max = 0x1p-10;
+
+/// Whether rounding at a position is so large that rays to a light there start at the receiver.
+pub fn isCoarseAt(geometry: *const world.Geometry, position: Vec3) bool {
+    const shift = geometry.padding.ofBox(.{ .lower = position, .upper = position });
+    return shift > geometry.size * source_shift_max;
+}
 
 fn placeOne(
     light: *const scene.Light,
@@ -69,14 +75,13 @@ fn placeOne(
         .directional => .{ 0, 0, 0 },
     };
     if (!vec3.isFinite(position)) return null;
-    const shift = geometry.padding.ofBox(.{ .lower = position, .upper = position });
     var result: world.Light = .{
         .kind = switch (light.kind) {
             .point => .point,
             .spot => .spot,
             .directional => .directional,
         },
-        .from_receiver = light.kind != .directional and shift > geometry.size * source_shift_max,
+        .from_receiver = light.kind != .directional and isCoarseAt(geometry, position),
         .position = position,
         .direction = direction,
         .intensity = undefined,

@@ -80,7 +80,6 @@ const Reader = struct {
     parameters: *const Parameters,
     /// Set by `baseColor`.
     base_texture: ?scene.TextureView = null,
-    transmitted_texture: ?scene.TextureView = null,
 
     fn read(reader: *Reader, kind: Kind) Error!scene.Material {
         return switch (kind) {
@@ -310,12 +309,11 @@ const Reader = struct {
 
     fn diffuseTransmission(reader: *Reader) Error!scene.Material {
         const reflect = try reader.baseColor("reflectance", 0.25);
-        const view = &reader.transmitted_texture;
+        var result = matte(.{ 0, 0, 0 });
+        const view = &result.diffuse_transmission_color_texture;
         const transmit = try reader.pictured("transmittance", 0.25, view);
         const scale = try reader.float("scale", 1);
-        var result = matte(.{ 0, 0, 0 });
         setDiffuse(&result, math.vec3.scale(reflect, scale), math.vec3.scale(transmit, scale));
-        result.diffuse_transmission_color_texture = view.*;
         return result;
     }
 

@@ -10,6 +10,7 @@
 
 const std = @import("std");
 const simd = @import("../../simd.zig");
+const bsdf_file = @import("bsdf.zig");
 const chi_squared = @import("chi_squared.zig");
 const microfacet = @import("microfacet.zig");
 const test_surface = @import("test_surface.zig");
