@@ -13,6 +13,7 @@ const Error = Source.Error;
 /// Extensions that are read.
 const read: []const []const u8 = &.{
     "EXT_lights_image_based",
+    "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
