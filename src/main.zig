@@ -376,6 +376,7 @@ const Job = struct {
         try session.pose(.{
             .lanes = raylane.variant.compiled[options.render.variant].lanes,
             .tree_quality = options.tree_quality,
+            .sharing = .of(options.instances),
             .view = options.view,
         });
         try session.view(options.view);

@@ -23,6 +23,8 @@ const flatten = @import("prepare/flatten.zig");
 const emitter_lights = @import("prepare/emitter_lights.zig");
 const emitters = @import("prepare/emitters.zig");
 const environment = @import("prepare/environment.zig");
+const sharing_file = @import("prepare/instances.zig");
+const join = @import("prepare/bvh/join.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
 const place_file = @import("prepare/pose.zig");
@@ -66,11 +68,16 @@ pub const PoseSettings = struct {
     lanes: u8,
     pool: *parallel.Pool,
     tree_quality: TreeQuality = .default,
+    /// When instances share their meshes.
+    sharing: SharingRule = .{},
     /// Diameter of points and width of lines, in pixels of the automatic view.
     point_size: f32 = choices.point_size.default,
     /// What decides how large these are.
     view: WantedView = .{},
 };
+
+/// See `PoseSettings`.
+pub const SharingRule = sharing_file.Rule;
 
 /// See `PoseSettings`.
 pub const WantedView = view_file.Wanted;
@@ -201,33 +208,60 @@ pub fn pose(
     var arena: std.heap.ArenaAllocator = .init(gpa);
     errdefer arena.deinit();
     const place = try place_file.compose(arena.allocator(), from);
+    const parts = &loaded.parts;
+    const attributes = attributesOf(&loaded.textures);
+    const sharing = try sharing_file.share(
+        gpa,
+        arena.allocator(),
+        parts.instances,
+        parts.meshes,
+        parts.materials,
+        attributes,
+        &place,
+        &.{
+            .rule = settings.sharing,
+            .lanes = settings.lanes,
+            .quality = settings.tree_quality,
+            .pool = settings.pool,
+        },
+    );
     var soup = try flatten.flatten(
         gpa,
         arena.allocator(),
-        loaded.parts.instances,
-        loaded.parts.meshes,
-        attributesOf(&loaded.textures),
+        sharing.flat,
+        parts.meshes,
+        attributes,
         settings.point_size,
         &place,
         settings.pool,
         diagnostic,
     );
+    soup.bounds = soup.bounds.join(sharing.bounds);
+    soup.dropped_count += sharing.dropped_count;
     var geometry = geometryOf(&soup, &place);
+    geometry.shared = try sharing_file.numberAll(
+        gpa,
+        arena.allocator(),
+        &sharing,
+        parts.instances,
+        parts.meshes,
+        &soup,
+        attributes,
+    );
     if (soup.strokes.spheres.len > 0) {
-        const materials = loaded.parts.materials;
-        const pixel = try view_file.pixelSize(gpa, from, materials, &geometry, &settings.view);
+        const pixel =
+            try view_file.pixelSize(gpa, from, parts.materials, &geometry, &settings.view);
         try strokes.draw(gpa, &soup, pixel * settings.point_size / 2, settings.pool);
         geometry = geometryOf(&soup, &place);
     }
     const materials = try material.place(
         arena.allocator(),
-        &loaded.parts,
+        parts,
         &loaded.textures,
-        soup.positions,
-        soup.triangles,
+        &geometry,
     );
     const tree_start = Clock.awake.now(io);
-    const tree_facts = try buildTree(gpa, arena.allocator(), &geometry, settings);
+    const tree_facts = try buildOver(gpa, arena.allocator(), &geometry, &sharing, settings);
     const end = Clock.awake.now(io);
     times.prepare_ns = nanoseconds(start.durationTo(tree_start));
     times.bvh_build_ns = nanoseconds(tree_start.durationTo(end));
@@ -241,7 +275,7 @@ pub fn pose(
         .facts = .{
             .tree = tree_facts,
             .degenerate_count = soup.dropped_count,
-            .stroke_triangle_count = soup.triangles.len - geometry.surfaces().len,
+            .stroke_triangle_count = soup.triangles.len - soup.surface_count,
         },
     };
     if (builtin.mode == .debug) try check.check(gpa, &result);
@@ -384,12 +418,23 @@ fn emittersOf(
     return seen.emitters.?;
 }
 
-/// Gives a geometry that has all else a tree of `settings.lanes`, whose memory comes from `arena`.
-/// Returns facts about it. For `pose` and benchmarks of the build. Not inlined, see `chooseView`.
-pub noinline fn buildTree(
+/// Gives a geometry that has all else a tree of `settings.lanes`, whose memory comes from `arena`,
+/// over its flattened triangles. Returns facts about it. For benchmarks of the build.
+pub fn buildTree(
     gpa: Allocator,
     arena: Allocator,
     geometry: *world.Geometry,
+    settings: PoseSettings,
+) PoseError!world.TreeStatistics {
+    return buildOver(gpa, arena, geometry, &.{ .flat = &.{} }, settings);
+}
+
+/// The same over the clusters of what is shared as well. Not inlined, see `chooseView`.
+noinline fn buildOver(
+    gpa: Allocator,
+    arena: Allocator,
+    geometry: *world.Geometry,
+    sharing: *const sharing_file.Sharing,
     settings: PoseSettings,
 ) PoseError!world.TreeStatistics {
     const input: bvh_wide.Input = .{
@@ -402,12 +447,29 @@ pub noinline fn buildTree(
     };
     var facts: world.TreeStatistics = undefined;
     geometry.tree = switch (settings.lanes) {
-        4 => .{ .w4 = try bvh_wide.build(gpa, arena, &input, 4, &facts) },
-        8 => .{ .w8 = try bvh_wide.build(gpa, arena, &input, 8, &facts) },
-        16 => .{ .w16 = try bvh_wide.build(gpa, arena, &input, 16, &facts) },
+        4 => .{ .w4 = try buildWide(gpa, arena, &input, geometry, sharing, 4, &facts) },
+        8 => .{ .w8 = try buildWide(gpa, arena, &input, geometry, sharing, 8, &facts) },
+        16 => .{ .w16 = try buildWide(gpa, arena, &input, geometry, sharing, 16, &facts) },
         else => unreachable, // Asserted at the door.
     };
     return facts;
+}
+
+fn buildWide(
+    gpa: Allocator,
+    arena: Allocator,
+    input: *const bvh_wide.Input,
+    geometry: *const world.Geometry,
+    sharing: *const sharing_file.Sharing,
+    comptime width: u32,
+    facts: *world.TreeStatistics,
+) PoseError!world.Tree(width) {
+    const tree = try bvh_wide.build(gpa, arena, input, width, facts);
+    if (sharing.boxes.len == 0) return tree;
+    sharing_file.renumber(width, &tree, geometry);
+    const joined = try join.join(gpa, arena, input, sharing.boxes, width, &tree, facts);
+    facts.bytes += sharing.bytes;
+    return joined;
 }
 
 /// A scene for tests: one node, one mesh, made in the scene's own arena.

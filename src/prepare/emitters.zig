@@ -101,7 +101,9 @@ const Finder = struct {
         while (first < triangles.len) {
             const number = triangles[first].material;
             var end = first + 1;
-            while (end < triangles.len and triangles[end].material == number) end += 1;
+            // Triangles of instances in between end a run, as if they were here.
+            const limit = finder.geometry.shared.flatEnd(first) orelse triangles.len;
+            while (end < limit and triangles[end].material == number) end += 1;
             defer first = end;
             const material = &finder.materials.all[number];
             if (!emits(material)) continue;
