@@ -356,7 +356,7 @@ const Work = struct {
     /// In the order of the images.
     fn warn(work: *const Work, diagnostic: *Diagnostic) void {
         for (work.reasons, work.from.images) |*failure, *image| {
-            if (failure.*) |*reason| diagnostic.warn("{f}: {s}, left out", .{
+            if (failure.*) |*reason| diagnostic.forgiveEach("{f}: {s}, left out", .{
                 printable(image.name), reason.text(),
             });
         }
