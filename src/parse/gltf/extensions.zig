@@ -72,7 +72,7 @@ pub const all: []const Extension = &.{
     ignored("EXT_lights_ies", .looks, "such lights are left out"),
     rendered("EXT_lights_image_based", "the finest level; irradiance is made from it"),
     ignored("EXT_mesh_features", .nothing, "data"),
-    ignored("EXT_mesh_gpu_instancing", .shapes, "drawn once"),
+    rendered("EXT_mesh_gpu_instancing", "translation, rotation, scale; other attributes ignored"),
     ignored("EXT_mesh_manifold", .nothing, "data"),
     ignored("EXT_mesh_primitive_edge_visibility", .looks, "no outlines"),
     ignored("EXT_meshopt_compression", .other_meshes, "what is there uncompressed is drawn"),
