@@ -2,10 +2,10 @@
 //!
 //! In: a scene and the world maps of its nodes and joints. Out: vertices, deformed as instances ask
 //! for, and triangles in the order of the instances; those that have no area or no finite place are
-//! marked as dropped, so that the number of a triangle is the same in every pose. Fronts stay fronts under
-//! mirroring maps. The arrays are the same whatever the number of threads: work is cut into fixed
-//! chunks that write to places known before. The vertices of points and lines are placed too, and
-//! room is left for the triangles that `strokes.zig` makes of them.
+//! marked as dropped, so that the number of a triangle is the same in every pose. Fronts stay
+//! fronts under mirroring maps. The arrays are the same whatever the number of threads: work is cut
+//! into fixed chunks that write to places known before. The vertices of points and lines are placed
+//! too, and room is left for the triangles that `strokes.zig` makes of them.
 
 const std = @import("std");
 const math = @import("../math.zig");

@@ -12,9 +12,9 @@ const Box3 = math.Box3;
 const Vec3 = math.Vec3;
 const World = world.World;
 
-/// Asserts that every triangle that is not dropped lies in one lane of one pack below one leaf, within all boxes above
-/// it, which are no larger than they have to be; that padding lanes are empty; that every node and
-/// pack is reached once; and that the tree is no deeper than it says.
+/// Asserts that every triangle that is not dropped lies in one lane of one pack below one leaf,
+/// within all boxes above it, which are no larger than they have to be; that padding lanes are
+/// empty; that every node and pack is reached once; and that the tree is no deeper than it says.
 pub fn check(gpa: Allocator, checked: *const World) error{OutOfMemory}!void {
     const vertex_count = checked.geometry.positions.len;
     assert(checked.geometry.normals.len == vertex_count);
