@@ -45,6 +45,7 @@ pub fn bruteForce(world: *const World, query: Query) Hit {
     const triangle = raylane.trace.triangle;
     var ray = query.ray();
     for (world.geometry.triangles, 0..) |corners, number| {
+        if (corners.isDropped()) continue;
         const p: [3]Single.Vec3 = .{
             .splat(world.geometry.positions[corners.corner[0]]),
             .splat(world.geometry.positions[corners.corner[1]]),
