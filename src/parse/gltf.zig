@@ -7,10 +7,10 @@
 const std = @import("std");
 const accessors = @import("gltf/accessors.zig");
 const asset = @import("gltf/asset.zig");
-const c = @import("cgltf.zig");
 const container = @import("gltf/container.zig");
 const escapes = @import("json/escapes.zig");
 const image_based_light = @import("gltf/image_based_light.zig");
+const instancing = @import("gltf/instancing.zig");
 const json = @import("json.zig");
 const limits = @import("gltf/limits.zig");
 const nodes = @import("gltf/nodes.zig");
@@ -116,7 +116,7 @@ fn fill(source: *Source, resources: *Resources) Error!void {
     for (origins, 0..) |origin, index| {
         const node = Source.item(source.data.nodes, origin);
         const node_index: u32 = @intCast(index);
-        if (node.mesh != null) try addInstances(node, node_index, &meshes, &skins);
+        if (node.mesh != null) try addInstances(origin, node_index, &meshes, &skins);
         if (node.camera) |raw| {
             try builder.addCamera(try views.readCamera(source, raw, node.name, node_index));
         }
@@ -130,30 +130,31 @@ fn fill(source: *Source, resources: *Resources) Error!void {
 
 /// Adds what a node draws.
 fn addInstances(
-    node: *const c.cgltf_node,
+    origin: u32,
     node_index: u32,
     meshes: *Meshes,
     skins: *Skins,
 ) Error!void {
     const source = meshes.source;
     const builder = source.builder;
-    if (node.has_mesh_gpu_instancing != 0) {
-        source.warn("EXT_mesh_gpu_instancing is not supported: its meshes are drawn once", .{});
-    }
+    const node = Source.item(source.data.nodes, origin);
     const mesh_index = Source.indexOf(source.data.meshes, node.mesh);
     const range = try meshes.get(mesh_index, skins.deformationOf(mesh_index));
     if (builder.instances.items.len + range.count > limits.instance_count_max)
         return source.fail("over {d} instances of meshes", .{limits.instance_count_max});
     const weights = try skins.instanceWeights(node);
     const skin = try skins.instanceSkin(node, range);
-    for (range.first..range.first + range.count) |drawn| {
-        const has_joints = builder.meshes.items[drawn].joint_sets.len > 0;
-        try builder.addDeformedInstance(.{
-            .mesh = @intCast(drawn),
-            .node = node_index,
-            .morph_weights = weights,
-            .skin = if (has_joints) skin else scene_data.none,
-        });
+    const places = try instancing.place(source, origin, node_index, range.count);
+    for (places.first..places.first + places.count) |at| {
+        for (range.first..range.first + range.count) |drawn| {
+            const has_joints = builder.meshes.items[drawn].joint_sets.len > 0;
+            try builder.addDeformedInstance(.{
+                .mesh = @intCast(drawn),
+                .node = @intCast(at),
+                .morph_weights = weights,
+                .skin = if (has_joints) skin else scene_data.none,
+            });
+        }
     }
 }
 
