@@ -9,6 +9,7 @@ const accessors = @import("gltf/accessors.zig");
 const asset = @import("gltf/asset.zig");
 const c = @import("cgltf.zig");
 const container = @import("gltf/container.zig");
+const description = @import("gltf/description.zig");
 const escapes = @import("json/escapes.zig");
 const image_based_light = @import("gltf/image_based_light.zig");
 const json = @import("json.zig");
@@ -56,6 +57,8 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
         .diagnostic = diagnostic,
     };
     defer source.deinit();
+    const is_binary = std.mem.startsWith(u8, bytes, container.magic);
+    builder.scene.file.format = if (is_binary) .glb else .gltf;
     try asset.check(&source);
     var buffers: Buffers = try .load(resources, document.data, parts.binary, diagnostic);
     defer buffers.deinit();
@@ -100,6 +103,7 @@ fn fill(source: *Source, resources: *Resources) Error!void {
     const builder = source.builder;
     const settings = &resources.settings;
     const shown = try nodes.choose(source, settings.scene);
+    builder.scene.file = try description.read(source, builder.scene.file.format, shown);
     const variant = try variants.choose(source, settings.material_variant);
     const origins = try nodes.collect(source, shown);
     defer source.gpa.free(origins);
