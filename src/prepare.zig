@@ -21,6 +21,7 @@ const check = @import("prepare/bvh/check.zig");
 const deform = @import("prepare/deform.zig");
 const flatten = @import("prepare/flatten.zig");
 const emitter_lights = @import("prepare/emitter_lights.zig");
+const extent_file = @import("prepare/extent.zig");
 const emitters = @import("prepare/emitters.zig");
 const environment = @import("prepare/environment.zig");
 const light = @import("prepare/light.zig");
@@ -74,6 +75,15 @@ pub const PoseSettings = struct {
 
 /// See `PoseSettings`.
 pub const WantedView = view_file.Wanted;
+
+/// The box of what a scene draws.
+pub const extentOf = extent_file.of;
+/// See `extentOf`.
+pub const Extent = extent_file.Extent;
+/// Width and height of the picture that is made where nobody says more.
+pub const pictureSize = view_file.pictureSize;
+/// Bytes that textures take.
+pub const planTextures = texture.plan;
 
 /// What is seen of it, and in what light.
 pub const ViewSettings = struct {
@@ -1152,6 +1162,7 @@ test {
     _ = place_file;
     _ = tangents;
     _ = texture;
+    _ = extent_file;
     _ = @import("prepare/layers.zig");
     _ = @import("prepare/texture_use.zig");
     _ = @import("prepare/pyramid.zig");
