@@ -659,7 +659,7 @@ test "more care, less cost" {
 
 test "nasty soups" {
     const gpa = std.testing.allocator;
-    const count = 6000;
+    const count = 2000;
     const corners = try gpa.alloc([3]math.Vec3, count);
     defer gpa.free(corners);
     const Kind = enum { coincident, line, concentric, huge_and_tiny, powers, flat };
