@@ -7,12 +7,14 @@
 const std = @import("std");
 const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
+const draco = @import("../../decode.zig").draco;
 const Source = @import("source.zig");
 const Error = Source.Error;
 
 /// Extensions that are read.
 const read: []const []const u8 = &.{
     "EXT_lights_image_based",
+    "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -31,6 +33,7 @@ const read: []const []const u8 = &.{
     "KHR_materials_volume",
     "KHR_materials_volume_scatter",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_texture_basisu",
     "KHR_texture_transform",
 };
@@ -70,10 +73,10 @@ const pictures: []const []const u8 = &.{
 
 /// Other forms of meshes that are there as well, unless they are required.
 const meshes: []const []const u8 = &.{
-    "EXT_meshopt_compression",
-    "KHR_draco_mesh_compression",
-    "KHR_meshopt_compression",
+    draco_name,
 };
+
+const draco_name = "KHR_draco_mesh_compression";
 
 /// Names of extensions in one warning.
 const named_count_max = 6;
@@ -96,9 +99,12 @@ pub fn check(source: *const Source) Error!void {
         const name = std.mem.span(@as([*:0]const u8, raw));
         for ([_][]const []const u8{ read, looks, unseen, pictures }) |list| {
             if (contains(list, name)) break;
-        } else return source.fail("the required extension {f} is not supported", .{
-            diagnostic.quote(name),
-        });
+        } else {
+            const is_draco = std.mem.eql(u8, name, draco_name);
+            if (is_draco and draco.is_held) continue;
+            const why = if (is_draco) "needs a build with Draco (-Ddraco)" else "is not supported";
+            return source.fail("the required extension {f} {s}", .{ diagnostic.quote(name), why });
+        }
     }
     warnOfUnrendered(source);
 }
