@@ -1,11 +1,11 @@
 //! The triangle soup: instances of meshes become one list of triangles in world space.
 //!
 //! In: a scene and the world maps of its nodes and joints. Out: vertices, deformed as instances ask
-//! for, and triangles in the order of the instances, without those that have no area or no finite
-//! place. Fronts stay fronts under
-//! mirroring maps. The arrays are the same whatever the number of threads: work is cut into fixed
-//! chunks that write to places known before. The vertices of points and lines are placed too, and
-//! room is left for the triangles that `strokes.zig` makes of them.
+//! for, and triangles in the order of the instances; those that have no area or no finite place are
+//! marked as dropped, so that the number of a triangle is the same in every pose. Fronts stay
+//! fronts under mirroring maps. The arrays are the same whatever the number of threads: work is cut
+//! into fixed chunks that write to places known before. The vertices of points and lines are placed
+//! too, and room is left for the triangles that `strokes.zig` makes of them.
 
 const std = @import("std");
 const math = @import("../math.zig");
@@ -59,96 +59,192 @@ pub const TriangleSoup = struct {
     triangles: []const world.Triangle,
     /// How many of the triangles are not of points and lines.
     surface_count: u32,
+    /// Of these, and of the others, how many are dropped.
+    dropped_count: u32,
+    dropped_stroke_count: u32 = 0,
     strokes: strokes.Strokes,
     /// In metres, once the strokes are drawn.
     sphere_radius: f32,
     room: Room,
-    /// Box of the triangles' corners, empty without triangles.
+    /// Box of the corners of what is not dropped, empty without any.
     bounds: Box3,
-    /// Box of twice the centroids of the triangles' boxes, empty without triangles.
+    /// Box of twice the centroids of its triangles' boxes, empty without any.
     centroid_bounds: Box3,
-    /// Triangles left out.
-    dropped_count: u64,
 };
 
 /// Where the triangles of points and lines go.
 pub const Room = struct {
     /// The first of their vertices, which are at the end of the arrays.
     vertex_first: u32,
-    /// All of the triangles' array: those that are there, and room behind them.
+    /// All of the triangles' array: those of surfaces, and room behind them.
     triangles: []world.Triangle,
 };
 
 /// One instance: where its vertices and triangles come from and go to.
 const Draw = struct {
-    mesh: *const scene.Mesh,
-    maps: Placement,
-    /// Of morph targets; empty: none changes the mesh.
-    weights: []const f32,
-    /// In place of `maps`; empty: the mesh has no skin.
-    joint_maps: []const AffineD,
-    /// The maps turn fronts into backs.
-    mirrored: bool,
     /// First vertex of the mesh that a triangle uses, and how many from there.
     vertex_source: u32,
     vertex_count: u32,
-    /// First vertex and triangle in the soup, the latter before any is dropped.
+    /// First vertex and triangle in the soup.
     vertex_target: u32,
     triangle_target: u32,
+
+    // By pose.
+    mesh: *const scene.Mesh = undefined,
+    maps: Placement = undefined,
+    /// Of morph targets; empty: none changes the mesh.
+    weights: []const f32 = &.{},
+    /// In place of `maps`; empty: the mesh has no skin.
+    joint_maps: []const AffineD = &.{},
+    /// The maps turn fronts into backs.
+    mirrored: bool = false,
+    /// Colours and texture coordinates are not there from an earlier pose.
+    is_colored_anew: bool = true,
+
+    fn put(
+        draw: *Draw,
+        instance: *const scene.Instance,
+        mesh: *const scene.Mesh,
+        pose: *const pose_file.Pose,
+        is_placed: bool,
+    ) void {
+        const map = pose.maps[instance.node];
+        const has_skin = instance.skin != scene.none;
+        const was_morphed = draw.weights.len > 0;
+        const is_morphed = deform.isMorphed(instance.morph_weights);
+        draw.joint_maps = if (has_skin) pose.joint_maps[instance.skin] else &.{};
+        draw.mirrored =
+            if (has_skin) deform.isMirrored(draw.joint_maps) else map.determinant() < 0;
+        draw.mesh = mesh;
+        draw.maps = .of(map, draw.mirrored);
+        draw.weights = if (is_morphed) instance.morph_weights else &.{};
+        draw.is_colored_anew = !is_placed or was_morphed or is_morphed;
+    }
 };
 
 /// What a chunk of triangles came to.
 const ChunkResult = struct {
-    kept_count: u32 = 0,
+    dropped_count: u32 = 0,
     outside_count: u32 = 0,
     bounds: Box3 = .empty,
     centroid_bounds: Box3 = .empty,
 };
 
-/// Flattens what is drawn: instances of `meshes`, where `pose` has their nodes and joints. The
-/// soup's arrays come from `arena`, what is needed meanwhile from `gpa`. Points and lines are to be
-/// `point_size` pixels wide, or nearly so.
-pub fn flatten(
-    gpa: std.mem.Allocator,
-    arena: std.mem.Allocator,
-    instances: []const scene.Instance,
-    meshes: []const scene.Mesh,
-    attributes: Attributes,
-    point_size: f32,
-    pose: *const pose_file.Pose,
-    pool: *parallel.Pool,
-    diagnostic: *Diagnostic,
-) Error!TriangleSoup {
-    const draws = try gpa.alloc(Draw, instances.len);
-    defer gpa.free(draws);
-    const size = try plan(gpa, instances, meshes, pose, draws, diagnostic);
-    const detail: strokes.Detail = .of(size.strokes, point_size);
-    const with_room = try size.withRoom(detail, diagnostic);
-    const count = with_room.vertex_count;
+/// The arrays of a soup, to be written by each pose.
+pub const Arrays = struct {
+    positions: []Vec3,
+    normals: []Vec3,
+    colors: [][4]f32,
+    texcoords: [texcoord_set_count][][2]f32,
+    tangents: [][4]f32,
+    triangles: []world.Triangle,
+};
 
-    var work: Work = .{
-        .draws = draws,
-        .size = &size,
-        .positions = try huge_pages.alloc(arena, Vec3, count),
-        .normals = try huge_pages.alloc(arena, Vec3, count),
-        .colors = try huge_pages.alloc(arena, [4]f32, if (size.has_colors) count else 0),
-        .texcoords = undefined,
-        .tangents = try huge_pages.alloc(arena, [4]f32, if (attributes.tangents) count else 0),
-        .triangles = try huge_pages.alloc(arena, world.Triangle, with_room.triangle_count),
-        .chunks = try gpa.alloc(ChunkResult, chunkCount(size.triangle_count)),
-    };
-    defer gpa.free(work.chunks);
-    for (&work.texcoords, attributes.texcoord_sets) |*set, is_used| {
-        set.* = try huge_pages.alloc(arena, [2]f32, if (is_used) count else 0);
+/// What is the same in all poses: where vertices and triangles go.
+pub const Plan = struct {
+    draws: []Draw,
+    chunks: []ChunkResult,
+    /// Of the arrays, but for the room at their ends, and with it.
+    size: Size,
+    with_room: Size,
+    detail: strokes.Detail,
+    /// The arrays have been written before.
+    is_placed: bool = false,
+
+    /// Plans what is drawn: instances of `meshes`, with points and lines that are to be
+    /// `point_size` pixels wide, or nearly so. Memory comes from `gpa`.
+    pub fn init(
+        gpa: std.mem.Allocator,
+        instances: []const scene.Instance,
+        meshes: []const scene.Mesh,
+        point_size: f32,
+        diagnostic: *Diagnostic,
+    ) Error!Plan {
+        const draws = try gpa.alloc(Draw, instances.len);
+        errdefer gpa.free(draws);
+        const size = try layOut(gpa, instances, meshes, draws, diagnostic);
+        const detail: strokes.Detail = .of(size.strokes, point_size);
+        const with_room = try size.withRoom(detail, diagnostic);
+        return .{
+            .draws = draws,
+            .chunks = try gpa.alloc(ChunkResult, chunkCount(size.triangle_count)),
+            .size = size,
+            .with_room = with_room,
+            .detail = detail,
+        };
     }
-    try pool.forEach(chunkCount(size.vertex_count), &work, Work.placeVertices);
-    try pool.forEach(work.chunks.len, &work, Work.placeTriangles);
-    var soup = work.finish(diagnostic);
-    if (size.strokes.spheres > 0) {
-        soup.strokes = try work.collectStrokes(gpa, arena, detail, diagnostic);
+
+    /// Frees it.
+    pub fn deinit(plan: *Plan, gpa: std.mem.Allocator) void {
+        gpa.free(plan.draws);
+        gpa.free(plan.chunks);
+        plan.* = undefined;
     }
-    return soup;
-}
+
+    /// Room for a soup with these attributes.
+    pub fn alloc(
+        plan: *const Plan,
+        arena: std.mem.Allocator,
+        attributes: Attributes,
+    ) error{OutOfMemory}!Arrays {
+        const count = plan.with_room.vertex_count;
+        var arrays: Arrays = .{
+            .positions = try huge_pages.alloc(arena, Vec3, count),
+            .normals = try huge_pages.alloc(arena, Vec3, count),
+            .colors = try huge_pages.alloc(arena, [4]f32, if (plan.size.has_colors) count else 0),
+            .texcoords = undefined,
+            .tangents = try huge_pages.alloc(arena, [4]f32, if (attributes.tangents) count else 0),
+            .triangles = try huge_pages.alloc(
+                arena,
+                world.Triangle,
+                plan.with_room.triangle_count,
+            ),
+        };
+        for (&arrays.texcoords, attributes.texcoord_sets) |*set, is_used| {
+            set.* = try huge_pages.alloc(arena, [2]f32, if (is_used) count else 0);
+        }
+        return arrays;
+    }
+
+    /// Writes the arrays, always the same ones, with what was planned for where `pose` has nodes
+    /// and joints; the instances' weights may be others than before. The strokes' lists come from
+    /// `arena`, what is needed meanwhile from `gpa`.
+    pub fn place(
+        plan: *Plan,
+        gpa: std.mem.Allocator,
+        arena: std.mem.Allocator,
+        arrays: *const Arrays,
+        instances: []const scene.Instance,
+        meshes: []const scene.Mesh,
+        pose: *const pose_file.Pose,
+        pool: *parallel.Pool,
+        diagnostic: *Diagnostic,
+    ) Error!TriangleSoup {
+        assert(plan.draws.len == instances.len);
+        for (plan.draws, instances) |*draw, *instance| {
+            draw.put(instance, &meshes[instance.mesh], pose, plan.is_placed);
+        }
+        var work: Work = .{
+            .draws = plan.draws,
+            .size = &plan.size,
+            .positions = arrays.positions,
+            .normals = arrays.normals,
+            .colors = arrays.colors,
+            .texcoords = arrays.texcoords,
+            .tangents = arrays.tangents,
+            .triangles = arrays.triangles,
+            .chunks = plan.chunks,
+        };
+        try pool.forEach(chunkCount(plan.size.vertex_count), &work, Work.placeVertices);
+        try pool.forEach(plan.chunks.len, &work, Work.placeTriangles);
+        plan.is_placed = true;
+        var soup = work.finish(diagnostic);
+        if (plan.size.strokes.spheres > 0) {
+            soup.strokes = try work.collectStrokes(gpa, arena, plan.detail, diagnostic);
+        }
+        return soup;
+    }
+};
 
 const Size = struct {
     vertex_count: u32 = 0,
@@ -180,12 +276,11 @@ fn chunkCount(count: usize) usize {
     return @divCeil(count, chunk_size);
 }
 
-/// Fills `draws` and adds up their sizes.
-fn plan(
+/// Fills the part of `draws` that no pose changes, and adds up their sizes.
+fn layOut(
     gpa: std.mem.Allocator,
     instances: []const scene.Instance,
     meshes: []const scene.Mesh,
-    pose: *const pose_file.Pose,
     draws: []Draw,
     diagnostic: *Diagnostic,
 ) Error!Size {
@@ -208,17 +303,7 @@ fn plan(
         }
         const range = ranges[instance.mesh].?;
         size.strokes.add(counts[instance.mesh]);
-        const map = pose.maps[instance.node];
-        const has_skin = instance.skin != scene.none;
-        const joint_maps: []const AffineD = if (has_skin) pose.joint_maps[instance.skin] else &.{};
-        const mirrored = if (has_skin) deform.isMirrored(joint_maps) else map.determinant() < 0;
-        const is_morphed = deform.isMorphed(instance.morph_weights);
         draw.* = .{
-            .mesh = mesh,
-            .maps = .of(map, mirrored),
-            .weights = if (is_morphed) instance.morph_weights else &.{},
-            .joint_maps = joint_maps,
-            .mirrored = mirrored,
             .vertex_source = range.first,
             .vertex_count = range.count,
             .vertex_target = @intCast(vertex_total),
@@ -304,11 +389,13 @@ const Work = struct {
         const source = draw.vertex_source + (from - draw.vertex_target);
         const count = to - from;
         const white: [4]f32 = .{ 1, 1, 1, 1 };
-        if (work.colors.len > 0) copy(work.colors[from..to], draw.mesh.colors, source, white);
-        for (work.texcoords, draw.mesh.texcoords) |to_set, set| {
-            if (to_set.len > 0) copy(to_set[from..to], set, source, .{ 0, 0 });
+        if (draw.is_colored_anew) {
+            if (work.colors.len > 0) copy(work.colors[from..to], draw.mesh.colors, source, white);
+            for (work.texcoords, draw.mesh.texcoords) |to_set, set| {
+                if (to_set.len > 0) copy(to_set[from..to], set, source, .{ 0, 0 });
+            }
+            if (draw.weights.len > 0) work.morphColors(draw, from, to, source);
         }
-        if (draw.weights.len > 0) work.morphColors(draw, from, to, source);
         if (draw.weights.len > 0 or draw.joint_maps.len > 0) {
             return work.placeDeformed(draw, from, to, source);
         }
@@ -390,24 +477,23 @@ const Work = struct {
             if (to > from) {
                 const source = from - draw.triangle_target;
                 const triangles = draw.mesh.triangles[source..][0 .. to - from];
-                work.placeDrawTriangles(draw, triangles, begin, &result);
+                work.placeDrawTriangles(draw, triangles, work.triangles[from..to], &result);
                 from = to;
             }
         }
         work.chunks[chunk] = result;
     }
 
-    /// Appends those of the triangles that can be hit to what the chunk from `begin` on holds.
     fn placeDrawTriangles(
         work: *Work,
         draw: *const Draw,
         triangles: []const [3]u32,
-        begin: usize,
+        placed: []world.Triangle,
         result: *ChunkResult,
     ) void {
         // Wraps where the source starts later than the target; the sum is right again.
         const shift = draw.vertex_target -% draw.vertex_source;
-        for (triangles) |triangle| {
+        for (triangles, placed) |triangle, *to| {
             var corner: [3]u32 = .{
                 triangle[0] +% shift, triangle[1] +% shift, triangle[2] +% shift,
             };
@@ -415,36 +501,27 @@ const Work = struct {
             const a = work.positions[corner[0]];
             const b = work.positions[corner[1]];
             const c = work.positions[corner[2]];
-            if (!isWithinRange(a, b, c)) {
-                result.outside_count += 1;
-            } else if (hasArea(a, b, c)) {
-                work.triangles[begin + result.kept_count] = .{
-                    .corner = corner,
-                    .material = draw.mesh.material,
-                };
-                result.kept_count += 1;
-                const box = Box3.empty.include(a).include(b).include(c);
-                result.bounds = result.bounds.join(box);
-                result.centroid_bounds = result.centroid_bounds.include(box.centerTwice());
+            const is_near = isWithinRange(a, b, c);
+            if (!is_near or !hasArea(a, b, c)) {
+                to.* = .{ .corner = corner, .material = world.none };
+                result.dropped_count += 1;
+                result.outside_count += @intFromBool(!is_near);
+                continue;
             }
+            to.* = .{ .corner = corner, .material = draw.mesh.material };
+            const box = Box3.empty.include(a).include(b).include(c);
+            result.bounds = result.bounds.join(box);
+            result.centroid_bounds = result.centroid_bounds.include(box.centerTwice());
         }
     }
 
-    /// Closes the gaps that dropped triangles left.
-    fn finish(work: *Work, diagnostic: *Diagnostic) TriangleSoup {
-        var kept_count: usize = 0;
-        var outside_count: u64 = 0;
+    fn finish(work: *const Work, diagnostic: *Diagnostic) TriangleSoup {
+        var dropped_count: u32 = 0;
+        var outside_count: u32 = 0;
         var bounds: Box3 = .empty;
         var centroid_bounds: Box3 = .empty;
-        for (work.chunks, 0..) |chunk, index| {
-            const begin = index * chunk_size;
-            assert(kept_count <= begin);
-            if (kept_count < begin) std.mem.copyForwards(
-                world.Triangle,
-                work.triangles[kept_count..][0..chunk.kept_count],
-                work.triangles[begin..][0..chunk.kept_count],
-            );
-            kept_count += chunk.kept_count;
+        for (work.chunks) |chunk| {
+            dropped_count += chunk.dropped_count;
             outside_count += chunk.outside_count;
             bounds = bounds.join(chunk.bounds);
             centroid_bounds = centroid_bounds.join(chunk.centroid_bounds);
@@ -459,18 +536,18 @@ const Work = struct {
             .colors = work.colors,
             .texcoords = work.texcoords,
             .tangents = work.tangents,
-            .triangles = work.triangles[0..kept_count],
-            .surface_count = @intCast(kept_count),
+            .triangles = work.triangles[0..work.size.triangle_count],
+            .surface_count = work.size.triangle_count,
+            .dropped_count = dropped_count,
             .strokes = .{},
             .sphere_radius = 0,
             .room = .{ .vertex_first = work.size.vertex_count, .triangles = work.triangles },
             .bounds = bounds,
             .centroid_bounds = centroid_bounds,
-            .dropped_count = work.size.triangle_count - kept_count,
         };
     }
 
-    /// Lists the strokes, without those that are nowhere.
+    /// Lists the strokes, those that are nowhere marked as dropped.
     fn collectStrokes(
         work: *const Work,
         gpa: std.mem.Allocator,
@@ -483,6 +560,7 @@ const Work = struct {
         var spheres: Spheres = try .initCapacity(arena, @intCast(count.spheres));
         const Segments = std.ArrayList(strokes.Segment);
         var segments: Segments = try .initCapacity(arena, @intCast(count.segments));
+        var outside_count: u64 = 0;
         for (work.draws) |*draw| {
             const mesh = draw.mesh;
             if (mesh.points.len == 0 and mesh.segments.len == 0) continue;
@@ -492,17 +570,19 @@ const Work = struct {
             var vertices = used.iterator(.{});
             while (vertices.next()) |vertex| {
                 const center = draw.vertex_target + @as(u32, @intCast(vertex));
-                if (!work.isPlaced(center)) continue;
-                spheres.appendAssumeCapacity(.{ .center = center, .material = mesh.material });
+                const is_placed = work.isPlaced(center);
+                outside_count += @intFromBool(!is_placed);
+                const material = if (is_placed) mesh.material else world.none;
+                spheres.appendAssumeCapacity(.{ .center = center, .material = material });
             }
             const shift = draw.vertex_target -% draw.vertex_source;
             for (mesh.segments) |pair| {
                 const ends: [2]u32 = .{ pair[0] +% shift, pair[1] +% shift };
-                if (!work.isPlaced(ends[0]) or !work.isPlaced(ends[1])) continue;
-                segments.appendAssumeCapacity(.{ .ends = ends, .material = mesh.material });
+                const are_placed = work.isPlaced(ends[0]) and work.isPlaced(ends[1]);
+                const material = if (are_placed) mesh.material else world.none;
+                segments.appendAssumeCapacity(.{ .ends = ends, .material = material });
             }
         }
-        const outside_count = count.spheres - spheres.items.len;
         if (outside_count > 0) diagnostic.warn(
             "{d} vertices of points and lines left out: they are farther than 2^40 m from the " ++
                 "origin",

@@ -26,6 +26,7 @@ const TreeQuality = @import("../settings.zig").TreeQuality;
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const AnyTree = world.AnyTree;
+const Parts = @import("alpha.zig").Parts;
 const Box3 = math.Box3;
 const Geometry = world.Geometry;
 const Vec3 = math.Vec3;
@@ -148,6 +149,28 @@ fn isCollapsed(positions: []const Vec3, corners: [3]u32) bool {
     return std.meta.eql(a, b) or std.meta.eql(b, c) or std.meta.eql(c, a);
 }
 
+/// The triangles of a mesh by its vertices from `first` on. Returns how many are not dropped, whose
+/// numbers go to `kept`.
+fn copyTriangles(
+    mesh: *const scene.Mesh,
+    first: u32,
+    triangles: []world.Triangle,
+    kept: []u32,
+) usize {
+    var count: usize = 0;
+    for (mesh.triangles, triangles, 0..) |corners, *triangle, number| {
+        const is_dropped = isCollapsed(mesh.positions, corners);
+        triangle.* = .{
+            .corner = .{ corners[0] - first, corners[1] - first, corners[2] - first },
+            .material = if (is_dropped) world.none else mesh.material,
+        };
+        if (is_dropped) continue;
+        kept[count] = @intCast(number);
+        count += 1;
+    }
+    return count;
+}
+
 /// Clusters that a thread takes at a time.
 const chunk_size = 64;
 
@@ -202,8 +225,11 @@ const Maker = struct {
         var bounds: Box3 = .empty;
         for (source) |position| bounds = bounds.include(position);
         if (!flatten.isWithinRange(bounds.lower, bounds.upper, bounds.upper)) return world.none;
-        const triangles = try maker.copyTriangles(mesh, range.first);
-        if (triangles.len == 0) return world.none;
+        const triangles = try maker.arena.alloc(world.Triangle, mesh.triangles.len);
+        const kept = try maker.gpa.alloc(u32, mesh.triangles.len);
+        defer maker.gpa.free(kept);
+        const kept_count = copyTriangles(mesh, range.first, triangles, kept);
+        if (kept_count == 0) return world.none;
         var shared: world.instances.SharedMesh = .{
             .positions = try arena.dupe(Vec3, source),
             .normals = try copyOf(arena, Vec3, mesh.normals, range),
@@ -214,47 +240,36 @@ const Maker = struct {
             else
                 &.{},
             .triangles = triangles,
-            .material = mesh.material,
             .tree = undefined,
             .clusters = undefined,
         };
         for (&shared.texcoords, mesh.texcoords, attributes.texcoord_sets) |*to, set, is_used| {
             if (is_used) to.* = try copyOf(arena, [2]f32, set, range);
         }
-        try maker.buildTree(&shared, bounds);
+        try maker.buildTree(&shared, bounds, kept[0..kept_count]);
         try maker.meshes.append(maker.gpa, shared);
-        try maker.collapsed.append(maker.gpa, @intCast(mesh.triangles.len - triangles.len));
+        try maker.collapsed.append(maker.gpa, @intCast(mesh.triangles.len - kept_count));
         return @intCast(maker.meshes.items.len - 1);
-    }
-
-    fn copyTriangles(maker: *Maker, mesh: *const scene.Mesh, first: u32) ![]const [3]u32 {
-        const triangles = try maker.arena.alloc([3]u32, mesh.triangles.len);
-        var count: usize = 0;
-        for (mesh.triangles) |corners| {
-            if (isCollapsed(mesh.positions, corners)) continue;
-            triangles[count] = .{ corners[0] - first, corners[1] - first, corners[2] - first };
-            count += 1;
-        }
-        return triangles[0..count];
     }
 
     fn buildTree(
         maker: *Maker,
         mesh: *world.instances.SharedMesh,
         bounds: Box3,
+        kept: []const u32,
     ) (error{OutOfMemory} || parallel.Error)!void {
-        const triangles = try maker.gpa.alloc(world.Triangle, mesh.triangles.len);
-        defer maker.gpa.free(triangles);
         var centroid_bounds: Box3 = .empty;
-        for (triangles, mesh.triangles) |*triangle, corner| {
-            triangle.* = .{ .corner = corner, .material = 0 };
+        for (kept) |number| {
             var box: Box3 = .empty;
-            for (corner) |vertex| box = box.include(mesh.positions[vertex]);
+            for (mesh.triangles[number].corner) |vertex| {
+                box = box.include(mesh.positions[vertex]);
+            }
             centroid_bounds = centroid_bounds.include(box.centerTwice());
         }
         const input: bvh_wide.Input = .{
             .positions = mesh.positions,
-            .triangles = triangles,
+            .triangles = mesh.triangles,
+            .kept = kept,
             .centroid_bounds = centroid_bounds,
             .padding = .init(@splat(0), bounds),
             .pool = maker.settings.pool,
@@ -262,11 +277,11 @@ const Maker = struct {
         };
         switch (maker.settings.lanes) {
             inline 4, 8, 16 => |width| {
-                var facts: world.TreeStatistics = undefined;
-                const tree = try bvh_wide.build(maker.gpa, maker.arena, &input, width, &facts);
+                const built = try bvh_wide.build(maker.gpa, maker.arena, &input, width);
+                const tree = built.tree();
                 mesh.clusters = try clusters_file.cut(maker.gpa, maker.arena, width, &tree);
                 mesh.tree = @unionInit(AnyTree, std.fmt.comptimePrint("w{d}", .{width}), tree);
-                maker.bytes += facts.bytes;
+                maker.bytes += built.statistics.bytes;
             },
             else => unreachable, // Asserted at the door.
         }
@@ -432,18 +447,17 @@ fn copyOf(
     return arena.dupe(T, all[range.first..][0..range.count]);
 }
 
-/// Numbers everything as if it were flattened: `soup` is what became of `sharing.flat`, `instances`
-/// all that are drawn.
+/// Numbers everything as if it were flattened: `soup` is what became of `sharing.flat`.
 pub fn numberAll(
     gpa: Allocator,
     arena: Allocator,
     sharing: *const Sharing,
-    instances: []const scene.Instance,
-    meshes: []const scene.Mesh,
+    parts: *const Parts,
     soup: *const flatten.TriangleSoup,
     attributes: flatten.Attributes,
 ) error{OutOfMemory}!world.instances.Shared {
     if (sharing.instances.len == 0) return .{};
+    const meshes = parts.meshes;
     const vertex_counts = try gpa.alloc(?u32, meshes.len);
     defer gpa.free(vertex_counts);
     @memset(vertex_counts, null);
@@ -458,7 +472,7 @@ pub fn numberAll(
     var triangle_next: u32 = 0;
     var vertex_end: u32 = 0;
     var vertex_next: u32 = 0;
-    for (instances, sharing.places) |*instance, place| {
+    for (parts.instances, sharing.places) |*instance, place| {
         if (place == world.none) {
             const count = &vertex_counts[instance.mesh];
             if (count.* == null) count.* = flatten.VertexRange.of(&meshes[instance.mesh]).count;

@@ -125,7 +125,9 @@ fn occluders(
     const words = try arena.alloc(u32, @divCeil(count, 32));
     @memset(words, 0);
     for (0..count) |number| {
-        const material = &materials[geometry.face(@intCast(number)).material];
+        const face = geometry.face(@intCast(number));
+        if (face.material == world.none) continue;
+        const material = &materials[face.material];
         const own = lookups[material.first_lookup..][0..material.lookup_count];
         const stops = material.stopsLight(own);
         words[number / 32] |= @as(u32, @intFromBool(stops)) << @intCast(number % 32);

@@ -35,10 +35,8 @@ pub const SharedMesh = struct {
     colors: []const [4]f32,
     texcoords: [geometry_file.texcoord_set_count][]const [2]f32,
     tangents: []const [4]f32,
-    /// None has two corners in one place.
-    triangles: []const [3]u32,
-    /// Index into `Materials.all`.
-    material: u32,
+    /// Those with two corners in one place are dropped.
+    triangles: []const Triangle,
     /// Its packs number the triangles of the mesh.
     tree: AnyTree,
     clusters: []const Cluster,
@@ -155,8 +153,8 @@ pub const Shared = struct {
         const instance = &shared.instances[run.instance];
         const mesh = &shared.meshes[instance.mesh];
         var result: Face = .{
-            .corner = mesh.triangles[local],
-            .material = mesh.material,
+            .corner = mesh.triangles[local].corner,
+            .material = mesh.triangles[local].material,
             .mesh = mesh,
             .placement = &instance.placement,
         };
@@ -203,7 +201,7 @@ inline fn orElse(list: anytype, index: u32, missing: std.meta.Elem(@TypeOf(list)
 pub const Face = struct {
     /// Indices into the arrays of the mesh, or of the geometry where it is flattened.
     corner: [3]u32,
-    /// Index into `Materials.all`.
+    /// Index into `Materials.all`; `none` if the triangle is dropped.
     material: u32,
     mesh: *const SharedMesh = undefined,
     /// Null: flattened.

@@ -12,19 +12,22 @@ const Box3 = math.Box3;
 const Vec3 = math.Vec3;
 const World = world.World;
 
-/// Asserts that every triangle lies in one lane of one pack below one leaf, within all boxes above
-/// it, which are no larger than they have to be; that padding lanes are empty; that every node and
-/// pack is reached once; and that the tree is no deeper than it says.
+/// Asserts that every triangle that is not dropped lies in one lane of one pack below one leaf,
+/// within all boxes above it, which are no larger than they have to be; that padding lanes are
+/// empty; that every node and pack is reached once; and that the tree is no deeper than it says.
 pub fn check(gpa: Allocator, checked: *const World) error{OutOfMemory}!void {
     const vertex_count = checked.geometry.positions.len;
     assert(checked.geometry.normals.len == vertex_count);
     checkNumbers(&checked.geometry);
     assert(checked.geometry.colors.len == 0 or checked.geometry.colors.len == vertex_count);
     assert(checked.view.width > 0 and checked.view.height > 0);
+    var dropped_count: usize = 0;
     for (checked.geometry.triangles) |triangle| {
-        assert(triangle.material < checked.materials.all.len);
+        dropped_count += @intFromBool(triangle.isDropped());
+        assert(triangle.isDropped() or triangle.material < checked.materials.all.len);
         for (triangle.corner) |vertex| assert(vertex < vertex_count);
     }
+    assert(dropped_count == checked.geometry.dropped_count);
     switch (checked.geometry.tree) {
         inline else => |*tree| try checkTree(gpa, checked, tree),
     }
@@ -72,7 +75,8 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
     var depth: u32 = 0;
     while (stack.pop()) |visit| {
         node_count += 1;
-        if (checked.geometry.triangleCount() > 0) depth = @max(depth, visit.depth);
+        if (tree.packs.len > 0 or checked.geometry.shared.runs.len > 0)
+            depth = @max(depth, visit.depth);
         const node = &tree.nodes[visit.node];
         var joined: Box3 = .empty;
         for (node.child, 0..) |child, index| {
@@ -95,11 +99,15 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
         // Boxes are unions, grown once: by no more than their own margin.
         const is_joined = checked.geometry.shared.runs.len > 0;
         if (visit.box) |box| if (is_joined) assert(box.contains(joined)) else {
+            assert(box.isEmpty() == joined.isEmpty());
+            if (box.isEmpty()) continue;
             const margin = checked.geometry.padding.marginOfBox(box);
             assert(box.contains(joined) and joined.grow(margin).contains(box));
         };
     }
-    for (seen) |is_seen| assert(is_seen);
+    for (seen, 0..) |is_seen, number| {
+        assert(is_seen != (checked.geometry.face(@intCast(number)).material == world.none));
+    }
     assert(node_count == tree.nodes.len and node_count == checked.facts.tree.node_count);
     assert(pack_count == tree.packs.len);
     assert(depth == checked.facts.tree.depth and depth <= world.tree_depth_max);
@@ -128,7 +136,9 @@ fn checkLeaf(checked: *const World, packs: anytype, box: Box3, seen: []bool) voi
             joined = joined.join(corners.grow(checked.geometry.padding.ofBox(corners)));
         }
     }
-    assert(!joined.isEmpty());
+    // All of its triangles may have been dropped since it was built.
+    assert(box.isEmpty() == joined.isEmpty());
+    if (box.isEmpty()) return;
     const grown = joined.grow(checked.geometry.padding.marginOfBox(joined));
     assert(box.contains(grown) and grown.contains(box));
 }

@@ -29,8 +29,9 @@ pub fn join(
 ) bvh_input.Error!world.Tree(width) {
     var scratch: std.heap.ArenaAllocator = .init(gpa);
     defer scratch.deinit();
-    var own: world.TreeStatistics = undefined;
-    const clusters = try buildClusters(gpa, scratch.allocator(), input, boxes, width, &own);
+    const built = try buildClusters(gpa, scratch.allocator(), input, boxes, width);
+    const own = &built.statistics;
+    const clusters = built.tree();
     const has_triangles = tree.packs.len > 0;
     const kept_count = if (has_triangles) tree.nodes.len else 0;
     const Node = world.Node(width);
@@ -73,8 +74,7 @@ fn buildClusters(
     input: *const wide.Input,
     boxes: []const Box3,
     comptime width: u32,
-    statistics: *world.TreeStatistics,
-) bvh_input.Error!world.Tree(width) {
+) bvh_input.Error!wide.Built(width) {
     const positions = try scratch.alloc(math.Vec3, 2 * boxes.len);
     const triangles = try scratch.alloc(world.Triangle, boxes.len);
     var centroid_bounds: Box3 = .empty;
@@ -88,7 +88,8 @@ fn buildClusters(
     own.positions = positions;
     own.triangles = triangles;
     own.centroid_bounds = centroid_bounds;
-    return wide.build(gpa, scratch, &own, width, statistics);
+    own.kept = null;
+    return wide.build(gpa, scratch, &own, width);
 }
 
 fn Writer(comptime width: u32) type {
