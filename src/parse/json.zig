@@ -550,7 +550,7 @@ const Scanner = struct {
             const list = frame.list orelse continue;
             try scanner.skipValue(start);
             const reason = scanner.diagnostic.message.text();
-            try lenience.leaveOut(list, @intCast(frame.count - 1), reason);
+            try lenience.leaveOut(list, @intCast(frame.count - 1), .{ .reason = reason });
             return lenience.replaceElement(start, scanner.offset, frame.substitute);
         }
         return err;
