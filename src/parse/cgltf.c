@@ -171,7 +171,7 @@ const unsigned short rl_cgltf_layout[] = {
               translation, rotation, scale, matrix, extras, has_mesh_gpu_instancing,
               mesh_gpu_instancing, extensions_count, extensions),
     STRUCTURE(cgltf_scene, name, nodes, nodes_count, extras, extensions_count, extensions),
-    STRUCTURE(cgltf_asset, copyright, version, min_version, extras),
+    STRUCTURE(cgltf_asset, copyright, generator, version, min_version, extras),
     OFFSETS(cgltf_data, file_type, asset, meshes, meshes_count, materials, materials_count,
             accessors, accessors_count, buffer_views, buffer_views_count, buffers,
             buffers_count, images, images_count, textures, textures_count, samplers,

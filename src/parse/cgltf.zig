@@ -418,7 +418,8 @@ pub const cgltf_scene = extern struct {
 };
 
 pub const cgltf_asset = extern struct {
-    copyright: [2]usize,
+    copyright: usize,
+    generator: String,
     version: String,
     min_version: String,
     extras: Tail,

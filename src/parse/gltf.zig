@@ -4,9 +4,11 @@
 //! is that of trust: container, JSON text, document, extensions, buffers, accessors, and only then
 //! the parts. Images stay as they are: prepare decodes them.
 
+const std = @import("std");
 const accessors = @import("gltf/accessors.zig");
 const asset = @import("gltf/asset.zig");
 const container = @import("gltf/container.zig");
+const description = @import("gltf/description.zig");
 const image_based_light = @import("gltf/image_based_light.zig");
 const instancing = @import("gltf/instancing.zig");
 const limits = @import("gltf/limits.zig");
@@ -52,6 +54,8 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
         .diagnostic = diagnostic,
     };
     defer source.deinit();
+    const is_binary = std.mem.startsWith(u8, bytes, container.magic);
+    builder.scene.file.format = if (is_binary) .glb else .gltf;
     try asset.check(&source);
     var buffers: Buffers = try .load(
         resources,
@@ -79,6 +83,7 @@ fn fill(source: *Source, resources: *Resources) Error!void {
     const settings = &resources.settings;
     const shown = try nodes.choose(source, settings.scene);
     if (shown) |one| try source.need(.scenes, Source.indexOf(source.data.scenes, one));
+    builder.scene.file = try description.read(source, builder.scene.file.format, shown);
     const variant = try variants.choose(source, settings.material_variant);
     const origins = try nodes.collect(source, shown);
     defer source.gpa.free(origins);

@@ -27,8 +27,7 @@ pub fn checkRest(source: *Source) Error!void {
         );
     }
     for (0..source.data.accessors_count) |index| {
-        const is_known = index < source.resolved.bit_length and source.resolved.isSet(index);
-        if (is_known or source.findBroken(.accessors, index) != null) continue;
+        if (source.isResolved(index) or source.findBroken(.accessors, index) != null) continue;
         _ = resolve(source, index) catch |err| try source.excuse(err);
     }
     for (source.buffers, 0..) |buffer, index| if (buffer) |bytes| {
@@ -88,9 +87,7 @@ fn resolveAs(source: *Source, index: usize, purpose: Purpose) Error!?Accessor {
         accessor.sparse = (try resolveSparse(source, index, accessor, element_bytes)) orelse
             return null;
     }
-    const count = source.data.accessors_count;
-    if (source.resolved.bit_length < count) try source.resolved.resize(source.gpa, count, false);
-    source.resolved.set(index);
+    try source.noteResolved(index);
     return accessor;
 }
 
@@ -188,8 +185,7 @@ fn resolveSparse(
         .index_component = index_component,
         .values = values orelse return null,
     };
-    const is_known = index < source.resolved.bit_length and source.resolved.isSet(index);
-    if (!is_known) try checkSparse(source, index, accessor.count, sparse);
+    if (!source.isResolved(index)) try checkSparse(source, index, accessor.count, sparse);
     return sparse;
 }
 

@@ -52,7 +52,7 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
     var used: Used = .{ .vertex_count = positions.count };
     for (list) |*attribute| {
         const index = accessorIndex(source, attribute);
-        if (hasNoElements(source, attribute.data)) {
+        if (try hasNoElements(source, attribute.data)) {
             source.forgive("{f}: {f} is empty, left out", .{ place, quote(attribute) });
             continue;
         }
@@ -75,19 +75,22 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
 }
 
 /// Whether a primitive has an accessor of no elements where there is nothing to draw without them.
-pub fn isEmpty(source: *const Source, primitive: *const c.cgltf_primitive) bool {
-    if (primitive.indices) |accessor| if (hasNoElements(source, accessor)) return true;
+pub fn isEmpty(source: *Source, primitive: *const c.cgltf_primitive) Error!bool {
+    if (primitive.indices) |accessor| if (try hasNoElements(source, accessor)) return true;
     for (Source.slice(primitive.attributes, primitive.attributes_count)) |*attribute| {
         const is_position = attribute.type == .position and attribute.index == 0;
-        if (is_position and hasNoElements(source, attribute.data)) return true;
+        if (is_position and try hasNoElements(source, attribute.data)) return true;
     }
     return false;
 }
 
 /// Whether an accessor is empty, and not just left out of the document.
-fn hasNoElements(source: *const Source, accessor: *const c.cgltf_accessor) bool {
+fn hasNoElements(source: *Source, accessor: *const c.cgltf_accessor) Error!bool {
     if (accessor.count > 0) return false;
-    return source.findBroken(.accessors, Source.indexOf(source.data.accessors, accessor)) == null;
+    const index = Source.indexOf(source.data.accessors, accessor);
+    if (source.findBroken(.accessors, index) != null) return false;
+    try source.noteResolved(index); // It has been said what becomes of it.
+    return true;
 }
 
 /// Checks an attribute that is drawn by its accessor.

@@ -16,7 +16,8 @@ pub const Container = struct {
 
 const header_bytes = 12;
 const chunk_header_bytes = 8;
-const magic = "glTF";
+/// What a GLB begins with.
+pub const magic = "glTF";
 const json_type = 0x4E4F534A;
 const binary_type = 0x004E4942;
 

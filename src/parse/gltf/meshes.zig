@@ -200,7 +200,7 @@ const Decoded = struct { mesh: scene.Mesh, used: attributes.Used };
 fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Error!?Decoded {
     const source = meshes.source;
     const mode = Mode.of(primitive) orelse return source.fail("{f}: unknown mode", .{place});
-    if (attributes.isEmpty(source, primitive)) {
+    if (try attributes.isEmpty(source, primitive)) {
         source.forgive("{f}: its vertices or indices are empty, not drawn", .{place});
         return null;
     }

@@ -96,6 +96,18 @@ pub fn forgiveUnneeded(source: *const Source, reason: []const u8) void {
     source.forgive("{s}; nothing drawn needs it", .{reason});
 }
 
+/// Notes that all has been said of an accessor.
+pub fn noteResolved(source: *Source, index: usize) error{OutOfMemory}!void {
+    const count = source.data.accessors_count;
+    if (source.resolved.bit_length < count) try source.resolved.resize(source.gpa, count, false);
+    source.resolved.set(index);
+}
+
+/// Whether it has.
+pub fn isResolved(source: *const Source, index: usize) bool {
+    return index < source.resolved.bit_length and source.resolved.isSet(index);
+}
+
 /// Whether a node of the scene is not shown.
 pub fn isHidden(source: *const Source, node: u32) bool {
     return node < source.hidden.bit_length and source.hidden.isSet(node);
