@@ -28,7 +28,9 @@ pub fn parse(
 ) Error!Scene {
     var scene = try Resources.open(gpa, io, path, settings, diagnostic);
     defer scene.close();
-    if (std.ascii.endsWithIgnoreCase(path, ".pbrt")) {
+    if (std.ascii.endsWithIgnoreCase(path, ".pbrt") or
+        std.ascii.endsWithIgnoreCase(path, ".pbrt.gz"))
+    {
         try checkOnly(settings, diagnostic);
         return pbrt.read(&scene.resources, path, scene.main, diagnostic);
     }

@@ -21,6 +21,7 @@ test {
     _ = @import("offset.zig");
     _ = @import("output.zig");
     _ = @import("pbrt.zig");
+    _ = @import("pbrt_forgiven.zig");
     _ = @import("pbrt_textures.zig");
     _ = @import("samples.zig");
     _ = @import("beams.zig");
