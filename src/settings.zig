@@ -256,6 +256,8 @@ pub const Load = struct {
     allow_outside: bool = false,
     /// Whether what is wrong with a file, but can be read all the same, is an error.
     strict: bool = false,
+    /// Whether a file is drawn that requires extensions which are not known.
+    force: bool = false,
     /// Within `tessellation`.
     tessellation: u32 = tessellation.default,
     /// Within `texture_side`.

@@ -41,6 +41,7 @@ pub fn read(
     try input.start();
     var scene_builder: scene_data.Builder = .init(gpa);
     errdefer scene_builder.deinit();
+    scene_builder.scene.file.format = .pbrt;
     var names: std.heap.ArenaAllocator = .init(gpa);
     defer names.deinit();
     var builder: SceneBuilder = try .init(&input, &scene_builder);
