@@ -1,14 +1,20 @@
 //! Stage 1: a scene file becomes a `Scene`.
 //!
-//! In: the path of a glTF 2.0 file, JSON or binary, or of a PBRT scene. Out: a checked `Scene`, or
-//! one line that says what is wrong. The format is chosen here and nowhere else.
+//! In: the path of a file, or standard input: glTF 2.0, JSON or binary, or a PBRT scene. Out: a
+//! checked `Scene`, or one line that says what is wrong. What format it is, its contents tell, and
+//! that is found out here and nowhere else.
 
 const std = @import("std");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Scene = @import("scene.zig").Scene;
+const gzip = @import("decode.zig").gzip;
+const format_file = @import("parse/format.zig");
 const gltf = @import("parse/gltf.zig");
 const pbrt = @import("parse/pbrt.zig");
-const Settings = @import("settings.zig").Load;
+const ply_scene = @import("parse/ply_scene.zig");
+const settings_file = @import("settings.zig");
+const stl = @import("parse/stl.zig");
+const Settings = settings_file.Load;
 const Allocator = std.mem.Allocator;
 const Resources = @import("parse/resource.zig");
 
@@ -16,6 +22,12 @@ const Resources = @import("parse/resource.zig");
 /// what it should be, or it needs what is not supported. `SceneUnknown`,
 /// `MaterialVariantUnknown`: none of its scenes, or variants, is the one that is asked for.
 pub const Error = Resources.Error || error{ SceneUnknown, MaterialVariantUnknown };
+
+/// What messages call the scene that the user names so.
+pub fn title(path: []const u8) []const u8 {
+    const is_input = std.mem.eql(u8, path, settings_file.standard_input);
+    return if (is_input) "standard input" else path;
+}
 
 /// Reads the scene at `path`. On an error the diagnostic holds one line without the path in it;
 /// what is odd but harmless becomes warnings there. The caller frees the scene with `deinit`.
@@ -28,11 +40,52 @@ pub fn parse(
 ) Error!Scene {
     var scene = try Resources.open(gpa, io, path, settings, diagnostic);
     defer scene.close();
-    if (std.ascii.endsWithIgnoreCase(path, ".pbrt")) {
-        try checkOnly(settings, diagnostic);
-        return pbrt.read(&scene.resources, path, scene.main, diagnostic);
+    try unpack(&scene, diagnostic);
+    const main = &scene.main;
+    const format = settings.format orelse try formatOf(main.bytes, path, diagnostic);
+    switch (format) {
+        .gltf, .glb => return gltf.read(&scene.resources, main.bytes, diagnostic),
+        .pbrt, .obj, .stl, .ply => try checkOnly(settings, diagnostic),
     }
-    return gltf.read(&scene.resources, scene.main.bytes, diagnostic);
+    return switch (format) {
+        .gltf, .glb => unreachable, // See above.
+        .pbrt => pbrt.read(&scene.resources, title(path), main.*, diagnostic),
+        .obj => diagnostic.invalid("is of a format that is not read", .{}),
+        .stl => stl.read(&scene.resources, main.bytes, diagnostic),
+        .ply => ply_scene.read(&scene.resources, main.bytes, diagnostic),
+    };
+}
+
+/// Puts what a gzip file holds in its place.
+fn unpack(scene: *Resources.Scene, diagnostic: *Diagnostic) Error!void {
+    const packed_bytes = scene.main.bytes;
+    if (!gzip.isGzip(packed_bytes)) return;
+    const gpa = scene.resources.gpa;
+    const limit = Resources.file_bytes_max;
+    const reason = &diagnostic.message;
+    scene.main.bytes = gzip.inflate(gpa, packed_bytes, limit, reason) catch |err| switch (err) {
+        error.OutOfMemory => |failure| return failure,
+        error.InvalidGzip => return error.InvalidInput,
+    };
+    gpa.free(packed_bytes);
+    scene.resources.bytes_read += scene.main.bytes.len;
+}
+
+/// What a file is to be read as, or what else it is.
+fn formatOf(
+    bytes: []const u8,
+    path: []const u8,
+    diagnostic: *Diagnostic,
+) Error!settings_file.SceneFormat {
+    return switch (format_file.recognize(bytes, path)) {
+        .format => |format| format,
+        .gzip => diagnostic.invalid("is a gzip file within another one; unpack it", .{}),
+        .foreign => |what| diagnostic.invalid("is {s}", .{what}),
+        .unknown => diagnostic.invalid(
+            "is no glTF, PBRT, OBJ, STL or PLY file by its contents (see --format-in)",
+            .{},
+        ),
+    };
 }
 
 /// Whether what has but one scene, without a name, and no variants is asked for that.
@@ -83,11 +136,20 @@ pub fn parsePbrt(
 test {
     _ = Resources;
     _ = @import("parse/cgltf.zig");
+    _ = format_file;
     _ = gltf;
     _ = pbrt;
+    _ = @import("parse/named_images.zig");
+    _ = @import("parse/number.zig");
+    _ = @import("parse/plain.zig");
+    _ = @import("parse/ply.zig");
+    _ = ply_scene;
+    _ = @import("parse/polygon.zig");
+    _ = stl;
+    _ = @import("parse/stream.zig");
 }
 
-test "a format is chosen by its extension" {
+test "what does not exist is of no format" {
     const gpa = std.testing.allocator;
     const io = std.testing.io;
     var diagnostic: Diagnostic = .{};
