@@ -10,6 +10,7 @@ const Scene = @import("scene.zig").Scene;
 const gzip = @import("decode.zig").gzip;
 const format_file = @import("parse/format.zig");
 const gltf = @import("parse/gltf.zig");
+const obj = @import("parse/obj.zig");
 const pbrt = @import("parse/pbrt.zig");
 const ply_scene = @import("parse/ply_scene.zig");
 const settings_file = @import("settings.zig");
@@ -17,6 +18,9 @@ const stl = @import("parse/stl.zig");
 const Settings = settings_file.Load;
 const Allocator = std.mem.Allocator;
 const Resources = @import("parse/resource.zig");
+
+/// Extensions of glTF: what becomes of each.
+pub const extensions = @import("parse/gltf/extensions.zig");
 
 /// `InputOutput`: a file is missing or cannot be read. `InvalidInput`: it is read, but it is not
 /// what it should be, or it needs what is not supported. `SceneUnknown`,
@@ -38,37 +42,38 @@ pub fn parse(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!Scene {
-    var scene = try Resources.open(gpa, io, path, settings, diagnostic);
-    defer scene.close();
-    try unpack(&scene, diagnostic);
-    const main = &scene.main;
+    diagnostic.strict = settings.strict;
+    var opened = try Resources.open(gpa, io, path, settings, diagnostic);
+    defer opened.close();
+    try unpack(&opened, diagnostic);
+    const main = &opened.main;
+    const resources = &opened.resources;
     const format = settings.format orelse try formatOf(main.bytes, path, diagnostic);
-    switch (format) {
-        .gltf, .glb => return gltf.read(&scene.resources, main.bytes, diagnostic),
-        .pbrt, .obj, .stl, .ply => try checkOnly(settings, diagnostic),
-    }
-    return switch (format) {
-        .gltf, .glb => unreachable, // See above.
-        .pbrt => pbrt.read(&scene.resources, title(path), main.*, diagnostic),
-        .obj => diagnostic.invalid("is of a format that is not read", .{}),
-        .stl => stl.read(&scene.resources, main.bytes, diagnostic),
-        .ply => ply_scene.read(&scene.resources, main.bytes, diagnostic),
+    if (format != .gltf and format != .glb) try checkOnly(settings, diagnostic);
+    var scene = try switch (format) {
+        .gltf, .glb => gltf.read(resources, main.bytes, diagnostic),
+        .pbrt => pbrt.read(resources, title(path), main.*, diagnostic),
+        .obj => obj.read(resources, path, main.bytes, diagnostic),
+        .stl => stl.read(resources, main.bytes, diagnostic),
+        .ply => ply_scene.read(resources, main.bytes, diagnostic),
     };
+    scene.file.byte_count = resources.bytes_read;
+    return scene;
 }
 
 /// Puts what a gzip file holds in its place.
-fn unpack(scene: *Resources.Scene, diagnostic: *Diagnostic) Error!void {
-    const packed_bytes = scene.main.bytes;
+fn unpack(opened: *Resources.Scene, diagnostic: *Diagnostic) Error!void {
+    const packed_bytes = opened.main.bytes;
     if (!gzip.isGzip(packed_bytes)) return;
-    const gpa = scene.resources.gpa;
+    const gpa = opened.resources.gpa;
     const limit = Resources.file_bytes_max;
     const reason = &diagnostic.message;
-    scene.main.bytes = gzip.inflate(gpa, packed_bytes, limit, reason) catch |err| switch (err) {
+    opened.main.bytes = gzip.inflate(gpa, packed_bytes, limit, reason) catch |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidGzip => return error.InvalidInput,
     };
     gpa.free(packed_bytes);
-    scene.resources.bytes_read += scene.main.bytes.len;
+    opened.resources.bytes_read += opened.main.bytes.len;
 }
 
 /// What a file is to be read as, or what else it is.
@@ -143,6 +148,7 @@ test {
     _ = @import("parse/number.zig");
     _ = @import("parse/plain.zig");
     _ = @import("parse/ply.zig");
+    _ = obj;
     _ = ply_scene;
     _ = @import("parse/polygon.zig");
     _ = stl;

@@ -22,16 +22,17 @@ pub fn read(
     const gpa = resources.gpa;
     var builder: scene.Builder = .init(gpa);
     errdefer builder.deinit();
+    builder.scene.file.format = .ply;
     var reason: Message = .{};
     const mesh = ply.read(gpa, builder.arena(), bytes, .{}, &reason) catch |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidPly => return diagnostic.invalid("{s}", .{reason.text()}),
     };
-    if (mesh.not_finite_count > 0) diagnostic.warn(
+    if (mesh.not_finite_count > 0) diagnostic.forgive(
         "{d} faces, edges or points whose places are not finite are left out",
         .{mesh.not_finite_count},
     );
-    if (mesh.dropped_count > 0) diagnostic.warn(
+    if (mesh.dropped_count > 0) diagnostic.forgive(
         "{d} normals or coordinates of textures that are not finite are dropped",
         .{mesh.dropped_count},
     );

@@ -32,6 +32,7 @@ pub fn read(
     var builder: scene.Builder = .init(resources.gpa);
     errdefer builder.deinit();
     builder.scene.is_z_up = true;
+    builder.scene.file.format = .stl;
     var reader: Reader = .{
         .gpa = resources.gpa,
         .arena = builder.arena(),
@@ -45,7 +46,7 @@ pub fn read(
     } else {
         colors = try reader.readBinary();
     }
-    if (reader.left_out_count > 0) diagnostic.warn(
+    if (reader.left_out_count > 0) diagnostic.forgive(
         "{d} triangles with corners that are not finite are left out",
         .{reader.left_out_count},
     );
@@ -121,10 +122,10 @@ const Reader = struct {
             .{ claimed, reader.bytes.len, present },
         );
         if (claimed == 0 and present > 0 and left % triangle_bytes == 0) {
-            reader.diagnostic.warn("STL claims no triangles, all {d} are read", .{present});
+            reader.diagnostic.forgive("STL claims no triangles, all {d} are read", .{present});
             return reader.bounded(present);
         }
-        if (left > @as(u64, claimed) * triangle_bytes) reader.diagnostic.warn(
+        if (left > @as(u64, claimed) * triangle_bytes) reader.diagnostic.forgive(
             "{d} bytes behind the triangles are ignored",
             .{left - @as(u64, claimed) * triangle_bytes},
         );
@@ -166,8 +167,10 @@ const Reader = struct {
             } else if (std.ascii.eqlIgnoreCase(word, "facet")) {
                 is_open = true;
             } else if (std.ascii.eqlIgnoreCase(word, "endfacet")) {
-                if (count < 3) reader.diagnostic.warn("facets of less than three corners are " ++
-                    "left out", .{});
+                if (count < 3) reader.diagnostic.forgive(
+                    "a facet has less than three corners, and is left out",
+                    .{},
+                );
                 is_open = false;
                 count = 0;
             } else if (isName(word)) {
