@@ -37,11 +37,15 @@ pub fn nextLine(words: *Words) bool {
 
 /// Passes over what is left of the line.
 pub fn skipLine(words: *Words) void {
+    words.cursor = @min(words.lineEnd() + 1, words.text.len);
+}
+
+fn lineEnd(words: *const Words) usize {
     var index = words.cursor;
     while (words.text[index] != '\n' and words.text[index] != '\r' and index < words.text.len) {
         index += 1;
     }
-    words.cursor = @min(index + 1, words.text.len);
+    return index;
 }
 
 /// Whether the line has more words.
@@ -69,8 +73,8 @@ pub fn word(words: *Words) []const u8 {
 /// The rest of the line, blanks around it left out.
 pub fn rest(words: *Words) []const u8 {
     const start = words.cursor;
-    words.skipLine();
-    return std.mem.trim(u8, words.text[start..words.cursor], " \t\r\n");
+    words.cursor = words.lineEnd();
+    return std.mem.trim(u8, words.text[start..words.cursor], " \t");
 }
 
 /// The next number of the line, NaN where it is not finite; null: something else stands there.
@@ -99,6 +103,8 @@ test "lines, words and numbers" {
     try std.testing.expect(!words.hasMore() and words.nextLine());
     try std.testing.expectEqualStrings("name", words.word());
     try std.testing.expectEqualStrings("a b # c", words.rest());
+    try std.testing.expectEqualStrings("", words.rest());
+    words.skipLine();
     try std.testing.expect(words.nextLine());
     try std.testing.expectEqualStrings("x", words.word());
     words.skipLine();
