@@ -42,14 +42,41 @@ pub fn parse(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!Scene {
-    diagnostic.strict = settings.strict;
     var opened = try Resources.open(gpa, io, path, settings, diagnostic);
     defer opened.close();
-    try unpack(&opened, diagnostic);
+    return read(&opened, path, diagnostic);
+}
+
+/// Reads a file that is in memory and is called `name`; what it names is looked for in `folder`.
+/// Otherwise like `parse`.
+pub fn parseNamed(
+    gpa: Allocator,
+    io: std.Io,
+    name: []const u8,
+    bytes: []const u8,
+    folder: std.Io.Dir,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error!Scene {
+    const copy = try gpa.dupeSentinel(u8, bytes, 0);
+    var opened: Resources.Scene = .{
+        .main = .{ .bytes = copy, .identity = null },
+        .resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings },
+    };
+    defer gpa.free(opened.main.bytes);
+    opened.resources.bytes_read = bytes.len;
+    return read(&opened, name, diagnostic);
+}
+
+/// Reads what has been opened, by its contents.
+fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Error!Scene {
+    try unpack(opened, diagnostic);
     const main = &opened.main;
     const resources = &opened.resources;
+    const settings = &resources.settings;
+    diagnostic.strict = settings.strict;
     const format = settings.format orelse try formatOf(main.bytes, path, diagnostic);
-    if (format != .gltf and format != .glb) try checkOnly(settings, diagnostic);
+    if (format != .gltf and format != .glb) try checkOnly(settings.*, diagnostic);
     var scene = try switch (format) {
         .gltf, .glb => gltf.read(resources, main.bytes, diagnostic),
         .pbrt => pbrt.read(resources, title(path), main.*, diagnostic),
@@ -57,6 +84,8 @@ pub fn parse(
         .stl => stl.read(resources, main.bytes, diagnostic),
         .ply => ply_scene.read(resources, main.bytes, diagnostic),
     };
+    errdefer scene.deinit();
+    try diagnostic.settle();
     scene.file.byte_count = resources.bytes_read;
     return scene;
 }
