@@ -154,7 +154,15 @@ const sections: []const Section = &.{
             .usage = "--material-variant N",
             .help = "name or index of one of its variants of materials",
         },
-        .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
+        .{
+            .usage = "--up-axis AXIS",
+            .help = "y or z: which axis of the file points up (STL: z)",
+        },
+        .{
+            .usage = "--format-in FORMAT",
+            .help = "how to read the scene where its contents do not tell:\n" ++
+                namesOf(settings.SceneFormat),
+        },
         .{
             .usage = "--env FILE",
             .help = "light from all around: an equirectangular image of\n" ++
@@ -286,16 +294,16 @@ const Reader = arguments_file.Arguments(sections);
 
 /// What `--help` prints.
 pub const help: []const u8 = "raylane " ++ version ++
-    \\: renders a glTF or PBRT scene to an image on the CPU
+    \\: renders a scene (glTF, PBRT, OBJ, STL, PLY) to an image on the CPU
     \\
     \\usage: raylane [render] SCENE [options]
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
     \\
-    \\SCENE is a glTF 2.0 file (.gltf, .glb), a PBRT scene (.pbrt) or builtin:NAME,
-    \\NAME being cornell, atrium, nave or handles. The image is written to the
-    \\working directory under the scene's name, as a whole or not at all; a report
-    \\goes to standard output.
+    \\SCENE is a file in glTF 2.0 (JSON or GLB), PBRT, OBJ, STL or PLY, - for standard
+    \\input, or builtin:NAME, NAME being cornell, atrium, nave or handles. The image
+    \\is written to the working directory under the scene's name, as a whole or not
+    \\at all; a report goes to standard output.
     \\
 ++ arguments_file.helpOf(sections) ++
     \\
@@ -402,6 +410,9 @@ const Parser = struct {
             .material_variant => options.load.material_variant = choiceOf(given.value) orelse
                 return reader.bad(given, "a material variant's name or its index"),
             .up_axis => options.load.up_axis = try reader.choice(given, settings.UpAxis),
+            .format_in => {
+                options.load.format = try reader.choice(given, settings.SceneFormat);
+            },
             .background => options.view.background = backgroundOf(given.value) orelse
                 return parser.noBackground(given),
             .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
@@ -540,7 +551,11 @@ const Parser = struct {
     fn settleFormat(parser: *Parser) Error!void {
         const options = &parser.options;
         options.write.format = parser.format orelse .png;
-        const output = options.output orelse return;
+        const output = options.output orelse {
+            if (!std.mem.eql(u8, options.scene, settings.standard_input)) return;
+            return parser.reader.fail("a scene from standard input has no name for the image: " ++
+                "say one by -o", .{});
+        };
         if (options.toStdout()) return;
         const extension = std.fs.path.extension(output);
         const implied = if (extension.len == 0) null else formatOf(extension[1..]);
@@ -743,11 +758,14 @@ test "a scene alone is rendered by the defaults" {
 
 test "after -- everything is a scene, and a lone dash always" {
     for ([_][:0]const u8{ "-q", "--help", "render", "--", "-" }) |name| {
-        const command = try parseForTest(&.{ "--", name });
+        const command = try parseForTest(&.{ "-oa.png", "--", name });
         try std.testing.expectEqualStrings(name, command.render.scene);
         try std.testing.expect(!command.render.quiet);
     }
-    try std.testing.expectEqualStrings("-", (try parseForTest(&.{"-"})).render.scene);
+    const piped = try parseForTest(&.{ "-", "-o", "-", "--format-in=stl" });
+    try std.testing.expectEqualStrings("-", piped.render.scene);
+    try std.testing.expectEqual(.stl, piped.render.load.format.?);
+    try expectUsage("say one by -o", &.{"-"});
 }
 
 test "help wins over mistakes, the other questions do not" {
@@ -872,6 +890,11 @@ test "numbers keep to their ranges" {
         .{ .flag = "--scene", .good = &.{ "0", "4294967296", "b c", "auto" }, .bad = &.{""} },
         .{ .flag = "--material-variant", .good = &.{ "0", "b c" }, .bad = &.{""} },
         .{ .flag = "--up-axis", .good = &.{ "y", "z" }, .bad = &.{ "", "x", "Z", "-y" } },
+        .{
+            .flag = "--format-in",
+            .good = &.{ "gltf", "glb", "pbrt", "obj", "stl", "ply" },
+            .bad = &.{ "", "GLB", "fbx" },
+        },
         .{ .flag = "--output", .good = &.{ "-", "a.png", "b/A.PPM" }, .bad = &.{ "", "png" } },
     };
     for (cases) |case| {
@@ -901,7 +924,7 @@ test "values arrive as they were meant" {
     try std.testing.expectEqualStrings("red", painted.name);
     const named_scene = (try optionsForTest(&.{"--scene=auto"})).load.scene;
     try std.testing.expectEqualStrings("auto", named_scene.name);
-    try std.testing.expectEqual(.z, (try optionsForTest(&.{"--up-axis=z"})).load.up_axis);
+    try std.testing.expectEqual(.z, (try optionsForTest(&.{"--up-axis=z"})).load.up_axis.?);
     const background = (try optionsForTest(&.{"--background=#FF8001"})).view.background;
     try std.testing.expectEqual([3]u8{ 255, 128, 1 }, background.srgb);
     try expectUsage("no colour 'rod', did you mean 'red'?", &.{ "--background=rod", "s" });

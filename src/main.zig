@@ -338,7 +338,7 @@ fn renderAndReport(
         const file = if (err == error.OutputFailed)
             job.outputTitle()
         else
-            placeOf(diagnostic, options.scene);
+            placeOf(diagnostic, raylane.parse.title(options.scene));
         if (err == error.OutOfMemory) account.explain(&diagnostic.message);
         const text = diagnostic.message.text();
         assert(text.len > 0);
@@ -451,7 +451,7 @@ const Job = struct {
     }
 
     fn sayOfScene(job: *Job, comptime format: []const u8, arguments: anytype) void {
-        const scene = printable(job.options.scene);
+        const scene = printable(raylane.parse.title(job.options.scene));
         say(job.io, "raylane: {f}: " ++ format ++ "\n", .{scene} ++ arguments);
     }
 
