@@ -89,13 +89,12 @@ pub fn treatmentOf(used: *const scene_data.File.Extension) ?*const Extension {
     return parse.extensions.find(used.name);
 }
 
-/// Looks at a scene, which has to outlive the result, for a program that renders with trees of
-/// `lanes`. All memory is from `arena`; what is needed meanwhile comes from `gpa`.
+/// Looks at a scene, which has to outlive the result. All memory is from `arena`; what is needed
+/// meanwhile comes from `gpa`.
 pub fn collect(
     gpa: Allocator,
     arena: Allocator,
     scene: *const Scene,
-    lanes: u8,
     diagnostic: *Diagnostic,
 ) Error!Info {
     const images = try arena.alloc(Image, scene.images.len);
@@ -117,7 +116,7 @@ pub fn collect(
         .lights = try lightsOf(gpa, scene),
         .extent = try prepare.extentOf(gpa, scene),
         .size = size,
-        .memory_bytes = try memory.estimate(gpa, scene, size, lanes, diagnostic),
+        .memory_bytes = try memory.estimate(gpa, scene, size, diagnostic),
     };
 }
 

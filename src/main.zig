@@ -311,8 +311,7 @@ fn describe(
     defer scene.deinit();
     var arena: std.heap.ArenaAllocator = .init(gpa);
     defer arena.deinit();
-    const lanes = raylane.variant.default.lanes;
-    var found = try raylane.info.collect(gpa, arena.allocator(), &scene, lanes, diagnostic);
+    var found = try raylane.info.collect(gpa, arena.allocator(), &scene, diagnostic);
     found.version = cli.version;
     found.name = name;
     var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;

@@ -5,6 +5,7 @@
 //! which is measured (docs/info.md).
 
 const std = @import("std");
+const decode = @import("../decode.zig");
 const prepare = @import("../prepare.zig");
 const scene_data = @import("../scene.zig");
 const settings = @import("../settings.zig");
@@ -15,22 +16,24 @@ const Scene = scene_data.Scene;
 
 /// The program, its threads' stacks, the light from all around.
 const base_bytes = 4 << 20;
-/// Of the tree, 50 bytes a triangle whatever its width: packs that are not all full, and nodes.
-const tree_bytes = 50;
-/// While it is built, besides: boxes, binary nodes and the costs of these, a number for each lane.
-const build_bytes = 64;
-const build_lane_bytes = 4;
+/// The tree has 50 bytes a triangle whatever its width: packs that are not all full, and nodes.
+const tree_triangle_bytes = 50;
+/// While it is built, besides: boxes, and what is touched of binary nodes and their costs.
+const build_triangle_bytes = 48;
+/// A map of the surroundings: what is decoded, radiance, its levels; by texel of the image.
+const environment_texel_bytes = 56;
+/// What else is made of it.
+const environment_bytes = 4 << 20;
 /// The picture's sums; a second layer where something is unlit.
 const film_pixel_bytes = 16;
 /// Encoded rows, and the file that they become.
 const output_pixel_bytes = 11;
 
-/// Bytes at the peak. `size`: width and height of the picture. `lanes`: width of the tree's nodes.
+/// Bytes at the peak. `size`: width and height of the picture.
 pub fn estimate(
     gpa: Allocator,
     scene: *const Scene,
     size: [2]u32,
-    lanes: u8,
     diagnostic: *Diagnostic,
 ) prepare.LoadError!u64 {
     const side_max = settings.texture_side.default;
@@ -39,14 +42,14 @@ pub fn estimate(
     const soup = soupOf(scene);
     const pixels = @as(u64, size[0]) * size[1];
     const layers: u64 = if (hasUnlit(scene)) 2 else 1;
-    const tree = soup.triangle_count * tree_bytes;
-    const build = soup.triangle_count * (build_bytes + build_lane_bytes * @as(u64, lanes));
+    const tree = soup.triangle_count * tree_triangle_bytes;
+    const posed = textures.byte_count + soup.byte_count + tree;
     return base_bytes + @max(
         scene.file.byte_count + read,
-        read + textures.byte_count + textures.decode_byte_count,
-        read + textures.byte_count + soup.byte_count + tree + build,
-        textures.byte_count + soup.byte_count + tree +
-            pixels * (layers * film_pixel_bytes + output_pixel_bytes),
+        read + textures.peak_byte_count,
+        read + posed + soup.triangle_count * build_triangle_bytes,
+        read + posed + environmentBytes(scene),
+        posed + pixels * (layers * film_pixel_bytes + output_pixel_bytes),
     );
 }
 
@@ -76,8 +79,11 @@ fn sceneBytes(gpa: Allocator, scene: *const Scene) error{OutOfMemory}!u64 {
         try arrays.add(mesh.segments);
     }
     for (scene.images) |image| try arrays.add(image.bytes);
-    const nodes = std.mem.sliceAsBytes(scene.nodes).len;
-    return arrays.byte_count + nodes + std.mem.sliceAsBytes(scene.instances).len;
+    inline for (.{ "nodes", "meshes", "instances", "materials", "lights" }) |name| {
+        const list = @field(scene, name);
+        arrays.byte_count += list.len * @sizeOf(std.meta.Elem(@TypeOf(list)));
+    }
+    return arrays.byte_count;
 }
 
 /// Arrays, each counted once.
@@ -127,6 +133,18 @@ fn soupOf(scene: *const Scene) Soup {
     }
     soup.byte_count = vertex_count * vertex_bytes + soup.triangle_count * @sizeOf(world.Triangle);
     return soup;
+}
+
+fn environmentBytes(scene: *const Scene) u64 {
+    const map = if (scene.environment) |*map| map else return 0;
+    const faces: []const u32 = if (map.projection == .cube) &map.faces else &.{map.image};
+    var texel_count: u64 = 0;
+    for (faces) |face| {
+        var reason: decode.Reason = .{};
+        const header = decode.info(scene.images[face].bytes, &reason) catch continue;
+        texel_count += @as(u64, header.width) * header.height;
+    }
+    return environment_bytes + texel_count * environment_texel_bytes;
 }
 
 fn hasUnlit(scene: *const Scene) bool {
