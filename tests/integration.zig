@@ -19,6 +19,7 @@ test {
     _ = @import("gltf_poses.zig");
     _ = @import("gltf_textures.zig");
     _ = @import("malformed.zig");
+    _ = @import("meshes.zig");
     _ = @import("offset.zig");
     _ = @import("output.zig");
     _ = @import("pbrt.zig");
