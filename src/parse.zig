@@ -32,7 +32,9 @@ pub fn parse(
     var opened = try Resources.open(gpa, io, path, settings, diagnostic);
     defer opened.close();
     const resources = &opened.resources;
-    var scene = if (std.ascii.endsWithIgnoreCase(path, ".pbrt")) scene: {
+    const is_pbrt = std.ascii.endsWithIgnoreCase(path, ".pbrt") or
+        std.ascii.endsWithIgnoreCase(path, ".pbrt.gz");
+    var scene = if (is_pbrt) scene: {
         try checkOnly(settings, diagnostic);
         break :scene try pbrt.read(resources, path, opened.main, diagnostic);
     } else try gltf.read(resources, opened.main.bytes, diagnostic);

@@ -23,6 +23,7 @@ test {
     _ = @import("offset.zig");
     _ = @import("output.zig");
     _ = @import("pbrt.zig");
+    _ = @import("pbrt_forgiven.zig");
     _ = @import("pbrt_textures.zig");
     _ = @import("poses.zig");
     _ = @import("samples.zig");

@@ -28,6 +28,9 @@ const Resources = @This();
 /// See parse.zig.
 pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
 
+/// What is said of a file that would be replaced.
+pub const overwritten = "would be overwritten by the output";
+
 /// Largest file that is read, in bytes.
 pub const file_bytes_max: u64 = 2 << 30;
 
@@ -138,7 +141,7 @@ fn load(
     defer file.close(io);
     const identity: ?Identity = .of(handle);
     if (Identity.eql(resources.settings.output, identity))
-        return refuse(reason, error.Overwritten, "would be overwritten by the output");
+        return refuse(reason, error.Overwritten, overwritten);
     const stat = file.stat(io) catch |err| return refuseError(reason, err);
     if (stat.kind == .directory) return refuse(reason, error.NotRegular, "is a folder");
     if (stat.kind != .file) return refuse(reason, error.NotRegular, "is not a regular file");
