@@ -7,6 +7,7 @@
 const std = @import("std");
 const bench = @import("cli/bench.zig");
 const compare = @import("cli/compare.zig");
+const info = @import("cli/info.zig");
 const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
@@ -35,6 +36,8 @@ pub const Command = union(enum) {
     bench_help,
     compare: Compare,
     compare_help,
+    info: Info,
+    info_help,
 };
 
 /// What `raylane bench` is to do.
@@ -45,6 +48,13 @@ pub const bench_help = bench.help;
 pub const Compare = compare.Compare;
 /// What `raylane compare --help` prints.
 pub const compare_help = compare.help;
+/// What `raylane info` is to do.
+pub const Info = info.Info;
+/// What `raylane info --help` prints.
+pub const info_help = info.help;
+
+/// Words that stand before all others, but for `render`, which may stand among flags.
+const Word = enum { bench, compare, info };
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -299,6 +309,7 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\usage: raylane [render] SCENE [options]
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
+    \\       raylane info SCENE [options]          (see raylane info --help)
     \\
     \\SCENE is a file in glTF 2.0 (JSON or GLB), PBRT, OBJ, STL or PLY, - for standard
     \\input, or builtin:NAME, NAME being cornell, atrium, nave or handles. The image
@@ -322,16 +333,22 @@ pub fn parse(
     diagnostic: *Diagnostic,
 ) Error!Command {
     assert(variant_names.len >= 1);
-    const is_bench = arguments.len > 0 and std.mem.eql(u8, arguments[0], "bench");
-    const is_compare = arguments.len > 0 and std.mem.eql(u8, arguments[0], "compare");
+    const first = if (arguments.len > 0) std.meta.stringToEnum(Word, arguments[0]) else null;
     // Help wins over everything, for it is what somebody asks for who got the rest wrong.
     for (arguments) |argument| {
         if (std.mem.eql(u8, argument, "--")) break;
         if (std.mem.eql(u8, argument, "-h") or std.mem.eql(u8, argument, "--help"))
-            return if (is_bench) .bench_help else if (is_compare) .compare_help else .help;
+            return if (first) |word| switch (word) {
+                .bench => .bench_help,
+                .compare => .compare_help,
+                .info => .info_help,
+            } else .help;
     }
-    if (is_bench) return .{ .bench = try bench.parse(arguments[1..], diagnostic) };
-    if (is_compare) return .{ .compare = try compare.parse(arguments[1..], diagnostic) };
+    if (first) |word| return switch (word) {
+        .bench => .{ .bench = try bench.parse(arguments[1..], diagnostic) },
+        .compare => .{ .compare = try compare.parse(arguments[1..], diagnostic) },
+        .info => .{ .info = try info.parse(arguments[1..], diagnostic) },
+    };
     var parser: Parser = .{
         .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
         .variant_names = variant_names,
@@ -370,6 +387,10 @@ const Parser = struct {
     fn positional(parser: *Parser, argument: []const u8) Error!void {
         if (argument.len == 0) return parser.reader.fail("the scene's name is empty", .{});
         if (parser.scene) |scene| {
+            if (nearest(scene, comptime std.meta.fieldNames(Word))) |word|
+                return parser.reader.fail("no command {f}, did you mean '{s}'?", .{
+                    quote(scene), word,
+                });
             return parser.reader.fail("one scene at a time: {f} and {f}", .{
                 quote(scene), quote(argument),
             });
@@ -676,7 +697,8 @@ fn cameraOf(text: []const u8) ?settings.Camera {
     return .{ .index = index };
 }
 
-fn choiceOf(text: []const u8) ?settings.Choice {
+/// By its index or its name; null: it is empty.
+pub fn choiceOf(text: []const u8) ?settings.Choice {
     if (text.len == 0) return null;
     const index = integer(text, any_index) orelse return .{ .name = text };
     return .{ .index = index };
@@ -1079,9 +1101,19 @@ test "the help fits a screen and says what flags take and may be" {
 test {
     _ = bench;
     _ = compare;
+    _ = info;
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");
+}
+
+test "info is a command where it comes first, and where it is misspelt" {
+    try std.testing.expectEqual(.info_help, try parseForTest(&.{ "info", "a", "--help" }));
+    const command = try parseForTest(&.{ "info", "info", "--json" });
+    try std.testing.expectEqualStrings("info", command.info.scene);
+    try expectUsage("no command 'inof', did you mean 'info'?", &.{ "inof", "a.glb" });
+    try expectUsage("no command 'benhc', did you mean 'bench'?", &.{ "benhc", "a.glb" });
+    try expectUsage("one scene at a time: 'in.glb' and 'a.glb'", &.{ "in.glb", "a.glb" });
 }
 
 test "bench is a command where it comes first" {
