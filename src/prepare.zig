@@ -232,7 +232,8 @@ pub const PoseCache = struct {
     /// Whether a pose with these settings can use it. Which instances share a mesh depends on where
     /// they stand.
     pub fn fits(cache: *const PoseCache, settings: *const PoseSettings) bool {
-        return cache.sharing.instances.len == 0 and cache.lanes == settings.lanes and cache.tree_quality == settings.tree_quality and
+        return cache.sharing.instances.len == 0 and cache.lanes == settings.lanes and
+            cache.tree_quality == settings.tree_quality and
             cache.point_size == settings.point_size;
     }
 };

@@ -541,7 +541,11 @@ fn isBefore(vertex: u32, triangle: world.Triangle) bool {
 }
 
 /// Numbers the triangles of the packs of a tree over the flattened ones.
-pub fn renumber(comptime width: u32, tree: *const world.Tree(width), geometry: *const Geometry) void {
+pub fn renumber(
+    comptime width: u32,
+    tree: *const world.Tree(width),
+    geometry: *const Geometry,
+) void {
     for (@constCast(tree.packs)) |*pack| for (&pack.primitive) |*primitive| {
         if (primitive.* != world.none) primitive.* = geometry.shared.numberOf(primitive.*);
     };

@@ -24,7 +24,7 @@ pub const cache_line_bytes = 64;
 /// A child of a node. One word, since stacks write and read it as a whole: two stores that one load
 /// reads back make processors wait.
 pub const Child = packed struct(u64) {
-    /// Number of a node, of the first triangle pack, or of a cluster of an instance; `none` if there
+    /// Number of a node, of the first triangle pack, or of an instance's cluster; `none` if there
     /// is no child.
     target: u32,
     /// 0: a node; `cluster_mark`: a cluster; else that many packs.

@@ -116,7 +116,7 @@ pub const Shared = struct {
         return run.primitive_first + (triangle - run.triangle_first);
     }
 
-    /// Where in `Geometry.triangles` the next triangles are that do not follow this one's by number;
+    /// Where in `Geometry.triangles` the next ones are that do not follow this one's by number;
     /// null: nowhere.
     pub fn flatEnd(shared: *const Shared, triangle: usize) ?usize {
         const search: FlatSearch = .{ .shared = shared, .triangle = triangle };
@@ -193,7 +193,11 @@ pub const Shared = struct {
 
 const white: [4]f32 = .{ 1, 1, 1, 1 };
 
-inline fn orElse(list: anytype, index: u32, missing: std.meta.Elem(@TypeOf(list))) @TypeOf(missing) {
+inline fn orElse(
+    list: anytype,
+    index: u32,
+    missing: std.meta.Elem(@TypeOf(list)),
+) @TypeOf(missing) {
     return if (list.len > 0) list[index] else missing;
 }
 

@@ -110,7 +110,7 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
     }
     assert(node_count == tree.nodes.len and node_count == checked.facts.tree.node_count);
     assert(pack_count == tree.packs.len);
-    assert(depth == checked.facts.tree.depth and depth <= world.tree_depth_max);
+    assert(depth == checked.facts.tree.depth and depth <= world.walk_depth_max);
     assert(checked.facts.tree.bytes >= std.mem.sliceAsBytes(tree.packs).len);
 }
 

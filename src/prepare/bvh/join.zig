@@ -30,7 +30,6 @@ pub fn join(
     var scratch: std.heap.ArenaAllocator = .init(gpa);
     defer scratch.deinit();
     const built = try buildClusters(gpa, scratch.allocator(), input, boxes, width);
-    const own = &built.statistics;
     const clusters = built.tree();
     const has_triangles = tree.packs.len > 0;
     const kept_count = if (has_triangles) tree.nodes.len else 0;
@@ -53,11 +52,10 @@ pub fn join(
     for (both[if (has_triangles) 0 else 1..], 0..) |child, slot| {
         writer.setChild(0, slot, child, writer.boundsOf(child.target));
     }
-    statistics.depth = 1 + @max(if (has_triangles) statistics.depth else 0, own.depth +
-        writer.levels_max);
+    statistics.depth = try writer.depth(gpa);
     assert(statistics.depth + instancesDepth(width) <= world.walk_depth_max);
     statistics.node_count = writer.count;
-    statistics.sah_cost += own.sah_cost;
+    statistics.sah_cost += built.statistics.sah_cost;
     statistics.bytes = writer.count * @sizeOf(Node) + std.mem.sliceAsBytes(tree.packs).len;
     return .{ .nodes = writer.nodes[0..writer.count], .packs = tree.packs };
 }
@@ -99,8 +97,6 @@ fn Writer(comptime width: u32) type {
         clusters: world.Tree(width),
         nodes: []align(64) world.Node(width),
         count: u32,
-        /// Between a leaf and its clusters.
-        levels_max: u32 = 0,
 
         const Self = @This();
         const Item = struct { child: Child, box: Box3 };
@@ -126,8 +122,7 @@ fn Writer(comptime width: u32) type {
                 const first, const end = child.packs();
                 var items = try scratch.alloc(Item, end - first);
                 for (items, first..end) |*item, pack| item.* = writer.nodeOf(pack);
-                var levels: u32 = 1;
-                while (items.len > 1) : (levels += 1) {
+                while (items.len > 1) {
                     const groups = @divCeil(items.len, width);
                     for (0..groups) |turn| {
                         const begin = turn * width;
@@ -135,7 +130,6 @@ fn Writer(comptime width: u32) type {
                     }
                     items = items[0..groups];
                 }
-                writer.levels_max = @max(writer.levels_max, levels);
                 writer.nodes[index].child[slot] = items[0].child;
             }
         }
@@ -181,6 +175,23 @@ fn Writer(comptime width: u32) type {
                 node.bounds[1][axis][slot] = grown.upper[axis];
             }
             node.child[slot] = child;
+        }
+
+        /// Levels of nodes.
+        fn depth(writer: *const Self, gpa: Allocator) error{OutOfMemory}!u32 {
+            const Visit = struct { node: u32, level: u32 };
+            var stack: std.ArrayList(Visit) = .empty;
+            defer stack.deinit(gpa);
+            try stack.append(gpa, .{ .node = 0, .level = 1 });
+            var deepest: u32 = 0;
+            while (stack.pop()) |visit| {
+                deepest = @max(deepest, visit.level);
+                for (writer.nodes[visit.node].child) |child| {
+                    if (child == Child.missing or child.pack_count > 0) continue;
+                    try stack.append(gpa, .{ .node = child.target, .level = visit.level + 1 });
+                }
+            }
+            return deepest;
         }
 
         fn boundsOf(writer: *const Self, index: u32) Box3 {

@@ -155,7 +155,12 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
                         if (slot == exact.no_slot) continue;
                         if (slot != last.slot) last = .{
                             .slot = slot,
-                            .placed = .of(padding, exact.splat(Kernel, geometry, slot), origin, shift),
+                            .placed = .of(
+                                padding,
+                                exact.splat(Kernel, geometry, slot),
+                                origin,
+                                shift,
+                            ),
                             .primitive = .splat(exact.primitiveAt(Kernel.width, geometry, slot)),
                         };
                         const hit = intersect(group, &last.placed, down, .splat(true));
