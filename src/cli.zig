@@ -277,8 +277,9 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--instances HOW",
-            .help = namesOf(settings.Instances) ++ ": whether instances of a\n" ++
-                "mesh share it, which takes less memory and more time",
+            .help = namesOf(settings.Instances) ++ ": whether a mesh is\n" ++
+                "held once for all its instances: less memory, more\n" ++
+                "time; the image is always the same",
         },
         .{ .usage = "--variant NAME", .help = "how rays are traced; the image is always the same" },
         .{
