@@ -65,6 +65,7 @@ pub const Pose = struct {
     /// Width of the tree: the variant's that is to render.
     lanes: u8,
     tree_quality: settings.TreeQuality = .default,
+    animation: settings.Animation = .{},
     /// What `view` will be asked for: points and lines are as large as its pixels want them, and
     /// stay so until the next pose.
     view: settings.View = .{},
@@ -90,6 +91,10 @@ pub const Session = struct {
     texture_side_max: u32 = settings.texture_side.default,
     /// Made by the first `pose` of a scene.
     loaded: ?prepare.Loaded = null,
+    /// The scene as it is posed.
+    posed: ?prepare.AnimatedScene = null,
+    /// All that moves, where a view frames it: until something else does.
+    motion: ?prepare.Motion = null,
     seen: settings.View = .{},
     world: ?World = null,
     environment: Environment = .{},
@@ -186,8 +191,20 @@ pub const Session = struct {
 
     /// Frees the scene, for which there is no use after the last `view`.
     pub fn dropScene(session: *Session) void {
+        session.dropPosed();
+        session.dropMotion();
         if (session.ownership == .owned) if (session.scene) |*scene| scene.deinit();
         session.scene = null;
+    }
+
+    fn dropPosed(session: *Session) void {
+        if (session.posed) |*posed| posed.deinit();
+        session.posed = null;
+    }
+
+    fn dropMotion(session: *Session) void {
+        if (session.motion) |*motion| motion.deinit();
+        session.motion = null;
     }
 
     fn dropWorld(session: *Session) void {
@@ -200,7 +217,8 @@ pub const Session = struct {
         session.loaded = null;
     }
 
-    /// Places the geometry and builds the tree over it; the first time, decodes the textures.
+    /// Places the geometry at a moment of the scene's animations and builds the tree over it; the
+    /// first time, decodes the textures.
     /// Asserts that there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
         session.dropWorld();
@@ -212,7 +230,16 @@ pub const Session = struct {
             }, session.diagnostic, &session.times);
         }
         const loaded = &session.loaded.?;
-        session.world = try prepare.pose(session.gpa, session.io, scene, loaded, .{
+        const diagnostic = session.diagnostic;
+        const posed = try prepare.animateScene(session.gpa, scene, chosen.animation, diagnostic);
+        if (session.posed) |*before| {
+            const is_same = std.meta.eql(before.moment.running, posed.moment.running);
+            if (!is_same) session.dropMotion();
+        }
+        session.dropPosed();
+        session.posed = posed;
+        const shown = &session.posed.?.scene;
+        session.world = try prepare.pose(session.gpa, session.io, shown, loaded, .{
             .lanes = chosen.lanes,
             .pool = &session.pool,
             .tree_quality = chosen.tree_quality,
@@ -247,8 +274,16 @@ pub const Session = struct {
             backdrop = try session.chooseFor(&session.backdrop, &studio);
             backdrop.?.is_seen = true;
         }
+        if (choices.frames_all and session.motion == null) session.motion =
+            try prepare.gatherMotion(
+                session.gpa,
+                &session.scene.?,
+                &session.loaded.?,
+                &session.posed.?,
+                &session.pool,
+            );
         session.times.prepare_ns += session.since(start);
-        try prepare.view(&session.world.?, session.io, &session.scene.?, .{
+        try prepare.view(&session.world.?, session.io, &session.posed.?.scene, .{
             .camera = choices.camera,
             .viewpoint = choices.viewpoint,
             .resolution = choices.resolution,
@@ -259,6 +294,10 @@ pub const Session = struct {
             .floor = choices.floor,
             .emitters = choices.emitters,
             .backdrop = backdrop,
+            .motion = if (!choices.frames_all) null else if (session.motion) |*motion|
+                motion
+            else
+                null,
         }, session.diagnostic, &session.times);
     }
 

@@ -7,7 +7,6 @@
 const std = @import("std");
 const accessors = @import("gltf/accessors.zig");
 const asset = @import("gltf/asset.zig");
-const c = @import("cgltf.zig");
 const container = @import("gltf/container.zig");
 const escapes = @import("json/escapes.zig");
 const image_based_light = @import("gltf/image_based_light.zig");
@@ -19,6 +18,7 @@ const schema = @import("gltf/schema.zig");
 const variants = @import("gltf/variants.zig");
 const views = @import("gltf/views.zig");
 const Allocator = std.mem.Allocator;
+const Animations = @import("gltf/animations.zig");
 const Buffers = @import("gltf/buffers.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Document = @import("gltf/document.zig");
@@ -64,7 +64,9 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
     source.buffers = buffers.list;
     source.decoded_bytes_left = limits.decodedBytesMax(input_bytes);
     try accessors.checkAll(&source);
-    try fill(&source, resources);
+    var animations: Animations = try .read(&source, text);
+    defer animations.deinit();
+    try fill(&source, resources, &animations);
     const scene = try builder.finish();
     warnOfGaps(&source, &scene);
     return scene;
@@ -96,7 +98,7 @@ fn parseDocument(
 }
 
 /// Puts the parts of the document into the scene.
-fn fill(source: *Source, resources: *Resources) Error!void {
+fn fill(source: *Source, resources: *Resources, animations: *Animations) Error!void {
     const builder = source.builder;
     const settings = &resources.settings;
     const shown = try nodes.choose(source, settings.scene);
@@ -105,37 +107,43 @@ fn fill(source: *Source, resources: *Resources) Error!void {
     defer source.gpa.free(origins);
     var textures: Textures = .init(source, resources);
     defer textures.deinit();
-    var materials: Materials = try .init(source, &textures);
+    var materials: Materials = try .init(source, &textures, animations.moves_material);
     defer materials.deinit();
     var meshes: Meshes = .{ .source = source, .materials = &materials, .variant = variant };
     defer meshes.deinit();
     var skins: Skins = .{ .source = source };
     defer skins.deinit();
     try skins.checkAll();
-    try skins.collect(origins);
+    try skins.collect(origins, animations);
     for (origins, 0..) |origin, index| {
         const node = Source.item(source.data.nodes, origin);
         const node_index: u32 = @intCast(index);
-        if (node.mesh != null) try addInstances(node, node_index, &meshes, &skins);
+        if (node.mesh != null) try addInstances(origin, node_index, &meshes, &skins, animations);
         if (node.camera) |raw| {
             try builder.addCamera(try views.readCamera(source, raw, node.name, node_index));
+            const camera = Source.indexOf(source.data.cameras, raw);
+            try animations.cameras.append(source.gpa, camera);
         }
-        if (node.light) |raw| {
-            if (views.readLight(source, raw, node_index)) |light| try builder.addLight(light);
-        }
+        if (node.light) |raw| if (views.readLight(source, raw, node_index)) |light| {
+            try builder.addLight(light);
+            try animations.lights.append(source.gpa, Source.indexOf(source.data.lights, raw));
+        };
     }
+    try animations.finish(origins, skins.places, &materials);
     try materials.finish();
     if (shown) |one| try image_based_light.read(source, &textures, one);
 }
 
-/// Adds what a node draws.
+/// Adds what a node of the file draws, whose number in the scene is `node_index`.
 fn addInstances(
-    node: *const c.cgltf_node,
+    origin: u32,
     node_index: u32,
     meshes: *Meshes,
     skins: *Skins,
+    animations: *Animations,
 ) Error!void {
     const source = meshes.source;
+    const node = Source.item(source.data.nodes, origin);
     const builder = source.builder;
     if (node.has_mesh_gpu_instancing != 0) {
         source.warn("EXT_mesh_gpu_instancing is not supported: its meshes are drawn once", .{});
@@ -145,6 +153,7 @@ fn addInstances(
     if (builder.instances.items.len + range.count > limits.instance_count_max)
         return source.fail("over {d} instances of meshes", .{limits.instance_count_max});
     const weights = try skins.instanceWeights(node);
+    const weight_list = try animations.weightList(origin, weights);
     const skin = try skins.instanceSkin(node, range);
     for (range.first..range.first + range.count) |drawn| {
         const has_joints = builder.meshes.items[drawn].joint_sets.len > 0;
@@ -152,6 +161,7 @@ fn addInstances(
             .mesh = @intCast(drawn),
             .node = node_index,
             .morph_weights = weights,
+            .moving_weights = weight_list,
             .skin = if (has_joints) skin else scene_data.none,
         });
     }

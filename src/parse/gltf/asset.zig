@@ -14,6 +14,7 @@ const Error = Source.Error;
 const read: []const []const u8 = &.{
     "EXT_lights_image_based",
     "EXT_texture_webp",
+    "KHR_animation_pointer",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -51,7 +52,6 @@ const unseen: []const []const u8 = &.{
     "EXT_structural_metadata",
     "FB_ngon_encoding",
     "GRIFFEL_bim_data",
-    "KHR_animation_pointer",
     "KHR_audio_emitter",
     "KHR_node_hoverability",
     "KHR_node_selectability",
