@@ -16,6 +16,9 @@ pub const Builder = @import("scene/builder.zig");
 /// How points in rows become triangles.
 pub const Grid = @import("scene/grid.zig");
 
+/// What a file says of itself.
+pub const File = @import("scene/file.zig").File;
+
 const animation_file = @import("scene/animation.zig");
 const material_file = @import("scene/material.zig");
 
@@ -284,6 +287,7 @@ pub const Scene = struct {
     images: []const Image = &.{},
     textures: []const Texture = &.{},
     environment: ?EnvironmentMap = null,
+    file: File = .{},
     /// In the order of the file, those that move nothing as well.
     animations: []const Animation = &.{},
     moving: Moving = .{},

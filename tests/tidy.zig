@@ -35,7 +35,7 @@ const directions = [_]Row{
     .{ .part = "simd", .may_import = &.{"variant"} },
     .{ .part = "parallel", .may_import = &.{"simd"} },
     .{ .part = "builtin", .may_import = &.{"scene"} },
-    .{ .part = "parse", .may_import = &.{"scene"} },
+    .{ .part = "parse", .may_import = &.{ "scene", "decode" } },
     .{ .part = "scene", .may_import = &.{} },
     .{
         .part = "prepare",

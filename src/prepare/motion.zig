@@ -119,6 +119,7 @@ const Gathered = struct {
         try gathered.positions.appendSlice(arena, own);
         if (soup.colors.len > 0) try gathered.colors.appendSlice(arena, soup.colors[0..own.len]);
         for (soup.triangles[0..soup.surface_count]) |triangle| {
+            if (triangle.isDropped()) continue;
             var moved = triangle;
             for (&moved.corner) |*corner| corner.* += first;
             try gathered.triangles.append(arena, moved);

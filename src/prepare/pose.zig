@@ -31,8 +31,8 @@ pub const Pose = struct {
     center: Vec3d,
     /// The largest distance between quartiles along an axis.
     size: f64,
-    /// What has been subtracted from all places.
-    shift: Vec3d,
+    /// What has been subtracted from all places of the scene.
+    shift: Vec3d = @splat(0),
 
     /// Frees the maps.
     pub fn deinit(pose: *const Pose, gpa: std.mem.Allocator) void {
@@ -57,13 +57,7 @@ pub fn composeShifted(
     errdefer gpa.free(maps);
     composeNodes(from.nodes, maps);
     const joint_maps = try deform.composeJoints(gpa, from.skins, maps);
-    var pose: Pose = .{
-        .maps = maps,
-        .joint_maps = joint_maps,
-        .center = @splat(0),
-        .size = 0,
-        .shift = @splat(0),
-    };
+    var pose: Pose = .{ .maps = maps, .joint_maps = joint_maps, .center = @splat(0), .size = 0 };
     findCenter(from, &pose);
     const shift = known_shift orelse shiftOf(&pose);
     for (maps) |*map| map.translation = vec3d.sub(map.translation, shift);

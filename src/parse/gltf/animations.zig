@@ -89,7 +89,7 @@ pub fn read(source: *Source, text: []const u8) Error!Animations {
     const Document = struct { animations: []const Text = &.{} };
     const parsed = try extension_text.parse(Document, animations.scratch.allocator(), text);
     const document = parsed orelse {
-        source.warn("its animations are not as they should be, left out", .{});
+        source.forgive("its animations are not as they should be, left out", .{});
         return animations;
     };
     animations.list = document.animations;
@@ -132,11 +132,11 @@ fn readChannel(animations: *Animations, place: Place, unknown: *Unknown) Error!v
     const text = &animations.list[place.animation];
     const channel = &text.channels[place.channel];
     const property = animations.propertyOf(place, &channel.target, unknown) orelse return;
-    const width = widthOf(source, property) orelse return source.warn(
+    const width = widthOf(source, property) orelse return source.forgive(
         "{f}: moves what is not there, left out",
         .{place},
     );
-    if (channel.sampler >= text.samplers.len) return source.warn(
+    if (channel.sampler >= text.samplers.len) return source.forgive(
         "{f}: there is no sampler {d}, left out",
         .{ place, channel.sampler },
     );
@@ -204,7 +204,7 @@ fn propertyOf(
     inline for (.{ "translation", "rotation", "scale", "weights" }) |name| {
         if (std.mem.eql(u8, target.path, name)) return @unionInit(Property, name, node);
     }
-    animations.source.warn("{f}: the path {f} is not known, left out", .{
+    animations.source.forgive("{f}: the path {f} is not known, left out", .{
         place, quote(target.path),
     });
     return null;
@@ -268,14 +268,14 @@ fn readSampler(animations: *Animations, place: Place, index: u32, width: u32) Er
     else
         "";
     if (wrong.len > 0) {
-        source.warn("{f}: sampler {d}: {s}, left out", .{ place, index, wrong });
+        source.forgive("{f}: sampler {d}: {s}, left out", .{ place, index, wrong });
         return null;
     }
     const interpolation: scene.Interpolation =
         if (std.mem.eql(u8, text.interpolation, "STEP"))
             .step
         else if (std.mem.eql(u8, text.interpolation, "CUBICSPLINE")) .cubic_spline else .linear;
-    if (interpolation == .linear and !std.mem.eql(u8, text.interpolation, "LINEAR")) source.warn(
+    if (interpolation == .linear and !std.mem.eql(u8, text.interpolation, "LINEAR")) source.forgive(
         "{f}: sampler {d}: the interpolation {f} is not known, taken as LINEAR",
         .{ place, index, quote(text.interpolation) },
     );
@@ -283,17 +283,17 @@ fn readSampler(animations: *Animations, place: Place, index: u32, width: u32) Er
     var repeats = false;
     for (times[1..], times[0 .. times.len - 1]) |next, time| {
         if (next < time) {
-            source.warn("{f}: sampler {d}: its times do not ascend, left out", .{ place, index });
+            source.forgive("{f}: sampler {d}: its times do not ascend, left out", .{ place, index });
             return null;
         }
         if (next == time) repeats = true;
     }
-    if (repeats) source.warn("{f}: sampler {d}: has two keys at one time", .{ place, index });
+    if (repeats) source.forgive("{f}: sampler {d}: has two keys at one time", .{ place, index });
     const parts: u64 = if (interpolation == .cubic_spline) 3 else 1;
     // Weights are single numbers in a row.
     const fits = values.width == width or values.width == 1;
     if (!fits or values.numbers.len != times.len * parts * width) {
-        source.warn("{f}: sampler {d}: {d} times with {d} values of {d} numbers, left out", .{
+        source.forgive("{f}: sampler {d}: {d} times with {d} values of {d} numbers, left out", .{
             place, index, times.len, values.numbers.len / values.width, values.width,
         });
         return null;
@@ -310,15 +310,25 @@ fn readSampler(animations: *Animations, place: Place, index: u32, width: u32) Er
 fn decode(animations: *Animations, index: u32) Error!Decoded {
     const source = animations.source;
     if (animations.decoded.get(index)) |known| return known;
-    const result = try decodeNew(source, index);
+    const result = try animations.decodeNew(index);
     try animations.decoded.put(source.gpa, index, result);
     return result;
 }
 
-fn decodeNew(source: *Source, index: u32) Error!Decoded {
+fn decodeNew(animations: *Animations, index: u32) Error!Decoded {
+    const source = animations.source;
     if (index >= source.data.accessors_count) return .{ .wrong = "names no accessor" };
-    const accessor = try gltf_accessors.resolve(source, index) orelse
-        return .{ .wrong = "has no data, or only compressed data" };
+    if (source.isBroken(.accessors, index)) |reason| return .{ .wrong = reason };
+    const before = source.diagnostic.message;
+    const resolved = gltf_accessors.resolve(source, index) catch |err| switch (err) {
+        error.InvalidInput => {
+            const message = source.diagnostic.message;
+            source.diagnostic.message = before;
+            return .{ .wrong = try animations.scratch.allocator().dupe(u8, message.text()) };
+        },
+        else => |other| return other,
+    };
+    const accessor = resolved orelse return .{ .wrong = "has no data, or only compressed data" };
     const width = accessor.component_count;
     try source.charge(@as(u64, accessor.count) * width * @sizeOf(f32));
     switch (width) {

@@ -199,7 +199,7 @@ pub fn partsOf(source: *const Source, index: u32) Error!scene.MovingNode {
         .rotation = try unitQuaternion(source, index, numbers.rotation),
         .scale = numbers.scale,
     };
-    source.warn("node {d}: is moved by animations, so its matrix is taken apart", .{index});
+    source.forgive("node {d}: is moved by animations, so its matrix is taken apart", .{index});
     return takeApart(try localTransform(source, index));
 }
 
@@ -243,7 +243,7 @@ fn quaternionOf(axes: [3]Vec3d) [4]f64 {
         2 => .{ z[0] + x[2], y[2] + z[1], squares[2], x[1] - y[0] },
         else => .{ y[2] - z[1], z[0] - x[2], x[1] - y[0], squares[3] },
     };
-    const length = @sqrt(((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3]);
+    const length = quaternionLength(q);
     return .{ q[0] / length, q[1] / length, q[2] / length, q[3] / length };
 }
 
@@ -283,7 +283,7 @@ const Numbers = extern struct {
 
 fn unitQuaternion(source: *const Source, index: u32, rotation: [4]f64) Error![4]f64 {
     const x, const y, const z, const w = rotation;
-    const length = @sqrt(((x * x + y * y) + z * z) + w * w);
+    const length = quaternionLength(rotation);
     if (!std.math.isFinite(length)) {
         return source.fail("node {d}: rotation is not finite", .{index});
     }
@@ -295,6 +295,12 @@ fn unitQuaternion(source: *const Source, index: u32, rotation: [4]f64) Error![4]
         source.warn("node {d}: rotation is not a unit quaternion, made one", .{index});
     }
     return .{ x / length, y / length, z / length, w / length };
+}
+
+/// Of a quaternion.
+pub fn quaternionLength(rotation: [4]f64) f64 {
+    const x, const y, const z, const w = rotation;
+    return @sqrt(((x * x + y * y) + z * z) + w * w);
 }
 
 test "maps are taken apart into what they were made of" {
