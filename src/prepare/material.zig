@@ -67,6 +67,7 @@ pub fn place(
 
 /// Whether there is any place where a surface of this material can be seen.
 pub fn isVisible(from: *const scene.Material, use: *const MaterialUse) bool {
+    if (from.in_motion) return true;
     return switch (from.alpha_mode) {
         .@"opaque" => true,
         .mask => use.alpha.largest >= from.alpha_cutoff,

@@ -86,7 +86,7 @@ pub const all: []const Extension = &.{
     ignored("GODOT_single_root", .nothing, "for editors"),
     ignored("GRIFFEL_bim_data", .nothing, "data"),
     ignored("KHR_accessor_float64", .shapes, "accessors of doubles"),
-    ignored("KHR_animation_pointer", .nothing, "such channels stand still"),
+    rendered("KHR_animation_pointer", "what docs/animation.md lists"),
     ignored("KHR_audio_emitter", .nothing, "sound"),
     rendered("KHR_draco_mesh_compression", "by builds with Draco (-Ddraco)"),
     ignored("KHR_gaussian_splatting", .looks, "splats are points"),

@@ -281,7 +281,7 @@ fn decodeForTangents(
         }
     }
     const has_tangents = mesh.normals != null and used.tangent != null; // See below.
-    if (material.anisotropy > 0) {
+    if (material.anisotropy > 0 or material.in_motion and material.anisotropy_texture != null) {
         const set = if (material.anisotropy_texture) |view| view.texcoord_set else 0;
         if (!needed and !has_tangents) if (used.texcoords[set]) |index| {
             mesh.texcoords[set] = try meshes.decodeTexcoords(primitive, index, used, place);
