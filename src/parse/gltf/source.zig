@@ -82,7 +82,7 @@ pub fn findBroken(source: *const Source, list: schema.List, index: usize) ?Lenie
     return source.lenience.broken.get(.{ .list = @backingInt(list), .index = @intCast(index) });
 }
 
-/// Makes an error of what is not drawn a warning.
+/// Makes an error of what is not drawn, or must not stop the rest, a warning.
 pub fn excuse(source: *const Source, err: Error) Error!void {
     if (err == error.OutOfMemory) return err;
     const diagnostic = source.diagnostic;
