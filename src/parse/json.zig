@@ -555,6 +555,7 @@ const Scanner = struct {
                 return;
             }
             const list = frame.list orelse continue;
+            if (lenience.broken.count() == Lenience.broken_count_max) return err;
             try scanner.skipValue(start);
             const reason = scanner.diagnostic.message.text();
             try lenience.leaveOut(list, @intCast(frame.count - 1), .{ .reason = reason });
