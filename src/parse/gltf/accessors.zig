@@ -8,6 +8,7 @@ const std = @import("std");
 const c = @import("../cgltf.zig");
 const limits = @import("limits.zig");
 const accessors = @import("../accessor.zig");
+const buffer_views = @import("buffer_views.zig");
 const Source = @import("source.zig");
 const Accessor = accessors.Accessor;
 const Component = accessors.Component;
@@ -17,15 +18,7 @@ const assert = std.debug.assert;
 /// Checks the accessors and views of the file that nothing drawn has needed: what is wrong with
 /// them is no reason to give up.
 pub fn checkRest(source: *Source) Error!void {
-    const views = Source.slice(source.data.buffer_views, source.data.buffer_views_count);
-    for (views, 0..) |*view, index| {
-        if (source.findBroken(.buffer_views, index) != null) continue;
-        checkView(source, view, index) catch |err| try source.excuse(err);
-        if (view.stride % 4 != 0) source.forgive(
-            "buffer view {d}: byteStride {d} is no multiple of 4",
-            .{ index, view.stride },
-        );
-    }
+    try buffer_views.checkRest(source);
     for (0..source.data.accessors_count) |index| {
         if (source.isResolved(index) or source.findBroken(.accessors, index) != null) continue;
         _ = resolve(source, index) catch |err| try source.excuse(err);
@@ -55,26 +48,11 @@ const Purpose = enum { vertices, indices };
 
 fn resolveAs(source: *Source, index: usize, purpose: Purpose) Error!?Accessor {
     assert(index < source.data.accessors_count);
-    try source.need(.accessors, index);
+    if (source.draco.get(@intCast(index))) |decoded| return decoded.accessor;
+    var accessor = try describe(source, index);
     const raw = Source.item(source.data.accessors, index);
-    const component = componentOf(raw.component_type) orelse
-        return source.fail("accessor {d}: unknown componentType", .{index});
-    const component_count = componentCount(raw.type) orelse
-        return source.fail("accessor {d}: unknown type", .{index});
-    if (raw.count == 0) return source.fail("accessor {d}: count is 0", .{index});
-    if (raw.count > limits.accessor_count_max) return source.fail(
-        "accessor {d}: count {d} is over the limit of {d}",
-        .{ index, raw.count, limits.accessor_count_max },
-    );
-    var accessor: Accessor = .{
-        .component = component,
-        .component_count = component_count,
-        .normalized = raw.normalized != 0,
-        .count = @intCast(raw.count),
-        .base = null,
-        .sparse = null,
-    };
-    const element_bytes = paddedBytes(raw.type, component, component_count);
+    const component = accessor.component;
+    const element_bytes = paddedBytes(raw.type, component, accessor.component_count);
     if (raw.buffer_view) |view| {
         const stride = try strideOf(source, index, raw, view, accessor, element_bytes, purpose);
         const base = try resolveBase(source, index, raw, view, component, stride, element_bytes);
@@ -129,8 +107,31 @@ fn strideOf(
     return view.stride;
 }
 
+/// The accessor without its data.
+pub fn describe(source: *const Source, index: usize) Error!Accessor {
+    try source.need(.accessors, index);
+    const raw = Source.item(source.data.accessors, index);
+    const component = componentOf(raw.component_type) orelse
+        return source.fail("accessor {d}: unknown componentType", .{index});
+    const component_count = componentCount(raw.type) orelse
+        return source.fail("accessor {d}: unknown type", .{index});
+    if (raw.count == 0) return source.fail("accessor {d}: count is 0", .{index});
+    if (raw.count > limits.accessor_count_max) return source.fail(
+        "accessor {d}: count {d} is over the limit of {d}",
+        .{ index, raw.count, limits.accessor_count_max },
+    );
+    return .{
+        .component = component,
+        .component_count = component_count,
+        .normalized = raw.normalized != 0,
+        .count = @intCast(raw.count),
+        .base = null,
+        .sparse = null,
+    };
+}
+
 fn resolveBase(
-    source: *const Source,
+    source: *Source,
     index: usize,
     raw: *const c.cgltf_accessor,
     view: *const c.cgltf_buffer_view,
@@ -208,7 +209,7 @@ fn checkSparse(source: *Source, index: usize, count: u32, sparse: accessors.Spar
 
 /// `length` bytes of a view from `offset`; null where its buffer has no data.
 fn range(
-    source: *const Source,
+    source: *Source,
     index: usize,
     part: []const u8,
     view: *const c.cgltf_buffer_view,
@@ -216,7 +217,7 @@ fn range(
     length: u64,
     alignment: u32,
 ) Error!?[]const u8 {
-    const bytes = try viewBytes(source, view);
+    const bytes = try buffer_views.contents(source, view);
     const view_bytes: u64 = view.size;
     const excess = (offset +| length) -| view_bytes;
     if (excess > 0) return source.fail(
@@ -230,32 +231,6 @@ fn range(
     );
     const all = bytes orelse return null;
     return all[@intCast(offset)..][0..@intCast(length)];
-}
-
-/// All bytes of a buffer view; null where its buffer has no data.
-pub fn viewBytes(source: *const Source, view: *const c.cgltf_buffer_view) Error!?[]const u8 {
-    const index = viewIndex(source, view);
-    try source.need(.buffer_views, index);
-    try checkView(source, view, index);
-    const buffer_index = bufferIndex(source, view);
-    const buffer = source.buffers[buffer_index] orelse return null;
-    if (view.offset + view.size > buffer.len) return source.fail(
-        "buffer {d}: has {d} bytes, its byteLength is {d}",
-        .{ buffer_index, buffer.len, view.buffer[0].size },
-    );
-    return buffer[view.offset..][0..view.size];
-}
-
-fn checkView(source: *const Source, view: *const c.cgltf_buffer_view, index: usize) Error!void {
-    const buffer_index = bufferIndex(source, view);
-    try source.need(.buffers, buffer_index);
-    const buffer_bytes: u64 = view.buffer[0].size;
-    const excess = (@as(u64, view.offset) +| @as(u64, view.size)) -| buffer_bytes;
-    if (excess > 0) return source.fail(
-        "buffer view {d}: {d} bytes past its buffer {d}",
-        .{ index, excess, buffer_index },
-    );
-    if (view.size == 0) return source.fail("buffer view {d}: byteLength is 0", .{index});
 }
 
 fn viewIndex(source: *const Source, view: *const c.cgltf_buffer_view) u32 {

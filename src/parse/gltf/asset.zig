@@ -7,6 +7,7 @@
 const std = @import("std");
 const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
+const draco = @import("../../decode.zig").draco;
 const extensions = @import("extensions.zig");
 const Source = @import("source.zig");
 const Error = Source.Error;
@@ -31,10 +32,13 @@ pub fn check(source: *const Source) Error!void {
     for (Source.slice(data.extensions_required, data.extensions_required_count)) |raw| {
         const name = std.mem.span(@as([*:0]const u8, raw));
         const is_accepted = if (extensions.find(name)) |known| known.mayBeRequired() else false;
-        if (!is_accepted and !source.force) return source.fail(
+        if (source.force) continue;
+        if (!is_accepted) return source.fail(
             "the required extension {f} is not supported (see --force)",
             .{diagnostic.quote(name)},
         );
+        if (!draco.is_held and std.mem.eql(u8, name, "KHR_draco_mesh_compression"))
+            return source.fail("{f} needs a build with Draco (-Ddraco)", .{diagnostic.quote(name)});
     }
     const required = Source.slice(data.extensions_required, data.extensions_required_count);
     const used = Source.slice(data.extensions_used, data.extensions_used_count);

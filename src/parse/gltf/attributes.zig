@@ -10,6 +10,7 @@ const c = @import("../cgltf.zig");
 const accessors = @import("../accessor.zig");
 const asset = @import("asset.zig");
 const diagnostic = @import("../../diagnostic.zig");
+const draco_meshes = @import("draco_meshes.zig");
 const gltf_accessors = @import("accessors.zig");
 const scene = @import("../../scene.zig");
 const Meshes = @import("meshes.zig");
@@ -30,6 +31,8 @@ pub const Used = struct {
     /// Whether there are more joints than there are sets for.
     has_more_joints: bool = false,
     vertex_count: u32 = 0,
+    /// Whether its triangles come one by one from Draco, whatever the mode.
+    is_draco: bool = false,
 };
 
 /// Finds the attributes of a primitive and checks those that are always drawn; for the others there
@@ -40,16 +43,12 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
         if (attribute.type != .position or attribute.index != 0) continue;
         break accessorIndex(source, attribute);
     } else return .{};
+    var used: Used = .{ .is_draco = try draco_meshes.decode(source, primitive, place) };
     const positions = try required(source, position);
-    if (positions.base == null and positions.sparse == null) {
-        if (primitive.has_draco_mesh_compression != 0) return source.fail(
-            "{f}: its data is in 'KHR_draco_mesh_compression', which is not supported",
-            .{place},
-        );
+    if (positions.base == null and positions.sparse == null)
         return source.fail("accessor {d}: positions without data", .{position});
-    }
 
-    var used: Used = .{ .vertex_count = positions.count };
+    used.vertex_count = positions.count;
     for (list) |*attribute| {
         const index = accessorIndex(source, attribute);
         if (try hasNoElements(source, attribute.data)) {
@@ -185,10 +184,7 @@ pub fn required(source: *Source, index: u32) Error!Accessor {
 }
 
 fn noData(source: *const Source, index: u32) Error {
-    return source.fail(
-        "accessor {d}: its buffer has no data, or only compressed data",
-        .{index},
-    );
+    return source.fail("accessor {d}: its buffer has no data", .{index});
 }
 
 fn accessorIndex(source: *const Source, attribute: *const c.cgltf_attribute) u32 {

@@ -203,12 +203,13 @@ const Decoded = struct { mesh: scene.Mesh, used: attributes.Used };
 
 fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Error!?Decoded {
     const source = meshes.source;
-    const mode = Mode.of(primitive) orelse return source.fail("{f}: unknown mode", .{place});
+    const named = Mode.of(primitive) orelse return source.fail("{f}: unknown mode", .{place});
     if (try attributes.isEmpty(source, primitive)) {
         source.forgive("{f}: its vertices or indices are empty, not drawn", .{place});
         return null;
     }
     const used = try attributes.find(source, primitive, place);
+    const mode: Mode = if (used.is_draco) .triangles else named;
     const position = used.position orelse {
         source.forgive("{f}: without POSITION, not drawn", .{place});
         return null;

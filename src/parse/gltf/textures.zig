@@ -6,7 +6,7 @@
 //! asks for it, and once, however many name it. One that cannot be had is a warning and no texture.
 
 const std = @import("std");
-const accessors = @import("accessors.zig");
+const buffer_views = @import("buffer_views.zig");
 const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
 const escapes = @import("../json/escapes.zig");
@@ -229,7 +229,7 @@ fn fromView(textures: *Textures, index: u32, raw: *const c.cgltf_buffer_view) Er
         .size = raw.size,
     };
     if (textures.ranges.get(range)) |image| return image;
-    const view_bytes = accessors.viewBytes(source, raw) catch |err| switch (err) {
+    const view_bytes = buffer_views.contents(source, raw) catch |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidInput, error.InputOutput => {
             const said = source.diagnostic.message;
@@ -238,9 +238,7 @@ fn fromView(textures: *Textures, index: u32, raw: *const c.cgltf_buffer_view) Er
             return null;
         },
     } orelse {
-        source.forgiveEach("image {d}: its buffer has no data, or only compressed data, left out", .{
-            index,
-        });
+        source.forgiveEach("image {d}: its buffer has no data, left out", .{index});
         return null;
     };
     if (range.size > textures.view_bytes_left) {
