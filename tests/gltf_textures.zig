@@ -427,7 +427,8 @@ test "coordinates of a set that is not read are left out, of one that is not the
     }, &said);
     defer scene.deinit();
     try testing.expectEqual(1, said.warning_count);
-    const expected = "material 0: baseColorTexture: only TEXCOORD_0 to TEXCOORD_3 are read, left out";
+    const expected = "material 0: baseColorTexture: only TEXCOORD_0 to TEXCOORD_3 are read, " ++
+        "left out";
     try testing.expectEqualStrings(expected, said.warnings[0].text());
 }
 

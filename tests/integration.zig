@@ -13,6 +13,7 @@ test {
     _ = @import("strokes.zig");
     _ = @import("decode.zig");
     _ = @import("environment.zig");
+    _ = @import("forgiven.zig");
     _ = @import("glass.zig");
     _ = @import("gltf_materials.zig");
     _ = @import("gltf_instances.zig");

@@ -15,7 +15,7 @@ const gpa = testing.allocator;
 const io = testing.io;
 
 /// A quad with everything that is read. `$DATA` stands for the buffer, in base64.
-const document =
+pub const document =
     \\{"asset":{"version":"2.0","minVersion":"2.0"},
     \\"extensionsUsed":["KHR_lights_punctual","KHR_materials_volume"],
     \\"extensionsRequired":["KHR_lights_punctual"],
@@ -64,7 +64,7 @@ const document =
 const buffer_bytes = 316;
 
 /// The document's buffer.
-fn makeBuffer() [buffer_bytes]u8 {
+pub fn makeBuffer() [buffer_bytes]u8 {
     var bytes: [buffer_bytes]u8 = @splat(0);
     const corners = [4][2]f32{ .{ 0, 0 }, .{ 1, 0 }, .{ 1, 1 }, .{ 0, 1 } };
     for (corners, 0..) |corner, index| {
@@ -85,14 +85,14 @@ fn makeBuffer() [buffer_bytes]u8 {
     return bytes;
 }
 
-fn putFloats(bytes: []u8, values: []const f32) void {
+pub fn putFloats(bytes: []u8, values: []const f32) void {
     for (values, 0..) |value, index| {
         std.mem.writeInt(u32, bytes[4 * index ..][0..4], @bitCast(value), .little);
     }
 }
 
 /// The document with its buffer inside. The caller frees it.
-fn makeText(buffer: []const u8) ![]u8 {
+pub fn makeText(buffer: []const u8) ![]u8 {
     const encoder = std.base64.standard.Encoder;
     const digits = try gpa.alloc(u8, encoder.calcSize(buffer.len));
     defer gpa.free(digits);
@@ -100,7 +100,7 @@ fn makeText(buffer: []const u8) ![]u8 {
 }
 
 /// The document as GLB. The caller frees it.
-fn makeBinary(buffer: []const u8) ![]u8 {
+pub fn makeBinary(buffer: []const u8) ![]u8 {
     const uri = ",\"uri\":\"data:application/octet-stream;base64,$DATA\"";
     const text = try replace(document, uri, "");
     defer gpa.free(text);
@@ -121,7 +121,7 @@ fn makeBinary(buffer: []const u8) ![]u8 {
 }
 
 /// `text` with the first `old` replaced, which has to be there. The caller frees it.
-fn replace(text: []const u8, old: []const u8, new: []const u8) ![]u8 {
+pub fn replace(text: []const u8, old: []const u8, new: []const u8) ![]u8 {
     const index = std.mem.find(u8, text, old) orelse return error.TestUnexpectedResult;
     return std.mem.concat(gpa, u8, &.{ text[0..index], new, text[index + old.len ..] });
 }

@@ -131,7 +131,8 @@ pub fn checkLeniently(
     graph: ?*Graph,
     said: *Diagnostic,
 ) error{ OutOfMemory, InvalidInput }!Checked {
-    if (!std.unicode.utf8ValidateSlice(text)) return said.invalid("the JSON text is not UTF-8", .{});
+    if (!std.unicode.utf8ValidateSlice(text))
+        return said.invalid("the JSON text is not UTF-8", .{});
     var unheard: Diagnostic = .{};
     var scanner: Scanner = .{
         .text = text,

@@ -714,8 +714,8 @@ fn takeApart(
     return length;
 }
 
-/// The vertices of a primitive in the order of the file. Returns the index behind which strips begin
-/// anew, if there is one (KHR_mesh_primitive_restart; the core has none).
+/// The vertices of a primitive in the order of the file. Returns the index behind which strips
+/// begin anew, if there is one (KHR_mesh_primitive_restart; the core has none).
 fn number(
     source: *const Source,
     connection: Connection,

@@ -25,8 +25,8 @@ placed: std.ArrayList(u32) = .empty,
 
 const none = std.math.maxInt(u32);
 
-/// Whether an element hangs below one of a list, or of none, which is assumed on the way up as well:
-/// that may be a circle.
+/// Whether an element hangs below one of a list, or of none, which is assumed on the way up as
+/// well: that may be a circle.
 const Place = enum { unknown, below, stray };
 
 /// What of a list is not as it should be.
