@@ -14,6 +14,7 @@ test {
     _ = @import("decode.zig");
     _ = @import("environment.zig");
     _ = @import("formats.zig");
+    _ = @import("forgiven.zig");
     _ = @import("glass.zig");
     _ = @import("gltf_animations.zig");
     _ = @import("gltf_materials.zig");

@@ -14,6 +14,7 @@ const instancing = @import("gltf/instancing.zig");
 const limits = @import("gltf/limits.zig");
 const nodes = @import("gltf/nodes.zig");
 const scene_data = @import("../scene.zig");
+const schema = @import("gltf/schema.zig");
 const variants = @import("gltf/variants.zig");
 const views = @import("gltf/views.zig");
 const Animations = @import("gltf/animations.zig");
@@ -124,7 +125,11 @@ fn fill(source: *Source, resources: *Resources, animations: *Animations) Error!v
     try materials.finish();
     if (shown) |one| try image_based_light.read(source, &textures, one);
     try skins.checkRest();
-    for (source.lenience.broken.values()) |broken| source.forgiveUnneeded(broken.reason);
+    for (source.lenience.broken.keys(), source.lenience.broken.values()) |element, broken| {
+        const is_image = element.list == @backingInt(schema.List.images);
+        if (is_image and textures.images.contains(element.index)) continue; // It has been said.
+        source.forgiveUnneeded(broken.reason);
+    }
 }
 
 /// Adds what a node of the file draws, whose number in the scene is `node_index`.

@@ -109,6 +109,7 @@ pub const all: []const Extension = &.{
     rendered("KHR_materials_variants", "by --material-variant"),
     rendered("KHR_materials_volume", "traced; thickness only says that there is a volume"),
     approximated("KHR_materials_volume_scatter", "one scattering traced, more are estimated"),
+    rendered("KHR_mesh_primitive_restart", "strips, fans and loops begin anew"),
     rendered("KHR_mesh_quantization", "every type of component"),
     rendered("KHR_meshopt_compression", "all modes and filters"),
     ignored("KHR_node_hoverability", .nothing, "behaviour"),

@@ -137,10 +137,12 @@ fn pushRoots(
     const roots = Source.slice(shown.nodes, shown.nodes_count);
     for (0..roots.len) |reversed| {
         const index = Source.indexOf(data.nodes, roots[roots.len - 1 - reversed]);
-        if (listed.isSet(index)) return source.fail(
-            "scene {d}: lists node {d} twice",
-            .{ Source.indexOf(data.scenes, shown), index },
-        );
+        if (listed.isSet(index)) {
+            source.forgive("scene {d}: lists node {d} twice, counted once", .{
+                Source.indexOf(data.scenes, shown), index,
+            });
+            continue;
+        }
         if (!in_tree.isSet(index)) return source.fail(
             "node {d}: is its own ancestor, or hangs below a node that is",
             .{index},

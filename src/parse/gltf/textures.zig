@@ -225,9 +225,7 @@ fn fromView(textures: *Textures, index: u32, raw: *const c.cgltf_buffer_view) Er
             return null;
         },
     } orelse {
-        source.forgiveEach("image {d}: its buffer has no data, left out", .{
-            index,
-        });
+        source.forgiveEach("image {d}: its buffer has no data, left out", .{index});
         return null;
     };
     if (range.size > textures.view_bytes_left) {
@@ -245,13 +243,16 @@ fn fromUri(textures: *Textures, index: u32, encoded: []const u8) Error!?u32 {
     const source = textures.source;
     if (textures.uris.get(encoded)) |image| return image;
     var reason: diagnostic.Message = .{};
-    const resolved = uri.resolve(source.gpa, source.arena, encoded, &reason);
-    const image = if (resolved) |target| switch (target) {
-        .bytes => |bytes| try textures.addImage(index, bytes),
-        .path => |path| file: {
-            defer source.gpa.free(path);
-            break :file try textures.fromFile(index, path);
-        },
+    const image = if (uri.resolve(source.gpa, source.arena, encoded, &reason)) |resolved| image: {
+        if (resolved.odd.len > 0)
+            source.forgive("image {d}: its URI {s}", .{ index, resolved.odd });
+        switch (resolved.target) {
+            .bytes => |bytes| break :image try textures.addImage(index, bytes),
+            .path => |path| {
+                defer source.gpa.free(path);
+                break :image try textures.fromFile(index, path);
+            },
+        }
     } else |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidInput => none: {

@@ -116,7 +116,8 @@ fn readCone(
     const outer = raw.spot_outer_cone_angle;
     const inner = math.flushDenormal(raw.spot_inner_cone_angle);
     // Half an ulp of rounding in the file is no reason to complain.
-    if (outer > outer_max + 1e-6 or !(outer > 0) or !(inner >= 0) or !(inner < outer)) source.forgive(
+    const fits = outer > 0 and outer <= outer_max + 1e-6 and inner >= 0 and inner < outer;
+    if (!fits) source.forgive(
         "light {d}: cone angles {d} and {d} do not fit 0 <= inner < outer <= pi / 2, clamped",
         .{ index, inner, outer },
     );
