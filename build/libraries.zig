@@ -138,17 +138,21 @@ pub const draco: Library = .{
     .flags = &.{"-fno-aligned-allocation"},
 };
 
-pub const libdeflate: Library = .{ .name = "libdeflate", .files = &.{
-    "libdeflate/lib/adler32.c",
-    "libdeflate/lib/arm/cpu_features.c",
-    "libdeflate/lib/crc32.c",
-    "libdeflate/lib/deflate_compress.c",
-    "libdeflate/lib/deflate_decompress.c",
-    "libdeflate/lib/utils.c",
-    "libdeflate/lib/x86/cpu_features.c",
-    "libdeflate/lib/zlib_compress.c",
-    "libdeflate/lib/zlib_decompress.c",
-} };
+pub const libdeflate: Library = .{
+    .name = "libdeflate",
+    .files = &.{
+        "libdeflate/lib/adler32.c",
+        "libdeflate/lib/arm/cpu_features.c",
+        "libdeflate/lib/crc32.c",
+        "libdeflate/lib/deflate_compress.c",
+        "libdeflate/lib/deflate_decompress.c",
+        "libdeflate/lib/utils.c",
+        "libdeflate/lib/x86/cpu_features.c",
+        "libdeflate/lib/zlib_compress.c",
+        "libdeflate/lib/zlib_decompress.c",
+    },
+    .shims = &.{"src/decode/gzip.c"},
+};
 
 /// The decoder in plain C. Threads are ours, but its tables are set up under locks. Its one place
 /// of allocations is given names of ours.

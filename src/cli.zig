@@ -206,6 +206,15 @@ const sections: []const Section = &.{
             .usage = "--allow-outside",
             .help = "let the scene name files outside of its own folder",
         },
+        .{
+            .usage = "--strict",
+            .help = "refuse files that break the rules of their format in\n" ++
+                "ways that are otherwise forgiven with a warning",
+        },
+        .{
+            .usage = "--force",
+            .help = "render what requires extensions that are not known,\nas far as it goes",
+        },
     } },
     .{ .title = "Rendering (PBRT scenes bring their own spp and depth)", .options = &.{
         .{
@@ -422,6 +431,8 @@ const Parser = struct {
                 options.load.texture_side_max = try reader.number(given, settings.texture_side);
             },
             .allow_outside => options.load.allow_outside = true,
+            .strict => options.load.strict = true,
+            .force => options.load.force = true,
             .quiet => options.quiet = true,
             .verbose => options.verbose = true,
             .help => parser.other = .help,
@@ -912,9 +923,12 @@ test "values arrive as they were meant" {
     const written = try optionsForTest(&.{ "--jpeg-quality=7", "--max-memory=3M" });
     try std.testing.expectEqual(7, written.write.jpeg_quality);
     try std.testing.expectEqual(3 << 20, written.memory_max);
-    const switches = try optionsForTest(&.{ "-qv", "--count-tests", "--allow-outside" });
+    const switches = try optionsForTest(&.{
+        "-qv", "--count-tests", "--allow-outside", "--strict", "--force",
+    });
     try std.testing.expect(switches.quiet and switches.verbose);
     try std.testing.expect(switches.count_tests and switches.load.allow_outside);
+    try std.testing.expect(switches.load.strict and switches.load.force);
 }
 
 test "viewpoints arrive as they were meant, and may not contradict each other" {

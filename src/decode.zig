@@ -1,9 +1,9 @@
 //! Encoded image bytes -> texels; compressed streams of geometry -> numbers.
 //!
 //! In: a file in memory, of a kind that its first bytes tell. Out: its texels in the channels that
-//! the file has, bytes or floats, the same on every target. The C libraries see no file that has
-//! not passed our own checks, and every limit is one before memory is asked for. Threads may decode
-//! at once; no state outlives a call. Geometry is asked for by its codec.
+//! the file has, bytes or floats, the same on every target; what gzip has compressed; geometry, by
+//! its codec. The C libraries of images see no file that has not passed our own checks, and every
+//! limit is one before memory is asked for. Threads may decode at once; no state outlives a call.
 
 const std = @import("std");
 const Allocator = std.mem.Allocator;
@@ -16,6 +16,7 @@ const texels = @import("decode/texels.zig");
 const webp = @import("decode/webp.zig");
 
 pub const draco = @import("decode/draco.zig");
+pub const gzip = @import("decode/gzip.zig");
 pub const meshopt = @import("decode/meshopt.zig");
 
 pub const Error = texels.Error;
@@ -72,6 +73,7 @@ fn formatWithin(file: []const u8, reason: *Reason) error{InvalidImage}!Format {
 
 test {
     _ = draco;
+    _ = gzip;
     _ = jpeg;
     _ = ktx2;
     _ = meshopt;

@@ -12,6 +12,9 @@ const Settings = @import("settings.zig").Load;
 const Allocator = std.mem.Allocator;
 const Resources = @import("parse/resource.zig");
 
+/// Extensions of glTF: what becomes of each.
+pub const extensions = @import("parse/gltf/extensions.zig");
+
 /// `InputOutput`: a file is missing or cannot be read. `InvalidInput`: it is read, but it is not
 /// what it should be, or it needs what is not supported. `SceneUnknown`,
 /// `MaterialVariantUnknown`: none of its scenes, or variants, is the one that is asked for.
@@ -26,13 +29,15 @@ pub fn parse(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!Scene {
-    var scene = try Resources.open(gpa, io, path, settings, diagnostic);
-    defer scene.close();
-    if (std.ascii.endsWithIgnoreCase(path, ".pbrt")) {
+    var opened = try Resources.open(gpa, io, path, settings, diagnostic);
+    defer opened.close();
+    const resources = &opened.resources;
+    var scene = if (std.ascii.endsWithIgnoreCase(path, ".pbrt")) scene: {
         try checkOnly(settings, diagnostic);
-        return pbrt.read(&scene.resources, path, scene.main, diagnostic);
-    }
-    return gltf.read(&scene.resources, scene.main.bytes, diagnostic);
+        break :scene try pbrt.read(resources, path, opened.main, diagnostic);
+    } else try gltf.read(resources, opened.main.bytes, diagnostic);
+    scene.file.byte_count = resources.bytes_read;
+    return scene;
 }
 
 /// Whether what has but one scene, without a name, and no variants is asked for that.

@@ -21,6 +21,7 @@ const check = @import("prepare/bvh/check.zig");
 const deform = @import("prepare/deform.zig");
 const flatten = @import("prepare/flatten.zig");
 const emitter_lights = @import("prepare/emitter_lights.zig");
+const extent_file = @import("prepare/extent.zig");
 const emitters = @import("prepare/emitters.zig");
 const environment = @import("prepare/environment.zig");
 const light = @import("prepare/light.zig");
@@ -74,6 +75,15 @@ pub const PoseSettings = struct {
 
 /// See `PoseSettings`.
 pub const WantedView = view_file.Wanted;
+
+/// The box of what a scene draws.
+pub const extentOf = extent_file.of;
+/// See `extentOf`.
+pub const Extent = extent_file.Extent;
+/// Width and height of the picture that is made where nobody says more.
+pub const pictureSize = view_file.pictureSize;
+/// Bytes that textures take.
+pub const planTextures = texture.plan;
 
 /// What is seen of it, and in what light.
 pub const ViewSettings = struct {
@@ -241,7 +251,8 @@ pub fn pose(
         .facts = .{
             .tree = tree_facts,
             .degenerate_count = soup.dropped_count,
-            .stroke_triangle_count = soup.triangles.len - geometry.surfaces().len,
+            .stroke_triangle_count = soup.triangles.len - soup.surface_count -
+                soup.dropped_stroke_count,
         },
     };
     if (builtin.mode == .debug) try check.check(gpa, &result);
@@ -257,6 +268,7 @@ fn geometryOf(soup: *const flatten.TriangleSoup, place: *const place_file.Pose) 
         .colors = soup.colors,
         .tangents = soup.tangents,
         .triangles = soup.triangles,
+        .dropped_count = soup.dropped_count + soup.dropped_stroke_count,
         .surface_count = soup.surface_count,
         .spheres = soup.strokes.spheres,
         .sphere_radius = soup.sphere_radius,
@@ -392,9 +404,12 @@ pub noinline fn buildTree(
     geometry: *world.Geometry,
     settings: PoseSettings,
 ) PoseError!world.TreeStatistics {
+    const kept = if (geometry.dropped_count > 0) try listKept(gpa, geometry) else null;
+    defer if (kept) |numbers| gpa.free(numbers);
     const input: bvh_wide.Input = .{
         .positions = geometry.positions,
         .triangles = geometry.triangles,
+        .kept = kept,
         .centroid_bounds = geometry.centroid_bounds,
         .padding = geometry.padding,
         .pool = settings.pool,
@@ -408,6 +423,19 @@ pub noinline fn buildTree(
         else => unreachable, // Asserted at the door.
     };
     return facts;
+}
+
+/// The numbers of the triangles that are not dropped.
+fn listKept(gpa: Allocator, geometry: *const world.Geometry) error{OutOfMemory}![]u32 {
+    const kept = try gpa.alloc(u32, geometry.triangles.len - geometry.dropped_count);
+    var count: usize = 0;
+    for (geometry.triangles, 0..) |*triangle, number| {
+        if (triangle.isDropped()) continue;
+        kept[count] = @intCast(number);
+        count += 1;
+    }
+    assert(count == kept.len);
+    return kept;
 }
 
 /// A scene for tests: one node, one mesh, made in the scene's own arena.
@@ -512,7 +540,7 @@ fn testThreads(from: *const Scene, lanes: u8, quality: TreeQuality) !usize {
         try std.testing.expectEqual(reference.geometry.padding, other.geometry.padding);
         try std.testing.expectEqual(reference.view.camera, other.view.camera);
     }
-    return reference.geometry.triangles.len;
+    return reference.geometry.triangles.len - reference.geometry.dropped_count;
 }
 
 fn expectSameBytes(a: anytype, b: @TypeOf(a)) !void {
@@ -674,7 +702,10 @@ test "triangles without area or a finite place are counted, not drawn" {
     var result = try testPrepare(&from, .{ .lanes = 4, .thread_count = 2 });
     defer result.deinit();
     try std.testing.expectEqual(4, result.facts.degenerate_count);
-    try std.testing.expectEqual(@as(u32, 14), result.geometry.triangles[0].corner[2]);
+    for (result.geometry.triangles, 0..) |triangle, number| {
+        try std.testing.expectEqual(number < 4, triangle.isDropped());
+    }
+    try std.testing.expectEqual(@as(u32, 14), result.geometry.triangles[4].corner[2]);
     // A node that throws everything beyond all numbers leaves nothing.
     from.nodes = &.{.{ .parent = scene.none, .local = .{
         .x = .{ 3e38, 3e38, 0 },
@@ -1033,7 +1064,7 @@ test "what can be seen nowhere is not drawn" {
     try std.testing.expect(!result.materials.has_holes and !result.materials.has_transparency);
 }
 
-test "many instances keep their order over many chunks, gaps closed" {
+test "many instances keep their order over many chunks, and triangles their numbers" {
     const gpa = std.testing.allocator;
     // Good, without area, good: moved apart by the node.
     var from = try TestScene.soup(gpa, &.{
@@ -1063,13 +1094,15 @@ test "many instances keep their order over many chunks, gaps closed" {
         var result = try testPrepare(&from, .{ .lanes = 8, .thread_count = thread_count });
         defer result.deinit();
         const shown_count = count - count / 5;
-        try std.testing.expectEqual(2 * shown_count, result.geometry.triangles.len);
+        try std.testing.expectEqual(3 * shown_count, result.geometry.triangles.len);
         try std.testing.expectEqual(shown_count, result.facts.degenerate_count);
         for (result.geometry.triangles, 0..) |triangle, index| {
-            const shown = index / 2; // Four in five, from node 1 on.
+            const shown = index / 3; // Four in five, from node 1 on.
             const at: f32 = @floatFromInt(shown + shown / 4 + 1);
             const corner = result.geometry.positions[triangle.corner[1]];
-            try std.testing.expectEqual(math.Vec3{ at + 1, 0, @floatFromInt(index % 2) }, corner);
+            const height: f32 = @floatFromInt(index % 3 / 2);
+            try std.testing.expectEqual(math.Vec3{ at + 1, 0, height }, corner);
+            try std.testing.expectEqual(index % 3 == 1, triangle.isDropped());
         }
     }
 }
@@ -1129,6 +1162,7 @@ test {
     _ = place_file;
     _ = tangents;
     _ = texture;
+    _ = extent_file;
     _ = @import("prepare/layers.zig");
     _ = @import("prepare/texture_use.zig");
     _ = @import("prepare/pyramid.zig");

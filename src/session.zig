@@ -43,11 +43,13 @@ pub fn loadScene(
     choices: settings.Load,
     diagnostic: *Diagnostic,
 ) LoadError!Scene {
+    diagnostic.strict = choices.strict;
     var scene = if (std.mem.cutPrefix(u8, name, settings.builtin_prefix)) |builtin_name| builtin: {
         try parse.checkOnly(choices, diagnostic);
         break :builtin try builtin_scenes.build(gpa, builtin_name, diagnostic);
     } else try parse.parse(gpa, io, name, choices, diagnostic);
     errdefer scene.deinit();
+    try diagnostic.settle();
     if (choices.up_axis == .z) try scene.turn(z_to_y);
     return scene;
 }
@@ -210,6 +212,7 @@ pub const Session = struct {
                 .pool = &session.pool,
                 .side_max = session.texture_side_max,
             }, session.diagnostic, &session.times);
+            try session.diagnostic.settle();
         }
         const loaded = &session.loaded.?;
         session.world = try prepare.pose(session.gpa, session.io, scene, loaded, .{

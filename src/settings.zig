@@ -254,6 +254,10 @@ pub fn samplesFor(width: u32, height: u32) u32 {
 pub const Load = struct {
     /// Whether a scene may name files outside of its own folder.
     allow_outside: bool = false,
+    /// Whether what is wrong with a file, but can be read all the same, is an error.
+    strict: bool = false,
+    /// Whether a file is drawn that requires extensions which are not known.
+    force: bool = false,
     /// Within `tessellation`.
     tessellation: u32 = tessellation.default,
     /// Within `texture_side`.

@@ -15,6 +15,7 @@ test {
     _ = @import("environment.zig");
     _ = @import("glass.zig");
     _ = @import("gltf_materials.zig");
+    _ = @import("gltf_instances.zig");
     _ = @import("gltf_poses.zig");
     _ = @import("gltf_textures.zig");
     _ = @import("malformed.zig");

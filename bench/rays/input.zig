@@ -156,11 +156,14 @@ fn lightOf(world: *const World) Vec3 {
 fn diagonal(world: *const World) f32 {
     var lower: Vec3 = @splat(std.math.inf(f32));
     var upper: Vec3 = @splat(-std.math.inf(f32));
-    for (world.geometry.triangles) |triangle| for (triangle.corner) |vertex| {
-        lower = vec3.min(lower, world.geometry.positions[vertex]);
-        upper = vec3.max(upper, world.geometry.positions[vertex]);
-    };
-    return if (world.geometry.triangles.len == 0) 0 else vec3.length(vec3.sub(upper, lower));
+    for (world.geometry.triangles) |triangle| {
+        if (triangle.isDropped()) continue;
+        for (triangle.corner) |vertex| {
+            lower = vec3.min(lower, world.geometry.positions[vertex]);
+            upper = vec3.max(upper, world.geometry.positions[vertex]);
+        }
+    }
+    return if (world.geometry.bounds.isEmpty()) 0 else vec3.length(vec3.sub(upper, lower));
 }
 
 fn normalsOf(arena: std.mem.Allocator, world: *const World) Error![]align(16) const [4]f32 {

@@ -21,18 +21,21 @@ pub const block_cost: f32 = 2;
 /// A triangle by its number, within its box.
 pub const Reference = struct { box: Box3, number: u32 };
 
-/// All triangles of a world, within their boxes grown as nodes are.
+/// All triangles of a world that are in its tree, within their boxes grown as nodes are.
 pub fn references(arena: Allocator, world: *const World) error{OutOfMemory}![]Reference {
-    const list = try arena.alloc(Reference, world.geometry.triangles.len);
-    for (list, world.geometry.triangles, 0..) |*reference, triangle, number| {
+    const geometry = &world.geometry;
+    var list: std.ArrayList(Reference) =
+        try .initCapacity(arena, geometry.triangles.len - geometry.dropped_count);
+    for (geometry.triangles, 0..) |triangle, number| {
+        if (triangle.isDropped()) continue;
         var box: Box3 = .empty;
-        for (triangle.corner) |corner| box = box.include(world.geometry.positions[corner]);
-        const padding = &world.geometry.padding;
+        for (triangle.corner) |corner| box = box.include(geometry.positions[corner]);
+        const padding = &geometry.padding;
         const padded = box.grow(padding.ofBox(box));
         const grown = padded.grow(padding.marginOfBox(padded));
-        reference.* = .{ .box = grown, .number = @intCast(number) };
+        list.appendAssumeCapacity(.{ .box = grown, .number = @intCast(number) });
     }
-    return list;
+    return list.items;
 }
 
 /// The box of all references.

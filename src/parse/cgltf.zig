@@ -411,6 +411,11 @@ pub const cgltf_light = extern struct {
     extras: Extras,
 };
 
+pub const cgltf_mesh_gpu_instancing = extern struct {
+    attributes: [*c]cgltf_attribute,
+    attributes_count: usize,
+};
+
 pub const cgltf_node = extern struct {
     name: String,
     parent: [*c]cgltf_node,
@@ -432,7 +437,9 @@ pub const cgltf_node = extern struct {
     matrix: [16]f32,
     extras: Extras,
     has_mesh_gpu_instancing: cgltf_bool,
-    mesh_gpu_instancing: [4]usize,
+    mesh_gpu_instancing: cgltf_mesh_gpu_instancing,
+    extensions_count: usize,
+    extensions: [*c]cgltf_extension,
 };
 
 pub const cgltf_scene = extern struct {
@@ -445,7 +452,8 @@ pub const cgltf_scene = extern struct {
 };
 
 pub const cgltf_asset = extern struct {
-    copyright: [2]usize,
+    copyright: usize,
+    generator: String,
     version: String,
     min_version: String,
     extras: Tail,

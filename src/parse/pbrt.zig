@@ -35,6 +35,7 @@ pub fn read(
     try input.push(path, main);
     var scene_builder: scene_data.Builder = .init(gpa);
     errdefer scene_builder.deinit();
+    scene_builder.scene.file.format = .pbrt;
     var names: std.heap.ArenaAllocator = .init(gpa);
     defer names.deinit();
     var builder: SceneBuilder = try .init(&input, &scene_builder);

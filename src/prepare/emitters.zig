@@ -50,7 +50,7 @@ const open_share_min = 0.25;
 /// Texels that a piece is as long as in the level that tells its mean.
 const texel_count = 4;
 
-/// Triangles of a material in a row.
+/// Triangles of a material in a row, dropped ones between them.
 const Run = struct { first: usize, end: usize, is_two_sided: bool };
 
 /// All pieces, in the order of triangles; the caller frees them.
@@ -74,8 +74,10 @@ pub fn find(
     if (glows) {
         const total = try finder.measure();
         if (total > 0 and std.math.isFinite(total)) for (finder.runs.items) |run| {
-            for (geometry.triangles[run.first..run.end]) |*triangle|
+            for (geometry.triangles[run.first..run.end]) |*triangle| {
+                if (triangle.isDropped()) continue;
                 try finder.addTriangle(triangle, run.is_two_sided, total);
+            }
         };
     }
     return finder.pieces.toOwnedSlice(gpa);
@@ -99,15 +101,22 @@ const Finder = struct {
         var total: f64 = 0;
         var first: usize = 0;
         while (first < triangles.len) {
+            if (triangles[first].isDropped()) {
+                first += 1;
+                continue;
+            }
             const number = triangles[first].material;
             var end = first + 1;
-            while (end < triangles.len and triangles[end].material == number) end += 1;
+            while (end < triangles.len) : (end += 1) {
+                if (triangles[end].material != number and !triangles[end].isDropped()) break;
+            }
             defer first = end;
             const material = &finder.materials.all[number];
             if (!emits(material)) continue;
             var area: f64 = 0;
             var facing: Vec3d = .{ 0, 0, 0 };
             for (triangles[first..end]) |*triangle| {
+                if (triangle.isDropped()) continue;
                 const doubled = facingOf(&finder.cornersOf(triangle));
                 facing = vec3d.add(facing, doubled);
                 area += vec3d.length(doubled);

@@ -1,11 +1,11 @@
 //! The triangle soup: instances of meshes become one list of triangles in world space.
 //!
 //! In: a scene and the world maps of its nodes and joints. Out: vertices, deformed as instances ask
-//! for, and triangles in the order of the instances, without those that have no area or no finite
-//! place. Fronts stay fronts under
-//! mirroring maps. The arrays are the same whatever the number of threads: work is cut into fixed
-//! chunks that write to places known before. The vertices of points and lines are placed too, and
-//! room is left for the triangles that `strokes.zig` makes of them.
+//! for, and triangles in the order of the instances; those that have no area or no finite place are
+//! marked as dropped, so that the number of a triangle is the same in every pose. Fronts stay
+//! fronts under mirroring maps. The arrays are the same whatever the number of threads: work is cut
+//! into fixed chunks that write to places known before. The vertices of points and lines are placed
+//! too, and room is left for the triangles that `strokes.zig` makes of them.
 
 const std = @import("std");
 const math = @import("../math.zig");
@@ -59,23 +59,24 @@ pub const TriangleSoup = struct {
     triangles: []const world.Triangle,
     /// How many of the triangles are not of points and lines.
     surface_count: u32,
+    /// Of these, and of the others, how many are dropped.
+    dropped_count: u32,
+    dropped_stroke_count: u32 = 0,
     strokes: strokes.Strokes,
     /// In metres, once the strokes are drawn.
     sphere_radius: f32,
     room: Room,
-    /// Box of the triangles' corners, empty without triangles.
+    /// Box of the corners of what is not dropped, empty without any.
     bounds: Box3,
-    /// Box of twice the centroids of the triangles' boxes, empty without triangles.
+    /// Box of twice the centroids of its triangles' boxes, empty without any.
     centroid_bounds: Box3,
-    /// Triangles left out.
-    dropped_count: u64,
 };
 
 /// Where the triangles of points and lines go.
 pub const Room = struct {
     /// The first of their vertices, which are at the end of the arrays.
     vertex_first: u32,
-    /// All of the triangles' array: those that are there, and room behind them.
+    /// All of the triangles' array: those of surfaces, and room behind them.
     triangles: []world.Triangle,
 };
 
@@ -92,7 +93,7 @@ const Draw = struct {
     /// First vertex of the mesh that a triangle uses, and how many from there.
     vertex_source: u32,
     vertex_count: u32,
-    /// First vertex and triangle in the soup, the latter before any is dropped.
+    /// First vertex and triangle in the soup.
     vertex_target: u32,
     triangle_target: u32,
 };
@@ -111,7 +112,7 @@ const Maps = struct {
 
 /// What a chunk of triangles came to.
 const ChunkResult = struct {
-    kept_count: u32 = 0,
+    dropped_count: u32 = 0,
     outside_count: u32 = 0,
     bounds: Box3 = .empty,
     centroid_bounds: Box3 = .empty,
@@ -441,24 +442,23 @@ const Work = struct {
             if (to > from) {
                 const source = from - draw.triangle_target;
                 const triangles = draw.mesh.triangles[source..][0 .. to - from];
-                work.placeDrawTriangles(draw, triangles, begin, &result);
+                work.placeDrawTriangles(draw, triangles, work.triangles[from..to], &result);
                 from = to;
             }
         }
         work.chunks[chunk] = result;
     }
 
-    /// Appends those of the triangles that can be hit to what the chunk from `begin` on holds.
     fn placeDrawTriangles(
         work: *Work,
         draw: *const Draw,
         triangles: []const [3]u32,
-        begin: usize,
+        placed: []world.Triangle,
         result: *ChunkResult,
     ) void {
         // Wraps where the source starts later than the target; the sum is right again.
         const shift = draw.vertex_target -% draw.vertex_source;
-        for (triangles) |triangle| {
+        for (triangles, placed) |triangle, *to| {
             var corner: [3]u32 = .{
                 triangle[0] +% shift, triangle[1] +% shift, triangle[2] +% shift,
             };
@@ -466,36 +466,27 @@ const Work = struct {
             const a = work.positions[corner[0]];
             const b = work.positions[corner[1]];
             const c = work.positions[corner[2]];
-            if (!isWithinRange(a, b, c)) {
-                result.outside_count += 1;
-            } else if (hasArea(a, b, c)) {
-                work.triangles[begin + result.kept_count] = .{
-                    .corner = corner,
-                    .material = draw.mesh.material,
-                };
-                result.kept_count += 1;
-                const box = Box3.empty.include(a).include(b).include(c);
-                result.bounds = result.bounds.join(box);
-                result.centroid_bounds = result.centroid_bounds.include(box.centerTwice());
+            const is_near = isWithinRange(a, b, c);
+            if (!is_near or !hasArea(a, b, c)) {
+                to.* = .{ .corner = corner, .material = world.none };
+                result.dropped_count += 1;
+                result.outside_count += @intFromBool(!is_near);
+                continue;
             }
+            to.* = .{ .corner = corner, .material = draw.mesh.material };
+            const box = Box3.empty.include(a).include(b).include(c);
+            result.bounds = result.bounds.join(box);
+            result.centroid_bounds = result.centroid_bounds.include(box.centerTwice());
         }
     }
 
-    /// Closes the gaps that dropped triangles left.
-    fn finish(work: *Work, diagnostic: *Diagnostic) TriangleSoup {
-        var kept_count: usize = 0;
-        var outside_count: u64 = 0;
+    fn finish(work: *const Work, diagnostic: *Diagnostic) TriangleSoup {
+        var dropped_count: u32 = 0;
+        var outside_count: u32 = 0;
         var bounds: Box3 = .empty;
         var centroid_bounds: Box3 = .empty;
-        for (work.chunks, 0..) |chunk, index| {
-            const begin = index * chunk_size;
-            assert(kept_count <= begin);
-            if (kept_count < begin) std.mem.copyForwards(
-                world.Triangle,
-                work.triangles[kept_count..][0..chunk.kept_count],
-                work.triangles[begin..][0..chunk.kept_count],
-            );
-            kept_count += chunk.kept_count;
+        for (work.chunks) |chunk| {
+            dropped_count += chunk.dropped_count;
             outside_count += chunk.outside_count;
             bounds = bounds.join(chunk.bounds);
             centroid_bounds = centroid_bounds.join(chunk.centroid_bounds);
@@ -510,18 +501,18 @@ const Work = struct {
             .colors = work.colors,
             .texcoords = work.texcoords,
             .tangents = work.tangents,
-            .triangles = work.triangles[0..kept_count],
-            .surface_count = @intCast(kept_count),
+            .triangles = work.triangles[0..work.size.triangle_count],
+            .surface_count = work.size.triangle_count,
+            .dropped_count = dropped_count,
             .strokes = .{},
             .sphere_radius = 0,
             .room = .{ .vertex_first = work.size.vertex_count, .triangles = work.triangles },
             .bounds = bounds,
             .centroid_bounds = centroid_bounds,
-            .dropped_count = work.size.triangle_count - kept_count,
         };
     }
 
-    /// Lists the strokes, without those that are nowhere.
+    /// Lists the strokes, those that are nowhere marked as dropped.
     fn collectStrokes(
         work: *const Work,
         gpa: std.mem.Allocator,
@@ -534,6 +525,7 @@ const Work = struct {
         var spheres: Spheres = try .initCapacity(arena, @intCast(count.spheres));
         const Segments = std.ArrayList(strokes.Segment);
         var segments: Segments = try .initCapacity(arena, @intCast(count.segments));
+        var outside_count: u64 = 0;
         for (work.draws) |*draw| {
             const mesh = draw.mesh;
             if (mesh.points.len == 0 and mesh.segments.len == 0) continue;
@@ -543,17 +535,19 @@ const Work = struct {
             var vertices = used.iterator(.{});
             while (vertices.next()) |vertex| {
                 const center = draw.vertex_target + @as(u32, @intCast(vertex));
-                if (!work.isPlaced(center)) continue;
-                spheres.appendAssumeCapacity(.{ .center = center, .material = mesh.material });
+                const is_placed = work.isPlaced(center);
+                outside_count += @intFromBool(!is_placed);
+                const material = if (is_placed) mesh.material else world.none;
+                spheres.appendAssumeCapacity(.{ .center = center, .material = material });
             }
             const shift = draw.vertex_target -% draw.vertex_source;
             for (mesh.segments) |pair| {
                 const ends: [2]u32 = .{ pair[0] +% shift, pair[1] +% shift };
-                if (!work.isPlaced(ends[0]) or !work.isPlaced(ends[1])) continue;
-                segments.appendAssumeCapacity(.{ .ends = ends, .material = mesh.material });
+                const are_placed = work.isPlaced(ends[0]) and work.isPlaced(ends[1]);
+                const material = if (are_placed) mesh.material else world.none;
+                segments.appendAssumeCapacity(.{ .ends = ends, .material = material });
             }
         }
-        const outside_count = count.spheres - spheres.items.len;
         if (outside_count > 0) diagnostic.warn(
             "{d} vertices of points and lines left out: they are farther than 2^40 m from the " ++
                 "origin",

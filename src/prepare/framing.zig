@@ -204,7 +204,9 @@ pub const Subject = struct {
 
     fn markShown(subject: *Subject) void {
         const shown = &subject.shown;
+        shown.surface_count = 0;
         for (shown.geometry.surfaces()) |*triangle| {
+            shown.surface_count += @intFromBool(!triangle.isDropped());
             if (shown.holds(triangle)) mark(&subject.used, triangle);
         }
         subject.markSpheres(&subject.used);
@@ -441,14 +443,18 @@ const Shown = struct {
     materials: []const scene.Material,
     /// All of them, since otherwise there would be none.
     all: bool = false,
+    /// Triangles of surfaces that are not dropped.
+    surface_count: usize = 0,
 
     /// Whether alpha leaves something of the triangle.
     fn holds(shown: *const Shown, triangle: *const world.Triangle) bool {
-        return shown.holdsVertices(&triangle.corner, triangle.material);
+        return !triangle.isDropped() and
+            shown.holdsVertices(&triangle.corner, triangle.material);
     }
 
     fn holdsSphere(shown: *const Shown, sphere: *const world.Sphere) bool {
-        return shown.holdsVertices(&.{sphere.center}, sphere.material);
+        return sphere.material != world.none and
+            shown.holdsVertices(&.{sphere.center}, sphere.material);
     }
 
     fn holdsVertices(shown: *const Shown, vertices: []const u32, material_index: u32) bool {
@@ -475,7 +481,7 @@ fn areaNormal(geometry: *const world.Geometry, triangle: *const world.Triangle) 
 
 /// The axes to look along.
 fn chooseBasis(shown: *const Shown, bounds: math.Box3) Basis {
-    if (shown.geometry.surfaces().len == 0) return strokeBasis(bounds);
+    if (shown.surface_count == 0) return strokeBasis(bounds);
     if (flatFront(shown, bounds)) |front| return .look(vec3d.neg(front), .{ 0, 1, 0 });
     const axis = boardAxis(shown, bounds) orelse
         return .ofDirection(chooseDirection(shown, &directions));
@@ -549,13 +555,21 @@ fn depthAlong(axis: Vec3d, shown: *const Shown, bounds: math.Box3) f64 {
 const Samples = struct {
     shown: *const Shown,
     index: usize = 0,
+    /// Triangles to pass by that are not dropped.
+    ahead: usize = 0,
 
     fn next(samples: *Samples) ?*const world.Triangle {
         const triangles = samples.shown.geometry.surfaces();
-        const stride = triangles.len / sample_count_max + 1;
+        const stride = samples.shown.surface_count / sample_count_max + 1;
         while (samples.index < triangles.len) {
             const triangle = &triangles[samples.index];
-            samples.index += stride;
+            samples.index += 1;
+            if (triangle.isDropped()) continue;
+            if (samples.ahead > 0) {
+                samples.ahead -= 1;
+                continue;
+            }
+            samples.ahead = stride - 1;
             if (samples.shown.holds(triangle)) return triangle;
         }
         return null;

@@ -125,6 +125,7 @@ fn occluders(
         word.* = 0;
         const first = 32 * index;
         for (triangles[first..@min(first + 32, triangles.len)], 0..) |*triangle, bit| {
+            if (triangle.isDropped()) continue;
             const material = &materials[triangle.material];
             const own = lookups[material.first_lookup..][0..material.lookup_count];
             const stops = material.stopsLight(own);

@@ -32,13 +32,13 @@ const triangle_count_wanted = 1 << 21;
 /// A line between two vertices of the soup.
 pub const Segment = struct {
     ends: [2]u32,
-    /// Index into `Materials.all`.
+    /// Index into `Materials.all`; `none` if an end has no finite place.
     material: u32,
 };
 
 /// What there is to draw.
 pub const Strokes = struct {
-    /// Of points and of lines' ends, each vertex once.
+    /// Of points and of lines' ends, each vertex once, those without a place too.
     spheres: []const world.Sphere = &.{},
     segments: []const Segment = &.{},
     detail: Detail = .{ .level = 0 },
@@ -209,19 +209,26 @@ const Ring = struct {
 
 /// What a chunk of strokes came to.
 const ChunkResult = struct {
-    begin: u32 = 0,
-    kept_count: u32 = 0,
+    /// Where the next triangle goes.
+    next: u32,
+    dropped_count: u32 = 0,
     bounds: Box3 = .empty,
     centroid_bounds: Box3 = .empty,
 
-    /// Puts a triangle behind those that the chunk has, unless it has no area or no place.
-    fn keep(result: *ChunkResult, soup: *flatten.TriangleSoup, triangle: world.Triangle) void {
+    /// Puts a triangle behind those that the chunk has, as dropped if it has no area or no place.
+    fn add(result: *ChunkResult, soup: *flatten.TriangleSoup, triangle: world.Triangle) void {
+        const to = &soup.room.triangles[result.next];
+        result.next += 1;
+        to.* = triangle;
         const a = soup.positions[triangle.corner[0]];
         const b = soup.positions[triangle.corner[1]];
         const c = soup.positions[triangle.corner[2]];
-        if (!flatten.isWithinRange(a, b, c) or !flatten.hasArea(a, b, c)) return;
-        soup.room.triangles[result.begin + result.kept_count] = triangle;
-        result.kept_count += 1;
+        const is_placed = !triangle.isDropped() and flatten.isWithinRange(a, b, c);
+        if (!is_placed or !flatten.hasArea(a, b, c)) {
+            to.material = world.none;
+            result.dropped_count += 1;
+            return;
+        }
         const box = Box3.empty.include(a).include(b).include(c);
         result.bounds = result.bounds.join(box);
         result.centroid_bounds = result.centroid_bounds.include(box.centerTwice());
@@ -256,7 +263,7 @@ const Work = struct {
 
     fn openChunk(work: *Work, chunk: usize, triangles_before: usize) *ChunkResult {
         const result = &work.chunks[chunk];
-        result.* = .{ .begin = @intCast(work.soup.triangles.len + triangles_before) };
+        result.* = .{ .next = @intCast(work.soup.surface_count + triangles_before) };
         return result;
     }
 
@@ -271,7 +278,7 @@ const Work = struct {
         for (solid.triangles[0..solid.triangle_count]) |triangle| {
             var corner = triangle;
             for (&corner) |*vertex| vertex.* += first;
-            result.keep(soup, .{ .corner = corner, .material = sphere.material });
+            result.add(soup, .{ .corner = corner, .material = sphere.material });
         }
     }
 
@@ -300,7 +307,7 @@ const Work = struct {
             for ([_][3]u32{
                 .{ a, b, b + side_count },
                 .{ a, b + side_count, a + side_count },
-            }) |corner| result.keep(soup, .{ .corner = corner, .material = segment.material });
+            }) |corner| result.add(soup, .{ .corner = corner, .material = segment.material });
         }
     }
 
@@ -319,21 +326,14 @@ const Work = struct {
         }
     }
 
-    /// Closes the gaps that triangles left that are not kept.
     fn finish(work: *Work) void {
         const soup = work.soup;
-        var kept_count = soup.triangles.len;
         for (work.chunks) |chunk| {
-            if (kept_count < chunk.begin) std.mem.copyForwards(
-                world.Triangle,
-                soup.room.triangles[kept_count..][0..chunk.kept_count],
-                soup.room.triangles[chunk.begin..][0..chunk.kept_count],
-            );
-            kept_count += chunk.kept_count;
+            soup.dropped_stroke_count += chunk.dropped_count;
             soup.bounds = soup.bounds.join(chunk.bounds);
             soup.centroid_bounds = soup.centroid_bounds.join(chunk.centroid_bounds);
         }
-        soup.triangles = soup.room.triangles[0..kept_count];
+        soup.triangles = soup.room.triangles;
     }
 };
 

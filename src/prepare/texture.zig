@@ -159,6 +159,26 @@ pub fn load(
     return work.finish();
 }
 
+/// Bytes that the textures of a scene take at most, and what `load` decodes at once besides.
+pub const Plan = struct { byte_count: u64 = 0, decode_byte_count: u64 = 0 };
+
+/// What `load` would ask for, by the headers of the images alone.
+pub fn plan(
+    gpa: Allocator,
+    from: *const scene.Scene,
+    side_max: u32,
+    diagnostic: *Diagnostic,
+) Error!Plan {
+    var work: Work = .{ .gpa = gpa, .from = from, .side_max = side_max };
+    defer work.deinit();
+    try work.collect();
+    var planned: Plan = .{ .byte_count = try work.plan(diagnostic) };
+    const at_once = @max(decode_bytes_max, planned.byte_count / 2);
+    const tasks = work.tasks.items;
+    for (tasks[0..batchCount(tasks, at_once)]) |*task| planned.decode_byte_count += task.bytes();
+    return planned;
+}
+
 /// How many of the tasks, in this order, are decoded at once: they need no more than `bytes_max`,
 /// or it is one.
 fn batchCount(tasks: []const Task, bytes_max: u64) usize {
@@ -356,7 +376,7 @@ const Work = struct {
     /// In the order of the images.
     fn warn(work: *const Work, diagnostic: *Diagnostic) void {
         for (work.reasons, work.from.images) |*failure, *image| {
-            if (failure.*) |*reason| diagnostic.warn("{f}: {s}, left out", .{
+            if (failure.*) |*reason| diagnostic.forgiveEach("{f}: {s}, left out", .{
                 printable(image.name), reason.text(),
             });
         }

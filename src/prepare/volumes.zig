@@ -110,6 +110,7 @@ fn findOpen(
     const areas = try arena.alloc(Area, volumes.len);
     @memset(areas, .{});
     for (triangles) |*triangle| {
+        if (triangle.isDropped()) continue;
         const place = materials[triangle.material].volume_rank;
         if (place == Volume.air) continue;
         var corners: [3][3]f64 = undefined;

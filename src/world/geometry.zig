@@ -134,13 +134,19 @@ pub const AnyTree = union(enum) {
     }
 };
 
-/// Three corners and a material; its index in `Geometry.triangles` is the primitive number.
+/// Three corners and a material; its index in `Geometry.triangles` is the primitive number. One that
+/// has no area or no finite place is dropped: it keeps its number, but the tree has none of it.
 pub const Triangle = extern struct {
     /// Indices into `Geometry.positions` and the other arrays by vertex, counter-clockwise in
     /// front.
     corner: [3]u32,
-    /// Index into `Materials.all`.
+    /// Index into `Materials.all`; `none` if the triangle is dropped.
     material: u32,
+
+    /// Whether no ray can meet it.
+    pub inline fn isDropped(triangle: *const Triangle) bool {
+        return triangle.material == none;
+    }
 
     comptime {
         assert(@sizeOf(Triangle) == 16);
@@ -151,7 +157,7 @@ pub const Triangle = extern struct {
 pub const Sphere = struct {
     /// Index into `Geometry.positions`.
     center: u32,
-    /// Index into `Materials.all`.
+    /// Index into `Materials.all`; `none` if it has no finite place.
     material: u32,
 };
 
@@ -185,12 +191,14 @@ pub const Geometry = struct {
     /// of the bitangent cross(normal, tangent); empty where no material has a normal texture.
     tangents: []const [4]f32 = &.{},
     triangles: []const Triangle,
+    /// How many of the triangles are dropped.
+    dropped_count: u32 = 0,
     /// How many triangles are of surfaces; those behind them are of points and lines.
     surface_count: u32 = none,
     /// Of points and lines, all with the same radius in metres.
     spheres: []const Sphere = &.{},
     sphere_radius: f32 = 0,
-    /// Box of the triangles' corners, empty without any.
+    /// Box of the corners of triangles that are not dropped, empty without any.
     bounds: Box3,
     /// Box of twice the centroids of the triangles' boxes, empty without any.
     centroid_bounds: Box3,

@@ -224,7 +224,7 @@ const Numbers = extern struct {
 
 fn unitQuaternion(source: *const Source, index: u32, rotation: [4]f64) Error![4]f64 {
     const x, const y, const z, const w = rotation;
-    const length = @sqrt(((x * x + y * y) + z * z) + w * w);
+    const length = quaternionLength(rotation);
     if (!std.math.isFinite(length)) {
         return source.fail("node {d}: rotation is not finite", .{index});
     }
@@ -236,4 +236,10 @@ fn unitQuaternion(source: *const Source, index: u32, rotation: [4]f64) Error![4]
         source.warn("node {d}: rotation is not a unit quaternion, made one", .{index});
     }
     return .{ x / length, y / length, z / length, w / length };
+}
+
+/// Of a quaternion.
+pub fn quaternionLength(rotation: [4]f64) f64 {
+    const x, const y, const z, const w = rotation;
+    return @sqrt(((x * x + y * y) + z * z) + w * w);
 }

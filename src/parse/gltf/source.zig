@@ -7,9 +7,11 @@ const std = @import("std");
 const c = @import("../cgltf.zig");
 const draco_meshes = @import("draco_meshes.zig");
 const json = @import("../json.zig");
+const schema = @import("schema.zig");
 const scene = @import("../../scene.zig");
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
 const Allocator = std.mem.Allocator;
+const Lenience = @import("../json/lenience.zig");
 const assert = std.debug.assert;
 const Source = @This();
 
@@ -27,6 +29,10 @@ draco: std.AutoHashMapUnmanaged(u32, draco_meshes.Decoded) = .empty,
 diagnostic: *Diagnostic,
 /// Numbers of nodes that are not exact in single precision, by node.
 doubles: []const json.Double = &.{},
+/// Elements that are left out of the document, and why.
+lenience: *const Lenience,
+/// Whether what requires unknown extensions is drawn all the same.
+force: bool = false,
 /// Bytes that decoded vertices and triangles may still take, and undrawn ones that are looked at.
 decoded_bytes_left: u64 = 0,
 /// Whether sparse indices are known to be in order and in range.
@@ -64,6 +70,22 @@ pub fn fail(
 /// Adds a warning.
 pub fn warn(source: *const Source, comptime format: []const u8, arguments: anytype) void {
     source.diagnostic.warn(format, arguments);
+}
+
+/// Adds a warning of what is wrong and can be read all the same; see `Diagnostic.forgive`.
+pub fn forgive(source: *const Source, comptime format: []const u8, arguments: anytype) void {
+    source.diagnostic.forgive(format, arguments);
+}
+
+/// Fails where the element is one that is left out.
+pub fn need(source: *const Source, list: schema.List, index: usize) error{InvalidInput}!void {
+    if (source.lenience.broken.count() == 0) return;
+    if (source.isBroken(list, index)) |reason| return source.fail("{s}", .{reason});
+}
+
+/// Why the element is left out; null: it is not.
+pub fn isBroken(source: *const Source, list: schema.List, index: usize) ?[]const u8 {
+    return source.lenience.broken.get(.{ .list = @backingInt(list), .index = @intCast(index) });
 }
 
 /// Counts decoded data before it is allocated.

@@ -113,8 +113,8 @@ pub fn build(
     input: *const Input,
     comptime pack_size: u32,
 ) bvh_input.Error!Tree {
-    assert(input.triangles.len > 0 and input.triangles.len <= split.number_limit);
-    const count: u32 = @intCast(input.triangles.len);
+    assert(input.count() > 0 and input.triangles.len <= split.number_limit);
+    const count: u32 = @intCast(input.count());
     var builder: Builder(pack_size) = .{
         .input = input,
         .references = undefined,
@@ -586,8 +586,8 @@ const ReferenceWork = struct {
         const begin = chunk * chunk_size;
         const end = @min(begin + chunk_size, work.references.len);
         var boxes: [2]Box = @splat(split.box_empty);
-        for (work.references[begin..end], begin..) |*reference, number| {
-            reference.* = work.input.reference(number);
+        for (work.references[begin..end], begin..) |*reference, index| {
+            reference.* = work.input.reference(index);
             boxes[0] = split.join(boxes[0], reference.*);
             boxes[1] = split.join(boxes[1], split.centerBox(reference.*));
         }

@@ -109,7 +109,7 @@ pub const Cells = struct {
 
     /// Counts the triangles of `input`, at least `reference_count_min`.
     pub fn init(gpa: Allocator, input: *const Input) bvh_input.Error!Cells {
-        const count = input.triangles.len;
+        const count = input.count();
         assert(count >= reference_count_min);
         const wanted = std.math.log2_int(usize, count / references_per_cell);
         const bits: u5 = @intCast(@min(wanted, cell_bits_max));
@@ -143,13 +143,13 @@ pub const Cells = struct {
 
     /// Where a chunk begins, and the one before it ends.
     fn chunkBegin(cells: *const Cells, index: usize) usize {
-        return @intCast(@as(u64, index) * cells.input.triangles.len / cells.chunk_count);
+        return @intCast(@as(u64, index) * cells.input.count() / cells.chunk_count);
     }
 
     /// Writes the references to `target`, cell by cell in the order of `items`. Asserts that there
     /// is one place for each. Spends the counts: once only.
     pub fn scatter(cells: *Cells, gpa: Allocator, target: []Box) bvh_input.Error!void {
-        assert(target.len == cells.input.triangles.len);
+        assert(target.len == cells.input.count());
         const places = try gpa.alloc(u32, cells.cell_count);
         defer gpa.free(places);
         @memset(places, 0);
@@ -188,8 +188,8 @@ const CountWork = struct {
         }
         const counts = cells.counts[index * cells.cell_count ..][0..cells.cell_count];
         @memset(counts, 0);
-        for (cells.chunkBegin(index)..cells.chunkBegin(index + 1)) |number| {
-            const box = cells.input.reference(number);
+        for (cells.chunkBegin(index)..cells.chunkBegin(index + 1)) |turn| {
+            const box = cells.input.reference(turn);
             const cell = cells.grid.cellOf(box);
             counts[cell] += 1;
             const pair = &boxes[cell];
@@ -239,8 +239,8 @@ const ScatterWork = struct {
     fn run(work: *ScatterWork, index: usize, _: usize) void {
         const cells = work.cells;
         const places = cells.counts[index * cells.cell_count ..][0..cells.cell_count];
-        for (cells.chunkBegin(index)..cells.chunkBegin(index + 1)) |number| {
-            const box = cells.input.reference(number);
+        for (cells.chunkBegin(index)..cells.chunkBegin(index + 1)) |turn| {
+            const box = cells.input.reference(turn);
             const place = &places[cells.grid.cellOf(box)];
             work.target[place.*] = box;
             place.* += 1;

@@ -12,18 +12,21 @@ const Box3 = math.Box3;
 const Vec3 = math.Vec3;
 const World = world.World;
 
-/// Asserts that every triangle lies in one lane of one pack below one leaf, within all boxes above
-/// it, which are no larger than they have to be; that padding lanes are empty; that every node and
-/// pack is reached once; and that the tree is no deeper than it says.
+/// Asserts that every triangle that is not dropped lies in one lane of one pack below one leaf,
+/// within all boxes above it, which are no larger than they have to be; that padding lanes are
+/// empty; that every node and pack is reached once; and that the tree is no deeper than it says.
 pub fn check(gpa: Allocator, checked: *const World) error{OutOfMemory}!void {
     const vertex_count = checked.geometry.positions.len;
     assert(checked.geometry.normals.len == vertex_count);
     assert(checked.geometry.colors.len == 0 or checked.geometry.colors.len == vertex_count);
     assert(checked.view.width > 0 and checked.view.height > 0);
+    var dropped_count: usize = 0;
     for (checked.geometry.triangles) |triangle| {
-        assert(triangle.material < checked.materials.all.len);
+        dropped_count += @intFromBool(triangle.isDropped());
+        assert(triangle.isDropped() or triangle.material < checked.materials.all.len);
         for (triangle.corner) |vertex| assert(vertex < vertex_count);
     }
+    assert(dropped_count == checked.geometry.dropped_count);
     switch (checked.geometry.tree) {
         inline else => |*tree| try checkTree(gpa, checked, tree),
     }
@@ -42,7 +45,7 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
     var depth: u32 = 0;
     while (stack.pop()) |visit| {
         node_count += 1;
-        if (checked.geometry.triangles.len > 0) depth = @max(depth, visit.depth);
+        if (tree.packs.len > 0) depth = @max(depth, visit.depth);
         const node = &tree.nodes[visit.node];
         var joined: Box3 = .empty;
         for (node.child, 0..) |child, index| {
@@ -65,7 +68,9 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
             assert(box.contains(joined) and joined.grow(margin).contains(box));
         }
     }
-    for (seen) |is_seen| assert(is_seen);
+    for (seen, checked.geometry.triangles) |is_seen, triangle| {
+        assert(is_seen != triangle.isDropped());
+    }
     assert(node_count == tree.nodes.len and node_count == checked.facts.tree.node_count);
     assert(pack_count == tree.packs.len);
     assert(depth == checked.facts.tree.depth and depth <= world.tree_depth_max);

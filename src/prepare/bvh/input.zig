@@ -1,4 +1,5 @@
-//! Input of a BVH's build: triangles, and the reference that stands for each of them.
+//! Input of a BVH's build: triangles, and the reference that stands for each of them that is not
+//! dropped.
 
 const std = @import("std");
 const math = @import("../../math.zig");
@@ -16,14 +17,22 @@ pub const Error = error{OutOfMemory} || parallel.Error;
 pub const Input = struct {
     positions: []const Vec3,
     triangles: []const world.Triangle,
+    /// Numbers of those that are not dropped, ascending; null: of all.
+    kept: ?[]const u32 = null,
     /// Box of twice the centroids of the triangles' boxes, give or take rounding.
     centroid_bounds: Box3,
     padding: world.Padding,
     pool: *parallel.Pool,
     quality: TreeQuality = .default,
 
-    /// The reference to a triangle, within its box grown by its pad.
-    pub inline fn reference(input: *const Input, number: usize) split.Box {
+    /// How many triangles the tree is to hold.
+    pub fn count(input: *const Input) usize {
+        return if (input.kept) |kept| kept.len else input.triangles.len;
+    }
+
+    /// The reference to one of them, within its box grown by its pad.
+    pub inline fn reference(input: *const Input, index: usize) split.Box {
+        const number = if (input.kept) |kept| kept[index] else index;
         const corner = input.triangles[number].corner;
         const box = Box3.empty
             .include(input.positions[corner[0]])

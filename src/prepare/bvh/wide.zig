@@ -40,7 +40,7 @@ pub fn build(
     comptime width: u32,
     statistics: *world.TreeStatistics,
 ) bvh_input.Error!world.Tree(width) {
-    if (input.triangles.len == 0) {
+    if (input.count() == 0) {
         const Node = world.Node(width);
         const nodes = try arena.alignedAlloc(Node, .@"64", 1);
         nodes[0] = .empty;
@@ -234,7 +234,7 @@ fn Collapse(comptime width: u32) type {
             arena: Allocator,
             statistics: *world.TreeStatistics,
         ) bvh_input.Error!world.Tree(width) {
-            const limit: u32 = @intCast(bvh_build.taskSize(collapse.input.triangles.len));
+            const limit: u32 = @intCast(bvh_build.taskSize(collapse.input.count()));
             var parts: std.ArrayList(Part) = .empty;
             defer parts.deinit(gpa);
             try collapse.findParts(gpa, &parts, limit);
