@@ -193,7 +193,7 @@ fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Er
     var mesh: scene.Mesh = .{
         .positions = try meshes.floats(3, &meshes.positions, position),
         .normals = if (used.normal) |index|
-            try meshes.floats(3, &meshes.normals, index)
+            try meshes.directions(index)
         else
             null,
         .colors = if (used.color) |index| try meshes.decodeColors(index) else null,
@@ -274,8 +274,24 @@ fn floats(
     index: u32,
 ) Error![]const [width]f32 {
     if (cache.get(index)) |known| return known;
+    return meshes.decodeFloats(width, cache, index, try attributes.required(meshes.source, index));
+}
+
+/// Normals, and what morph targets add to them and to tangents.
+fn directions(meshes: *Meshes, index: u32) Error![]const Vec3 {
+    if (meshes.normals.get(index)) |known| return known;
+    const accessor = try attributes.directions(meshes.source, index);
+    return meshes.decodeFloats(3, &meshes.normals, index, accessor);
+}
+
+fn decodeFloats(
+    meshes: *Meshes,
+    comptime width: u8,
+    cache: *std.AutoHashMapUnmanaged(u32, []const [width]f32),
+    index: u32,
+    accessor: Accessor,
+) Error![]const [width]f32 {
     const source = meshes.source;
-    const accessor = try attributes.required(source, index);
     try source.charge(@as(u64, accessor.count) * @sizeOf([width]f32));
     const out = try source.arena.alloc([width]f32, accessor.count);
     if (accessors.decodeFloats(width, accessor, out)) |bad| return source.fail(
@@ -290,7 +306,7 @@ fn floats(
 fn decodeTangents(meshes: *Meshes, index: u32) Error![]const [4]f32 {
     if (meshes.tangents.get(index)) |known| return known;
     const source = meshes.source;
-    const accessor = try attributes.required(source, index);
+    const accessor = try attributes.directions(source, index);
     try source.charge(@as(u64, accessor.count) * @sizeOf([4]f32));
     const tangents = try source.arena.alloc([4]f32, accessor.count);
     if (accessors.decodeFloats(4, accessor, tangents)) |bad| return source.fail(
@@ -356,10 +372,10 @@ fn decodeTargets(
             target.positions = try meshes.floats(3, &meshes.positions, index);
         }
         if (mesh.normals != null) if (used.normal) |index| {
-            target.normals = try meshes.floats(3, &meshes.normals, index);
+            target.normals = try meshes.directions(index);
         };
         if (mesh.tangents != null) if (used.tangent) |index| {
-            target.tangents = try meshes.floats(3, &meshes.normals, index);
+            target.tangents = try meshes.directions(index);
         };
         if (mesh.colors != null) if (used.color) |index| {
             target.colors = try meshes.decodeColorDeltas(index);
