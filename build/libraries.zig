@@ -129,15 +129,6 @@ pub const basisu: Library = .{
 
 pub const cgltf: Library = .{ .name = "cgltf", .shims = &.{"src/parse/cgltf.c"} };
 
-/// The decoder of meshes, an option.
-pub const draco: Library = .{
-    .name = "draco",
-    .cpp_shim = "src/decode/draco.cpp",
-    .includes = &.{"draco/src"},
-    .own_headers = "src/decode/draco",
-    .flags = &.{"-fno-aligned-allocation"},
-};
-
 pub const libdeflate: Library = .{
     .name = "libdeflate",
     .files = &.{
@@ -152,6 +143,15 @@ pub const libdeflate: Library = .{
         "libdeflate/lib/zlib_decompress.c",
     },
     .shims = &.{"src/decode/gzip.c"},
+};
+
+/// The decoder of meshes, an option.
+pub const draco: Library = .{
+    .name = "draco",
+    .cpp_shim = "src/decode/draco.cpp",
+    .includes = &.{"draco/src"},
+    .own_headers = "src/decode/draco",
+    .flags = &.{"-fno-aligned-allocation"},
 };
 
 /// The decoder in plain C. Threads are ours, but its tables are set up under locks. Its one place

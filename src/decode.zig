@@ -1,9 +1,10 @@
 //! Encoded image bytes -> texels; compressed streams of geometry -> numbers.
 //!
 //! In: a file in memory, of a kind that its first bytes tell. Out: its texels in the channels that
-//! the file has, bytes or floats, the same on every target; what gzip has compressed; geometry, by
-//! its codec. The C libraries of images see no file that has not passed our own checks, and every
-//! limit is one before memory is asked for. Threads may decode at once; no state outlives a call.
+//! the file has, bytes or floats, the same on every target; or what gzip has compressed. The C
+//! libraries of images see no file that has not passed our own checks, and every limit is one
+//! before memory is asked for. Threads may decode at once; no state outlives a call. Geometry is
+//! asked for by its codec.
 
 const std = @import("std");
 const Allocator = std.mem.Allocator;

@@ -13,6 +13,7 @@ test {
     _ = @import("strokes.zig");
     _ = @import("decode.zig");
     _ = @import("environment.zig");
+    _ = @import("formats.zig");
     _ = @import("glass.zig");
     _ = @import("gltf_materials.zig");
     _ = @import("gltf_instances.zig");
@@ -24,7 +25,9 @@ test {
     _ = @import("offset.zig");
     _ = @import("output.zig");
     _ = @import("pbrt.zig");
+    _ = @import("pbrt_forgiven.zig");
     _ = @import("pbrt_textures.zig");
+    _ = @import("poses.zig");
     _ = @import("samples.zig");
     _ = @import("beams.zig");
     _ = @import("soup.zig");

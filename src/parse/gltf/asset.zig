@@ -7,6 +7,7 @@
 const std = @import("std");
 const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
+const draco = @import("../../decode.zig").draco;
 const extensions = @import("extensions.zig");
 const Source = @import("source.zig");
 const Error = Source.Error;
@@ -31,12 +32,14 @@ pub fn check(source: *const Source) Error!void {
     for (Source.slice(data.extensions_required, data.extensions_required_count)) |raw| {
         const name = std.mem.span(@as([*:0]const u8, raw));
         const is_accepted = if (extensions.find(name)) |known| known.mayBeRequired() else false;
-        if (is_accepted) continue;
-        const is_draco = std.mem.eql(u8, name, "KHR_draco_mesh_compression");
-        const where = if (is_draco) " by this build, only with -Ddraco" else "";
-        return source.fail("the required extension {f} is not supported{s}", .{
-            diagnostic.quote(name), where,
+        if (!is_accepted) return source.fail("the required extension {f} is not supported", .{
+            diagnostic.quote(name),
         });
+        if (!draco.is_held and std.mem.eql(u8, name, "KHR_draco_mesh_compression"))
+            return source.fail(
+                "the required extension {f} needs a build with Draco (-Ddraco)",
+                .{diagnostic.quote(name)},
+            );
     }
     warnOfUnrendered(source);
 }

@@ -4,7 +4,6 @@
 //! docs/formats.md has the same rows. What is not in it is unknown: it may change anything.
 
 const std = @import("std");
-const draco = @import("../../decode.zig").draco;
 
 /// What becomes of what an extension says.
 pub const Treatment = enum {
@@ -76,7 +75,7 @@ pub const all: []const Extension = &.{
     rendered("EXT_mesh_gpu_instancing", "not together with a skin"),
     ignored("EXT_mesh_manifold", .nothing, "data"),
     ignored("EXT_mesh_primitive_edge_visibility", .looks, "no outlines"),
-    rendered("EXT_meshopt_compression", "preferred to what is there uncompressed"),
+    rendered("EXT_meshopt_compression", "all modes and filters"),
     ignored("EXT_structural_metadata", .nothing, "data"),
     ignored("EXT_texture_astc", .images, "the image that stands beside it"),
     ignored("EXT_texture_avif", .images, "the image that stands beside it"),
@@ -89,10 +88,7 @@ pub const all: []const Extension = &.{
     ignored("KHR_accessor_float64", .shapes, "accessors of doubles"),
     ignored("KHR_animation_pointer", .nothing, "such channels stand still"),
     ignored("KHR_audio_emitter", .nothing, "sound"),
-    if (draco.is_held)
-        rendered("KHR_draco_mesh_compression", "where nothing is there uncompressed")
-    else
-        ignored("KHR_draco_mesh_compression", .other_meshes, "read by builds with -Ddraco"),
+    rendered("KHR_draco_mesh_compression", "by builds with Draco (-Ddraco)"),
     ignored("KHR_gaussian_splatting", .looks, "splats are points"),
     ignored("KHR_implicit_shapes", .nothing, "shapes of colliders"),
     ignored("KHR_interactivity", .nothing, "behaviour"),
@@ -114,7 +110,7 @@ pub const all: []const Extension = &.{
     rendered("KHR_materials_volume", "traced; thickness only says that there is a volume"),
     approximated("KHR_materials_volume_scatter", "one scattering traced, more are estimated"),
     rendered("KHR_mesh_quantization", "every type of component"),
-    rendered("KHR_meshopt_compression", "preferred to what is there uncompressed"),
+    rendered("KHR_meshopt_compression", "all modes and filters"),
     ignored("KHR_node_hoverability", .nothing, "behaviour"),
     ignored("KHR_node_selectability", .nothing, "behaviour"),
     rendered("KHR_node_visibility", "as it stands, not as animations have it"),
