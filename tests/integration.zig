@@ -20,6 +20,7 @@ test {
     _ = @import("gltf_materials.zig");
     _ = @import("gltf_instances.zig");
     _ = @import("gltf_poses.zig");
+    _ = @import("gltf_quantization.zig");
     _ = @import("gltf_textures.zig");
     _ = @import("malformed.zig");
     _ = @import("meshes.zig");
