@@ -50,7 +50,8 @@ pub fn loadScene(
     } else try parse.parse(gpa, io, name, choices, diagnostic);
     errdefer scene.deinit();
     try diagnostic.settle();
-    if (choices.up_axis == .z) try scene.turn(z_to_y);
+    const is_z_up = if (choices.up_axis) |axis| axis == .z else scene.is_z_up;
+    if (is_z_up) try scene.turn(z_to_y);
     return scene;
 }
 
@@ -94,6 +95,8 @@ pub const Session = struct {
     loaded: ?prepare.Loaded = null,
     seen: settings.View = .{},
     world: ?World = null,
+    /// What the next pose has a use for; there with the world.
+    pose_cache: ?prepare.PoseCache = null,
     environment: Environment = .{},
     /// The studio, where it is seen but something else lights the scene.
     backdrop: Environment = .{},
@@ -195,6 +198,8 @@ pub const Session = struct {
     fn dropWorld(session: *Session) void {
         if (session.world) |*world| world.deinit();
         session.world = null;
+        if (session.pose_cache) |*cache| cache.deinit();
+        session.pose_cache = null;
     }
 
     fn dropLoaded(session: *Session) void {
@@ -203,9 +208,11 @@ pub const Session = struct {
     }
 
     /// Places the geometry and builds the tree over it; the first time, decodes the textures.
-    /// Asserts that there is a scene.
+    /// Where nodes, weights and materials of the scene have changed since, and nothing else, it
+    /// may be called again: arrays are written once more, and the tree is fitted. Asserts that
+    /// there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
-        session.dropWorld();
+        errdefer session.dropWorld();
         const scene = &session.scene.?;
         if (session.loaded == null) {
             session.loaded = try prepare.load(session.gpa, session.io, scene, .{
@@ -215,7 +222,7 @@ pub const Session = struct {
             try session.diagnostic.settle();
         }
         const loaded = &session.loaded.?;
-        session.world = try prepare.pose(session.gpa, session.io, scene, loaded, .{
+        const pose_settings: prepare.PoseSettings = .{
             .lanes = chosen.lanes,
             .pool = &session.pool,
             .tree_quality = chosen.tree_quality,
@@ -226,7 +233,31 @@ pub const Session = struct {
                 .resolution = chosen.view.resolution,
                 .long_side = chosen.view.long_side,
             },
-        }, session.diagnostic, &session.times);
+        };
+        if (session.pose_cache) |*cache| if (cache.fits(&pose_settings)) {
+            return prepare.poseAgain(
+                &session.world.?,
+                cache,
+                session.io,
+                scene,
+                loaded,
+                pose_settings,
+                session.diagnostic,
+                &session.times,
+            );
+        };
+        session.dropWorld();
+        const posed = try prepare.pose(
+            session.gpa,
+            session.io,
+            scene,
+            loaded,
+            pose_settings,
+            session.diagnostic,
+            &session.times,
+        );
+        session.world = posed.world;
+        session.pose_cache = posed.cache;
     }
 
     /// Chooses what is seen, from where and by what light; the tree stays. Asserts that there is a

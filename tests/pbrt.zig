@@ -1216,7 +1216,7 @@ test "what is wrong in a PLY file" {
         .{ "3 0 1 2", "3 0 1 -1", "index -1 is not one of 0 to 4" },
         .{ "3 0 1 2", "3 0 1 x", "a whole number is expected where something else stands" },
         .{ "5 0 1", "-5 0 1", "the face's length -5 is not one of 0 to 65536" },
-        .{ "1 2 0 255", "nan 2 0 255", "a number is expected where something else stands" },
+        .{ "1 2 0 255", "nan 2 0 255", "a number is not finite" },
         .{ "element vertex", "element vertices", "has faces before vertices" },
     };
     inline for (cases) |case| {

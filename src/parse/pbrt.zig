@@ -84,7 +84,6 @@ test {
     _ = @import("pbrt/defaults.zig");
     _ = @import("pbrt/lights.zig");
     _ = @import("pbrt/materials.zig");
-    _ = @import("pbrt/number.zig");
     _ = @import("pbrt/parameters.zig");
     _ = @import("pbrt/shapes.zig");
     _ = @import("pbrt/spectra.zig");

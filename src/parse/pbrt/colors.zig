@@ -5,7 +5,7 @@
 
 const std = @import("std");
 const quote = @import("../../diagnostic.zig").quote;
-const number = @import("number.zig");
+const number = @import("../number.zig");
 const spectra = @import("spectra.zig");
 const Input = @import("input.zig");
 const Parameters = @import("parameters.zig");
