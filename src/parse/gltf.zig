@@ -57,14 +57,20 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
     const is_binary = std.mem.startsWith(u8, bytes, container.magic);
     builder.scene.file.format = if (is_binary) .glb else .gltf;
     try asset.check(&source);
-    var buffers: Buffers = try .load(resources, document.data, parts.binary, diagnostic);
+    var buffers: Buffers = try .load(
+        resources,
+        document.data,
+        parts.binary,
+        &text.lenience,
+        diagnostic,
+    );
     defer buffers.deinit();
     var input_bytes: u64 = bytes.len;
     for (buffers.owned.items) |owned| input_bytes += owned.len;
     source.buffers = buffers.list;
     source.decoded_bytes_left = limits.decodedBytesMax(input_bytes);
-    try accessors.checkAll(&source);
     try fill(&source, resources);
+    try accessors.checkRest(&source);
     try diagnostic.settle();
     const scene = try builder.finish();
     warnOfGaps(&source, &scene);
@@ -76,6 +82,7 @@ fn fill(source: *Source, resources: *Resources) Error!void {
     const builder = source.builder;
     const settings = &resources.settings;
     const shown = try nodes.choose(source, settings.scene);
+    if (shown) |one| try source.need(.scenes, Source.indexOf(source.data.scenes, one));
     builder.scene.file = try description.read(source, builder.scene.file.format, shown);
     const variant = try variants.choose(source, settings.material_variant);
     const origins = try nodes.collect(source, shown);
@@ -88,21 +95,26 @@ fn fill(source: *Source, resources: *Resources) Error!void {
     defer meshes.deinit();
     var skins: Skins = .{ .source = source };
     defer skins.deinit();
-    try skins.checkAll();
     try skins.collect(origins);
     for (origins, 0..) |origin, index| {
         const node = Source.item(source.data.nodes, origin);
         const node_index: u32 = @intCast(index);
-        if (node.mesh != null) try addInstances(origin, node_index, &meshes, &skins);
+        const is_hidden = source.isHidden(node_index);
+        if (node.mesh != null and !is_hidden) {
+            try addInstances(origin, node_index, &meshes, &skins);
+        }
         if (node.camera) |raw| {
             try builder.addCamera(try views.readCamera(source, raw, node.name, node_index));
         }
-        if (node.light) |raw| {
+        if (node.light) |raw| if (!is_hidden) {
+            try source.need(.lights, Source.indexOf(source.data.lights, raw));
             if (views.readLight(source, raw, node_index)) |light| try builder.addLight(light);
-        }
+        };
     }
     try materials.finish();
     if (shown) |one| try image_based_light.read(source, &textures, one);
+    try skins.checkRest();
+    for (source.lenience.broken.values()) |broken| source.forgiveUnneeded(broken.reason);
 }
 
 /// Adds what a node draws.

@@ -310,6 +310,13 @@ const Scanner = struct {
             if (!std.mem.eql(u8, field.name, frame.key)) continue;
             const bit = @as(u64, 1) << @intCast(index);
             if (frame.seen & bit != 0) {
+                if (field.is_spare) if (scanner.lenience) |lenience| {
+                    try lenience.hideKey(frame.key_start);
+                    scanner.said.forgive("{f}: stands twice, the first one counts", .{
+                        Path{ .scanner = scanner },
+                    });
+                    return &.any;
+                };
                 frame.count += 1;
                 return scanner.wrong("stands twice", .{});
             }
@@ -550,7 +557,7 @@ const Scanner = struct {
             const list = frame.list orelse continue;
             try scanner.skipValue(start);
             const reason = scanner.diagnostic.message.text();
-            try lenience.leaveOut(list, @intCast(frame.count - 1), reason);
+            try lenience.leaveOut(list, @intCast(frame.count - 1), .{ .reason = reason });
             return lenience.replaceElement(start, scanner.offset, frame.substitute);
         }
         return err;

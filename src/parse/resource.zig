@@ -31,6 +31,9 @@ const Resources = @This();
 /// See parse.zig.
 pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
 
+/// What is said of a file that would be replaced.
+pub const overwritten = "would be overwritten by the output";
+
 /// Largest file that is read, in bytes.
 pub const file_bytes_max: u64 = 2 << 30;
 
@@ -190,7 +193,7 @@ fn openFile(resources: *const Resources, path: []const u8, reason: *Reason) Load
 fn identify(resources: *const Resources, file: Io.File, reason: *Reason) LoadError!?Identity {
     const identity: ?Identity = .of(file.handle);
     if (Identity.eql(resources.settings.output, identity))
-        return refuse(reason, error.Overwritten, "would be overwritten by the output");
+        return refuse(reason, error.Overwritten, overwritten);
     return identity;
 }
 
