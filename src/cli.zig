@@ -294,7 +294,7 @@ const Reader = arguments_file.Arguments(sections);
 
 /// What `--help` prints.
 pub const help: []const u8 = "raylane " ++ version ++
-    \\: renders a scene (glTF, PBRT, OBJ, STL, PLY) to an image on the CPU
+    \\: renders glTF, PBRT, OBJ, STL or PLY to an image on the CPU
     \\
     \\usage: raylane [render] SCENE [options]
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)

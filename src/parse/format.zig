@@ -176,36 +176,34 @@ fn ofText(start: []const u8) ?Recognized {
         const word = trimmed[0..end];
         if (word.len == 0) continue;
         if (isOneOf(word, pbrt_words)) return .{ .format = .pbrt };
-        if (isOneOf(word, &obj_words)) return .{ .format = .obj };
+        if (isOneOf(word, obj_words)) return .{ .format = .obj };
         if (std.mem.eql(u8, word, "newmtl"))
             return .{ .foreign = "a material library of an OBJ file; name that file" };
-        if (isOneOf(word, &.{ "OFF", "COFF", "NOFF" }))
+        if (isOneOf(word, "OFF COFF NOFF"))
             return .{ .foreign = "an OFF file" ++ convert };
         return null;
     }
     return null;
 }
 
-fn isOneOf(word: []const u8, words: []const []const u8) bool {
-    for (words) |other| if (std.mem.eql(u8, word, other)) return true;
+fn isOneOf(word: []const u8, words: []const u8) bool {
+    var others = std.mem.tokenizeAny(u8, words, " \n");
+    while (others.next()) |other| if (std.mem.eql(u8, word, other)) return true;
     return false;
 }
 
 /// Words that begin an OBJ file or one of its lines.
-const obj_words = [_][]const u8{
-    "v", "vt", "vn", "vp", "f", "o", "g", "s", "p", "l", "mtllib", "usemtl", "mg",
-};
+const obj_words = "v vt vn vp f o g s p l mtllib usemtl mg";
 
 /// Directives that a PBRT text may begin with.
-const pbrt_words: []const []const u8 = &.{
-    "Accelerator",     "ActiveTransform", "AreaLightSource",   "Attribute",          "AttributeBegin", "Camera",
-    "ColorSpace",      "ConcatTransform", "CoordSysTransform", "CoordinateSystem",   "Film",           "Identity",
-    "Import",          "Include",         "Integrator",        "LightSource",        "LookAt",         "MakeNamedMaterial",
-    "MakeNamedMedium", "Material",        "MediumInterface",   "NamedMaterial",      "ObjectBegin",    "ObjectInstance",
-    "Option",          "PixelFilter",     "Renderer",          "ReverseOrientation", "Rotate",         "Sampler",
-    "Scale",           "Shape",           "SurfaceIntegrator", "Texture",            "Transform",      "TransformBegin",
-    "TransformTimes",  "Translate",       "Volume",            "VolumeIntegrator",   "WorldBegin",
-};
+const pbrt_words =
+    \\Accelerator ActiveTransform AreaLightSource Attribute AttributeBegin Camera ColorSpace
+    \\ConcatTransform CoordSysTransform CoordinateSystem Film Identity Import Include Integrator
+    \\LightSource LookAt MakeNamedMaterial MakeNamedMedium Material MediumInterface
+    \\NamedMaterial ObjectBegin ObjectInstance Option PixelFilter Renderer ReverseOrientation
+    \\Rotate Sampler Scale Shape SurfaceIntegrator Texture Transform TransformBegin
+    \\TransformTimes Translate Volume VolumeIntegrator WorldBegin
+;
 
 /// Whether the bytes are an STL text; binary ones may begin with "solid" as well.
 pub fn isTextStl(bytes: []const u8) bool {
