@@ -282,7 +282,7 @@ fn info(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagnosti
     var text: Io.Writer.Allocating = .init(account.allocator());
     defer text.deinit();
     const outcome = describe(&account, io, options, diagnostic, &text.writer);
-    const title = printable(options.scene);
+    const title = printable(raylane.parse.title(options.scene));
     if (!options.quiet) for (diagnostic.warnings[0..diagnostic.warning_count]) |*warning| {
         say(io, "raylane: {f}: warning: {s}\n", .{ title, warning.text() });
     };
@@ -290,7 +290,7 @@ fn info(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagnosti
         error.WriteFailed => return outOfMemory(io),
         else => |other| {
             if (other == error.OutOfMemory) account.explain(&diagnostic.message);
-            const place = printable(placeOf(diagnostic, options.scene));
+            const place = printable(placeOf(diagnostic, raylane.parse.title(options.scene)));
             say(io, "raylane: {f}: {s}\n", .{ place, diagnostic.message.text() });
             return exitCodeOf(other);
         },

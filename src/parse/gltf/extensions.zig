@@ -166,6 +166,22 @@ test "names are in order, each once" {
     }
 }
 
+test "docs/formats.md has every row" {
+    const gpa = std.testing.allocator;
+    const folder: std.Io.Dir = .cwd();
+    const limit: std.Io.Limit = .limited(1 << 20);
+    const text = try folder.readFileAlloc(std.testing.io, "docs/formats.md", gpa, limit);
+    defer gpa.free(text);
+    var buffer: [256]u8 = undefined;
+    for (all) |*extension| {
+        const row = try std.mem.print(&buffer, "\n| {s} | {t} | {s} |\n", .{
+            extension.name, extension.treatment, extension.remark,
+        });
+        errdefer std.debug.print("missing:{s}", .{row});
+        try std.testing.expect(std.mem.find(u8, text, row) != null);
+    }
+}
+
 test "what is missing decides whether an extension may be required" {
     try std.testing.expect(find("KHR_materials_ior").?.mayBeRequired());
     try std.testing.expect(find("KHR_xmp").?.mayBeRequired());
