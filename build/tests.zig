@@ -210,6 +210,7 @@ fn runOn(tests: Tests, suite: []const u8, target: Target, tested: *Compile) Lazy
     const run, const log = tests.start(suite, target.name);
     if (target.emulator.len != 0) {
         run.addArg(tests.owner.fmt("--needs={s}", .{target.emulator[0]}));
+        run.addArg("--env=RAYLANE_EMULATED=1");
     }
     run.addArg("--");
     run.addArgs(target.emulator);

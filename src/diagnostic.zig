@@ -13,6 +13,8 @@ pub const message_bytes_max = 300;
 pub const name_bytes_max = 80;
 /// Warnings kept of one run; what comes after is counted only.
 pub const warning_count_max = 32;
+/// Longest number of others of a kind, in words and bytes.
+const fault_count_bytes_max = " (and 18446744073709551615 more)".len;
 
 /// A fixed-size line of text.
 pub const Message = struct {
@@ -26,12 +28,19 @@ pub const Message = struct {
 
     /// Replaces the text; what does not fit is cut.
     pub fn set(message: *Message, comptime format: []const u8, arguments: anytype) void {
-        var writer: std.Io.Writer = .fixed(&message.buffer);
+        message.length = 0;
+        message.append(format, arguments);
+    }
+
+    /// Puts more behind the text; what does not fit is cut.
+    pub fn append(message: *Message, comptime format: []const u8, arguments: anytype) void {
+        const start = message.length;
+        var writer: std.Io.Writer = .fixed(message.buffer[start..]);
         writer.print(format, arguments) catch |err| switch (err) {
             error.WriteFailed => {}, // Full: the beginning is what matters.
         };
-        message.length = writer.buffered().len;
-        for (message.buffer[0..message.length]) |*byte| {
+        message.length = start + writer.buffered().len;
+        for (message.buffer[start..message.length]) |*byte| {
             if (byte.* < 0x20 or byte.* == 0x7f) byte.* = '?';
         }
         assert(message.length <= message_bytes_max);
@@ -46,9 +55,19 @@ pub const Diagnostic = struct {
     /// the user named, as a whole.
     place: Message = .{},
     warnings: [warning_count_max]Message = undefined,
+    /// Of those that `forgive` has added.
+    faults: [warning_count_max]Fault = undefined,
     warning_count: usize = 0,
     /// Warnings past `warning_count_max`.
     warning_dropped_count: usize = 0,
+    /// Whether what could be forgiven is an error.
+    strict: bool = false,
+    /// Whether `forgive` has set the error line.
+    refused: bool = false,
+
+    /// A kind of what is wrong with a file: what its warning says of the first one, and how many
+    /// there are.
+    const Fault = struct { kind: []const u8 = "", text_length: usize = 0, count: u64 = 0 };
 
     /// Sets the error line and returns the error, so that a stage can write `return d.fail(...)`.
     pub fn fail(
@@ -74,6 +93,61 @@ pub const Diagnostic = struct {
     pub fn warn(diagnostic: *Diagnostic, comptime format: []const u8, arguments: anytype) void {
         var message: Message = .{};
         message.set(format, arguments);
+        diagnostic.add(&message, .{});
+    }
+
+    /// Says what is wrong with a file that can be read all the same: a warning, one for each
+    /// `format` with the number of the others. If `strict`, the first one is the error line; see
+    /// `settle`.
+    pub fn forgive(diagnostic: *Diagnostic, comptime format: []const u8, arguments: anytype) void {
+        if (diagnostic.strict) return diagnostic.refuse(format, arguments);
+        const count = diagnostic.warning_count;
+        for (diagnostic.warnings[0..count], diagnostic.faults[0..count]) |*warning, *fault| {
+            if (!std.mem.eql(u8, fault.kind, format)) continue;
+            fault.count += 1;
+            warning.length = fault.text_length;
+            warning.append(" (and {d} more)", .{fault.count - 1});
+            return;
+        }
+        var message: Message = .{};
+        message.set(format, arguments);
+        message.length = @min(message.length, message_bytes_max - fault_count_bytes_max);
+        diagnostic.add(&message, .{ .kind = format, .text_length = message.length, .count = 1 });
+    }
+
+    /// The same for what has names of its own, of which each gets a warning.
+    pub fn forgiveEach(
+        diagnostic: *Diagnostic,
+        comptime format: []const u8,
+        arguments: anytype,
+    ) void {
+        if (diagnostic.strict) return diagnostic.refuse(format, arguments);
+        diagnostic.warn(format, arguments);
+    }
+
+    fn refuse(diagnostic: *Diagnostic, comptime format: []const u8, arguments: anytype) void {
+        if (!diagnostic.refused) diagnostic.message.set(format, arguments);
+        diagnostic.refused = true;
+    }
+
+    /// Returns an error if there was something to forgive, and `strict`.
+    pub fn settle(diagnostic: *const Diagnostic) error{InvalidInput}!void {
+        if (diagnostic.refused) return error.InvalidInput;
+    }
+
+    /// The texts of all warnings so far.
+    pub fn warningTexts(
+        diagnostic: *const Diagnostic,
+        buffer: *[warning_count_max][]const u8,
+    ) []const []const u8 {
+        const count = diagnostic.warning_count;
+        for (buffer[0..count], diagnostic.warnings[0..count]) |*text, *warning| {
+            text.* = warning.text();
+        }
+        return buffer[0..count];
+    }
+
+    fn add(diagnostic: *Diagnostic, message: *const Message, fault: Fault) void {
         for (diagnostic.warnings[0..diagnostic.warning_count]) |*other| {
             if (std.mem.eql(u8, other.text(), message.text())) return;
         }
@@ -81,7 +155,8 @@ pub const Diagnostic = struct {
             diagnostic.warning_dropped_count += 1;
             return;
         }
-        diagnostic.warnings[diagnostic.warning_count] = message;
+        diagnostic.warnings[diagnostic.warning_count] = message.*;
+        diagnostic.faults[diagnostic.warning_count] = fault;
         diagnostic.warning_count += 1;
     }
 };
@@ -208,4 +283,27 @@ test "the same warning is said once, and their number is bounded" {
     for (0..100) |index| diagnostic.warn("number {d}", .{index});
     try std.testing.expectEqual(warning_count_max, diagnostic.warning_count);
     try std.testing.expectEqual(101 - warning_count_max, diagnostic.warning_dropped_count);
+}
+
+test "what is forgiven is a warning for each kind with a count, or an error" {
+    var diagnostic: Diagnostic = .{};
+    for (0..3) |index| {
+        diagnostic.forgive("node {d}: odd", .{index});
+        diagnostic.forgive("mesh {d}: odd", .{index + 7});
+    }
+    try std.testing.expectEqual(2, diagnostic.warning_count);
+    try std.testing.expectEqualStrings("node 0: odd (and 2 more)", diagnostic.warnings[0].text());
+    try std.testing.expectEqualStrings("mesh 7: odd (and 2 more)", diagnostic.warnings[1].text());
+    try diagnostic.settle();
+    const long: [1000]u8 = @splat('x');
+    for (0..2) |_| diagnostic.forgive("{s}", .{&long});
+    try std.testing.expect(std.mem.endsWith(u8, diagnostic.warnings[2].text(), "x (and 1 more)"));
+
+    var strict: Diagnostic = .{ .strict = true };
+    strict.warn("a gap", .{});
+    try strict.settle();
+    for (0..3) |index| strict.forgive("node {d}: odd", .{index});
+    try std.testing.expectError(error.InvalidInput, strict.settle());
+    try std.testing.expectEqualStrings("node 0: odd", strict.message.text());
+    try std.testing.expectEqual(1, strict.warning_count);
 }

@@ -22,6 +22,7 @@ const check = @import("prepare/bvh/check.zig");
 const deform = @import("prepare/deform.zig");
 const flatten = @import("prepare/flatten.zig");
 const emitter_lights = @import("prepare/emitter_lights.zig");
+const extent_file = @import("prepare/extent.zig");
 const emitters = @import("prepare/emitters.zig");
 const environment = @import("prepare/environment.zig");
 const light = @import("prepare/light.zig");
@@ -75,6 +76,15 @@ pub const PoseSettings = struct {
 
 /// See `PoseSettings`.
 pub const WantedView = view_file.Wanted;
+
+/// The box of what a scene draws.
+pub const extentOf = extent_file.of;
+/// See `extentOf`.
+pub const Extent = extent_file.Extent;
+/// Width and height of the picture that is made where nobody says more.
+pub const pictureSize = view_file.pictureSize;
+/// Bytes that textures take.
+pub const planTextures = texture.plan;
 
 /// What is seen of it, and in what light.
 pub const ViewSettings = struct {
@@ -769,7 +779,7 @@ test "more care, less cost" {
 
 test "nasty soups" {
     const gpa = std.testing.allocator;
-    const count = 6000;
+    const count = 2000;
     const corners = try gpa.alloc([3]math.Vec3, count);
     defer gpa.free(corners);
     const Kind = enum { coincident, line, concentric, huge_and_tiny, powers, flat };
@@ -1274,6 +1284,7 @@ test {
     _ = place_file;
     _ = tangents;
     _ = texture;
+    _ = extent_file;
     _ = @import("prepare/layers.zig");
     _ = @import("prepare/texture_use.zig");
     _ = @import("prepare/pyramid.zig");

@@ -156,7 +156,7 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
 }
 
 /// A size in KiB or MiB, whichever is readable.
-fn writeBytes(writer: *Writer, bytes: u64) Writer.Error!void {
+pub fn writeBytes(writer: *Writer, bytes: u64) Writer.Error!void {
     const is_large = bytes >= 1 << 20;
     const unit: f64 = if (is_large) 1 << 20 else 1 << 10;
     try writer.print("{d:.1} {s}", .{ float(bytes) / unit, if (is_large) "MiB" else "KiB" });
@@ -213,8 +213,9 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
     try writer.writeByte('\n');
 }
 
-/// A JSON string. Bytes that are not UTF-8, which a file name may hold, become U+FFFD.
-const Text = struct {
+/// A JSON string of any bytes. Those that are not UTF-8, which a file name may hold, become
+/// U+FFFD.
+pub const Text = struct {
     bytes: []const u8,
 
     /// Called by `Stringify`.
@@ -235,7 +236,8 @@ const Text = struct {
     }
 };
 
-const Texts = struct {
+/// An array of them.
+pub const Texts = struct {
     list: []const []const u8,
 
     /// Called by `Stringify`.

@@ -16,6 +16,9 @@ pub const Builder = @import("scene/builder.zig");
 /// How points in rows become triangles.
 pub const Grid = @import("scene/grid.zig");
 
+/// What a file says of itself.
+pub const File = @import("scene/file.zig").File;
+
 const material_file = @import("scene/material.zig");
 
 pub const AlphaMode = material_file.AlphaMode;
@@ -226,9 +229,12 @@ pub const Scene = struct {
     images: []const Image = &.{},
     textures: []const Texture = &.{},
     environment: ?EnvironmentMap = null,
+    file: File = .{},
     /// Names of what the file may be shown as, by the materials of its meshes (which are those of
     /// the variant that was asked for); empty ones where it gives none.
     material_variants: []const []const u8 = &.{},
+    /// Its format has z point up, unless the user says otherwise.
+    is_z_up: bool = false,
     /// Index of the camera that the file itself would use, `none` without cameras.
     camera_default: u32 = none,
     /// Surfaces that emit are all of the lights that the file says, each to be lit by in full.

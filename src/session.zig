@@ -43,12 +43,15 @@ pub fn loadScene(
     choices: settings.Load,
     diagnostic: *Diagnostic,
 ) LoadError!Scene {
+    diagnostic.strict = choices.strict;
     var scene = if (std.mem.cutPrefix(u8, name, settings.builtin_prefix)) |builtin_name| builtin: {
         try parse.checkOnly(choices, diagnostic);
         break :builtin try builtin_scenes.build(gpa, builtin_name, diagnostic);
     } else try parse.parse(gpa, io, name, choices, diagnostic);
     errdefer scene.deinit();
-    if (choices.up_axis == .z) try scene.turn(z_to_y);
+    try diagnostic.settle();
+    const is_z_up = if (choices.up_axis) |axis| axis == .z else scene.is_z_up;
+    if (is_z_up) try scene.turn(z_to_y);
     return scene;
 }
 
@@ -216,6 +219,7 @@ pub const Session = struct {
                 .pool = &session.pool,
                 .side_max = session.texture_side_max,
             }, session.diagnostic, &session.times);
+            try session.diagnostic.settle();
         }
         const loaded = &session.loaded.?;
         const pose_settings: prepare.PoseSettings = .{

@@ -164,6 +164,12 @@ pub const Choice = union(enum) {
 /// The axis of a scene that points up.
 pub const UpAxis = enum { y, z };
 
+/// File formats of scenes, by their extensions.
+pub const SceneFormat = enum { gltf, glb, pbrt, obj, stl, ply };
+
+/// Name of a scene that comes from standard input.
+pub const standard_input = "-";
+
 /// What is seen where there is nothing.
 pub const Background = union(enum) {
     /// The scene's own, else a quiet gradient.
@@ -254,14 +260,20 @@ pub fn samplesFor(width: u32, height: u32) u32 {
 pub const Load = struct {
     /// Whether a scene may name files outside of its own folder.
     allow_outside: bool = false,
+    /// Whether what is wrong with a file, but can be read all the same, is an error.
+    strict: bool = false,
+    /// Whether a file is drawn that requires extensions which are not known.
+    force: bool = false,
     /// Within `tessellation`.
     tessellation: u32 = tessellation.default,
     /// Within `texture_side`.
     texture_side_max: u32 = texture_side.default,
     scene: Choice = .default,
     material_variant: Choice = .default,
-    /// Where it is not y, the scene is turned about x until it is.
-    up_axis: UpAxis = .y,
+    /// Null: what the file's contents and its name tell.
+    format: ?SceneFormat = null,
+    /// Where it is not y, the scene is turned about x until it is; null: as the format has it.
+    up_axis: ?UpAxis = null,
     /// A file that is about to be replaced: a scene that is read from it is refused.
     output: ?Identity = null,
 };

@@ -335,8 +335,8 @@ test "what lies behind more surfaces than a ray may go through is not black" {
         var scene = try builder.finish();
         defer scene.deinit();
         var image = try fixture.render(&scene, .{
-            .width = 8,
-            .height = 8,
+            .width = 3,
+            .height = 3,
             .ambient = 0,
             .background = .{ 0.25, 0.5, 2 },
             .transparent = transparent,

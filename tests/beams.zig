@@ -267,7 +267,7 @@ fn expectSoup(soup: soup_file.Soup, triangle_count: usize, tile_count: usize) !v
 
 test "beams find the hits and shadows of brute force in random and nasty soups" {
     for (std.enums.values(soup_file.Soup)) |soup| {
-        expectSoup(soup, 100, 8) catch |err| {
+        expectSoup(soup, 100, fixture.enough(8)) catch |err| {
             std.debug.print("in the soup {t}\n", .{soup});
             return err;
         };

@@ -173,6 +173,13 @@ pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options)
     defer raylane.simd.setFloatControl(mode);
     session.adopt(scene.*, .borrowed);
     try session.pose(.{ .lanes = lanes, .tree_quality = options.tree_quality });
+    try look(session, options);
+}
+
+/// Chooses another view of what a session has posed.
+pub fn look(session: *Session, options: Options) !void {
+    const mode = raylane.simd.setFlushToZero();
+    defer raylane.simd.setFloatControl(mode);
     try session.view(.{
         .resolution = .{ options.width, options.height },
         .ambient = options.ambient,
@@ -190,6 +197,12 @@ pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options)
 /// Traces what a session sees. The image is the session's.
 pub fn trace(session: *Session, options: Options) !*Image {
     const layers: raylane.film.Layers = .init(.{ .color = true });
+    if (session.film) |*film| {
+        if (film.image.width != options.width or film.image.height != options.height) {
+            film.deinit(gpa);
+            session.film = null;
+        }
+    }
     if (session.film == null)
         session.film = try .init(gpa, options.width, options.height, layers);
     // Every pixel must be written.
@@ -212,6 +225,13 @@ pub fn render(scene: *const Scene, options: Options) !Image {
     try view(&session, scene, raylane.variant.compiled[options.variant].lanes, options);
     defer session.film = null; // The caller's now.
     return (try trace(&session, options)).*;
+}
+
+/// How many of `count` random things are enough here: under an emulator, which is some twenty times
+/// slower and whose machine has the same random things tested natively elsewhere, a quarter.
+pub fn enough(count: usize) usize {
+    const is_emulated = std.testing.environ.getPosix("RAYLANE_EMULATED") != null;
+    return if (is_emulated) @divCeil(count, 4) else count;
 }
 
 /// A material without reflection, lit or shining by itself only.

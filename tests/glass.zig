@@ -199,7 +199,7 @@ test "surfaces that do not close, and more volumes than are kept, do no harm in 
     try builder.addCamera(.{ 0, 0, -2.8 }, 1);
     var scene = try builder.finish();
     defer scene.deinit();
-    const options: fixture.Options = .{ .width = 24, .height = 24, .ambient = 0.2, .depth_max = 9 };
+    const options: fixture.Options = .{ .width = 13, .height = 11, .ambient = 0.2, .depth_max = 9 };
     var image = try fixture.render(&scene, options);
     defer image.deinit(gpa);
     for (image.pixels) |pixel| for (pixel) |channel| {

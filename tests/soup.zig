@@ -402,7 +402,7 @@ pub fn isCompiled(comptime lanes: u8) bool {
 
 test "brute force, single rays and packets find the same hits in random and nasty soups" {
     for (std.enums.values(Soup)) |soup| {
-        expectSoup(soup, 300, 500) catch |err| {
+        expectSoup(soup, 300, fixture.enough(500)) catch |err| {
             std.debug.print("in the soup {t}\n", .{soup});
             return err;
         };

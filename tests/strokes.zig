@@ -30,7 +30,7 @@ fn render(mesh: raylane.scene.Mesh, scale: [3]f64, view: View) !raylane.image.Im
     seen.display_referred = false;
     try session.pose(.{ .lanes = raylane.variant.compiled[0].lanes, .view = seen });
     try session.view(seen);
-    try session.render(.{ .sample_count = 16 });
+    try session.render(.{ .sample_count = 8 });
     const image = session.film.?.image;
     const copy: raylane.image.Image = try .init(gpa, image.width, image.height);
     @memcpy(copy.pixels, image.pixels);

@@ -7,27 +7,24 @@
 const std = @import("std");
 const accessors = @import("gltf/accessors.zig");
 const asset = @import("gltf/asset.zig");
-const c = @import("cgltf.zig");
 const container = @import("gltf/container.zig");
-const escapes = @import("json/escapes.zig");
+const description = @import("gltf/description.zig");
 const image_based_light = @import("gltf/image_based_light.zig");
-const json = @import("json.zig");
+const instancing = @import("gltf/instancing.zig");
 const limits = @import("gltf/limits.zig");
 const nodes = @import("gltf/nodes.zig");
 const scene_data = @import("../scene.zig");
-const schema = @import("gltf/schema.zig");
 const variants = @import("gltf/variants.zig");
 const views = @import("gltf/views.zig");
-const Allocator = std.mem.Allocator;
 const Buffers = @import("gltf/buffers.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
-const Document = @import("gltf/document.zig");
 const Materials = @import("gltf/materials.zig");
 const Meshes = @import("gltf/meshes.zig");
 const Resources = @import("resource.zig");
 const Scene = scene_data.Scene;
 const Skins = @import("gltf/skins.zig");
 const Source = @import("gltf/source.zig");
+const Text = @import("gltf/text.zig");
 const Textures = @import("gltf/textures.zig");
 
 /// See parse.zig.
@@ -36,14 +33,13 @@ pub const Error = Source.Error || error{ SceneUnknown, MaterialVariantUnknown };
 /// Reads a file that is in memory; what it names comes from `resources`.
 pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) Error!Scene {
     const gpa = resources.gpa;
+    diagnostic.strict = resources.settings.strict;
     const parts = try container.open(bytes, diagnostic);
-    const simplified = try escapes.simplifyEscapes(gpa, parts.json);
-    defer if (simplified) |copy| gpa.free(copy);
-    const text = simplified orelse parts.json;
-    const checked = try json.check(text, &schema.document, diagnostic);
-    var document = try parseDocument(gpa, text, checked.lengths, diagnostic);
+    var text: Text = try .open(gpa, parts.json, diagnostic);
+    defer text.deinit();
+    var document = try text.parse(diagnostic);
     defer document.deinit();
-    const doubles = try json.readDoubles(gpa, text, &schema.document, &checked);
+    const doubles = try text.readDoubles();
     defer gpa.free(doubles);
     var builder: scene_data.Builder = .init(gpa);
     errdefer builder.deinit();
@@ -53,46 +49,32 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
         .arena = builder.arena(),
         .data = document.data,
         .doubles = doubles,
+        .lenience = &text.lenience,
+        .force = resources.settings.force,
         .diagnostic = diagnostic,
     };
     defer source.deinit();
+    const is_binary = std.mem.startsWith(u8, bytes, container.magic);
+    builder.scene.file.format = if (is_binary) .glb else .gltf;
     try asset.check(&source);
-    var buffers: Buffers = try .load(resources, document.data, parts.binary, diagnostic);
+    var buffers: Buffers = try .load(
+        resources,
+        document.data,
+        parts.binary,
+        &text.lenience,
+        diagnostic,
+    );
     defer buffers.deinit();
     var input_bytes: u64 = bytes.len;
     for (buffers.owned.items) |owned| input_bytes += owned.len;
     source.buffers = buffers.list;
     source.decoded_bytes_left = limits.decodedBytesMax(input_bytes);
-    try accessors.checkAll(&source);
     try fill(&source, resources);
+    try accessors.checkRest(&source);
+    try diagnostic.settle();
     const scene = try builder.finish();
     warnOfGaps(&source, &scene);
     return scene;
-}
-
-/// Has cgltf parse a JSON text that has been checked.
-fn parseDocument(
-    gpa: Allocator,
-    text: []const u8,
-    lengths: json.Lengths,
-    diagnostic: *Diagnostic,
-) Error!Document {
-    return Document.parse(gpa, text) catch |err| switch (err) {
-        error.OutOfMemory => error.OutOfMemory,
-        error.TooLarge => diagnostic.invalid(
-            "the document would need much more memory than its size explains",
-            .{},
-        ),
-        error.Legacy => diagnostic.invalid("glTF 1.0 is not supported, only 2.0", .{}),
-        error.Refused => {
-            // cgltf does not say why, so look for the reasons that the table leaves.
-            try json.checkReferences(gpa, text, &schema.document, lengths, "node", diagnostic);
-            return diagnostic.invalid(
-                "is not valid glTF: an animation or an extension refers to what is not there",
-                .{},
-            );
-        },
-    };
 }
 
 /// Puts the parts of the document into the scene.
@@ -100,6 +82,8 @@ fn fill(source: *Source, resources: *Resources) Error!void {
     const builder = source.builder;
     const settings = &resources.settings;
     const shown = try nodes.choose(source, settings.scene);
+    if (shown) |one| try source.need(.scenes, Source.indexOf(source.data.scenes, one));
+    builder.scene.file = try description.read(source, builder.scene.file.format, shown);
     const variant = try variants.choose(source, settings.material_variant);
     const origins = try nodes.collect(source, shown);
     defer source.gpa.free(origins);
@@ -111,49 +95,55 @@ fn fill(source: *Source, resources: *Resources) Error!void {
     defer meshes.deinit();
     var skins: Skins = .{ .source = source };
     defer skins.deinit();
-    try skins.checkAll();
     try skins.collect(origins);
     for (origins, 0..) |origin, index| {
         const node = Source.item(source.data.nodes, origin);
         const node_index: u32 = @intCast(index);
-        if (node.mesh != null) try addInstances(node, node_index, &meshes, &skins);
+        const is_hidden = source.isHidden(node_index);
+        if (node.mesh != null and !is_hidden) {
+            try addInstances(origin, node_index, &meshes, &skins);
+        }
         if (node.camera) |raw| {
             try builder.addCamera(try views.readCamera(source, raw, node.name, node_index));
         }
-        if (node.light) |raw| {
+        if (node.light) |raw| if (!is_hidden) {
+            try source.need(.lights, Source.indexOf(source.data.lights, raw));
             if (views.readLight(source, raw, node_index)) |light| try builder.addLight(light);
-        }
+        };
     }
     try materials.finish();
     if (shown) |one| try image_based_light.read(source, &textures, one);
+    try skins.checkRest();
+    for (source.lenience.broken.values()) |broken| source.forgiveUnneeded(broken.reason);
 }
 
 /// Adds what a node draws.
 fn addInstances(
-    node: *const c.cgltf_node,
+    origin: u32,
     node_index: u32,
     meshes: *Meshes,
     skins: *Skins,
 ) Error!void {
     const source = meshes.source;
     const builder = source.builder;
-    if (node.has_mesh_gpu_instancing != 0) {
-        source.warn("EXT_mesh_gpu_instancing is not supported: its meshes are drawn once", .{});
-    }
+    const node = Source.item(source.data.nodes, origin);
     const mesh_index = Source.indexOf(source.data.meshes, node.mesh);
     const range = try meshes.get(mesh_index, skins.deformationOf(mesh_index));
     if (builder.instances.items.len + range.count > limits.instance_count_max)
         return source.fail("over {d} instances of meshes", .{limits.instance_count_max});
     const weights = try skins.instanceWeights(node);
     const skin = try skins.instanceSkin(node, range);
-    for (range.first..range.first + range.count) |drawn| {
-        const has_joints = builder.meshes.items[drawn].joint_sets.len > 0;
-        try builder.addDeformedInstance(.{
-            .mesh = @intCast(drawn),
-            .node = node_index,
-            .morph_weights = weights,
-            .skin = if (has_joints) skin else scene_data.none,
-        });
+    const places = try instancing.place(source, origin, node_index, range.count);
+    for (places.first..places.first + places.count) |at| {
+        for (range.first..range.first + range.count) |drawn| {
+            const has_joints = builder.meshes.items[drawn].joint_sets.len > 0;
+            try builder.addDeformedInstance(.{
+                .mesh = @intCast(drawn),
+                .node = @intCast(at),
+                .morph_weights = weights,
+                .skin = if (has_joints) skin else scene_data.none,
+            });
+        }
     }
 }
 

@@ -3,12 +3,15 @@
 //! In: bytes and a `Rule` that says what a document may hold where. Out: nothing, or one line with
 //! the place and what is wrong. One linear scan with an explicit stack, strict about the grammar
 //! (RFC 8259), UTF-8, depth, whole numbers and keys that stand twice. What the rule does not know
-//! only has to be JSON.
+//! only has to be JSON. A second scan, for documents that have not passed, leaves out what can be
+//! left out (json/lenience.zig).
 
 const std = @import("std");
 const diagnostic_data = @import("../diagnostic.zig");
 const escapes = @import("json/escapes.zig");
 const numbers = @import("json/numbers.zig");
+const Graph = @import("json/graph.zig");
+const Lenience = @import("json/lenience.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = diagnostic_data.Diagnostic;
 const assert = std.debug.assert;
@@ -78,6 +81,8 @@ pub const Array = struct {
     item: *const Rule,
     /// The counted list that it is.
     list: ?u8 = null,
+    /// What stands for an element that is left out.
+    substitute: []const u8 = "{}",
 };
 
 /// An object, at most 64 of whose keys are known.
@@ -92,6 +97,8 @@ pub const Field = struct {
     name: []const u8,
     rule: Rule,
     required: bool = false,
+    /// Whether it is left out where it breaks its rule, for nobody looks at it.
+    is_spare: bool = false,
 };
 
 /// Lengths of the counted lists.
@@ -106,8 +113,38 @@ pub fn check(
 ) error{InvalidInput}!Checked {
     if (!std.unicode.utf8ValidateSlice(text))
         return diagnostic.invalid("the JSON text is not UTF-8", .{});
-    var scanner: Scanner = .{ .text = text, .diagnostic = diagnostic };
-    try scanner.run(rule);
+    var scanner: Scanner = .{ .text = text, .diagnostic = diagnostic, .said = diagnostic };
+    scanner.run(rule) catch |err| switch (err) {
+        error.InvalidInput => |other| return other,
+        error.OutOfMemory => unreachable, // It takes memory for what is left out alone.
+    };
+    return .{ .lengths = scanner.lengths, .double_count = scanner.double_count };
+}
+
+/// Checks a document and notes what has to be changed, until the rule holds, in `lenience`: that is
+/// for its `apply`. What is left out is a warning of `said`, or an element of a counted list that
+/// is broken; references are followed with a `graph`. On an error `said` has the line.
+pub fn checkLeniently(
+    text: []const u8,
+    rule: *const Rule,
+    lenience: *Lenience,
+    graph: ?*Graph,
+    said: *Diagnostic,
+) error{ OutOfMemory, InvalidInput }!Checked {
+    if (!std.unicode.utf8ValidateSlice(text)) return said.invalid("the JSON text is not UTF-8", .{});
+    var unheard: Diagnostic = .{};
+    var scanner: Scanner = .{
+        .text = text,
+        .diagnostic = &unheard,
+        .said = said,
+        .lenience = lenience,
+        .graph = graph,
+        .references = if (graph) |known| .{ .lengths = known.lengths } else null,
+    };
+    scanner.run(rule) catch |err| {
+        said.message = unheard.message;
+        return err;
+    };
     return .{ .lengths = scanner.lengths, .double_count = scanner.double_count };
 }
 
@@ -132,7 +169,11 @@ pub fn checkReferences(
     var scanner: Scanner = .{
         .text = text,
         .diagnostic = &unheard,
-        .references = .{ .lengths = lengths, .children = &children, .roots = &roots },
+        .said = &unheard,
+        .references = .{
+            .lengths = lengths,
+            .family = .{ .children = &children, .roots = &roots },
+        },
     };
     scanner.run(rule) catch |err| {
         diagnostic.message = unheard.message;
@@ -143,17 +184,25 @@ pub fn checkReferences(
         return diagnostic.invalid("{s} {d} is a root and a child at once", .{ noun, index });
 }
 
-/// The doubles of a document that `check` has passed, in their order; the caller frees them.
+/// The doubles of a document that `check` has passed, in their order; the caller frees them. With
+/// `lenience` where something had to be left out of it.
 pub fn readDoubles(
     gpa: Allocator,
     text: []const u8,
     rule: *const Rule,
     checked: *const Checked,
+    lenience: ?*Lenience,
 ) error{OutOfMemory}![]Double {
     const doubles = try gpa.alloc(Double, checked.double_count);
     if (doubles.len == 0) return doubles;
     var unheard: Diagnostic = .{}; // The warnings have been given.
-    var scanner: Scanner = .{ .text = text, .diagnostic = &unheard, .doubles = doubles };
+    var scanner: Scanner = .{
+        .text = text,
+        .diagnostic = &unheard,
+        .said = &unheard,
+        .doubles = doubles,
+        .lenience = lenience,
+    };
     scanner.run(rule) catch unreachable; // It has been passed.
     assert(scanner.double_count == doubles.len);
     return doubles;
@@ -162,8 +211,10 @@ pub fn readDoubles(
 /// What the second look compares with.
 const References = struct {
     lengths: Lengths,
-    children: *std.DynamicBitSetUnmanaged,
-    roots: *std.DynamicBitSetUnmanaged,
+    family: ?struct {
+        children: *std.DynamicBitSetUnmanaged,
+        roots: *std.DynamicBitSetUnmanaged,
+    } = null,
 };
 
 /// An array or object that is not closed yet.
@@ -181,11 +232,31 @@ const Frame = struct {
     /// Elements or keys met so far.
     count: u64 = 0,
     key: []const u8 = "",
+    /// Of the key that was met last, if it is known.
+    field: ?*const Field = null,
+    /// Where the key and its value begin, or the element that was met last.
+    key_start: usize = 0,
+    value_start: usize = 0,
+    /// Where it begins itself.
+    start: usize = 0,
+    substitute: []const u8 = "",
+    /// Of the references in it.
+    role: Reference.Role = .plain,
 };
 
 const Scanner = struct {
+    const Error = error{ InvalidInput, OutOfMemory };
+
     text: []const u8,
+    /// Gets the line of an error.
     diagnostic: *Diagnostic,
+    /// Gets the warnings.
+    said: *Diagnostic,
+    lenience: ?*Lenience = null,
+    /// Where there is one, the text has been scanned before.
+    graph: ?*Graph = null,
+    /// Whether the error is one of the text as a whole.
+    is_fatal: bool = false,
     references: ?References = null,
     offset: usize = 0,
     stack: [depth_max]Frame = undefined,
@@ -195,16 +266,16 @@ const Scanner = struct {
     /// Where doubles go, if they are kept.
     doubles: ?[]Double = null,
 
-    fn run(scanner: *Scanner, rule: *const Rule) error{InvalidInput}!void {
+    fn run(scanner: *Scanner, rule: *const Rule) Error!void {
         scanner.skipSpace();
         try scanner.value(rule);
-        while (scanner.depth > 0) try scanner.step();
+        while (scanner.depth > 0) scanner.step() catch |err| try scanner.recover(err);
         scanner.skipSpace();
         if (scanner.offset < scanner.text.len) return scanner.syntax("text behind the document");
     }
 
     /// Reads up to the end of the innermost container's next element, or closes the container.
-    fn step(scanner: *Scanner) error{InvalidInput}!void {
+    fn step(scanner: *Scanner) Error!void {
         const frame = &scanner.stack[scanner.depth - 1];
         scanner.skipSpace();
         const closing: u8 = if (frame.is_object) '}' else ']';
@@ -213,17 +284,24 @@ const Scanner = struct {
             try scanner.expect(',', "a comma or the end of the list");
             scanner.skipSpace();
         }
-        if (frame.count == frame.length_max) return scanner.wrong("has over {d} elements", .{
-            frame.length_max,
-        });
+        if (frame.count == frame.length_max) {
+            if (frame.list != null) scanner.is_fatal = true;
+            return scanner.wrong("has over {d} elements", .{frame.length_max});
+        }
         var item = frame.item;
         if (frame.is_object) item = try scanner.readKey(frame);
+        frame.value_start = scanner.offset;
+        if (scanner.lenience) |lenience| if (frame.list) |list| {
+            if (lenience.isBroken(list, @intCast(frame.count))) item = &.any;
+        };
         frame.count += 1;
         try scanner.value(item);
     }
 
-    fn readKey(scanner: *Scanner, frame: *Frame) error{InvalidInput}!*const Rule {
+    fn readKey(scanner: *Scanner, frame: *Frame) Error!*const Rule {
         if (scanner.peek() != '"') return scanner.syntax("a key in quotes is expected");
+        frame.key_start = scanner.offset;
+        frame.field = null;
         frame.key = try scanner.readString();
         scanner.skipSpace();
         try scanner.expect(':', "a colon");
@@ -232,20 +310,29 @@ const Scanner = struct {
             if (!std.mem.eql(u8, field.name, frame.key)) continue;
             const bit = @as(u64, 1) << @intCast(index);
             if (frame.seen & bit != 0) {
+                if (field.is_spare) if (scanner.lenience) |lenience| {
+                    try lenience.hideKey(frame.key_start);
+                    scanner.said.forgive("{f}: stands twice, the first one counts", .{
+                        Path{ .scanner = scanner },
+                    });
+                    return &.any;
+                };
                 frame.count += 1;
                 return scanner.wrong("stands twice", .{});
             }
             frame.seen |= bit;
+            frame.field = field;
             return &field.rule;
         }
         return frame.object.rest;
     }
 
-    fn close(scanner: *Scanner) error{InvalidInput}!void {
+    fn close(scanner: *Scanner) Error!void {
         const frame = &scanner.stack[scanner.depth - 1];
         scanner.offset += 1;
         scanner.depth -= 1;
         if (frame.list) |list| scanner.lengths[list] = frame.count;
+        if (frame.role != .plain) if (scanner.graph) |graph| try scanner.closeFamily(graph, frame);
         if (frame.count < frame.length_min) {
             return scanner.wrong("{d} numbers are expected", .{frame.length_min});
         }
@@ -255,7 +342,7 @@ const Scanner = struct {
         }
     }
 
-    fn value(scanner: *Scanner, rule: *const Rule) error{InvalidInput}!void {
+    fn value(scanner: *Scanner, rule: *const Rule) Error!void {
         const byte = scanner.peek() orelse return scanner.syntax("the text ends too early");
         switch (byte) {
             '{' => switch (rule.*) {
@@ -280,6 +367,12 @@ const Scanner = struct {
                     .item = array.item,
                     .list = array.list,
                     .length_max = list_length_max,
+                    .substitute = array.substitute,
+                    .start = scanner.offset,
+                    .role = switch (array.item.*) {
+                        .reference => |to| to.role,
+                        else => .plain,
+                    },
                 }),
                 .vector => |length| try scanner.push(.{
                     .is_object = false,
@@ -298,11 +391,15 @@ const Scanner = struct {
         }
     }
 
-    fn push(scanner: *Scanner, frame: Frame) error{InvalidInput}!void {
-        if (scanner.depth == depth_max) return scanner.diagnostic.invalid(
-            "the JSON text is nested over {d} deep",
-            .{depth_max},
-        );
+    fn push(scanner: *Scanner, frame: Frame) Error!void {
+        if (scanner.depth == depth_max) {
+            scanner.is_fatal = true;
+            return scanner.diagnostic.invalid(
+                "the JSON text is nested over {d} deep",
+                .{depth_max},
+            );
+        }
+        if (frame.role != .plain) if (scanner.graph) |graph| graph.members.clearRetainingCapacity();
         scanner.stack[scanner.depth] = frame;
         scanner.depth += 1;
         scanner.offset += 1;
@@ -321,13 +418,13 @@ const Scanner = struct {
         scanner.offset += name.len;
     }
 
-    fn stringValue(scanner: *Scanner, rule: *const Rule) error{InvalidInput}!void {
+    fn stringValue(scanner: *Scanner, rule: *const Rule) Error!void {
         switch (rule.*) {
             .any, .string => _ = try scanner.readString(),
             .word => |words| {
                 const content = try scanner.readString();
                 for (words) |known| if (std.mem.eql(u8, known, content)) return;
-                scanner.diagnostic.warn("{f}: {f} is not known, ignored", .{
+                if (scanner.graph == null) scanner.said.forgive("{f}: {f} is not known, ignored", .{
                     Path{ .scanner = scanner }, diagnostic_data.quote(content),
                 });
             },
@@ -335,7 +432,7 @@ const Scanner = struct {
         }
     }
 
-    fn numberValue(scanner: *Scanner, rule: *const Rule) error{InvalidInput}!void {
+    fn numberValue(scanner: *Scanner, rule: *const Rule) Error!void {
         const start = scanner.offset;
         try scanner.skipNumber();
         const digits = scanner.text[start..scanner.offset];
@@ -350,7 +447,8 @@ const Scanner = struct {
         if (rule.* == .number or rule.* == .positive) {
             const float = numbers.parseFloat(digits) orelse
                 return scanner.wrong("{s} is out of range", .{digits});
-            if (rule.* == .positive and !(float > 0)) scanner.diagnostic.warn(
+            const is_odd = rule.* == .positive and !(float > 0);
+            if (is_odd and scanner.graph == null) scanner.said.forgive(
                 "{f}: {s} is not above 0, ignored",
                 .{ Path{ .scanner = scanner }, digits },
             );
@@ -393,20 +491,84 @@ const Scanner = struct {
         unreachable; // A rule for doubles stands within a counted list.
     }
 
-    fn resolve(scanner: *Scanner, reference: Reference, index: u64) error{InvalidInput}!void {
+    fn resolve(scanner: *Scanner, reference: Reference, index: u64) Error!void {
         const references = scanner.references orelse return;
         const length = references.lengths[reference.list];
         if (index >= length) return scanner.wrong("{d} of {d}", .{ index, length });
-        switch (reference.role) {
-            .plain => {},
-            .root => references.roots.set(@intCast(index)),
-            .child => {
-                if (references.children.isSet(@intCast(index))) {
-                    return scanner.wrong("{d} has two parents", .{index});
-                }
-                references.children.set(@intCast(index));
-            },
+        if (reference.role == .plain) return;
+        const of: u32 = @intCast(index);
+        if (scanner.graph) |graph| {
+            try graph.members.append(graph.gpa, of);
+            if (reference.role == .root or !graph.is_first) return;
+            if (!graph.adopt(scanner.enclosing(reference.list), of))
+                return scanner.wrong("{d} has two parents", .{index});
+            return;
         }
+        const family = references.family orelse return;
+        if (reference.role == .root) return family.roots.set(of);
+        if (family.children.isSet(of)) return scanner.wrong("{d} has two parents", .{index});
+        family.children.set(of);
+    }
+
+    /// The element of a counted list that the scanner is in. Asserts that it is in one.
+    fn enclosing(scanner: *const Scanner, list: u8) u32 {
+        var depth = scanner.depth;
+        while (depth > 0) : (depth -= 1) {
+            const frame = &scanner.stack[depth - 1];
+            if (frame.list == list) return @intCast(frame.count - 1);
+        }
+        unreachable;
+    }
+
+    /// Behind a list of children or roots: leaves out those that say nothing new.
+    fn closeFamily(scanner: *Scanner, graph: *Graph, frame: *const Frame) Error!void {
+        const lenience = scanner.lenience.?;
+        if (graph.is_first != (frame.role == .child)) return;
+        const odd = if (frame.role == .child) graph.tidyChildren() else try graph.tidyRoots();
+        if (odd.stray) |node| return scanner.wrong("{d} is a root and a child at once", .{node});
+        if (graph.members.items.len == frame.count) return;
+        if (odd.twice) |node| scanner.said.forgive("{f}: {d} stands twice, counted once", .{
+            Path{ .scanner = scanner }, node,
+        });
+        if (odd.child) |node| scanner.said.forgive(
+            "{f}: {d} is a child of another node there, listed once too often",
+            .{ Path{ .scanner = scanner }, node },
+        );
+        try lenience.replaceNumbers(frame.start, scanner.offset, graph.members.items);
+    }
+
+    /// Goes on behind what breaks a rule: a field that nobody looks at or that is null, or else the
+    /// whole element of a counted list. `err` itself where it can only be refused.
+    fn recover(scanner: *Scanner, err: Error) Error!void {
+        const lenience = scanner.lenience orelse return err;
+        if (err != error.InvalidInput or scanner.is_fatal) return err;
+        while (scanner.depth > 0) : (scanner.depth -= 1) {
+            const frame = &scanner.stack[scanner.depth - 1];
+            const start = frame.value_start;
+            if (frame.is_object) {
+                const field = frame.field orelse continue;
+                const is_null = std.mem.startsWith(u8, scanner.text[start..], "null");
+                if (!field.is_spare and (field.required or !is_null)) continue;
+                scanner.said.forgive("{s}; left out", .{scanner.diagnostic.message.text()});
+                try lenience.hideKey(frame.key_start);
+                try scanner.skipValue(start);
+                return;
+            }
+            const list = frame.list orelse continue;
+            try scanner.skipValue(start);
+            const reason = scanner.diagnostic.message.text();
+            try lenience.leaveOut(list, @intCast(frame.count - 1), .{ .reason = reason });
+            return lenience.replaceElement(start, scanner.offset, frame.substitute);
+        }
+        return err;
+    }
+
+    /// Passes over the value at `start`, of the innermost container.
+    fn skipValue(scanner: *Scanner, start: usize) Error!void {
+        const depth = scanner.depth;
+        scanner.offset = start;
+        try scanner.value(&.any);
+        while (scanner.depth > depth) try scanner.step();
     }
 
     /// Reads a string and returns what is between its quotes, escapes untouched.
@@ -490,7 +652,8 @@ const Scanner = struct {
     }
 
     /// The text is not JSON.
-    fn syntax(scanner: *const Scanner, comptime what: []const u8) error{InvalidInput} {
+    fn syntax(scanner: *Scanner, comptime what: []const u8) error{InvalidInput} {
+        scanner.is_fatal = true;
         const before = scanner.text[0..scanner.offset];
         const line_start = if (std.mem.findScalarLast(u8, before, '\n')) |index| index + 1 else 0;
         return scanner.diagnostic.invalid("JSON line {d}, byte {d}: " ++ what, .{

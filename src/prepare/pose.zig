@@ -31,6 +31,8 @@ pub const Pose = struct {
     center: Vec3d,
     /// The largest distance between quartiles along an axis.
     size: f64,
+    /// What has been subtracted from all places of the scene.
+    shift: Vec3d = @splat(0),
 
     /// Frees the maps.
     pub fn deinit(pose: *const Pose, gpa: std.mem.Allocator) void {
@@ -61,6 +63,7 @@ pub fn compose(gpa: std.mem.Allocator, from: *const scene.Scene) error{OutOfMemo
         map.translation = vec3d.sub(map.translation, shift);
     };
     pose.center = vec3d.sub(pose.center, shift);
+    pose.shift = shift;
     return pose;
 }
 

@@ -113,7 +113,7 @@ pub fn pixelSize(
 }
 
 /// Size of the picture that `choose` makes; a camera that it will not find has no say.
-fn pictureSize(from: *const scene.Scene, wanted: *const Wanted) [2]u32 {
+pub fn pictureSize(from: *const scene.Scene, wanted: *const Wanted) [2]u32 {
     var unsaid: Diagnostic = .{};
     const in_place = wanted.viewpoint.replacesCamera();
     const found = if (in_place) null else find(from, wanted.camera, &unsaid) catch null;

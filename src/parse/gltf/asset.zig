@@ -7,73 +7,10 @@
 const std = @import("std");
 const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
+const draco = @import("../../decode.zig").draco;
+const extensions = @import("extensions.zig");
 const Source = @import("source.zig");
 const Error = Source.Error;
-
-/// Extensions that are read.
-const read: []const []const u8 = &.{
-    "EXT_lights_image_based",
-    "EXT_texture_webp",
-    "KHR_lights_punctual",
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_iridescence",
-    "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_variants",
-    "KHR_materials_volume",
-    "KHR_materials_volume_scatter",
-    "KHR_mesh_quantization",
-    "KHR_texture_basisu",
-    "KHR_texture_transform",
-};
-
-/// Extensions without which the shapes are right and only their looks are not.
-const looks: []const []const u8 = &.{
-    "ADOBE_materials_thin_transparency",
-    "EXT_lights_ies",
-    "FB_materials_modmap",
-    "KHR_materials_subsurface",
-};
-
-/// Extensions that have no part in the picture that a file shows first.
-const unseen: []const []const u8 = &.{
-    "AGI_articulations",
-    "EXT_instance_features",
-    "EXT_mesh_features",
-    "EXT_structural_metadata",
-    "FB_ngon_encoding",
-    "GRIFFEL_bim_data",
-    "KHR_animation_pointer",
-    "KHR_audio_emitter",
-    "KHR_node_hoverability",
-    "KHR_node_selectability",
-    "KHR_xmp",
-    "KHR_xmp_json_ld",
-    "MSFT_packing_normalRoughnessMetallic",
-    "MSFT_packing_occlusionRoughnessMetallic",
-};
-
-/// Other forms of images; textures that have none besides are warned of one by one.
-const pictures: []const []const u8 = &.{
-    "EXT_texture_astc",
-    "EXT_texture_avif",
-    "MSFT_texture_dds",
-};
-
-/// Other forms of meshes that are there as well, unless they are required.
-const meshes: []const []const u8 = &.{
-    "EXT_meshopt_compression",
-    "KHR_draco_mesh_compression",
-    "KHR_meshopt_compression",
-};
 
 /// Names of extensions in one warning.
 const named_count_max = 6;
@@ -94,11 +31,12 @@ pub fn check(source: *const Source) Error!void {
     );
     for (Source.slice(data.extensions_required, data.extensions_required_count)) |raw| {
         const name = std.mem.span(@as([*:0]const u8, raw));
-        for ([_][]const []const u8{ read, looks, unseen, pictures }) |list| {
-            if (contains(list, name)) break;
-        } else return source.fail("the required extension {f} is not supported", .{
+        const is_accepted = if (extensions.find(name)) |known| known.mayBeRequired() else false;
+        if (!is_accepted) return source.fail("the required extension {f} is not supported", .{
             diagnostic.quote(name),
         });
+        if (!draco.is_held and std.mem.eql(u8, name, "KHR_draco_mesh_compression"))
+            return source.fail("{f} needs a build with Draco (-Ddraco)", .{diagnostic.quote(name)});
     }
     warnOfUnrendered(source);
 }
@@ -113,13 +51,10 @@ fn warnOfUnrendered(source: *const Source) void {
         Source.slice(data.extensions_used, data.extensions_used_count),
     }) |list| for (list) |raw| {
         const name = std.mem.span(@as([*:0]const u8, raw));
-        for ([_][]const []const u8{ read, unseen, pictures, meshes }) |known| {
-            if (contains(known, name)) break;
-        } else {
-            if (contains(names[0..@min(count, names.len)], name)) continue;
-            if (count < names.len) names[count] = name;
-            count += 1;
-        }
+        const is_missed = if (extensions.find(name)) |known| known.isMissed() else true;
+        if (!is_missed or contains(names[0..@min(count, names.len)], name)) continue;
+        if (count < names.len) names[count] = name;
+        count += 1;
     };
     if (count == 0) return;
     var buffer: [names.len * 96]u8 = undefined;

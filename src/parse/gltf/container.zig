@@ -16,7 +16,8 @@ pub const Container = struct {
 
 const header_bytes = 12;
 const chunk_header_bytes = 8;
-const magic = "glTF";
+/// What a GLB begins with.
+pub const magic = "glTF";
 const json_type = 0x4E4F534A;
 const binary_type = 0x004E4942;
 
@@ -44,62 +45,115 @@ fn openBinary(bytes: []const u8, diagnostic: *Diagnostic) error{InvalidInput}!Co
     const length = readU32(bytes, 8);
     if (length > bytes.len)
         return diagnostic.invalid("GLB is cut short: {d} bytes of {d}", .{ bytes.len, length });
-    if (length < bytes.len) diagnostic.warn(
+    const chunks = try readChunks(bytes, length, diagnostic);
+    const end = @max(length, chunks.end);
+    if (end < bytes.len) diagnostic.forgive(
         "{d} bytes behind the end of the GLB are ignored",
-        .{bytes.len - length},
+        .{bytes.len - end},
     );
-    return readChunks(bytes[0..length], diagnostic);
+    return chunks.container;
 }
 
-fn readChunks(bytes: []const u8, diagnostic: *Diagnostic) error{InvalidInput}!Container {
+const Chunks = struct {
+    container: Container,
+    /// Of the last one that is known.
+    end: usize,
+};
+
+/// Reads the chunks that begin before `declared`, the length that the header gives.
+fn readChunks(
+    bytes: []const u8,
+    declared: usize,
+    diagnostic: *Diagnostic,
+) error{InvalidInput}!Chunks {
     var json: ?[]const u8 = null;
     var binary: ?[]const u8 = null;
     var offset: usize = header_bytes;
+    var end = offset;
     var index: usize = 0;
-    while (offset < bytes.len) : (index += 1) {
+    while (offset < declared) : (index += 1) {
         const left = bytes.len - offset;
-        if (left < chunk_header_bytes) return diagnostic.invalid(
-            "GLB chunk {d}: {d} bytes are no chunk header",
-            .{ index, left },
-        );
-        const length = readU32(bytes, offset);
-        const kind = readU32(bytes, offset + 4);
+        const length = if (left < chunk_header_bytes) left else readU32(bytes, offset);
+        const kind = if (left < chunk_header_bytes) 0 else readU32(bytes, offset + 4);
+        const is_known = kind == json_type or kind == binary_type;
+        const is_whole = left >= chunk_header_bytes and length <= left - chunk_header_bytes;
+        if (!is_whole and index > 0 and !is_known) {
+            diagnostic.forgive("{d} bytes behind the last chunk of the GLB are ignored", .{
+                declared - offset,
+            });
+            break;
+        }
         offset += chunk_header_bytes;
-        if (length > bytes.len - offset) return diagnostic.invalid(
+        if (!is_whole) return diagnostic.invalid(
             "GLB chunk {d}: {d} bytes past the end",
             .{ index, length - (bytes.len - offset) },
         );
-        if (length % 4 != 0) return diagnostic.invalid(
-            "GLB chunk {d}: length {d} is no multiple of 4",
-            .{ index, length },
-        );
         const content = bytes[offset..][0..length];
-        offset += length;
+        end = offset + length;
+        offset = try nextChunk(bytes, end, length, index, diagnostic);
         if (index == 0 and kind != json_type) break;
         if (index == 0) json = skipPadding(content, diagnostic);
         // Further chunks of a kind that is not known have to be passed over.
         if (kind == binary_type and binary == null) binary = content;
     }
-    return .{
+    if (end > declared) diagnostic.forgive(
+        "the GLB's chunks end at {d} bytes, its header says {d}",
+        .{ end, declared },
+    );
+    return .{ .end = end, .container = .{
         .json = json orelse return diagnostic.invalid("GLB does not begin with a JSON chunk", .{}),
         .binary = binary,
-    };
+    } };
+}
+
+/// Where the chunk behind one that ends at `end` begins. Lengths are multiples of 4, but there are
+/// writers that leave out the padding, and others that do not count it.
+fn nextChunk(
+    bytes: []const u8,
+    end: usize,
+    length: usize,
+    index: usize,
+    diagnostic: *Diagnostic,
+) error{InvalidInput}!usize {
+    if (length % 4 == 0) return end;
+    const padded = std.mem.alignForward(usize, end, 4);
+    const next = if (isChunk(bytes, padded))
+        padded
+    else if (isChunk(bytes, end))
+        end
+    else if (bytes.len - end < chunk_header_bytes)
+        bytes.len
+    else
+        return diagnostic.invalid("GLB chunk {d}: length {d} is no multiple of 4", .{
+            index, length,
+        });
+    diagnostic.forgive("GLB chunk {d}: length {d} is no multiple of 4", .{ index, length });
+    return next;
+}
+
+/// Whether a chunk of a known kind begins at `offset`, and ends within the file.
+fn isChunk(bytes: []const u8, offset: usize) bool {
+    if (offset > bytes.len or bytes.len - offset < chunk_header_bytes) return false;
+    const kind = readU32(bytes, offset + 4);
+    if (kind != json_type and kind != binary_type) return false;
+    return readU32(bytes, offset) <= bytes.len - offset - chunk_header_bytes;
 }
 
 /// Leaves out a byte order mark, which JSON forbids but files have.
 fn skipMark(json: []const u8, diagnostic: *Diagnostic) []const u8 {
     const mark = "\xef\xbb\xbf";
     if (!std.mem.startsWith(u8, json, mark)) return json;
-    diagnostic.warn("the JSON text begins with a byte order mark, ignored", .{});
+    diagnostic.forgive("the JSON text begins with a byte order mark, ignored", .{});
     return json[mark.len..];
 }
 
 /// Leaves out zero bytes where the specification wants spaces.
 fn skipPadding(json: []const u8, diagnostic: *Diagnostic) []const u8 {
     const trimmed = std.mem.trimEnd(u8, json, "\x00");
-    if (trimmed.len < json.len) {
-        diagnostic.warn("the JSON chunk is padded with zero bytes instead of spaces", .{});
-    }
+    if (trimmed.len < json.len) diagnostic.forgive(
+        "the JSON chunk is padded with zero bytes instead of spaces",
+        .{},
+    );
     return trimmed;
 }
 
@@ -126,11 +180,10 @@ test "lengths and kinds of chunks" {
         "",
         "glTF",
         header ++ "\x00\x00\x00\x00" ++ chunk,
-        header ++ "\x13\x00\x00\x00" ++ chunk,
-        header ++ "\x19\x00\x00\x00" ++ chunk ++ " ",
         header ++ "\x18\x00\x00\x00" ++ "\x04\x00\x00\x00BIN\x00{}  ",
         header ++ "\x18\x00\x00\x00" ++ "\x08\x00\x00\x00JSON{}  ",
-        header ++ "\x18\x00\x00\x00" ++ "\x03\x00\x00\x00JSON{}  ",
+        header ++ "\x1f\x00\x00\x00" ++ "\x03\x00\x00\x00JSON{}  1234567",
+        header ++ "\x20\x00\x00\x00" ++ chunk ++ "\x01\x00\x00\x00BIN\x00",
     };
     for (bad) |bytes| {
         var diagnostic: Diagnostic = .{};
@@ -147,4 +200,66 @@ test "marks and padding are left out with a warning" {
     const binary = try open(padded, &diagnostic);
     try std.testing.expectEqualStrings("{}", binary.json);
     try std.testing.expectEqual(2, diagnostic.warning_count);
+}
+
+test "padding that is missing or not counted, and bytes behind the last chunk" {
+    const header = "glTF\x02\x00\x00\x00";
+    const Case = struct { length: u8, chunks: []const u8, binary: ?[]const u8 };
+    for ([_]Case{
+        .{
+            .length = 34,
+            .chunks = "\x02\x00\x00\x00JSON{}\x04\x00\x00\x00BIN\x001234",
+            .binary = "1234",
+        },
+        .{
+            .length = 36,
+            .chunks = "\x02\x00\x00\x00JSON{}  \x04\x00\x00\x00BIN\x001234",
+            .binary = "1234",
+        },
+        .{
+            .length = 35,
+            .chunks = "\x04\x00\x00\x00JSON{}  \x03\x00\x00\x00BIN\x00123",
+            .binary = "123",
+        },
+        .{
+            .length = 36,
+            .chunks = "\x04\x00\x00\x00JSON{}  \x03\x00\x00\x00BIN\x00123\x00",
+            .binary = "123",
+        },
+        .{ .length = 26, .chunks = "\x02\x00\x00\x00JSON{}  \x00\x00", .binary = null },
+        .{
+            .length = 28,
+            .chunks = "\x04\x00\x00\x00JSON{}  \x00\x00\x00\x00",
+            .binary = null,
+        },
+        .{
+            .length = 40,
+            .chunks = "\x04\x00\x00\x00JSON{}  \xff\xff\xff\xffjunkjunkjunk",
+            .binary = null,
+        },
+        .{ .length = 25, .chunks = "\x04\x00\x00\x00JSON{}   ", .binary = null },
+        // Its header says less than there is.
+        .{ .length = 19, .chunks = "\x04\x00\x00\x00JSON{}  ", .binary = null },
+        .{
+            .length = 35,
+            .chunks = "\x04\x00\x00\x00JSON{}  \x04\x00\x00\x00BIN\x001234",
+            .binary = "1234",
+        },
+    }) |case| {
+        const parts = [_][]const u8{ header, &.{ case.length, 0, 0, 0 }, case.chunks };
+        const bytes = try std.mem.concat(std.testing.allocator, u8, &parts);
+        defer std.testing.allocator.free(bytes);
+        for ([_]bool{ false, true }) |strict| {
+            var diagnostic: Diagnostic = .{ .strict = strict };
+            const container = try open(bytes, &diagnostic);
+            const json = std.mem.trim(u8, container.json, " ");
+            try std.testing.expectEqualStrings("{}", json);
+            try std.testing.expectEqual(case.binary == null, container.binary == null);
+            if (case.binary) |binary| {
+                try std.testing.expectEqualStrings(binary, container.binary.?);
+            }
+            try std.testing.expectEqual(strict, diagnostic.refused);
+            try std.testing.expectEqual(!strict, diagnostic.warning_count > 0);
+        }
+    }
 }

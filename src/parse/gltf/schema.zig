@@ -12,6 +12,7 @@ const Rule = json.Rule;
 /// The counted lists.
 pub const List = enum(u8) {
     accessors,
+    animations,
     buffers,
     buffer_views,
     cameras,
@@ -33,14 +34,21 @@ pub const document: Rule = object(&.{
     required("asset", object(&.{
         required("version", .string),
         optional("minVersion", .string),
-        optional("generator", .string),
-        optional("copyright", .string),
+        spare("generator", .string),
+        spare("copyright", .string),
         optional("extensions", extensions(&.{})),
     })),
     optional("accessors", list(.accessors, &accessor)),
-    optional("animations", many(&animation)),
+    optional("animations", list(.animations, &animation)),
     optional("buffers", list(.buffers, &buffer)),
-    optional("bufferViews", list(.buffer_views, &buffer_view)),
+    optional("bufferViews", .{
+        .array = .{
+            .item = &buffer_view,
+            .list = @backingInt(List.buffer_views),
+            // cgltf does not take one without a buffer.
+            .substitute = "{\"buffer\":0}",
+        },
+    }),
     optional("cameras", list(.cameras, &camera)),
     optional("images", list(.images, &image)),
     optional("materials", list(.materials, &material)),
@@ -61,7 +69,7 @@ pub const document: Rule = object(&.{
             required("lights", list(.lights, &light)),
         })),
         optional("KHR_materials_variants", object(&.{
-            optional("variants", list(.variants, &object(&.{optional("name", .string)}))),
+            optional("variants", list(.variants, &object(&.{spare("name", .string)}))),
         })),
     })),
     optional("extras", .any),
@@ -74,8 +82,8 @@ const accessor: Rule = named(&.{
     optional("normalized", .boolean),
     required("count", .whole),
     required("type", .string),
-    optional("max", many(&.number)),
-    optional("min", many(&.number)),
+    spare("max", many(&.number)),
+    spare("min", many(&.number)),
     optional("sparse", object(&.{
         required("count", .whole),
         required("indices", object(&.{
@@ -118,7 +126,7 @@ const buffer_view: Rule = namedWith(&.{
     optional("byteOffset", .whole),
     required("byteLength", .whole),
     optional("byteStride", .whole),
-    optional("target", .whole),
+    spare("target", .whole),
 }, &.{
     optional("EXT_meshopt_compression", meshopt),
     optional("KHR_meshopt_compression", meshopt),
@@ -127,11 +135,13 @@ const buffer_view: Rule = namedWith(&.{
 const meshopt: Rule = object(&.{
     required("buffer", reference(.buffers)),
     optional("byteOffset", .whole),
-    optional("byteLength", .whole),
-    optional("byteStride", .whole),
-    optional("count", .whole),
-    optional("mode", .string),
-    optional("filter", .string),
+    required("byteLength", .whole),
+    required("byteStride", .whole),
+    required("count", .whole),
+    required("mode", .string),
+    optional("filter", .{ .word = &.{
+        "NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR",
+    } }),
 });
 
 const camera: Rule = named(&.{
@@ -139,20 +149,20 @@ const camera: Rule = named(&.{
     optional("perspective", object(&.{
         optional("aspectRatio", .number),
         required("yfov", .number),
-        optional("zfar", .number),
-        optional("znear", .number),
+        spare("zfar", .number),
+        spare("znear", .number),
     })),
     optional("orthographic", object(&.{
         required("xmag", .number),
         required("ymag", .number),
-        optional("zfar", .number),
-        optional("znear", .number),
+        spare("zfar", .number),
+        spare("znear", .number),
     })),
 });
 
 const image: Rule = named(&.{
     optional("uri", .string),
-    optional("mimeType", .string),
+    spare("mimeType", .string),
     optional("bufferView", reference(.buffer_views)),
 });
 
@@ -223,6 +233,7 @@ const node: Rule = namedWith(&.{
     optional("weights", many(&.number)),
 }, &.{
     optional("KHR_lights_punctual", object(&.{optional("light", reference(.lights))})),
+    optional("KHR_node_visibility", object(&.{optional("visible", .boolean)})),
     optional("EXT_mesh_gpu_instancing", object(&.{optional("attributes", attributes)})),
 });
 
@@ -364,6 +375,11 @@ fn optional(comptime name: []const u8, comptime rule: Rule) Field {
     return .{ .name = name, .rule = rule };
 }
 
+/// What nobody looks at.
+fn spare(comptime name: []const u8, comptime rule: Rule) Field {
+    return .{ .name = name, .rule = rule, .is_spare = true };
+}
+
 fn required(comptime name: []const u8, comptime rule: Rule) Field {
     return .{ .name = name, .rule = rule, .required = true };
 }
@@ -379,7 +395,7 @@ fn named(comptime fields: []const Field) Rule {
 
 fn namedWith(comptime fields: []const Field, comptime known: []const Field) Rule {
     return object(fields ++ [_]Field{
-        optional("name", .string),
+        spare("name", .string),
         optional("extensions", extensions(known)),
         optional("extras", .any),
     });

@@ -6,6 +6,7 @@
 //! asks for it, and once, however many name it. One that cannot be had is a warning and no texture.
 
 const std = @import("std");
+const buffer_views = @import("buffer_views.zig");
 const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
 const escapes = @import("../json/escapes.zig");
@@ -67,6 +68,10 @@ pub fn view(
     const has_own_set = raw.has_transform != 0 and transform.has_texcoord != 0;
     const set = if (has_own_set) transform.texcoord else raw.texcoord;
     if (set < 0 or set >= scene.texcoord_set_count) {
+        if (!hasTexcoords(source, set)) return source.fail(
+            "material {d}: {s}: there is no TEXCOORD of its texCoord",
+            .{ material, slot },
+        );
         source.warn("material {d}: {s}: only TEXCOORD_0 to TEXCOORD_{d} are read, left out", .{
             material, slot, scene.texcoord_set_count - 1,
         });
@@ -78,7 +83,7 @@ pub fn view(
         .texcoord_set = @intCast(set),
         .transform = if (raw.has_transform != 0)
             compose(transform.offset, transform.rotation, transform.scale) orelse {
-                source.warn("material {d}: {s}: its rotation is out of range, left out", .{
+                source.forgive("material {d}: {s}: its rotation is out of range, left out", .{
                     material, slot,
                 });
                 return null;
@@ -86,6 +91,19 @@ pub fn view(
         else
             .{ .{ 1, 0, 0 }, .{ 0, 1, 0 } },
     };
+}
+
+/// Whether a mesh of the file has coordinates of this set.
+fn hasTexcoords(source: *const Source, set: c_int) bool {
+    for (Source.slice(source.data.meshes, source.data.meshes_count)) |*mesh| {
+        for (Source.slice(mesh.primitives, mesh.primitives_count)) |*primitive| {
+            const list = Source.slice(primitive.attributes, primitive.attributes_count);
+            for (list) |*attribute| {
+                if (attribute.type == .texcoord and attribute.index == set) return true;
+            }
+        }
+    }
+    return false;
 }
 
 /// KHR_texture_transform: scaled, turned, moved; null where the angle has no digits left. The turn
@@ -110,6 +128,7 @@ fn compose(offset: [2]f32, rotation_rad: f32, scaling: [2]f32) ?[2][3]f32 {
 fn get(textures: *Textures, index: u32) Error!?u32 {
     const source = textures.source;
     if (textures.known.get(index)) |texture| return texture;
+    try source.need(.textures, index);
     const raw = Source.item(source.data.textures, index);
     // What a file offers besides the image of the core is there to be preferred.
     var named = false;
@@ -121,10 +140,10 @@ fn get(textures: *Textures, index: u32) Error!?u32 {
         const image_index = Source.indexOf(source.data.images, candidate);
         if (try textures.getImage(image_index)) |image| break image;
     } else null;
-    if (!named) source.warn("texture {d}: has no image that can be read, left out", .{index});
+    if (!named) source.forgive("texture {d}: has no image that can be read, left out", .{index});
     var texture: ?u32 = null;
     if (image) |present| {
-        var complete = textures.readSampler(raw);
+        var complete = try textures.readSampler(raw);
         complete.image = present;
         texture = try source.builder.addTexture(complete);
     }
@@ -133,10 +152,11 @@ fn get(textures: *Textures, index: u32) Error!?u32 {
 }
 
 /// How a texture is looked up, without its image.
-fn readSampler(textures: *const Textures, raw: *const c.cgltf_texture) scene.Texture {
+fn readSampler(textures: *const Textures, raw: *const c.cgltf_texture) Error!scene.Texture {
     var texture: scene.Texture = .{ .image = scene.none };
     if (raw.sampler == null) return texture;
     const source = textures.source;
+    try source.need(.samplers, Source.indexOf(source.data.samplers, raw.sampler));
     const sampler = Source.item(raw.sampler, 0);
     switch (sampler.mag_filter) {
         .undefined, .linear => {},
@@ -176,20 +196,25 @@ fn warnOfSampler(
 ) void {
     const index = Source.indexOf(source.data.textures, raw);
     const parts = .{ index, name, value };
-    source.warn("texture {d}: its sampler's {s} {d} is not known, ignored", parts);
+    source.forgive("texture {d}: its sampler's {s} {d} is not known, ignored", parts);
 }
 
 /// The scene's image for the file's with this index; null, with a warning, where it has none.
 pub fn getImage(textures: *Textures, index: u32) Error!?u32 {
     const source = textures.source;
     if (textures.images.get(index)) |image| return image;
+    if (source.findBroken(.images, index)) |broken| {
+        source.forgiveEach("image {d}: {s}, left out", .{ index, broken.reason });
+        try textures.images.put(source.gpa, index, null);
+        return null;
+    }
     const raw = Source.item(source.data.images, index);
     const image = if (raw.buffer_view != null)
         try textures.fromView(index, Source.item(raw.buffer_view, 0))
     else if (raw.uri != null)
         try textures.fromUri(index, std.mem.span(@as([*:0]const u8, raw.uri)))
     else no_data: {
-        source.warn("image {d}: has neither bufferView nor uri, left out", .{index});
+        source.forgiveEach("image {d}: has neither bufferView nor uri, left out", .{index});
         break :no_data null;
     };
     try textures.images.put(source.gpa, index, image);
@@ -204,19 +229,26 @@ fn fromView(textures: *Textures, index: u32, raw: *const c.cgltf_buffer_view) Er
         .size = raw.size,
     };
     if (textures.ranges.get(range)) |image| return image;
-    const buffer = source.buffers[range.buffer] orelse {
-        source.warn("image {d}: its buffer has no data, or only compressed data, left out", .{
+    const view_bytes = buffer_views.contents(source, raw) catch |err| switch (err) {
+        error.OutOfMemory => |failure| return failure,
+        error.InvalidInput, error.InputOutput => {
+            const said = source.diagnostic.message;
+            if (!source.diagnostic.refused) source.diagnostic.message.set("", .{});
+            source.forgiveEach("image {d}: {s}, left out", .{ index, said.text() });
+            return null;
+        },
+    } orelse {
+        source.forgiveEach("image {d}: its buffer has no data, left out", .{
             index,
         });
         return null;
     };
     if (range.size > textures.view_bytes_left) {
-        source.warn("image {d}: images of the file overlap, left out", .{index});
+        source.forgiveEach("image {d}: images of the file overlap, left out", .{index});
         return null;
     }
     textures.view_bytes_left -= range.size;
-    // Whole views have been checked against their buffers.
-    const bytes = try source.arena.dupe(u8, buffer[range.offset..][0..range.size]);
+    const bytes = try source.arena.dupe(u8, view_bytes);
     const image = try textures.addImage(index, bytes);
     try textures.ranges.put(source.gpa, range, image);
     return image;
@@ -236,7 +268,7 @@ fn fromUri(textures: *Textures, index: u32, encoded: []const u8) Error!?u32 {
     } else |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidInput => none: {
-            source.warn("image {d}: {s}, left out", .{ index, reason.text() });
+            source.forgiveEach("image {d}: {s}, left out", .{ index, reason.text() });
             break :none null;
         },
     };
@@ -257,7 +289,7 @@ fn fromFile(textures: *Textures, index: u32, path: []const u8) Error!?u32 {
             .{ index, diagnostic.quote(path), reason.text() },
         ),
         error.Unreadable => {
-            source.warn("image {d}: {f} {s}, left out", .{
+            source.forgiveEach("image {d}: {f} {s}, left out", .{
                 index, diagnostic.quote(path), reason.text(),
             });
             return null;

@@ -1,0 +1,70 @@
+//! What a glTF file says of itself: generator, scenes, extensions, and how much there is of what.
+//!
+//! In: a document that has been checked. Out: `scene.File`, its texts in the scene's memory.
+
+const std = @import("std");
+const choice = @import("choice.zig");
+const c = @import("../cgltf.zig");
+const escapes = @import("../json/escapes.zig");
+const scene = @import("../../scene.zig");
+const Source = @import("source.zig");
+const Error = error{OutOfMemory};
+
+/// The description of the file whose scene `shown` is read; null: all of its nodes are.
+pub fn read(
+    source: *const Source,
+    format: scene.File.Format,
+    shown: ?*const c.cgltf_scene,
+) Error!scene.File {
+    const data = source.data;
+    const scenes = try source.arena.alloc([]const u8, data.scenes_count);
+    for (scenes, Source.slice(data.scenes, data.scenes_count)) |*name, *one| {
+        name.* = try choice.nameOf(source.arena, one) orelse "";
+    }
+    return .{
+        .format = format,
+        .version = try textOf(source, data.asset.version),
+        .generator = try textOf(source, data.asset.generator),
+        .scenes = scenes,
+        .scene_shown = if (shown) |one| Source.indexOf(data.scenes, one) else scene.none,
+        .extensions = try extensionsOf(source),
+        .counts = .{
+            .nodes = data.nodes_count,
+            .meshes = data.meshes_count,
+            .materials = data.materials_count,
+            .textures = data.textures_count,
+            .images = data.images_count,
+            .skins = data.skins_count,
+            .animations = data.animations_count,
+            .cameras = data.cameras_count,
+            .lights = data.lights_count,
+        },
+    };
+}
+
+fn textOf(source: *const Source, raw: [*c]const u8) Error![]const u8 {
+    if (raw == null) return "";
+    return escapes.decodeString(source.arena, std.mem.span(@as([*:0]const u8, raw)));
+}
+
+/// Those that are required, also where the file does not say that it uses them, and then the rest.
+fn extensionsOf(source: *const Source) Error![]const scene.File.Extension {
+    const data = source.data;
+    var known: std.StringArrayHashMapUnmanaged(bool) = .empty;
+    defer known.deinit(source.gpa);
+    for ([_][]const [*c]u8{
+        Source.slice(data.extensions_required, data.extensions_required_count),
+        Source.slice(data.extensions_used, data.extensions_used_count),
+    }, [_]bool{ true, false }) |list, required| for (list) |raw| {
+        const entry = try known.getOrPut(source.gpa, std.mem.span(@as([*:0]const u8, raw)));
+        if (!entry.found_existing) entry.value_ptr.* = required;
+    };
+    const extensions = try source.arena.alloc(scene.File.Extension, known.count());
+    for (extensions, known.keys(), known.values()) |*extension, name, required| {
+        extension.* = .{
+            .name = try escapes.decodeString(source.arena, name),
+            .required = required,
+        };
+    }
+    return extensions;
+}
