@@ -66,7 +66,7 @@ pub fn build(b: *std.Build) void {
 
     addBenchmark(steps.check, steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
     addBenchmark(steps.check, steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
-    addBenchmark(steps.check, steps.bench_frames, package.benchmark("frames", "bench/frames.zig"));
+    addBenchmark(steps.check, steps.bench_frames, package.renderer("frames", "bench/frames.zig"));
     const structures = package.benchmark("structures", "bench/structures.zig");
     addBenchmark(steps.check, steps.bench_structures, structures);
     const full: Package = .init(b, target, optimize orelse .fast, vendor.headers, all);
