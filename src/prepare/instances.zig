@@ -82,17 +82,17 @@ pub const Sharing = struct {
 pub fn share(
     gpa: Allocator,
     arena: Allocator,
-    instances: []const scene.Instance,
-    meshes: []const scene.Mesh,
-    materials: []const scene.Material,
+    parts: *const Parts,
     attributes: flatten.Attributes,
     pose: *const pose_file.Pose,
     settings: *const Settings,
 ) (error{OutOfMemory} || parallel.Error)!Sharing {
+    const instances = parts.instances;
+    const meshes = parts.meshes;
     const all_flat: Sharing = .{ .flat = instances };
     const chosen = try gpa.alloc(bool, meshes.len);
     defer gpa.free(chosen);
-    if (!try choose(gpa, instances, meshes, materials, settings.rule, chosen)) return all_flat;
+    if (!try choose(gpa, parts, settings.rule, chosen)) return all_flat;
     var maker: Maker = .{
         .gpa = gpa,
         .arena = arena,
@@ -112,23 +112,22 @@ pub fn share(
 /// Chooses meshes by counts and materials; false: none is shared.
 fn choose(
     gpa: Allocator,
-    instances: []const scene.Instance,
-    meshes: []const scene.Mesh,
-    materials: []const scene.Material,
+    parts: *const Parts,
     rule: Rule,
     chosen: []bool,
 ) error{OutOfMemory}!bool {
+    const meshes = parts.meshes;
     const counts = try gpa.alloc(u32, meshes.len);
     defer gpa.free(counts);
     @memset(counts, 0);
-    for (instances) |*instance| {
+    for (parts.instances) |*instance| {
         const mesh = &meshes[instance.mesh];
         if (mesh.points.len > 0 or mesh.segments.len > 0) return false;
         counts[instance.mesh] += @intFromBool(isRigid(instance));
     }
     var saved: u64 = 0;
     for (meshes, counts, chosen) |*mesh, count, *is_chosen| {
-        const material = &materials[mesh.material];
+        const material = &parts.materials[mesh.material];
         const emits = math.vec3.maxComponent(material.emissive) > 0;
         is_chosen.* = count > 1 and mesh.triangles.len >= rule.triangle_min and
             mesh.triangles.len > 0 and !emits and !material.volume;

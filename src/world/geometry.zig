@@ -158,8 +158,8 @@ pub const AnyTree = union(enum) {
 };
 
 /// Three corners and a material; its index in `Geometry.triangles` is the primitive number, unless
-/// there are instances that share meshes. One that has no area or no finite place is dropped: it
-/// keeps its number, but the tree has none of it.
+/// instances share meshes. One that has no area or no finite place is dropped: it keeps its number,
+/// but the tree lacks it.
 pub const Triangle = extern struct {
     /// Indices into `Geometry.positions` and the other arrays by vertex, counter-clockwise in
     /// front.
