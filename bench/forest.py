@@ -23,7 +23,7 @@ BRANCH_SIDES = 5
 
 
 def pieces(count, rng):
-    """Positions, normals and indices of a tree of `count` triangles: a trunk, and leaves about it."""
+    """Positions, normals and indices of a tree of `count` triangles: a trunk, leaves about it."""
     trunk_rings = max(2, count // 400)
     angles = numpy.arange(BRANCH_SIDES) * (2 * math.pi / BRANCH_SIDES)
     heights = numpy.linspace(0, 3.2, trunk_rings + 1)
@@ -187,7 +187,7 @@ def forest(arguments, instanced):
         "buffers": [{"byteLength": len(buffer.bytes)}],
         "extensions": {"KHR_lights_punctual": {"lights": [
             {"type": "directional", "intensity": 4, "color": [1, 0.95, 0.85]}]}},
-        "extensionsUsed": ["KHR_lights_punctual"] + (["EXT_mesh_gpu_instancing"] if instanced else []),
+        "extensionsUsed": ["KHR_lights_punctual"] + ["EXT_mesh_gpu_instancing"] * instanced,
     }
     triangles = sum(buffer.accessors[p["indices"]]["count"] // 3
                     for m in meshes for p in m["primitives"])
