@@ -1,8 +1,8 @@
 //! Two-level instancing (Wald, Benthin and Slusallek 2003, "Distributed Interactive Ray Tracing of
 //! Dynamic Scenes"): meshes that many instances share, with the tree over each.
 //!
-//! A mesh is held once, in its own space, with a tree of its own that is cut into clusters of some
-//! 200 triangles at most. An instance is a map and the number of its first triangle. Above the
+//! A mesh is held once, in its own space, with a tree of its own that is cut into clusters of
+//! 256 triangles at most. An instance is a map and the number of its first triangle. Above the
 //! clusters of all instances stand boxes in world space, so that no ray is ever transformed: where
 //! one comes to a cluster, that is mapped as a whole (`MappedCluster`), by the expressions that
 //! flatten meshes, and from there on it is a small tree like any other. So a hit is the same as if
@@ -55,7 +55,7 @@ pub const Cluster = struct {
 
 /// Packs of a cluster at most.
 pub fn clusterPacksMax(comptime width: comptime_int) comptime_int {
-    return 192 / width;
+    return 256 / width;
 }
 
 /// Nodes of a cluster at most, which has always one.

@@ -9,8 +9,8 @@ const Allocator = std.mem.Allocator;
 const Frame = world_file.Frame;
 const Geometry = world_file.Geometry;
 
-/// Clusters that a thread keeps, in `Boxes` of the tree's width: some 2.5 MB.
-const slot_count = 256;
+/// Clusters that a thread keeps: some 6 MB.
+const slot_count = 512;
 
 /// Must stay where it is.
 pub fn OwnFrame(comptime Kernel: type) type {
