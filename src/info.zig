@@ -42,16 +42,6 @@ pub const Info = struct {
     /// About the most that it takes to render that.
     memory_bytes: u64,
     warnings: []const []const u8 = &.{},
-
-    /// Whether it is rendered only with `--force`.
-    pub fn needsForce(info: *const Info) bool {
-        for (info.scene.file.extensions) |used| {
-            if (!used.required) continue;
-            const known = parse.extensions.find(used.name) orelse return true;
-            if (!known.mayBeRequired()) return true;
-        }
-        return false;
-    }
 };
 
 /// An image of the scene's, by its header.
