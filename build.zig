@@ -9,6 +9,7 @@ const builtin = @import("builtin");
 const manifest = @import("build.zig.zon");
 const Package = @import("build/package.zig");
 const Tests = @import("build/tests.zig");
+const libraries = @import("build/libraries.zig");
 const variants = @import("build/variants.zig");
 const Compile = std.Build.Step.Compile;
 const Run = std.Build.Step.Run;
@@ -44,9 +45,13 @@ pub fn build(b: *std.Build) void {
     };
     const query = b.standardTargetOptionsQueryOnly(.{});
     const optimize = b.option(std.lang.Optimize, "optimize", "debug, safe, fast (default), small");
-    const options, const all = variantOptions(b);
+    const optional: libraries.Optional = .{
+        .draco = b.option(bool, "draco", "Read meshes compressed by Draco (releases do)") orelse
+            false,
+    };
+    const options, const all = variantOptions(b, optional);
     const filters = b.option([]const []const u8, "test-filter", "Only tests with this in the name");
-    const vendor = addVendor(b);
+    const vendor = addVendor(b, optional);
     steps.vendor.dependOn(vendor.step);
     const target = resolve(b, query);
     const package: Package = .init(b, target, optimize orelse .fast, vendor.headers, options);
@@ -87,13 +92,14 @@ pub fn build(b: *std.Build) void {
 }
 
 /// The choice of variants, for programs that are used and for those that compare variants.
-fn variantOptions(b: *std.Build) [2]Package.Options {
+fn variantOptions(b: *std.Build, optional: libraries.Optional) [2]Package.Options {
     var options: Package.Options = .{
         .backend = b.option(variants.Backend, "backend", "Arithmetic of the default variant") orelse
             .vector,
         .traversal = b.option(variants.Traversal, "traversal", "Its bundles of rays") orelse .beam,
         .lanes = b.option(u8, "lanes", "Its SIMD width: 4, 8 or 16 (default: the target's)"),
         .extent = undefined,
+        .optional = optional,
     };
     const description = "Hold that variant (one), the scalar reference beside it (few), or all";
     const extent = b.option(variants.Extent, "variants", description);
@@ -132,6 +138,7 @@ fn addCompare(step: *std.Build.Step, package: Package, headers: std.Build.LazyPa
             .traversal = variant.traversal,
             .lanes = variant.lanes,
             .extent = .one,
+            .optional = package.optional,
         });
         run.addArtifactArg2(single.program(), .{
             .prefix = b.fmt("{s}=", .{name}),
@@ -155,10 +162,14 @@ fn addLowering(step: *std.Build.Step) void {
 }
 
 /// The step that puts the third-party files in place, and the folder of copies that depends on it.
-fn addVendor(b: *std.Build) struct { step: *std.Build.Step, headers: std.Build.LazyPath } {
+fn addVendor(
+    b: *std.Build,
+    optional: libraries.Optional,
+) struct { step: *std.Build.Step, headers: std.Build.LazyPath } {
     const fetch = b.addSystemCommand(&.{"python3"});
     fetch.setName("vendor/fetch");
     fetch.addFileArg(b.path("vendor/fetch"));
+    fetch.addArgs(optional.names());
     // It looks at files that a user may have put there, so it runs each time (0.1 s).
     fetch.has_side_effects = true;
     const copies = b.addWriteFiles();

@@ -92,6 +92,7 @@ pub const Library = struct {
             root.addIncludePath(LazyPath.zig_lib.path(b, folder));
         }
         root.addIncludePath(headers);
+        for (library.includes) |folder| root.addIncludePath(headers.path(b, folder));
         if (library.own_headers) |folder| root.addIncludePath(b.path(folder));
         const flags = std.mem.concat(b.allocator, []const u8, &.{
             cpp_flags, library.flags,
@@ -144,6 +145,16 @@ pub const libdeflate: Library = .{
     .shims = &.{"src/decode/gzip.c"},
 };
 
+/// The decoder of meshes, an option.
+pub const draco: Library = .{
+    .name = "draco",
+    .cpp_shim = "src/decode/draco.cpp",
+    .includes = &.{"draco/src"},
+    .own_headers = "src/decode/draco",
+    .flags = &.{"-fno-aligned-allocation"},
+};
+
+
 /// The decoder in plain C. Threads are ours, but its tables are set up under locks. Its one place
 /// of allocations is given names of ours.
 pub const libwebp: Library = .{
@@ -185,6 +196,13 @@ pub const libwebp: Library = .{
         "-U__AVX2__",              "-U__ARM_NEON__",          "-U__aarch64__",
         "-Dmalloc=rl_webp_malloc", "-Dcalloc=rl_webp_calloc", "-Dfree=rl_webp_free",
     },
+};
+
+/// The decoders, without SIMD.
+pub const meshopt: Library = .{
+    .name = "meshopt",
+    .cpp_shim = "src/decode/meshopt.cpp",
+    .flags = &.{"-DMESHOPTIMIZER_NO_SIMD"},
 };
 
 pub const mikktspace: Library = .{
@@ -268,17 +286,37 @@ pub const zstd: Library = .{
     .shims = &.{"src/decode/zstd.c"},
 };
 
-/// What the program holds.
-pub const program = [_]Library{
-    basisu,  cgltf,     libdeflate,      libwebp, mikktspace,
-    openexr, stb_image, stb_image_write, zstd,
+/// What every program holds.
+const program = [_]Library{
+    basisu,     cgltf,   libdeflate, libwebp,         meshopt,
+    mikktspace, openexr, stb_image,  stb_image_write, zstd,
 };
 
+/// What is a choice of the build, and of its command line. Releases hold it.
+pub const Optional = struct {
+    draco: bool,
+
+    /// The names by which vendor/fetch knows them.
+    pub fn names(optional: Optional) []const []const u8 {
+        return if (optional.draco) &.{draco.name} else &.{};
+    }
+};
+
+/// What a program holds.
+pub fn held(optional: Optional) []const Library {
+    return if (optional.draco) &(program ++ [_]Library{draco}) else &program;
+}
+
 /// A module with `text`: the project's licence, and the notices of what a program is made of.
-pub fn licenses(b: *std.Build, headers: LazyPath, is_musl: bool) *Module {
+pub fn licenses(
+    b: *std.Build,
+    headers: LazyPath,
+    of: []const Library,
+    is_musl: bool,
+) *Module {
     var texts: std.ArrayList(LazyPath) = .empty;
     texts.append(b.allocator, b.path("LICENSE")) catch @panic("OOM");
-    for (program) |library| {
+    for (of) |library| {
         const notice = headers.path(b, b.fmt("{s}.notice", .{library.name}));
         texts.append(b.allocator, notice) catch @panic("OOM");
     }

@@ -20,6 +20,7 @@ target: std.Build.ResolvedTarget,
 optimize: std.lang.Optimize,
 headers: LazyPath,
 is_stripped: bool,
+optional: libraries.Optional,
 /// The library, `@import("raylane")`.
 raylane: *Module,
 shows_searches: bool,
@@ -42,6 +43,7 @@ pub const Options = struct {
     shows_searches: bool = false,
     /// Whether its programs do without what debuggers and traces of the stack read.
     is_stripped: bool = false,
+    optional: libraries.Optional,
 };
 
 const own_c_flags: []const []const u8 = &.{
@@ -69,6 +71,7 @@ pub fn init(
         .optimize = optimize,
         .headers = headers,
         .is_stripped = options.is_stripped,
+        .optional = options.optional,
         .shows_searches = options.shows_searches,
         .held = held,
         .counting = counting,
@@ -77,7 +80,9 @@ pub fn init(
         .intrinsics = undefined,
         .kernels = undefined,
     };
-    package.config = package.configOf(held, counting, options.extent == .all);
+    const config = package.configOf(held, counting, options.extent == .all);
+    config.addOption(bool, "has_draco", options.optional.draco); // Not for kernels to know.
+    package.config = config.createModule();
     package.raylane = package.library();
     package.intrinsics = package.intrinsicsObject();
     package.kernels = package.kernelObjects();
@@ -89,8 +94,9 @@ pub fn library(package: Package) *Module {
     const root = package.moduleOf("src/raylane.zig");
     const is_musl = package.target.result.isMuslLibC();
     root.addImport("config", package.config);
-    root.addImport("licenses", libraries.licenses(package.owner, package.headers, is_musl));
-    for (libraries.program) |each| each.addTo(root, package.headers);
+    const held = libraries.held(package.optional);
+    root.addImport("licenses", libraries.licenses(package.owner, package.headers, held, is_musl));
+    for (held) |each| each.addTo(root, package.headers);
     return root;
 }
 
@@ -113,7 +119,7 @@ fn configOf(
     held: []const Variant,
     counting: []const Variant,
     are_all: bool,
-) *Module {
+) *std.Build.Step.Options {
     const b = package.owner;
     const options = b.addOptions();
     options.addOption([]const u8, "version", manifest.version);
@@ -121,7 +127,7 @@ fn configOf(
     options.addOption([]const []const u8, "counting", package.names(counting));
     options.addOption(bool, "are_all", are_all);
     options.addOption(bool, "shows_searches", package.shows_searches);
-    return options.createModule();
+    return options;
 }
 
 fn names(package: Package, list: []const Variant) []const []const u8 {
@@ -173,7 +179,8 @@ fn kernel(package: Package, variant: Variant, is_counting: bool) *Compile {
     const b = package.owner;
     const root = package.moduleOf("src/kernel.zig");
     const own: []const Variant = &.{variant};
-    root.addImport("config", package.configOf(own, if (is_counting) own else &.{}, false));
+    const config = package.configOf(own, if (is_counting) own else &.{}, false);
+    root.addImport("config", config.createModule());
     // What LLVM does for a debugger is two fifths of its time.
     root.strip = package.optimize != .debug;
     const suffix = if (is_counting) "-counting" else "";

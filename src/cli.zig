@@ -415,12 +415,10 @@ const Parser = struct {
                 })),
             .camera, .frame_all => try parser.setCamera(given),
             .eye, .target, .up, .orbit, .fov, .ortho => try parser.setCamera(given),
-            .scene => options.load.scene = choiceOf(given.value) orelse
-                return reader.bad(given, "a scene's name or its index"),
-            .material_variant => options.load.material_variant = choiceOf(given.value) orelse
-                return reader.bad(given, "a material variant's name or its index"),
+            .scene, .material_variant, .up_axis => try parser.setLoad(given),
+            .tessellation, .max_texture_size => try parser.setLoad(given),
+            .allow_outside, .strict, .force => try parser.setLoad(given),
             .animation, .animation_time => try parser.setAnimation(given),
-            .up_axis => options.load.up_axis = try reader.choice(given, settings.UpAxis),
             .background => options.view.background = backgroundOf(given.value) orelse
                 return parser.noBackground(given),
             .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
@@ -443,15 +441,6 @@ const Parser = struct {
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
                     settings.point_size.min, settings.point_size.max,
                 })),
-            .tessellation => {
-                options.load.tessellation = try reader.number(given, settings.tessellation);
-            },
-            .max_texture_size => {
-                options.load.texture_side_max = try reader.number(given, settings.texture_side);
-            },
-            .allow_outside => options.load.allow_outside = true,
-            .strict => options.load.strict = true,
-            .force => options.load.force = true,
             .quiet => options.quiet = true,
             .verbose => options.verbose = true,
             .help => parser.other = .help,
@@ -474,6 +463,26 @@ const Parser = struct {
         options.view.emitters = false;
         options.write.exposure = settings.thesis.exposure;
         options.write.tone_mapping = settings.thesis.tone_mapping;
+    }
+
+    fn setLoad(parser: *Parser, given: Reader.Given) Error!void {
+        const load = &parser.options.load;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .scene => load.scene = choiceOf(given.value) orelse
+                return reader.bad(given, "a scene's name or its index"),
+            .material_variant => load.material_variant = choiceOf(given.value) orelse
+                return reader.bad(given, "a material variant's name or its index"),
+            .up_axis => load.up_axis = try reader.choice(given, settings.UpAxis),
+            .tessellation => load.tessellation = try reader.number(given, settings.tessellation),
+            .max_texture_size => {
+                load.texture_side_max = try reader.number(given, settings.texture_side);
+            },
+            .allow_outside => load.allow_outside = true,
+            .strict => load.strict = true,
+            .force => load.force = true,
+            else => unreachable, // `set` hands over the above.
+        }
     }
 
     fn setAnimation(parser: *Parser, given: Reader.Given) Error!void {

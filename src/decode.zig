@@ -1,9 +1,10 @@
-//! Encoded image bytes -> texels.
+//! Encoded image bytes -> texels; compressed streams of geometry -> numbers.
 //!
 //! In: a file in memory, of a kind that its first bytes tell. Out: its texels in the channels that
 //! the file has, bytes or floats, the same on every target; or what gzip has compressed. The C
-//! libraries of images see no file that has not passed our own checks, and every limit is one before
-//! memory is asked for. Threads may decode at once; no state outlives a call.
+//! libraries see no file that has not passed our own checks, and every limit is one before memory is
+//! asked for. Threads may decode at once; no state outlives a call. Geometry is asked for by its
+//! codec.
 
 const std = @import("std");
 const Allocator = std.mem.Allocator;
@@ -15,7 +16,10 @@ const stb_image = @import("decode/stb_image.zig");
 const texels = @import("decode/texels.zig");
 const webp = @import("decode/webp.zig");
 
+pub const draco = @import("decode/draco.zig");
 pub const gzip = @import("decode/gzip.zig");
+pub const meshopt = @import("decode/meshopt.zig");
+
 pub const Error = texels.Error;
 pub const Format = texels.Format;
 pub const Info = texels.Info;
@@ -69,9 +73,11 @@ fn formatWithin(file: []const u8, reason: *Reason) error{InvalidImage}!Format {
 }
 
 test {
+    _ = draco;
     _ = gzip;
     _ = jpeg;
     _ = ktx2;
+    _ = meshopt;
     _ = openexr;
     _ = png;
     _ = stb_image;

@@ -17,6 +17,7 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const alpha = @import("prepare/alpha.zig");
 const animate = @import("prepare/animate.zig");
 const bvh_input = @import("prepare/bvh/input.zig");
+const bvh_refit = @import("prepare/bvh/refit.zig");
 const bvh_wide = @import("prepare/bvh/wide.zig");
 const check = @import("prepare/bvh/check.zig");
 const deform = @import("prepare/deform.zig");
@@ -204,11 +205,48 @@ pub const OwnedEnvironmentMap = environment.OwnedMap;
 /// How a map is placed around the scene.
 pub const EnvironmentSettings = light.EnvironmentSettings;
 
-/// Places what is in a scene, as it stands, and builds the tree over it: a world in which nothing
-/// shines and that is seen by nobody yet. Its memory comes from `gpa` by way of an arena: its few
-/// large arrays are a block of `gpa` each, of which the arena asks for half as much again but
-/// touches only what is used. What was loaded of the scene has to live as long. Fills `prepare_ns`
-/// and `bvh_build_ns` of `times`.
+/// A world, and what of it the next pose has a use for.
+pub const Posed = struct {
+    world: World,
+    cache: PoseCache,
+
+    /// Frees both.
+    pub fn deinit(posed: *Posed) void {
+        posed.cache.deinit();
+        posed.world.deinit();
+    }
+};
+
+/// What a pose leaves for the next one of the same scene: how triangles are numbered, arrays to be
+/// written again, a tree to be fitted. The memory of arrays and tree is the world's.
+pub const PoseCache = struct {
+    gpa: Allocator,
+    plan: flatten.Plan,
+    arrays: flatten.Arrays,
+    tree: ?bvh_refit.AnyRefit = null,
+    lanes: u8,
+    tree_quality: TreeQuality,
+    point_size: f32,
+
+    /// Frees it.
+    pub fn deinit(cache: *PoseCache) void {
+        if (cache.tree) |*tree| tree.deinit(cache.gpa);
+        cache.plan.deinit(cache.gpa);
+        cache.* = undefined;
+    }
+
+    /// Whether a pose with these settings can use it.
+    pub fn fits(cache: *const PoseCache, settings: *const PoseSettings) bool {
+        return cache.lanes == settings.lanes and cache.tree_quality == settings.tree_quality and
+            cache.point_size == settings.point_size;
+    }
+};
+
+/// Places what is in a scene and builds the tree over it: a world in which nothing shines and that
+/// is seen by nobody yet. Its memory comes from `gpa` by way of arenas: its few large arrays are a
+/// block of `gpa` each, of which an arena asks for half as much again but touches only what is
+/// used. What was loaded of the scene has to live as long. Fills `prepare_ns` and `bvh_build_ns` of
+/// `times`.
 pub fn pose(
     gpa: Allocator,
     io: std.Io,
@@ -217,49 +255,84 @@ pub fn pose(
     settings: PoseSettings,
     diagnostic: *Diagnostic,
     times: *StageTimes,
-) PoseError!World {
+) PoseError!Posed {
     assert(settings.lanes == 4 or settings.lanes == 8 or settings.lanes == 16);
+    const start = Clock.awake.now(io);
+    var posed: Posed = .{ .world = .init(gpa), .cache = undefined };
+    errdefer posed.world.deinit();
+    const parts = &loaded.parts;
+    const point_size = settings.point_size;
+    var plan: flatten.Plan =
+        try .init(gpa, parts.instances, parts.meshes, point_size, diagnostic);
+    errdefer plan.deinit(gpa);
+    const attributes = attributesOf(&loaded.textures);
+    posed.cache = .{
+        .gpa = gpa,
+        .plan = plan,
+        .arrays = try plan.alloc(posed.world.arena.allocator(), attributes),
+        .lanes = settings.lanes,
+        .tree_quality = settings.tree_quality,
+        .point_size = point_size,
+    };
+    const planned_ns = nanoseconds(start.durationTo(Clock.awake.now(io)));
+    try poseAgain(&posed.world, &posed.cache, io, from, loaded, settings, diagnostic, times);
+    times.prepare_ns += planned_ns;
+    return posed;
+}
+
+/// Makes a world that `pose` made of the scene what it would be if `pose` had been called now: but
+/// for the shape of the tree, which no picture depends on. Nodes and weights may have moved, and
+/// materials changed; meshes and instances are the same, and `cache` fits the settings. Where this
+/// fails, world and cache are of no use but to be freed.
+pub fn poseAgain(
+    posed: *World,
+    cache: *PoseCache,
+    io: std.Io,
+    from: *const Scene,
+    loaded: *const Loaded,
+    settings: PoseSettings,
+    diagnostic: *Diagnostic,
+    times: *StageTimes,
+) PoseError!void {
+    assert(cache.fits(&settings));
     const mode = simd.setFlushToZero();
     defer simd.setFloatControl(mode);
-
     const start = Clock.awake.now(io);
-    var arena: std.heap.ArenaAllocator = .init(gpa);
-    errdefer arena.deinit();
-    const place = try place_file.compose(arena.allocator(), from);
-    const drawn: Drawn = try .of(arena.allocator(), from, &loaded.parts, &loaded.textures);
-    var soup = try flatten.flatten(
+    const gpa = cache.gpa;
+    _ = posed.pose_arena.reset(.retain_capacity);
+    const arena = posed.pose_arena.allocator();
+    const drawn: Drawn = try .of(arena, from, &loaded.parts, &loaded.textures);
+    const parts = &drawn.parts;
+    const place = try place_file.compose(arena, from);
+    var soup = try cache.plan.place(
         gpa,
-        arena.allocator(),
-        drawn.parts.instances,
-        drawn.parts.meshes,
-        attributesOf(&loaded.textures),
-        settings.point_size,
+        arena,
+        &cache.arrays,
+        parts.instances,
+        parts.meshes,
         &place,
         settings.pool,
         diagnostic,
     );
     var geometry = geometryOf(&soup, &place);
     if (soup.strokes.spheres.len > 0) {
-        const materials = drawn.parts.materials;
+        const materials = parts.materials;
         const pixel = try view_file.pixelSize(gpa, from, materials, &geometry, &settings.view);
         try strokes.draw(gpa, &soup, pixel * settings.point_size / 2, settings.pool);
         geometry = geometryOf(&soup, &place);
     }
-    const materials = try material.place(
-        arena.allocator(),
-        &drawn.parts,
-        &drawn.textures,
-        soup.positions,
-        soup.triangles,
-    );
+    const materials =
+        try material.place(arena, parts, &drawn.textures, soup.positions, soup.triangles);
     const tree_start = Clock.awake.now(io);
-    const tree_facts = try buildTree(gpa, arena.allocator(), &geometry, settings);
+    const tree_facts = try fitTree(&posed.tree_arena, cache, &geometry, settings);
     const end = Clock.awake.now(io);
     times.prepare_ns = nanoseconds(start.durationTo(tree_start));
     times.bvh_build_ns = nanoseconds(tree_start.durationTo(end));
-    const result: World = .{
-        .arena = arena,
-        .view_arena = .init(gpa),
+    posed.* = .{
+        .arena = posed.arena,
+        .tree_arena = posed.tree_arena,
+        .pose_arena = posed.pose_arena,
+        .view_arena = posed.view_arena,
         .geometry = geometry,
         .node_maps = place.maps,
         .materials = materials,
@@ -271,8 +344,7 @@ pub fn pose(
                 soup.dropped_stroke_count,
         },
     };
-    if (builtin.mode == .debug) try check.check(gpa, &result);
-    return result;
+    if (builtin.mode == .debug) try check.check(gpa, posed);
 }
 
 /// All but the tree.
@@ -430,7 +502,7 @@ fn emittersOf(
         }
         count = @min(count, emitter_lights.count_max);
     }
-    const arena = seen.arena.allocator();
+    const arena = seen.pose_arena.allocator();
     seen.emitters = try emitter_lights.make(gpa, arena, pieces, &seen.geometry, .{
         .count_max = count,
         .cuts_round = from.has_area_lights,
@@ -438,17 +510,71 @@ fn emittersOf(
     return seen.emitters.?;
 }
 
+/// Gives a geometry that has all else the tree that an earlier pose left, or a new one where that
+/// costs too much, or triangles are to be seen that it does not have. Returns facts about it. Not
+/// inlined, see `chooseView`.
+noinline fn fitTree(
+    arena: *std.heap.ArenaAllocator,
+    cache: *PoseCache,
+    geometry: *world.Geometry,
+    settings: PoseSettings,
+) PoseError!world.TreeStatistics {
+    if (cache.tree) |*tree| {
+        const fitted = try tree.run(cache.gpa, &inputOf(geometry, settings, null));
+        var facts = tree.statistics();
+        const kept_count = geometry.triangles.len - geometry.dropped_count;
+        const is_good = fitted.sah_cost <= bvh_refit.cost_ratio_max * facts.sah_cost;
+        if (is_good and fitted.kept_count == kept_count) {
+            facts.sah_cost = fitted.sah_cost;
+            geometry.tree = tree.tree();
+            return facts;
+        }
+        tree.deinit(cache.gpa);
+        cache.tree = null;
+    }
+    _ = arena.reset(.retain_capacity);
+    cache.tree = try growTree(cache.gpa, arena.allocator(), geometry, settings);
+    geometry.tree = cache.tree.?.tree();
+    return cache.tree.?.statistics();
+}
+
 /// Gives a geometry that has all else a tree of `settings.lanes`, whose memory comes from `arena`.
-/// Returns facts about it. For `pose` and benchmarks of the build. Not inlined, see `chooseView`.
-pub noinline fn buildTree(
+/// Returns facts about it. For benchmarks of the build.
+pub fn buildTree(
     gpa: Allocator,
     arena: Allocator,
     geometry: *world.Geometry,
     settings: PoseSettings,
 ) PoseError!world.TreeStatistics {
+    const tree = try growTree(gpa, arena, geometry, settings);
+    geometry.tree = tree.tree();
+    return tree.statistics();
+}
+
+/// Not inlined, see `chooseView`.
+noinline fn growTree(
+    gpa: Allocator,
+    arena: Allocator,
+    geometry: *const world.Geometry,
+    settings: PoseSettings,
+) PoseError!bvh_refit.AnyRefit {
     const kept = if (geometry.dropped_count > 0) try listKept(gpa, geometry) else null;
     defer if (kept) |numbers| gpa.free(numbers);
-    const input: bvh_wide.Input = .{
+    const input = inputOf(geometry, settings, kept);
+    return switch (settings.lanes) {
+        4 => .{ .w4 = .{ .built = try bvh_wide.build(gpa, arena, &input, 4) } },
+        8 => .{ .w8 = .{ .built = try bvh_wide.build(gpa, arena, &input, 8) } },
+        16 => .{ .w16 = .{ .built = try bvh_wide.build(gpa, arena, &input, 16) } },
+        else => unreachable, // Asserted at the door.
+    };
+}
+
+fn inputOf(
+    geometry: *const world.Geometry,
+    settings: PoseSettings,
+    kept: ?[]const u32,
+) bvh_wide.Input {
+    return .{
         .positions = geometry.positions,
         .triangles = geometry.triangles,
         .kept = kept,
@@ -457,14 +583,6 @@ pub noinline fn buildTree(
         .pool = settings.pool,
         .quality = settings.tree_quality,
     };
-    var facts: world.TreeStatistics = undefined;
-    geometry.tree = switch (settings.lanes) {
-        4 => .{ .w4 = try bvh_wide.build(gpa, arena, &input, 4, &facts) },
-        8 => .{ .w8 = try bvh_wide.build(gpa, arena, &input, 8, &facts) },
-        16 => .{ .w16 = try bvh_wide.build(gpa, arena, &input, 16, &facts) },
-        else => unreachable, // Asserted at the door.
-    };
-    return facts;
 }
 
 /// The numbers of the triangles that are not dropped.
@@ -530,7 +648,9 @@ fn prepareForTest(gpa: Allocator, from: *const Scene, settings: PoseSettings) !W
     }, &diagnostic, &times);
     defer loaded.deinit();
     assert(loaded.textures.lookups.len == 0);
-    var result = try pose(gpa, std.testing.io, from, &loaded, settings, &diagnostic, &times);
+    var posed = try pose(gpa, std.testing.io, from, &loaded, settings, &diagnostic, &times);
+    posed.cache.deinit();
+    var result = posed.world;
     errdefer result.deinit();
     try view(&result, std.testing.io, from, .{}, &diagnostic, &times);
     return result;
@@ -701,7 +821,7 @@ test "more care, less cost" {
 
 test "nasty soups" {
     const gpa = std.testing.allocator;
-    const count = 6000;
+    const count = 2000;
     const corners = try gpa.alloc([3]math.Vec3, count);
     defer gpa.free(corners);
     const Kind = enum { coincident, line, concentric, huge_and_tiny, powers, flat };
@@ -908,8 +1028,9 @@ test "tangents of deformed meshes go with the joints" {
     var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
     defer loaded.deinit();
     const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
-    var result = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
-    defer result.deinit();
+    var posed = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
+    defer posed.deinit();
+    const result = &posed.world;
     for (result.geometry.tangents, result.geometry.normals) |tangent, normal| {
         for ([4]f32{ -0.6, 0.8, 0, -1 }, tangent) |wanted, found| {
             try std.testing.expectApproxEqAbs(wanted, found, 1e-6);
@@ -974,12 +1095,12 @@ test "texture coordinates and tangents are placed where a texture asks for them"
     const io = std.testing.io;
     var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
     defer loaded.deinit();
-    var result = try pose(gpa, io, &from, &loaded, .{
+    var posed = try pose(gpa, io, &from, &loaded, .{
         .lanes = 4,
         .pool = &pool,
     }, &diagnostic, &times);
-    defer result.deinit();
-    const geometry = &result.geometry;
+    defer posed.deinit();
+    const geometry = &posed.world.geometry;
     for ([_]usize{ 0, 2, 3 }) |set| try std.testing.expectEqual(0, geometry.texcoords[set].len);
     for ([_]usize{ 0, 3 }) |first| {
         const placed = geometry.texcoords[1][first..][0..3];
@@ -1002,14 +1123,14 @@ test "texture coordinates and tangents are placed where a texture asks for them"
         try std.testing.expect(math.vec3.dot(bitangent, mapped) > 0.5);
         for (expected, direction) |a, b| try std.testing.expectApproxEqAbs(a, b, 1e-6);
     };
-    const used = &result.materials.all[0];
+    const used = &posed.world.materials.all[0];
     try std.testing.expectEqual(0.5, used.normal_scale);
     try std.testing.expectEqual(1, used.lookup_count);
-    const lookup = &result.materials.lookups[used.first_lookup];
+    const lookup = &posed.world.materials.lookups[used.first_lookup];
     try std.testing.expectEqual(1, lookup.texcoord_set);
-    const texture_of = &result.frame().textures.all[lookup.texture];
+    const texture_of = &posed.world.frame().textures.all[lookup.texture];
     try std.testing.expectEqualSlices(u8, &texels, texture_of.levels[0].texels);
-    try std.testing.expectEqual(0, result.materials.all[1].lookup_count);
+    try std.testing.expectEqual(0, posed.world.materials.all[1].lookup_count);
 }
 
 test "layers are there where a drawn material has some, and tangents for what has a direction" {
@@ -1033,8 +1154,9 @@ test "layers are there where a drawn material has some, and tangents for what ha
         var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
         defer loaded.deinit();
         const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
-        var result = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
-        defer result.deinit();
+        var posed = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
+        defer posed.deinit();
+        const result = &posed.world;
         const layers = result.materials.layers;
         if (drawn_count == 1) {
             try std.testing.expectEqual(0, layers.len);
@@ -1220,4 +1342,5 @@ test {
     _ = @import("prepare/bvh/build.zig");
     _ = @import("prepare/bvh/cells.zig");
     _ = @import("prepare/bvh/reinsert.zig");
+    _ = bvh_refit;
 }

@@ -99,6 +99,8 @@ pub const Session = struct {
     motion: ?prepare.Motion = null,
     seen: settings.View = .{},
     world: ?World = null,
+    /// What the next pose has a use for; there with the world.
+    pose_cache: ?prepare.PoseCache = null,
     environment: Environment = .{},
     /// The studio, where it is seen but something else lights the scene.
     backdrop: Environment = .{},
@@ -212,6 +214,8 @@ pub const Session = struct {
     fn dropWorld(session: *Session) void {
         if (session.world) |*world| world.deinit();
         session.world = null;
+        if (session.pose_cache) |*cache| cache.deinit();
+        session.pose_cache = null;
     }
 
     fn dropLoaded(session: *Session) void {
@@ -220,10 +224,11 @@ pub const Session = struct {
     }
 
     /// Places the geometry at a moment of the scene's animations and builds the tree over it; the
-    /// first time, decodes the textures.
-    /// Asserts that there is a scene.
+    /// first time, decodes the textures. Where nodes, weights and materials of the scene have
+    /// changed since, and nothing else, it may be called again, as for other moments: arrays are
+    /// written once more, and the tree is fitted. Asserts that there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
-        session.dropWorld();
+        errdefer session.dropWorld();
         const scene = &session.scene.?;
         if (session.loaded == null) {
             session.loaded = try prepare.load(session.gpa, session.io, scene, .{
@@ -233,16 +238,8 @@ pub const Session = struct {
             try session.diagnostic.settle();
         }
         const loaded = &session.loaded.?;
-        const diagnostic = session.diagnostic;
-        const posed = try prepare.animateScene(session.gpa, scene, chosen.animation, diagnostic);
-        if (session.posed) |*before| {
-            const is_same = std.meta.eql(before.moment.running, posed.moment.running);
-            if (!is_same) session.dropMotion();
-        }
-        session.dropPosed();
-        session.posed = posed;
-        const shown = &session.posed.?.scene;
-        session.world = try prepare.pose(session.gpa, session.io, shown, loaded, .{
+        const shown = try session.animate(chosen.animation);
+        const pose_settings: prepare.PoseSettings = .{
             .lanes = chosen.lanes,
             .pool = &session.pool,
             .tree_quality = chosen.tree_quality,
@@ -253,7 +250,44 @@ pub const Session = struct {
                 .resolution = chosen.view.resolution,
                 .long_side = chosen.view.long_side,
             },
-        }, session.diagnostic, &session.times);
+        };
+        if (session.pose_cache) |*cache| if (cache.fits(&pose_settings)) {
+            return prepare.poseAgain(
+                &session.world.?,
+                cache,
+                session.io,
+                shown,
+                loaded,
+                pose_settings,
+                session.diagnostic,
+                &session.times,
+            );
+        };
+        session.dropWorld();
+        const posed = try prepare.pose(
+            session.gpa,
+            session.io,
+            shown,
+            loaded,
+            pose_settings,
+            session.diagnostic,
+            &session.times,
+        );
+        session.world = posed.world;
+        session.pose_cache = posed.cache;
+    }
+
+    /// The scene at a moment, until the next one.
+    fn animate(session: *Session, chosen: settings.Animation) Error!*const Scene {
+        const scene = &session.scene.?;
+        const posed = try prepare.animateScene(session.gpa, scene, chosen, session.diagnostic);
+        if (session.posed) |*before| {
+            const is_same = std.meta.eql(before.moment.running, posed.moment.running);
+            if (!is_same) session.dropMotion();
+        }
+        session.dropPosed();
+        session.posed = posed;
+        return &session.posed.?.scene;
     }
 
     /// Chooses what is seen, from where and by what light; the tree stays. Asserts that there is a

@@ -93,8 +93,10 @@ pub const Facts = struct {
 
 /// Everything that tracing needs, and its memory.
 pub const World = struct {
-    /// Of all that the view has no part in, and of what it has.
+    /// Of arrays that all poses write, of the tree, of what else a pose makes, and of the view.
     arena: std.heap.ArenaAllocator,
+    tree_arena: std.heap.ArenaAllocator,
+    pose_arena: std.heap.ArenaAllocator,
     view_arena: std.heap.ArenaAllocator,
     geometry: Geometry,
     /// Where the nodes of the scene are: for cameras and lights, which are placed by the view.
@@ -108,6 +110,29 @@ pub const World = struct {
     environment: Environment = .{ .ambient = 0, .background = @splat(0) },
     view: View = .nowhere,
     facts: Facts,
+
+    /// A world with nothing in it; its memory is to come from `gpa`.
+    pub fn init(gpa: std.mem.Allocator) World {
+        return .{
+            .arena = .init(gpa),
+            .tree_arena = .init(gpa),
+            .pose_arena = .init(gpa),
+            .view_arena = .init(gpa),
+            .geometry = .empty,
+            .node_maps = &.{},
+            .materials = .{
+                .all = &.{},
+                .has_transparency = false,
+                .has_holes = false,
+                .occluders = &.{},
+            },
+            .textures = .{ .all = &.{} },
+            .facts = .{
+                .tree = .{ .node_count = 0, .depth = 0, .sah_cost = 0, .bytes = 0 },
+                .degenerate_count = 0,
+            },
+        };
+    }
 
     /// What tracing takes; the world has to stay where it is meanwhile.
     pub fn frame(world: *const World) Frame {
@@ -124,6 +149,8 @@ pub const World = struct {
     /// Frees everything.
     pub fn deinit(world: *World) void {
         world.arena.deinit();
+        world.tree_arena.deinit();
+        world.pose_arena.deinit();
         world.view_arena.deinit();
         world.* = undefined;
     }

@@ -20,10 +20,12 @@ test {
     _ = @import("gltf_poses.zig");
     _ = @import("gltf_textures.zig");
     _ = @import("malformed.zig");
+    _ = @import("meshes.zig");
     _ = @import("offset.zig");
     _ = @import("output.zig");
     _ = @import("pbrt.zig");
     _ = @import("pbrt_textures.zig");
+    _ = @import("poses.zig");
     _ = @import("samples.zig");
     _ = @import("beams.zig");
     _ = @import("soup.zig");

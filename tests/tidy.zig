@@ -49,7 +49,7 @@ const directions = [_]Row{
     .{ .part = "output", .may_import = &.{ "image", "memory_account", "parallel" } },
     .{ .part = "report", .may_import = &.{} },
     .{ .part = "energy", .may_import = &.{} },
-    .{ .part = "decode", .may_import = &.{"memory_account"} },
+    .{ .part = "decode", .may_import = &.{ "module:config", "memory_account" } },
     .{ .part = "diagnostic", .may_import = &.{} },
     .{ .part = "huge_pages", .may_import = &.{} },
     .{ .part = "identity", .may_import = &.{} },

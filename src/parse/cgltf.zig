@@ -72,6 +72,22 @@ pub const cgltf_wrap_mode = enum(c_uint) {
     _,
 };
 
+pub const cgltf_meshopt_compression_mode = enum(c_uint) {
+    invalid,
+    attributes,
+    triangles,
+    indices,
+    _,
+};
+pub const cgltf_meshopt_compression_filter = enum(c_uint) {
+    none,
+    octahedral,
+    quaternion,
+    exponential,
+    color,
+    _,
+};
+
 const String = [*c]u8;
 const cgltf_bool = c_int;
 /// Texts that are not read.
@@ -89,6 +105,17 @@ pub const cgltf_buffer = extern struct {
     extras: Tail,
 };
 
+pub const cgltf_meshopt_compression = extern struct {
+    buffer: [*c]cgltf_buffer,
+    offset: usize,
+    size: usize,
+    stride: usize,
+    count: usize,
+    mode: cgltf_meshopt_compression_mode,
+    filter: cgltf_meshopt_compression_filter,
+    is_khr: cgltf_bool,
+};
+
 pub const cgltf_buffer_view = extern struct {
     name: String,
     buffer: [*c]cgltf_buffer,
@@ -97,7 +124,7 @@ pub const cgltf_buffer_view = extern struct {
     stride: usize,
     type: [2]usize,
     has_meshopt_compression: cgltf_bool,
-    meshopt_compression: extern struct { buffer: [5]usize, mode: [3]c_uint },
+    meshopt_compression: cgltf_meshopt_compression,
     extras: Tail,
 };
 
@@ -304,6 +331,13 @@ pub const cgltf_morph_target = extern struct {
     attributes_count: usize,
 };
 
+pub const cgltf_draco_mesh_compression = extern struct {
+    buffer_view: [*c]cgltf_buffer_view,
+    /// Draco's own numbers of attributes, as if they were indices of accessors.
+    attributes: [*c]cgltf_attribute,
+    attributes_count: usize,
+};
+
 pub const cgltf_primitive = extern struct {
     type: cgltf_primitive_type,
     indices: [*c]cgltf_accessor,
@@ -314,7 +348,7 @@ pub const cgltf_primitive = extern struct {
     targets_count: usize,
     extras: Extras,
     has_draco_mesh_compression: cgltf_bool,
-    draco_mesh_compression: [3]usize,
+    draco_mesh_compression: cgltf_draco_mesh_compression,
     mappings: [*c]cgltf_material_mapping,
     mappings_count: usize,
     extensions_count: [2]usize,

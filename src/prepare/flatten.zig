@@ -82,20 +82,44 @@ pub const Room = struct {
 
 /// One instance: where its vertices and triangles come from and go to.
 const Draw = struct {
-    mesh: *const scene.Mesh,
-    maps: Maps,
-    /// Of morph targets; empty: none changes the mesh.
-    weights: []const f32,
-    /// In place of `maps`; empty: the mesh has no skin.
-    joint_maps: []const AffineD,
-    /// The maps turn fronts into backs.
-    mirrored: bool,
     /// First vertex of the mesh that a triangle uses, and how many from there.
     vertex_source: u32,
     vertex_count: u32,
     /// First vertex and triangle in the soup.
     vertex_target: u32,
     triangle_target: u32,
+
+    // By pose.
+    mesh: *const scene.Mesh = undefined,
+    maps: Maps = undefined,
+    /// Of morph targets; empty: none changes the mesh.
+    weights: []const f32 = &.{},
+    /// In place of `maps`; empty: the mesh has no skin.
+    joint_maps: []const AffineD = &.{},
+    /// The maps turn fronts into backs.
+    mirrored: bool = false,
+    /// Colours and texture coordinates are not there from an earlier pose.
+    is_colored_anew: bool = true,
+
+    fn put(
+        draw: *Draw,
+        instance: *const scene.Instance,
+        mesh: *const scene.Mesh,
+        pose: *const pose_file.Pose,
+        is_placed: bool,
+    ) void {
+        const map = pose.maps[instance.node];
+        const has_skin = instance.skin != scene.none;
+        const was_morphed = draw.weights.len > 0;
+        const is_morphed = deform.isMorphed(instance.morph_weights);
+        draw.joint_maps = if (has_skin) pose.joint_maps[instance.skin] else &.{};
+        draw.mirrored =
+            if (has_skin) deform.isMirrored(draw.joint_maps) else map.determinant() < 0;
+        draw.mesh = mesh;
+        draw.maps = .of(map, draw.mirrored);
+        draw.weights = if (is_morphed) instance.morph_weights else &.{};
+        draw.is_colored_anew = !is_placed or was_morphed or is_morphed;
+    }
 };
 
 /// Maps into the world.
@@ -118,50 +142,121 @@ const ChunkResult = struct {
     centroid_bounds: Box3 = .empty,
 };
 
-/// Flattens what is drawn: instances of `meshes`, where `pose` has their nodes and joints. The
-/// soup's arrays come from `arena`, what is needed meanwhile from `gpa`. Points and lines are to be
-/// `point_size` pixels wide, or nearly so.
-pub fn flatten(
-    gpa: std.mem.Allocator,
-    arena: std.mem.Allocator,
-    instances: []const scene.Instance,
-    meshes: []const scene.Mesh,
-    attributes: Attributes,
-    point_size: f32,
-    pose: *const pose_file.Pose,
-    pool: *parallel.Pool,
-    diagnostic: *Diagnostic,
-) Error!TriangleSoup {
-    const draws = try gpa.alloc(Draw, instances.len);
-    defer gpa.free(draws);
-    const size = try plan(gpa, instances, meshes, pose, draws, diagnostic);
-    const detail: strokes.Detail = .of(size.strokes, point_size);
-    const with_room = try size.withRoom(detail, diagnostic);
-    const count = with_room.vertex_count;
+/// The arrays of a soup, to be written by each pose.
+pub const Arrays = struct {
+    positions: []Vec3,
+    normals: []Vec3,
+    colors: [][4]f32,
+    texcoords: [texcoord_set_count][][2]f32,
+    tangents: [][4]f32,
+    triangles: []world.Triangle,
+};
 
-    var work: Work = .{
-        .draws = draws,
-        .size = &size,
-        .positions = try huge_pages.alloc(arena, Vec3, count),
-        .normals = try huge_pages.alloc(arena, Vec3, count),
-        .colors = try huge_pages.alloc(arena, [4]f32, if (size.has_colors) count else 0),
-        .texcoords = undefined,
-        .tangents = try huge_pages.alloc(arena, [4]f32, if (attributes.tangents) count else 0),
-        .triangles = try huge_pages.alloc(arena, world.Triangle, with_room.triangle_count),
-        .chunks = try gpa.alloc(ChunkResult, chunkCount(size.triangle_count)),
-    };
-    defer gpa.free(work.chunks);
-    for (&work.texcoords, attributes.texcoord_sets) |*set, is_used| {
-        set.* = try huge_pages.alloc(arena, [2]f32, if (is_used) count else 0);
+/// What is the same in all poses: where vertices and triangles go.
+pub const Plan = struct {
+    draws: []Draw,
+    chunks: []ChunkResult,
+    /// Of the arrays, but for the room at their ends, and with it.
+    size: Size,
+    with_room: Size,
+    detail: strokes.Detail,
+    /// The arrays have been written before.
+    is_placed: bool = false,
+
+    /// Plans what is drawn: instances of `meshes`, with points and lines that are to be
+    /// `point_size` pixels wide, or nearly so. Memory comes from `gpa`.
+    pub fn init(
+        gpa: std.mem.Allocator,
+        instances: []const scene.Instance,
+        meshes: []const scene.Mesh,
+        point_size: f32,
+        diagnostic: *Diagnostic,
+    ) Error!Plan {
+        const draws = try gpa.alloc(Draw, instances.len);
+        errdefer gpa.free(draws);
+        const size = try layOut(gpa, instances, meshes, draws, diagnostic);
+        const detail: strokes.Detail = .of(size.strokes, point_size);
+        const with_room = try size.withRoom(detail, diagnostic);
+        return .{
+            .draws = draws,
+            .chunks = try gpa.alloc(ChunkResult, chunkCount(size.triangle_count)),
+            .size = size,
+            .with_room = with_room,
+            .detail = detail,
+        };
     }
-    try pool.forEach(chunkCount(size.vertex_count), &work, Work.placeVertices);
-    try pool.forEach(work.chunks.len, &work, Work.placeTriangles);
-    var soup = work.finish(diagnostic);
-    if (size.strokes.spheres > 0) {
-        soup.strokes = try work.collectStrokes(gpa, arena, detail, diagnostic);
+
+    /// Frees it.
+    pub fn deinit(plan: *Plan, gpa: std.mem.Allocator) void {
+        gpa.free(plan.draws);
+        gpa.free(plan.chunks);
+        plan.* = undefined;
     }
-    return soup;
-}
+
+    /// Room for a soup with these attributes.
+    pub fn alloc(
+        plan: *const Plan,
+        arena: std.mem.Allocator,
+        attributes: Attributes,
+    ) error{OutOfMemory}!Arrays {
+        const count = plan.with_room.vertex_count;
+        var arrays: Arrays = .{
+            .positions = try huge_pages.alloc(arena, Vec3, count),
+            .normals = try huge_pages.alloc(arena, Vec3, count),
+            .colors = try huge_pages.alloc(arena, [4]f32, if (plan.size.has_colors) count else 0),
+            .texcoords = undefined,
+            .tangents = try huge_pages.alloc(arena, [4]f32, if (attributes.tangents) count else 0),
+            .triangles = try huge_pages.alloc(
+                arena,
+                world.Triangle,
+                plan.with_room.triangle_count,
+            ),
+        };
+        for (&arrays.texcoords, attributes.texcoord_sets) |*set, is_used| {
+            set.* = try huge_pages.alloc(arena, [2]f32, if (is_used) count else 0);
+        }
+        return arrays;
+    }
+
+    /// Writes the arrays, always the same ones, with what was planned for where `pose` has nodes
+    /// and joints; the instances' weights may be others than before. The strokes' lists come from
+    /// `arena`, what is needed meanwhile from `gpa`.
+    pub fn place(
+        plan: *Plan,
+        gpa: std.mem.Allocator,
+        arena: std.mem.Allocator,
+        arrays: *const Arrays,
+        instances: []const scene.Instance,
+        meshes: []const scene.Mesh,
+        pose: *const pose_file.Pose,
+        pool: *parallel.Pool,
+        diagnostic: *Diagnostic,
+    ) Error!TriangleSoup {
+        assert(plan.draws.len == instances.len);
+        for (plan.draws, instances) |*draw, *instance| {
+            draw.put(instance, &meshes[instance.mesh], pose, plan.is_placed);
+        }
+        var work: Work = .{
+            .draws = plan.draws,
+            .size = &plan.size,
+            .positions = arrays.positions,
+            .normals = arrays.normals,
+            .colors = arrays.colors,
+            .texcoords = arrays.texcoords,
+            .tangents = arrays.tangents,
+            .triangles = arrays.triangles,
+            .chunks = plan.chunks,
+        };
+        try pool.forEach(chunkCount(plan.size.vertex_count), &work, Work.placeVertices);
+        try pool.forEach(plan.chunks.len, &work, Work.placeTriangles);
+        plan.is_placed = true;
+        var soup = work.finish(diagnostic);
+        if (plan.size.strokes.spheres > 0) {
+            soup.strokes = try work.collectStrokes(gpa, arena, plan.detail, diagnostic);
+        }
+        return soup;
+    }
+};
 
 const Size = struct {
     vertex_count: u32 = 0,
@@ -193,12 +288,11 @@ fn chunkCount(count: usize) usize {
     return @divCeil(count, chunk_size);
 }
 
-/// Fills `draws` and adds up their sizes.
-fn plan(
+/// Fills the part of `draws` that no pose changes, and adds up their sizes.
+fn layOut(
     gpa: std.mem.Allocator,
     instances: []const scene.Instance,
     meshes: []const scene.Mesh,
-    pose: *const pose_file.Pose,
     draws: []Draw,
     diagnostic: *Diagnostic,
 ) Error!Size {
@@ -221,17 +315,7 @@ fn plan(
         }
         const range = ranges[instance.mesh].?;
         size.strokes.add(counts[instance.mesh]);
-        const map = pose.maps[instance.node];
-        const has_skin = instance.skin != scene.none;
-        const joint_maps: []const AffineD = if (has_skin) pose.joint_maps[instance.skin] else &.{};
-        const mirrored = if (has_skin) deform.isMirrored(joint_maps) else map.determinant() < 0;
-        const is_morphed = deform.isMorphed(instance.morph_weights);
         draw.* = .{
-            .mesh = mesh,
-            .maps = .of(map, mirrored),
-            .weights = if (is_morphed) instance.morph_weights else &.{},
-            .joint_maps = joint_maps,
-            .mirrored = mirrored,
             .vertex_source = range.first,
             .vertex_count = range.count,
             .vertex_target = @intCast(vertex_total),
@@ -356,11 +440,13 @@ const Work = struct {
         const source = draw.vertex_source + (from - draw.vertex_target);
         const count = to - from;
         const white: [4]f32 = .{ 1, 1, 1, 1 };
-        if (work.colors.len > 0) copy(work.colors[from..to], draw.mesh.colors, source, white);
-        for (work.texcoords, draw.mesh.texcoords) |to_set, set| {
-            if (to_set.len > 0) copy(to_set[from..to], set, source, .{ 0, 0 });
+        if (draw.is_colored_anew) {
+            if (work.colors.len > 0) copy(work.colors[from..to], draw.mesh.colors, source, white);
+            for (work.texcoords, draw.mesh.texcoords) |to_set, set| {
+                if (to_set.len > 0) copy(to_set[from..to], set, source, .{ 0, 0 });
+            }
+            if (draw.weights.len > 0) work.morphColors(draw, from, to, source);
         }
-        if (draw.weights.len > 0) work.morphColors(draw, from, to, source);
         if (draw.weights.len > 0 or draw.joint_maps.len > 0) {
             return work.placeDeformed(draw, from, to, source);
         }

@@ -8,6 +8,7 @@ const std = @import("std");
 const c = @import("../cgltf.zig");
 const limits = @import("limits.zig");
 const accessors = @import("../accessor.zig");
+const buffer_views = @import("buffer_views.zig");
 const Source = @import("source.zig");
 const Accessor = accessors.Accessor;
 const Component = accessors.Component;
@@ -16,8 +17,7 @@ const assert = std.debug.assert;
 
 /// Checks every accessor and view of the file, drawn or not.
 pub fn checkAll(source: *Source) Error!void {
-    const views = Source.slice(source.data.buffer_views, source.data.buffer_views_count);
-    for (views, 0..) |*view, index| try checkView(source, view, index);
+    try buffer_views.checkAll(source);
     for (0..source.data.accessors_count) |index| _ = try resolve(source, index);
     source.sparse_checked = true;
 }
@@ -26,25 +26,11 @@ pub fn checkAll(source: *Source) Error!void {
 /// nobody needs it.
 pub fn resolve(source: *Source, index: usize) Error!?Accessor {
     assert(index < source.data.accessors_count);
+    if (source.draco.get(@intCast(index))) |decoded| return decoded.accessor;
+    var accessor = try describe(source, index);
     const raw = Source.item(source.data.accessors, index);
-    const component = componentOf(raw.component_type) orelse
-        return source.fail("accessor {d}: unknown componentType", .{index});
-    const component_count = componentCount(raw.type) orelse
-        return source.fail("accessor {d}: unknown type", .{index});
-    if (raw.count == 0) return source.fail("accessor {d}: count is 0", .{index});
-    if (raw.count > limits.accessor_count_max) return source.fail(
-        "accessor {d}: count {d} is over the limit of {d}",
-        .{ index, raw.count, limits.accessor_count_max },
-    );
-    var accessor: Accessor = .{
-        .component = component,
-        .component_count = component_count,
-        .normalized = raw.normalized != 0,
-        .count = @intCast(raw.count),
-        .base = null,
-        .sparse = null,
-    };
-    const element_bytes = paddedBytes(raw.type, component, component_count);
+    const component = accessor.component;
+    const element_bytes = paddedBytes(raw.type, component, accessor.component_count);
     if (raw.buffer_view) |view| {
         const base = try resolveBase(source, index, raw, view, component, element_bytes);
         accessor.base = base orelse return null;
@@ -59,8 +45,30 @@ pub fn resolve(source: *Source, index: usize) Error!?Accessor {
     return accessor;
 }
 
+/// The accessor without its data.
+pub fn describe(source: *const Source, index: usize) Error!Accessor {
+    const raw = Source.item(source.data.accessors, index);
+    const component = componentOf(raw.component_type) orelse
+        return source.fail("accessor {d}: unknown componentType", .{index});
+    const component_count = componentCount(raw.type) orelse
+        return source.fail("accessor {d}: unknown type", .{index});
+    if (raw.count == 0) return source.fail("accessor {d}: count is 0", .{index});
+    if (raw.count > limits.accessor_count_max) return source.fail(
+        "accessor {d}: count {d} is over the limit of {d}",
+        .{ index, raw.count, limits.accessor_count_max },
+    );
+    return .{
+        .component = component,
+        .component_count = component_count,
+        .normalized = raw.normalized != 0,
+        .count = @intCast(raw.count),
+        .base = null,
+        .sparse = null,
+    };
+}
+
 fn resolveBase(
-    source: *const Source,
+    source: *Source,
     index: usize,
     raw: *const c.cgltf_accessor,
     view: *const c.cgltf_buffer_view,
@@ -157,7 +165,7 @@ pub fn checkFinite(source: *Source, index: u32, accessor: Accessor) Error!void {
 
 /// `length` bytes of a view from `offset`; null where its buffer has no data.
 fn range(
-    source: *const Source,
+    source: *Source,
     index: usize,
     part: []const u8,
     view: *const c.cgltf_buffer_view,
@@ -176,29 +184,8 @@ fn range(
         "accessor {d}: {s}byte {d} of buffer {d} is not aligned to {d} bytes",
         .{ index, part, start, bufferIndex(source, view), alignment },
     );
-    const buffer = source.buffers[bufferIndex(source, view)] orelse return null;
-    // Whole views have been checked against their buffers.
-    assert(start + length <= buffer.len);
-    return buffer[@intCast(start)..][0..@intCast(length)];
-}
-
-fn checkView(source: *const Source, view: *const c.cgltf_buffer_view, index: usize) Error!void {
-    const buffer_bytes: u64 = view.buffer[0].size;
-    const excess = (@as(u64, view.offset) +| @as(u64, view.size)) -| buffer_bytes;
-    if (excess > 0) return source.fail(
-        "buffer view {d}: {d} bytes past its buffer {d}",
-        .{ index, excess, bufferIndex(source, view) },
-    );
-    if (view.size == 0) return source.fail("buffer view {d}: byteLength is 0", .{index});
-    if (view.stride == 0) return;
-    if (view.stride < 4 or view.stride > 252) return source.fail(
-        "buffer view {d}: byteStride {d} is not in 4..252",
-        .{ index, view.stride },
-    );
-    if (view.stride % 4 != 0) source.warn(
-        "buffer view {d}: byteStride {d} is no multiple of 4",
-        .{ index, view.stride },
-    );
+    const bytes = try buffer_views.contents(source, view) orelse return null;
+    return bytes[@intCast(offset)..][0..@intCast(length)];
 }
 
 fn viewIndex(source: *const Source, view: *const c.cgltf_buffer_view) u32 {

@@ -7,6 +7,7 @@
 const std = @import("std");
 const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
+const draco = @import("../../decode.zig").draco;
 const extensions = @import("extensions.zig");
 const Source = @import("source.zig");
 const Error = Source.Error;
@@ -34,6 +35,8 @@ pub fn check(source: *const Source) Error!void {
         if (!is_accepted) return source.fail("the required extension {f} is not supported", .{
             diagnostic.quote(name),
         });
+        if (!draco.is_held and std.mem.eql(u8, name, "KHR_draco_mesh_compression"))
+            return source.fail("{f} needs a build with Draco (-Ddraco)", .{diagnostic.quote(name)});
     }
     warnOfUnrendered(source);
 }

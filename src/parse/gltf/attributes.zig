@@ -10,6 +10,7 @@ const c = @import("../cgltf.zig");
 const accessors = @import("../accessor.zig");
 const asset = @import("asset.zig");
 const diagnostic = @import("../../diagnostic.zig");
+const draco_meshes = @import("draco_meshes.zig");
 const gltf_accessors = @import("accessors.zig");
 const scene = @import("../../scene.zig");
 const Meshes = @import("meshes.zig");
@@ -29,6 +30,8 @@ pub const Used = struct {
     weights: [scene.joint_set_count]?u32 = @splat(null),
     /// Whether there are more joints than there are sets for.
     has_more_joints: bool = false,
+    /// Whether its triangles come one by one from Draco, whatever the mode.
+    is_draco: bool = false,
 };
 
 /// Finds and checks the attributes of a primitive, and those of its morph targets. Without
@@ -39,16 +42,11 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
         if (attribute.type != .position or attribute.index != 0) continue;
         break accessorIndex(source, attribute);
     } else return .{};
+    var used: Used = .{ .is_draco = try draco_meshes.decode(source, primitive, place) };
     const positions = try required(source, position);
-    if (positions.base == null and positions.sparse == null) {
-        if (primitive.has_draco_mesh_compression != 0) return source.fail(
-            "{f}: its data is in 'KHR_draco_mesh_compression', which is not supported",
-            .{place},
-        );
+    if (positions.base == null and positions.sparse == null)
         return source.fail("accessor {d}: positions without data", .{position});
-    }
 
-    var used: Used = .{};
     for (list) |*attribute| {
         const index = accessorIndex(source, attribute);
         try checkAttribute(source, attribute, index, positions.count, place);
@@ -116,7 +114,7 @@ pub fn indices(source: *Source, index: u32) Error!Accessor {
 /// An accessor that something drawn needs.
 pub fn required(source: *Source, index: u32) Error!Accessor {
     return try gltf_accessors.resolve(source, index) orelse
-        source.fail("accessor {d}: its buffer has no data, or only compressed data", .{index});
+        source.fail("accessor {d}: its buffer has no data", .{index});
 }
 
 fn accessorIndex(source: *const Source, attribute: *const c.cgltf_attribute) u32 {

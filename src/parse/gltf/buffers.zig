@@ -4,6 +4,7 @@
 //! bytes as its byteLength says (glTF 2.0, section 3.6.1). Images: textures.zig.
 
 const std = @import("std");
+const buffer_views = @import("buffer_views.zig");
 const c = @import("../cgltf.zig");
 const limits = @import("limits.zig");
 const escapes = @import("../json/escapes.zig");
@@ -43,6 +44,8 @@ pub fn load(
     const list = try gpa.alloc(?[]const u8, data.buffers_count);
     var buffers: Buffers = .{ .gpa = gpa, .list = list };
     errdefer buffers.deinit();
+    const is_fallback = try buffer_views.findFallbacks(gpa, data);
+    defer gpa.free(is_fallback);
     var total: u64 = 0;
     for (list, Source.slice(data.buffers, data.buffers_count), 0..) |*bytes, *raw, index| {
         const reader: Reader = .{
@@ -52,12 +55,14 @@ pub fn load(
             .raw = raw,
             .index = index,
         };
+        bytes.* = null;
+        if (raw.size == 0) return reader.fail("byteLength is 0", .{});
+        if (is_fallback[index]) continue;
         total +|= raw.size;
         if (total > limits.buffer_bytes_max) return reader.fail(
             "{d} bytes of buffers are over the limit of {d}",
             .{ total, limits.buffer_bytes_max },
         );
-        if (raw.size == 0) return reader.fail("byteLength is 0", .{});
         bytes.* = if (raw.uri != null)
             try reader.whole(try reader.fromUri())
         else if (index == 0 and binary != null)

@@ -183,8 +183,9 @@ const Decoded = struct { mesh: scene.Mesh, used: attributes.Used };
 
 fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Error!?Decoded {
     const source = meshes.source;
-    const mode = Mode.of(primitive) orelse return source.fail("{f}: unknown mode", .{place});
+    const named = Mode.of(primitive) orelse return source.fail("{f}: unknown mode", .{place});
     const used = try attributes.find(source, primitive, place);
+    const mode: Mode = if (used.is_draco) .triangles else named;
     const position = used.position orelse {
         source.warn("{f}: without POSITION, not drawn", .{place});
         return null;

@@ -135,11 +135,13 @@ const buffer_view: Rule = namedWith(&.{
 const meshopt: Rule = object(&.{
     required("buffer", reference(.buffers)),
     optional("byteOffset", .whole),
-    optional("byteLength", .whole),
-    optional("byteStride", .whole),
-    optional("count", .whole),
-    optional("mode", .string),
-    optional("filter", .string),
+    required("byteLength", .whole),
+    required("byteStride", .whole),
+    required("count", .whole),
+    required("mode", .string),
+    optional("filter", .{ .word = &.{
+        "NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR",
+    } }),
 });
 
 const camera: Rule = named(&.{

@@ -5,6 +5,7 @@
 
 const std = @import("std");
 const c = @import("../cgltf.zig");
+const draco_meshes = @import("draco_meshes.zig");
 const json = @import("../json.zig");
 const schema = @import("schema.zig");
 const scene = @import("../../scene.zig");
@@ -21,6 +22,10 @@ arena: Allocator,
 data: *const c.cgltf_data,
 /// Bytes of each buffer, as many as its byteLength says; null where the file gives none.
 buffers: []const ?[]const u8 = &.{},
+/// Contents of the buffer views that have been decompressed.
+decompressed: std.AutoHashMapUnmanaged(u32, []align(4) const u8) = .empty,
+/// Accessors whose elements have been decoded.
+draco: std.AutoHashMapUnmanaged(u32, draco_meshes.Decoded) = .empty,
 diagnostic: *Diagnostic,
 /// Numbers of nodes that are not exact in single precision, by node.
 doubles: []const json.Double = &.{},
@@ -41,6 +46,15 @@ pub const Error = @import("../resource.zig").Error;
 /// Frees what the reader has noted.
 pub fn deinit(source: *Source) void {
     source.finite.deinit(source.gpa);
+    var contents = source.decompressed.valueIterator();
+    while (contents.next()) |bytes| source.gpa.free(bytes.*);
+    source.decompressed.deinit(source.gpa);
+    var decoded = source.draco.valueIterator();
+    while (decoded.next()) |entry| {
+        const bytes: []align(4) const u8 = @alignCast(entry.accessor.base.?.bytes);
+        source.gpa.free(bytes);
+    }
+    source.draco.deinit(source.gpa);
     source.* = undefined;
 }
 

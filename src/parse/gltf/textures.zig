@@ -6,6 +6,7 @@
 //! asks for it, and once, however many name it. One that cannot be had is a warning and no texture.
 
 const std = @import("std");
+const buffer_views = @import("buffer_views.zig");
 const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
 const escapes = @import("../json/escapes.zig");
@@ -191,10 +192,8 @@ fn fromView(textures: *Textures, index: u32, raw: *const c.cgltf_buffer_view) Er
         .size = raw.size,
     };
     if (textures.ranges.get(range)) |image| return image;
-    const buffer = source.buffers[range.buffer] orelse {
-        source.warn("image {d}: its buffer has no data, or only compressed data, left out", .{
-            index,
-        });
+    const view_bytes = try buffer_views.contents(source, raw) orelse {
+        source.warn("image {d}: its buffer has no data, left out", .{index});
         return null;
     };
     if (range.size > textures.view_bytes_left) {
@@ -202,8 +201,7 @@ fn fromView(textures: *Textures, index: u32, raw: *const c.cgltf_buffer_view) Er
         return null;
     }
     textures.view_bytes_left -= range.size;
-    // Whole views have been checked against their buffers.
-    const bytes = try source.arena.dupe(u8, buffer[range.offset..][0..range.size]);
+    const bytes = try source.arena.dupe(u8, view_bytes);
     const image = try textures.addImage(index, bytes);
     try textures.ranges.put(source.gpa, range, image);
     return image;

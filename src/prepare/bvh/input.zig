@@ -33,11 +33,16 @@ pub const Input = struct {
     /// The reference to one of them, within its box grown by its pad.
     pub inline fn reference(input: *const Input, index: usize) split.Box {
         const number = if (input.kept) |kept| kept[index] else index;
-        const corner = input.triangles[number].corner;
+        return split.reference(input.grownBox(&input.triangles[number]), @intCast(number));
+    }
+
+    /// The box of a triangle's corners, grown by its pad.
+    pub inline fn grownBox(input: *const Input, triangle: *const world.Triangle) Box3 {
+        const corner = triangle.corner;
         const box = Box3.empty
             .include(input.positions[corner[0]])
             .include(input.positions[corner[1]])
             .include(input.positions[corner[2]]);
-        return split.reference(box.grow(input.padding.ofBox(box)), @intCast(number));
+        return box.grow(input.padding.ofBox(box));
     }
 };

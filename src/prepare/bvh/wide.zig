@@ -25,27 +25,56 @@ const Vec3 = math.Vec3;
 pub const Input = bvh_input.Input;
 
 /// Cost of testing a ray against the boxes of a node, and against a pack of triangles.
-const node_cost: f32 = 1;
-const pack_cost: f32 = 1;
+pub const node_cost: f32 = 1;
+pub const pack_cost: f32 = 1;
 
 /// How many references ahead corners are fetched, and their triangles once more as many.
 const prefetch_distance = 16;
 
-/// Builds the tree of `input`. Nodes and packs come from `arena`; what is needed meanwhile comes
-/// from `gpa`. Without triangles the tree is one node without children.
+/// Nodes and packs that one thread works on: children stand behind their parents.
+pub const Part = struct { node_begin: u32, node_end: u32, pack_begin: u32, pack_end: u32 };
+
+/// A tree, to be fitted to other places of its triangles.
+pub fn Built(comptime width: u32) type {
+    return struct {
+        nodes: []align(world.cache_line_bytes) world.Node(width),
+        packs: []align(world.cache_line_bytes) world.TrianglePack(width),
+        /// All of it. The first part begins with the root and is above all others; what is below a
+        /// node of another part is in that.
+        parts: []const Part,
+        statistics: world.TreeStatistics,
+
+        /// As rays have it.
+        pub fn tree(built: *const @This()) world.Tree(width) {
+            return .{ .nodes = built.nodes, .packs = built.packs };
+        }
+    };
+}
+
+/// Builds the tree of `input`. It comes from `arena`; what is needed meanwhile comes from `gpa`.
+/// Without triangles the tree is one node without children.
 pub fn build(
     gpa: Allocator,
     arena: Allocator,
     input: *const Input,
     comptime width: u32,
-    statistics: *world.TreeStatistics,
-) bvh_input.Error!world.Tree(width) {
+) bvh_input.Error!Built(width) {
     if (input.count() == 0) {
         const Node = world.Node(width);
         const nodes = try arena.alignedAlloc(Node, .@"64", 1);
         nodes[0] = .empty;
-        statistics.* = .{ .node_count = 1, .depth = 0, .sah_cost = 0, .bytes = @sizeOf(Node) };
-        return .{ .nodes = nodes, .packs = &.{} };
+        const root: Part = .{ .node_begin = 0, .node_end = 1, .pack_begin = 0, .pack_end = 0 };
+        return .{
+            .nodes = nodes,
+            .packs = &.{},
+            .parts = try arena.dupe(Part, &.{root}),
+            .statistics = .{
+                .node_count = 1,
+                .depth = 0,
+                .sah_cost = 0,
+                .bytes = @sizeOf(Node),
+            },
+        };
     }
     var binary = try bvh_build.build(gpa, input, width);
     defer binary.deinit(gpa);
@@ -56,7 +85,7 @@ pub fn build(
     defer gpa.free(costs);
     var collapse: Collapse(width) = .init(input, &binary, costs);
     try collapse.weigh();
-    return collapse.emit(gpa, arena, statistics);
+    return collapse.emit(gpa, arena);
 }
 
 /// A binary node and where its triangles begin.
@@ -171,8 +200,8 @@ fn Collapse(comptime width: u32) type {
                 children[0] = item;
                 return 1;
             }
-            const Share = struct { item: Item, slot_count: u32 };
-            var stack: [width]Share = undefined;
+            const Opening = struct { item: Item, slot_count: u32 };
+            var stack: [width]Opening = undefined;
             stack[0] = .{ .item = item, .slot_count = width };
             var stack_count: usize = 1;
             var child_count: u32 = 0;
@@ -232,10 +261,9 @@ fn Collapse(comptime width: u32) type {
             collapse: *Self,
             gpa: Allocator,
             arena: Allocator,
-            statistics: *world.TreeStatistics,
-        ) bvh_input.Error!world.Tree(width) {
+        ) bvh_input.Error!Built(width) {
             const limit: u32 = @intCast(bvh_build.taskSize(collapse.input.count()));
-            var parts: std.ArrayList(Part) = .empty;
+            var parts: std.ArrayList(Share) = .empty;
             defer parts.deinit(gpa);
             try collapse.findParts(gpa, &parts, limit);
             var work: EmitWork = .{ .collapse = collapse, .parts = parts.items, .limit = limit };
@@ -244,12 +272,20 @@ fn Collapse(comptime width: u32) type {
 
             var node_count: u32 = 0;
             var pack_count: u32 = 0;
-            statistics.* = .{ .node_count = 0, .depth = 0, .sah_cost = 0, .bytes = 0 };
-            for (parts.items) |*part| {
+            var statistics: world.TreeStatistics =
+                .{ .node_count = 0, .depth = 0, .sah_cost = 0, .bytes = 0 };
+            const written = try arena.alloc(Part, parts.items.len);
+            for (parts.items, written) |*part, *to| {
                 part.node_begin = node_count;
                 part.pack_begin = pack_count;
                 node_count += part.node_count;
                 pack_count += part.pack_count;
+                to.* = .{
+                    .node_begin = part.node_begin,
+                    .node_end = node_count,
+                    .pack_begin = part.pack_begin,
+                    .pack_end = pack_count,
+                };
                 statistics.depth = @max(statistics.depth, part.depth_max);
                 statistics.sah_cost += part.cost;
             }
@@ -260,7 +296,12 @@ fn Collapse(comptime width: u32) type {
             statistics.node_count = node_count;
             statistics.bytes = @as(u64, node_count) * @sizeOf(Node) +
                 @as(u64, pack_count) * @sizeOf(Pack);
-            return .{ .nodes = work.nodes, .packs = work.packs };
+            return .{
+                .nodes = work.nodes,
+                .packs = work.packs,
+                .parts = written,
+                .statistics = statistics,
+            };
         }
 
         /// Parts of about `limit` triangles, each a wide node and all below it, but for the first,
@@ -268,12 +309,12 @@ fn Collapse(comptime width: u32) type {
         fn findParts(
             collapse: *const Self,
             gpa: Allocator,
-            parts: *std.ArrayList(Part),
+            parts: *std.ArrayList(Share),
             limit: u32,
         ) error{OutOfMemory}!void {
-            const top: Part = .{ .item = .{ .node = 0, .begin = 0 }, .depth = 1 };
+            const top: Share = .{ .item = .{ .node = 0, .begin = 0 }, .depth = 1 };
             try parts.append(gpa, top);
-            var waiting: std.ArrayList(Part) = .empty;
+            var waiting: std.ArrayList(Share) = .empty;
             defer waiting.deinit(gpa);
             try waiting.append(gpa, top);
             // In the order of `walk`, which meets the same parts.
@@ -287,12 +328,12 @@ fn Collapse(comptime width: u32) type {
                     const list = if (is_part) parts else &waiting;
                     try list.append(gpa, .{ .item = child, .depth = visit.depth + 1 });
                 }
-                std.mem.reverse(Part, waiting.items[bottom..]);
+                std.mem.reverse(Share, waiting.items[bottom..]);
             }
         }
 
         /// A stretch of the tree that one thread counts and writes.
-        const Part = struct {
+        const Share = struct {
             item: Item,
             depth: u32,
             node_begin: u32 = 0,
@@ -308,7 +349,7 @@ fn Collapse(comptime width: u32) type {
 
         const EmitWork = struct {
             collapse: *const Self,
-            parts: []Part,
+            parts: []Share,
             limit: u32,
             nodes: []align(world.cache_line_bytes) Node = &.{},
             packs: []align(world.cache_line_bytes) Pack = &.{},
