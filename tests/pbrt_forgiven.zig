@@ -482,3 +482,32 @@ test "lights of version 4 are as bright as their scale, the film as its exposure
 fn luminanceOf(color: Vec3) f32 {
     return 0.212671 * color[0] + 0.715160 * color[1] + 0.072169 * color[2];
 }
+
+test "parameters that nothing reads are said, once for each kind of directive" {
+    var folder: Folder = .make();
+    defer folder.free();
+    var scene = try folder.read(
+        \\Camera "perspective" "float aperture" 1 "float focaldistance" 2
+        \\Film "rgb" "integer xresolution" 10 "float diagonal" 35
+        \\WorldBegin
+        \\Attribute "shape" "float unknown" 1
+        \\LightSource "point" "float brightness" 2 "integer nsamples" 4
+        \\Material "matte" "float sigma" 20
+        \\Shape "disk" "float shadowalpha" 0
+        \\Shape "disk" "float shadowalpha" 0 "float radius" 2
+        \\Shape "curve" "float width" 1
+        \\Material "subsurface" "string name" "Ketchup" "float scale" 2
+        \\Shape "disk"
+    , true);
+    defer scene.deinit();
+    for ([_][]const u8{
+        "line 1: Camera: 'aperture' is not read",
+        "line 5: LightSource: 'brightness' is not read",
+        "line 6: Material: 'sigma' is not read",
+        "line 7: Shape: 'shadowalpha' is not read",
+        "line 9: Shape 'curve' is not supported and left out",
+    }, 0..) |text, index| try expectEqualStrings(text, folder.said.warnings[index].text());
+    try expectEqual(5, folder.said.warning_count);
+    const ketchup = colorOf(&scene, 2);
+    try expect(ketchup[0] > 4 * ketchup[1] and ketchup[0] > 4 * ketchup[2]);
+}

@@ -170,6 +170,15 @@ const Directive = enum {
     TransformEnd,
     Translate,
 
+    /// Whether its parameters have to do with what is seen, beside how.
+    fn isSeen(directive: Directive) bool {
+        return switch (directive) {
+            .Camera, .Film, .Shape => true,
+            .AreaLightSource, .LightSource, .MakeNamedMaterial, .Material => true,
+            else => false,
+        };
+    }
+
     /// Whose defaults its parameters have.
     fn target(directive: Directive) ?Defaults.Target {
         return switch (directive) {
@@ -307,17 +316,21 @@ fn perform(reader: *Reader, directive: Directive) Error!void {
         .Option => try reader.option(),
         .Texture => {
             const name = try reader.text();
-            _ = try reader.text(); // Its type: all of them are colours here.
+            // All of them are colours here.
+            const is_color = !std.mem.eql(u8, try reader.text(), "float");
             const class = try reader.text();
             try reader.readParameters(directive);
             const textures = &reader.colors.textures;
-            const made = try textures.make(&reader.colors, class, &reader.parameters);
+            const made = try textures.make(&reader.colors, class, is_color, &reader.parameters);
+            try reader.parameters.warnOfUnread(reader.input, "Texture");
             try reader.keep(Textures.Texture, &textures.named, name, made);
         },
         else => {
             const name = try reader.text();
             try reader.readParameters(directive);
             try reader.performNamed(directive, name);
+            if (directive.isSeen())
+                try reader.parameters.warnOfUnread(reader.input, @tagName(directive));
         },
     }
 }
@@ -705,11 +718,10 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
     const input = reader.input;
     reader.tessellator.parameters = &reader.parameters;
     reader.tessellator.name = name;
-    const kind = shapes.kinds.get(name) orelse return input.warnHere(
-        name,
-        "Shape {f} is not supported and left out",
-        .{quote(name)},
-    );
+    const kind = shapes.kinds.get(name) orelse {
+        reader.parameters.pass();
+        return input.warnHere(name, "Shape {f} is not supported and left out", .{quote(name)});
+    };
     const is_boundary = if (graphics.material) |material| material.is_boundary else false;
     const seen = if (is_boundary) null else try reader.shapeMaterial();
     const has_picture = if (graphics.area_light) |light| light.picture != null else false;
@@ -729,7 +741,7 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
             return reader.addAreaLight(kind, black, area_light);
         } else try input.warnHere("boundary", "Shape: what bounds a medium does not shine", .{});
     }
-    const material = seen orelse return;
+    const material = seen orelse return reader.parameters.pass();
     const mesh = try reader.meshOf(kind, material);
     if (reader.object == null)
         try reader.builder.instantiate(mesh, &graphics.transform)
@@ -783,7 +795,10 @@ fn meshOf(reader: *Reader, kind: shapes.Kind, material: u32) Error!u32 {
     }
     const key = shapes.hash(&reader.tessellator, reader.graphics.reverse) ^
         (@as(u64, material) *% 0x9e3779b97f4a7c15);
-    if (reader.known_meshes.get(key)) |mesh| return mesh;
+    if (reader.known_meshes.get(key)) |mesh| {
+        reader.parameters.pass();
+        return mesh;
+    }
     const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
     const mesh = try reader.builder.addMesh(geometry, material);
     try reader.known_meshes.put(reader.arena, key, mesh);

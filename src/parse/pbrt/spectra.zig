@@ -195,6 +195,31 @@ const named: std.StaticStringMap(Vec3) = .initComptime(.{
     .{ "stdillum-D65", Vec3{ 1, 1, 1 } },
 });
 
+/// What a medium does to light on a way of a millimetre: scattering is the reduced one.
+pub const Medium = struct { scattered: Vec3, absorbed: Vec3 };
+
+/// Media that PBRT knows by name (Jensen et al. 2001, "A practical model for subsurface light
+/// transport", figure 5); null for those of other sources.
+pub fn mediumNamed(name: []const u8) ?Medium {
+    const row = media.get(name) orelse return null;
+    return .{ .scattered = row[0..3].*, .absorbed = row[3..6].* };
+}
+
+const media: std.StaticStringMap([6]f32) = .initComptime(.{
+    .{ "Apple", .{ 2.29, 2.39, 1.97, 0.0030, 0.0034, 0.046 } },
+    .{ "Chicken1", .{ 0.15, 0.21, 0.38, 0.015, 0.077, 0.19 } },
+    .{ "Chicken2", .{ 0.19, 0.25, 0.32, 0.018, 0.088, 0.20 } },
+    .{ "Cream", .{ 7.38, 5.47, 3.15, 0.0002, 0.0028, 0.0163 } },
+    .{ "Ketchup", .{ 0.18, 0.07, 0.03, 0.061, 0.97, 1.45 } },
+    .{ "Marble", .{ 2.19, 2.62, 3.00, 0.0021, 0.0041, 0.0071 } },
+    .{ "Potato", .{ 0.68, 0.70, 0.55, 0.0024, 0.0090, 0.12 } },
+    .{ "Skimmilk", .{ 0.70, 1.22, 1.90, 0.0014, 0.0025, 0.0142 } },
+    .{ "Skin1", .{ 0.74, 0.88, 1.01, 0.032, 0.17, 0.48 } },
+    .{ "Skin2", .{ 1.09, 1.59, 1.79, 0.013, 0.070, 0.145 } },
+    .{ "Spectralon", .{ 11.6, 20.4, 14.9, 0, 0, 0 } },
+    .{ "Wholemilk", .{ 2.55, 3.21, 3.77, 0.0011, 0.0024, 0.014 } },
+});
+
 /// Luminance of linear RGB (Rec. 709).
 pub fn luminance(rgb: Vec3) f32 {
     return 0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2];

@@ -110,10 +110,17 @@ pub fn make(
     textures: *Textures,
     colors: *Colors,
     class: []const u8,
+    is_color: bool,
     parameters: *const Parameters,
 ) Error!Texture {
-    const maker: Maker = .{ .textures = textures, .colors = colors, .parameters = parameters };
+    const maker: Maker = .{
+        .textures = textures,
+        .colors = colors,
+        .parameters = parameters,
+        .is_color = is_color,
+    };
     const known = std.meta.stringToEnum(Class, class) orelse {
+        parameters.pass();
         try textures.input.warnHere(
             class,
             "Texture {f} is not supported: its mean is taken as {d}",
@@ -123,11 +130,14 @@ pub fn make(
     };
     switch (known) {
         .constant, .scale, .mix, .imagemap => {},
-        .directionmix, .checkerboard, .dots, .bilerp => try textures.input.warnHere(
-            class,
-            "Texture {f} is shown as its mean",
-            .{quote(class)},
-        ),
+        .directionmix, .checkerboard, .dots, .bilerp => {
+            parameters.pass();
+            try textures.input.warnHere(
+                class,
+                "Texture {f} is shown as its mean",
+                .{quote(class)},
+            );
+        },
     }
     return maker.make(known);
 }
@@ -137,6 +147,7 @@ const Maker = struct {
     textures: *Textures,
     colors: *Colors,
     parameters: *const Parameters,
+    is_color: bool,
 
     const white: Texture = .{ .mean = .{ 1, 1, 1 } };
     const black: Texture = .{ .mean = .{ 0, 0, 0 } };
@@ -240,12 +251,21 @@ const Maker = struct {
         const from = maker.parameters;
         const scale = from.float("scale", 1);
         const result: Texture = .{ .mean = @splat(picture_mean * scale) };
+        const default = if (from.boolean("gamma", true)) "sRGB" else "linear";
+        const encoding = from.string("encoding") orelse default;
+        if (maker.is_color and !std.mem.eql(u8, encoding, "sRGB")) try input.warnHere(
+            "encoding",
+            "Texture 'imagemap': colours of 8 bits are sRGB, not {f}",
+            .{quote(encoding)},
+        );
         const path = from.string("filename") orelse {
+            from.pass();
             try input.warnHere("no file", "Texture 'imagemap' has no filename, left out", .{});
             return result;
         };
         const mapping = from.string("mapping") orelse "uv";
         if (from.boolean("invert", false) or !std.mem.eql(u8, mapping, "uv")) {
+            from.pass();
             try input.warnHere(
                 "imagemap",
                 "Texture 'imagemap': inverted pictures, and those that are mapped otherwise " ++
