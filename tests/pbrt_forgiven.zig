@@ -488,7 +488,7 @@ test "parameters that nothing reads are said, once for each kind of directive" {
     defer folder.free();
     var scene = try folder.read(
         \\Camera "perspective" "float aperture" 1 "float focaldistance" 2
-        \\Film "rgb" "integer xresolution" 10 "float diagonal" 35
+        \\Film "rgb" "integer xresolution" 5 "integer xresolution" 10 "float diagonal" 35
         \\WorldBegin
         \\Attribute "shape" "float unknown" 1
         \\LightSource "point" "float brightness" 2 "integer nsamples" 4
@@ -508,6 +508,7 @@ test "parameters that nothing reads are said, once for each kind of directive" {
         "line 9: Shape 'curve' is not supported and left out",
     }, 0..) |text, index| try expectEqualStrings(text, folder.said.warnings[index].text());
     try expectEqual(5, folder.said.warning_count);
+    try expectEqual(10, scene.resolution.?[0]);
     const ketchup = colorOf(&scene, 2);
     try expect(ketchup[0] > 4 * ketchup[1] and ketchup[0] > 4 * ketchup[2]);
 }

@@ -281,7 +281,11 @@ pub fn pass(parameters: *const Parameters) void {
 }
 
 /// Says which ones nobody has asked for, but for those that change nothing of what is seen.
-pub fn warnOfUnread(parameters: *const Parameters, input: *Input, directive: []const u8) Error!void {
+pub fn warnOfUnread(
+    parameters: *const Parameters,
+    input: *Input,
+    directive: []const u8,
+) Error!void {
     for (parameters.items.items) |*item| {
         if (item.is_read or unseen.has(item.name)) continue;
         var kind: [256]u8 = undefined;
@@ -297,9 +301,9 @@ pub fn warnOfUnread(parameters: *const Parameters, input: *Input, directive: []c
 /// Parameters of how PBRT makes its picture, and those that only some values of others ask for.
 const unseen: std.StaticStringMap(void) = .initComptime(names: {
     const list = "S diagonal difftrans display edgelength faceIndices filename filter " ++
-        "focaldistance maxanisotropy maxcomponentvalue maxdepth maxsampleluminance nsamples " ++
-        "pixelbounds remaproughness samples savefp16 scheme shutterclose shutteropen splitdepth " ++
-        "st trilinear uv";
+        "focaldistance mapname maxanisotropy maxcomponentvalue maxdepth maxsampleluminance " ++
+        "meanfreepath mfp nsamples pixelbounds remaproughness samples savefp16 scheme shutterclose " ++
+        "shutteropen splitdepth st trilinear uv";
     @setEvalBranchQuota(10_000);
     var rows: []const struct { []const u8 } = &.{};
     var words = std.mem.tokenizeScalar(u8, list, ' ');
@@ -309,15 +313,13 @@ const unseen: std.StaticStringMap(void) = .initComptime(names: {
 
 /// The parameter of that name, the last one where it stands twice.
 pub fn find(parameters: *const Parameters, name: []const u8) ?*const Parameter {
-    var index = parameters.items.items.len;
-    while (index > 0) {
-        index -= 1;
-        const parameter = &parameters.items.items[index];
+    var found: ?*const Parameter = null;
+    for (parameters.items.items) |*parameter| {
         if (!std.mem.eql(u8, parameter.name, name)) continue;
         parameter.is_read = true;
-        return parameter;
+        found = parameter;
     }
-    return null;
+    return found;
 }
 
 /// Its numbers, none where it is made of others or of strings.

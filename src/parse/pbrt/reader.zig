@@ -314,17 +314,7 @@ fn perform(reader: *Reader, directive: Directive) Error!void {
         },
         .NamedMaterial => try reader.namedMaterial(),
         .Option => try reader.option(),
-        .Texture => {
-            const name = try reader.text();
-            // All of them are colours here.
-            const is_color = !std.mem.eql(u8, try reader.text(), "float");
-            const class = try reader.text();
-            try reader.readParameters(directive);
-            const textures = &reader.colors.textures;
-            const made = try textures.make(&reader.colors, class, is_color, &reader.parameters);
-            try reader.parameters.warnOfUnread(reader.input, "Texture");
-            try reader.keep(Textures.Texture, &textures.named, name, made);
-        },
+        .Texture => try reader.texture(),
         else => {
             const name = try reader.text();
             try reader.readParameters(directive);
@@ -351,6 +341,20 @@ fn forgive(
     arguments: anytype,
 ) Error!void {
     return reader.input.forgive(reader.input.directive, kind, format, arguments);
+}
+
+/// `Texture "name" "type" "class" parameters`.
+fn texture(reader: *Reader) Error!void {
+    const name = try reader.text();
+    // All of them are colours here.
+    const is_color = !std.mem.eql(u8, try reader.text(), "float");
+    const class = try reader.text();
+    const parameters = &reader.parameters;
+    try reader.readParameters(.Texture);
+    const textures = &reader.colors.textures;
+    const made = try textures.make(&reader.colors, class, is_color, parameters);
+    try parameters.warnOfUnread(reader.input, "Texture");
+    try reader.keep(Textures.Texture, &textures.named, name, made);
 }
 
 /// Directives of the form `Directive "name" parameters`.
