@@ -302,8 +302,8 @@ pub fn warnOfUnread(
 const unseen: std.StaticStringMap(void) = .initComptime(names: {
     const list = "S diagonal difftrans display edgelength faceIndices filename filter " ++
         "focaldistance mapname maxanisotropy maxcomponentvalue maxdepth maxsampleluminance " ++
-        "meanfreepath mfp nsamples pixelbounds remaproughness samples savefp16 scheme shutterclose " ++
-        "shutteropen splitdepth st trilinear uv";
+        "meanfreepath mfp nsamples pixelbounds remaproughness samples savefp16 scheme " ++
+        "shutterclose shutteropen splitdepth st trilinear uv";
     @setEvalBranchQuota(10_000);
     var rows: []const struct { []const u8 } = &.{};
     var words = std.mem.tokenizeScalar(u8, list, ' ');

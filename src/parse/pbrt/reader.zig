@@ -51,6 +51,8 @@ const AreaLight = struct {
     two_sided: bool,
     /// What each shape emits in all; 0: as its emission says.
     power: f32 = 0,
+    /// Mean luminance of the picture.
+    luminance: f64 = 1,
     picture: ?scene_data.TextureView = null,
 };
 
@@ -706,6 +708,11 @@ fn areaLightSource(reader: *Reader) Error!void {
     if (parameters.string("filename")) |path| {
         const shown = try reader.colors.textures.show(&.{ .path = path });
         area_light.picture = if (shown) |picture| picture.view else null;
+        if (shown != null and area_light.power > 0) {
+            const textures = &reader.colors.textures;
+            const image = (try textures.imageOf(path)).?;
+            area_light.luminance = try textures.luminanceOf(image) orelse 1;
+        }
     }
     reader.graphics.area_light = area_light;
 }
@@ -824,7 +831,8 @@ fn addAreaLight(
     else
         materials.hidden_lamp;
     const sides: f64 = if (area_light.two_sided) 2 else 1;
-    const of_unit = sides * std.math.pi * lights.areaOf(&geometry, place);
+    const area = lights.areaOf(&geometry, place);
+    const of_unit = sides * std.math.pi * area * area_light.luminance;
     bright.emissive = area_light.emission.by(area_light.power, of_unit);
     bright.emissive_texture = area_light.picture;
     bright.double_sided = area_light.two_sided;

@@ -6,14 +6,17 @@
 //! warning, once a kind. docs/pbrt.md has the table.
 
 const std = @import("std");
+const decode = @import("../../decode.zig");
 const diagnostic = @import("../../diagnostic.zig");
+const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
+const spectra = @import("spectra.zig");
 const Colors = @import("colors.zig");
 const ImageFiles = @import("../image_files.zig");
 const Input = @import("input.zig");
 const Parameters = @import("parameters.zig");
 const Error = Input.Error;
-const Vec3 = @import("../../math.zig").Vec3;
+const Vec3 = math.Vec3;
 const quote = diagnostic.quote;
 const Textures = @This();
 
@@ -92,6 +95,32 @@ pub fn imageOf(textures: *Textures, path: []const u8) Error!?u32 {
     };
     try textures.images.put(textures.arena, try textures.arena.dupe(u8, path), image);
     return image;
+}
+
+/// The mean luminance of one of the scene's images, which is decoded for that; null where it is
+/// none.
+pub fn luminanceOf(textures: *Textures, image: u32) error{OutOfMemory}!?f64 {
+    const gpa = textures.input.gpa;
+    const file = textures.files.builder.images.items[image].bytes;
+    var reason: decode.Reason = .{};
+    var texels = decode.decode(gpa, file, &reason) catch |err| switch (err) {
+        error.OutOfMemory => |failure| return failure,
+        error.InvalidImage => return null,
+    };
+    defer texels.deinit(gpa);
+    const count = @as(usize, texels.width) * texels.height;
+    var sum: f64 = 0;
+    for (0..count) |texel| {
+        const first = texel * texels.channel_count;
+        const step: usize = @intFromBool(texels.channel_count >= 3);
+        var rgb: Vec3 = undefined;
+        for (&rgb, 0..) |*to, channel| to.* = switch (texels.data) {
+            .bytes => |bytes| math.srgb.decoded[bytes[first + step * channel]],
+            .floats => |floats| floats[first + step * channel],
+        };
+        sum += spectra.luminance(rgb);
+    }
+    return sum / @as(f64, @floatFromInt(count));
 }
 
 const Class = enum {
