@@ -67,7 +67,7 @@ pub fn place(
 
 /// Whether there is any place where a surface of this material can be seen, or shines.
 pub fn isVisible(from: *const scene.Material, use: *const MaterialUse) bool {
-    if (from.is_hidden_lamp) return true;
+    if (from.in_motion or from.is_hidden_lamp) return true;
     return switch (from.alpha_mode) {
         .@"opaque" => true,
         .mask => use.alpha.largest >= from.alpha_cutoff,
