@@ -163,20 +163,21 @@ fn readNumbers(
     var cursor = text.cursor;
     while (true) {
         if (bytes[cursor] <= ' ' or bytes[cursor] == '#') cursor = Input.skip(bytes, cursor);
-        if (bytes[cursor] == 0 or bytes[cursor] == 'I') {
-            // The end of an included text, or another one.
-            text.cursor = cursor;
-            _ = try input.peekInList();
-            text = input.top();
-            bytes = text.bytes;
-            cursor = text.cursor;
-        }
         if (bytes[cursor] == ']' and bracketed) break;
         const value = (if (Number == f32)
             number.float(bytes, &cursor)
         else
             number.integer(bytes, &cursor)) catch |err| {
             text.cursor = cursor;
+            const position = input.offset();
+            _ = try input.peekInList();
+            if (input.offset() != position) {
+                // The end of an included text, or another one.
+                text = input.top();
+                bytes = text.bytes;
+                cursor = text.cursor;
+                continue;
+            }
             return failNumber(input, err, if (Number == f32) "number" else "whole number");
         };
         if (list.items.len == list.capacity) try list.ensureUnusedCapacity(input.gpa, 1);
