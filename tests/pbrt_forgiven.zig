@@ -439,6 +439,14 @@ test "what samples and depth are clamped to is said" {
             0,
         },
         .{
+            "Option \"seed\" 3 Option \"disablePixelJitter\" true " ++
+                "Option \"bool pixelstats\" [false] " ++
+                "Option \"string msereferenceout\" \"a b\" Option \"forcediffuse\" true",
+            "line 1: Option 'forcediffuse' is not read",
+            null,
+            null,
+        },
+        .{
             "Option \"bool forcediffuse\" true",
             "line 1: Option 'forcediffuse' is not read",
             null,

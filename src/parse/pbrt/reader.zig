@@ -582,17 +582,29 @@ fn sampler(reader: *Reader) Error!void {
     reader.sample_count = @intCast(count);
 }
 
-/// `Option "type name" value`: none of them has to do with what is seen, but for one.
+/// `Option "name" value`, the name with a type before it or without: none of them has to do with
+/// what is seen, but for one.
 fn option(reader: *Reader) Error!void {
-    try reader.parameters.read(reader.input);
-    const known: std.StaticStringMap(void) = .initComptime(.{
-        .{"disablepixeljitter"},    .{"disabletexturefiltering"}, .{"disablewavelengthjitter"},
-        .{"displacementedgescale"}, .{"msereferenceimage"},       .{"msereferenceout"},
-        .{"rendercoordsys"},        .{"seed"},                    .{"pixelstats"},
-        .{"wavefront"},
-    });
-    for (reader.parameters.items.items) |*item| if (!known.has(item.name))
-        try reader.input.warnHere(item.name, "Option {f} is not read", .{quote(item.name)});
+    const input = reader.input;
+    const declaration = try reader.text();
+    const bracketed = input.peek() == '[';
+    if (bracketed) input.top().cursor += 1;
+    const value = if (input.peek() == '"') try input.string() else input.word();
+    if (value.len == 0) return input.fail(input.offset(), "a value is expected", .{});
+    if (bracketed) {
+        if (input.peek() != ']') return input.fail(input.offset(), "']' is expected", .{});
+        input.top().cursor += 1;
+    }
+    const start = if (std.mem.findScalarLast(u8, declaration, ' ')) |space| space + 1 else 0;
+    const name = declaration[start..];
+    const known = [_][]const u8{
+        "disablepixeljitter",    "disabletexturefiltering", "disablewavelengthjitter",
+        "displacementedgescale", "msereferenceimage",       "msereferenceout",
+        "rendercoordsys",        "seed",                    "pixelstats",
+        "wavefront",
+    };
+    for (known) |other| if (std.ascii.eqlIgnoreCase(name, other)) return;
+    try input.warnHere(name, "Option {f} is not read", .{quote(name)});
 }
 
 /// All integrators are Whitted's here; "maxdepth" counts rays in his and in direct lighting,
