@@ -50,7 +50,8 @@ pub fn loadScene(
     } else try parse.parse(gpa, io, name, choices, diagnostic);
     errdefer scene.deinit();
     try diagnostic.settle();
-    if (choices.up_axis == .z) try scene.turn(z_to_y);
+    const is_z_up = if (choices.up_axis) |axis| axis == .z else scene.is_z_up;
+    if (is_z_up) try scene.turn(z_to_y);
     return scene;
 }
 

@@ -14,6 +14,7 @@ test {
     _ = @import("decode.zig");
     _ = @import("environment.zig");
     _ = @import("forgiven.zig");
+    _ = @import("formats.zig");
     _ = @import("glass.zig");
     _ = @import("gltf_materials.zig");
     _ = @import("gltf_instances.zig");
@@ -24,6 +25,7 @@ test {
     _ = @import("offset.zig");
     _ = @import("output.zig");
     _ = @import("pbrt.zig");
+    _ = @import("pbrt_forgiven.zig");
     _ = @import("pbrt_textures.zig");
     _ = @import("poses.zig");
     _ = @import("samples.zig");

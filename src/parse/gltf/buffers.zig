@@ -60,7 +60,6 @@ pub fn load(
             .index = index,
         };
         bytes.* = null;
-        if (raw.size == 0) return reader.fail("byteLength is 0", .{});
         if (is_fallback[index]) continue;
         total +|= raw.size;
         if (total > limits.buffer_bytes_max) return reader.fail(
