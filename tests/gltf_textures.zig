@@ -178,6 +178,7 @@ test "textures, samplers, transforms and coordinates are those of the file" {
         .texture = 0,
         .texcoord_set = 2,
         .transform = .{ .{ 2, 0, 0.25 }, .{ 0, 3, 0.5 } },
+        .parts = .{ .offset = .{ 0.25, 0.5 }, .scale = .{ 2, 3 } },
     }, material.base_color_texture.?);
     try testing.expectEqual(raylane.scene.TextureView{
         .texture = 1,

@@ -49,7 +49,6 @@ const Purpose = enum { vertices, indices };
 fn resolveAs(source: *Source, index: usize, purpose: Purpose) Error!?Accessor {
     assert(index < source.data.accessors_count);
     if (source.draco.get(@intCast(index))) |decoded| return decoded.accessor;
-    try source.need(.accessors, index);
     var accessor = try describe(source, index);
     const raw = Source.item(source.data.accessors, index);
     const component = accessor.component;

@@ -38,7 +38,10 @@ pub fn check(source: *const Source) Error!void {
             .{diagnostic.quote(name)},
         );
         if (!draco.is_held and std.mem.eql(u8, name, "KHR_draco_mesh_compression"))
-            return source.fail("{f} needs a build with Draco (-Ddraco)", .{diagnostic.quote(name)});
+            return source.fail(
+                "the required extension {f} needs a build with Draco (-Ddraco)",
+                .{diagnostic.quote(name)},
+            );
     }
     const required = Source.slice(data.extensions_required, data.extensions_required_count);
     const used = Source.slice(data.extensions_used, data.extensions_used_count);

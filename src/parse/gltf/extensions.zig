@@ -86,7 +86,7 @@ pub const all: []const Extension = &.{
     ignored("GODOT_single_root", .nothing, "for editors"),
     ignored("GRIFFEL_bim_data", .nothing, "data"),
     ignored("KHR_accessor_float64", .shapes, "accessors of doubles"),
-    ignored("KHR_animation_pointer", .nothing, "such channels stand still"),
+    rendered("KHR_animation_pointer", "what docs/animation.md lists"),
     ignored("KHR_audio_emitter", .nothing, "sound"),
     rendered("KHR_draco_mesh_compression", "by builds with Draco (-Ddraco)"),
     ignored("KHR_gaussian_splatting", .looks, "splats are points"),
@@ -163,6 +163,22 @@ test "names are in order, each once" {
     for (all[0 .. all.len - 1], all[1..]) |*one, *next| {
         errdefer std.debug.print("{s} stands before {s}\n", .{ one.name, next.name });
         try std.testing.expect(std.ascii.orderIgnoreCase(one.name, next.name) == .lt);
+    }
+}
+
+test "docs/formats.md has every row" {
+    const gpa = std.testing.allocator;
+    const folder: std.Io.Dir = .cwd();
+    const limit: std.Io.Limit = .limited(1 << 20);
+    const text = try folder.readFileAlloc(std.testing.io, "docs/formats.md", gpa, limit);
+    defer gpa.free(text);
+    var buffer: [256]u8 = undefined;
+    for (all) |*extension| {
+        const row = try std.mem.print(&buffer, "\n| {s} | {t} | {s} |\n", .{
+            extension.name, extension.treatment, extension.remark,
+        });
+        errdefer std.debug.print("missing:{s}", .{row});
+        try std.testing.expect(std.mem.find(u8, text, row) != null);
     }
 }
 
