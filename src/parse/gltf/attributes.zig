@@ -48,7 +48,7 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
     if (positions.base == null and positions.sparse == null)
         return source.fail("accessor {d}: positions without data", .{position});
 
-    var used: Used = .{ .is_draco = is_draco, .vertex_count = positions.count };
+    used.vertex_count = positions.count;
     for (list) |*attribute| {
         const index = accessorIndex(source, attribute);
         if (try hasNoElements(source, attribute.data)) {
