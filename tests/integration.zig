@@ -14,7 +14,9 @@ test {
     _ = @import("decode.zig");
     _ = @import("environment.zig");
     _ = @import("formats.zig");
+    _ = @import("forgiven.zig");
     _ = @import("glass.zig");
+    _ = @import("gltf_animations.zig");
     _ = @import("gltf_materials.zig");
     _ = @import("gltf_instances.zig");
     _ = @import("gltf_poses.zig");

@@ -30,9 +30,9 @@ pub const Used = struct {
     weights: [scene.joint_set_count]?u32 = @splat(null),
     /// Whether there are more joints than there are sets for.
     has_more_joints: bool = false,
+    vertex_count: u32 = 0,
     /// Whether its triangles come one by one from Draco, whatever the mode.
     is_draco: bool = false,
-    vertex_count: u32 = 0,
 };
 
 /// Finds the attributes of a primitive and checks those that are always drawn; for the others there
@@ -43,12 +43,12 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
         if (attribute.type != .position or attribute.index != 0) continue;
         break accessorIndex(source, attribute);
     } else return .{};
-    const is_draco = try draco_meshes.decode(source, primitive, place);
+    var used: Used = .{ .is_draco = try draco_meshes.decode(source, primitive, place) };
     const positions = try required(source, position);
     if (positions.base == null and positions.sparse == null)
         return source.fail("accessor {d}: positions without data", .{position});
 
-    var used: Used = .{ .is_draco = is_draco, .vertex_count = positions.count };
+    used.vertex_count = positions.count;
     for (list) |*attribute| {
         const index = accessorIndex(source, attribute);
         if (try hasNoElements(source, attribute.data)) {

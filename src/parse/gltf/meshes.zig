@@ -165,7 +165,11 @@ pub fn get(meshes: *Meshes, mesh_index: u32, deformation: Deformation) Error!Ran
     var range: Range = .{ .first = first, .count = 0, .joint_max = 0 };
     for (Source.slice(mesh.primitives, mesh.primitives_count), 0..) |*primitive, index| {
         const place: Place = .{ .mesh = mesh_index, .primitive = @intCast(index) };
-        const decoded = try meshes.decode(primitive, place) orelse continue;
+        const decoded = meshes.decode(primitive, place) catch |err| {
+            if (err == error.OutOfMemory or !meshes.source.force) return err;
+            try meshes.source.excuse(err);
+            continue;
+        } orelse continue;
         const index_of = try builder.addMesh(decoded.mesh);
         const drawn = &builder.meshes.items[index_of];
         drawn.morph_targets =
@@ -281,7 +285,7 @@ fn decodeForTangents(
         }
     }
     const has_tangents = mesh.normals != null and used.tangent != null; // See below.
-    if (material.anisotropy > 0) {
+    if (material.anisotropy > 0 or material.in_motion and material.anisotropy_texture != null) {
         const set = if (material.anisotropy_texture) |view| view.texcoord_set else 0;
         if (!needed and !has_tangents) if (used.texcoords[set]) |index| {
             mesh.texcoords[set] = try meshes.decodeTexcoords(primitive, index, used, place);
@@ -728,8 +732,8 @@ fn takeApart(
     return length;
 }
 
-/// The vertices of a primitive in the order of the file. Returns the index behind which strips begin
-/// anew, if there is one (KHR_mesh_primitive_restart; the core has none).
+/// The vertices of a primitive in the order of the file. Returns the index behind which strips
+/// begin anew, if there is one (KHR_mesh_primitive_restart; the core has none).
 fn number(
     source: *const Source,
     connection: Connection,
