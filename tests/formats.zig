@@ -479,6 +479,18 @@ test "PLY: colours of vertices, of faces, and coordinates of corners" {
     try std.testing.expectEqualStrings("image", own.images[0].bytes);
 }
 
+test "PLY: lines that end in returns alone, faces that look as their normals say" {
+    var scene = try readClean("a", "ply\rformat binary_little_endian 1.0\rcomment x\r" ++
+        "element vertex 3\rproperty char x\rproperty char y\rproperty char z\r" ++
+        "property char nx\rproperty char ny\rproperty char nz\r" ++
+        "element face 1\rproperty list uchar uchar vertex_index\rend_header\r" ++
+        "\x0a\x00\x00\x00\x00\x01\x01\x00\x00\x00\x00\x01\x00\x01\x00\x00\x00\x01" ++
+        "\x03\x00\x01\x02");
+    defer scene.deinit();
+    try expectEqual(Vec3{ 10, 0, 0 }, scene.meshes[0].positions[0]);
+    try expectEqual([3]u32{ 0, 2, 1 }, scene.meshes[0].triangles[0]);
+}
+
 test "PLY: points, edges and strips" {
     var points = try expectForgiven(
         "1 faces, edges or points whose places are not finite are left out",

@@ -204,10 +204,13 @@ const Reader = struct {
         return error.InvalidPly;
     }
 
-    /// The next line of the header, without its end.
+    /// The next line of the header, without its end, which is the same for all: old systems have
+    /// returns alone, behind the last of which binary data may look like another end.
     fn line(reader: *Reader) Error![]const u8 {
         const rest = reader.bytes[reader.cursor..];
-        const end = std.mem.findScalar(u8, rest, '\n') orelse
+        const has_returns = std.mem.startsWith(u8, reader.bytes, "ply\r") and
+            reader.bytes[4] != '\n';
+        const end = std.mem.findScalar(u8, rest, if (has_returns) '\r' else '\n') orelse
             return reader.fail("the PLY header does not end", .{});
         reader.cursor += end + 1;
         return std.mem.trimEnd(u8, rest[0..end], "\r \t");
