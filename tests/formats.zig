@@ -305,6 +305,15 @@ test "MTL: what is missing is grey, with a warning" {
     try expectEqual(0.5, scene.materials[0].base_color[0]);
     // Under the name of the scene it is found all the same.
     try folder.dir.writeFile(io, .{ .sub_path = "a.mtl", .data = "newmtl matt\nmap_Kd x.png\nhm" });
+    try folder.dir.writeFile(io, .{ .sub_path = "c.mtl", .data = "newmtl a\nrefl r.png\nKa 1" });
+    var unread: Diagnostic = .{};
+    var third = try readIn(folder.dir, "c.obj", "mtllib c.mtl\nv 0 0 0\np 1", &unread);
+    third.deinit();
+    try expectEqual(1, unread.warning_count);
+    try std.testing.expectEqualStrings(
+        "'c.mtl': refl is not rendered",
+        unread.warnings[0].text(),
+    );
     var other: Diagnostic = .{};
     var named = try readIn(folder.dir, "b/a.obj", with_library, &other);
     defer named.deinit();
