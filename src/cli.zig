@@ -7,6 +7,7 @@
 const std = @import("std");
 const bench = @import("cli/bench.zig");
 const compare = @import("cli/compare.zig");
+const info = @import("cli/info.zig");
 const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
@@ -35,6 +36,8 @@ pub const Command = union(enum) {
     bench_help,
     compare: Compare,
     compare_help,
+    info: Info,
+    info_help,
 };
 
 /// What `raylane bench` is to do.
@@ -45,6 +48,13 @@ pub const bench_help = bench.help;
 pub const Compare = compare.Compare;
 /// What `raylane compare --help` prints.
 pub const compare_help = compare.help;
+/// What `raylane info` is to do.
+pub const Info = info.Info;
+/// What `raylane info --help` prints.
+pub const info_help = info.help;
+
+/// Words that stand before all others, but for `render`, which may stand among flags.
+const Word = enum { bench, compare, info };
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -69,6 +79,7 @@ pub const Options = struct {
     thread_count: ?u32 = null,
     tree_quality: settings.TreeQuality = .default,
     load: settings.Load = .{},
+    animation: settings.Animation = .{},
     view: settings.View = .{},
     render: settings.Render = .{},
     write: settings.Write = .{},
@@ -147,12 +158,26 @@ const sections: []const Section = &.{
         },
         .{ .usage = "--fov DEG", .help = "vertical angle of view, in place of the camera's" },
         .{ .usage = "--ortho", .help = "no perspective" },
+        .{
+            .usage = "--frame-all",
+            .help = "frame all that the animation shows at any time",
+        },
     } },
     .{ .title = "Scene", .options = &.{
         .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
         .{
             .usage = "--material-variant N",
             .help = "name or index of one of its variants of materials",
+        },
+        .{
+            .usage = "--animation WHICH",
+            .help = "name or index of an animation, or all at once\n" ++
+                "(default: none, the scene as it stands)",
+        },
+        .{
+            .usage = "--animation-time S",
+            .help = "seconds since its start (default: 0); by itself of\n" ++
+                "the first animation",
         },
         .{
             .usage = "--up-axis AXIS",
@@ -299,6 +324,7 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\usage: raylane [render] SCENE [options]
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
+    \\       raylane info SCENE [options]          (see raylane info --help)
     \\
     \\SCENE is a file in glTF 2.0 (JSON or GLB), PBRT, OBJ, STL or PLY, - for standard
     \\input, or builtin:NAME, NAME being cornell, atrium, nave or handles. The image
@@ -322,16 +348,22 @@ pub fn parse(
     diagnostic: *Diagnostic,
 ) Error!Command {
     assert(variant_names.len >= 1);
-    const is_bench = arguments.len > 0 and std.mem.eql(u8, arguments[0], "bench");
-    const is_compare = arguments.len > 0 and std.mem.eql(u8, arguments[0], "compare");
+    const first = if (arguments.len > 0) std.meta.stringToEnum(Word, arguments[0]) else null;
     // Help wins over everything, for it is what somebody asks for who got the rest wrong.
     for (arguments) |argument| {
         if (std.mem.eql(u8, argument, "--")) break;
         if (std.mem.eql(u8, argument, "-h") or std.mem.eql(u8, argument, "--help"))
-            return if (is_bench) .bench_help else if (is_compare) .compare_help else .help;
+            return if (first) |word| switch (word) {
+                .bench => .bench_help,
+                .compare => .compare_help,
+                .info => .info_help,
+            } else .help;
     }
-    if (is_bench) return .{ .bench = try bench.parse(arguments[1..], diagnostic) };
-    if (is_compare) return .{ .compare = try compare.parse(arguments[1..], diagnostic) };
+    if (first) |word| return switch (word) {
+        .bench => .{ .bench = try bench.parse(arguments[1..], diagnostic) },
+        .compare => .{ .compare = try compare.parse(arguments[1..], diagnostic) },
+        .info => .{ .info = try info.parse(arguments[1..], diagnostic) },
+    };
     var parser: Parser = .{
         .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
         .variant_names = variant_names,
@@ -344,6 +376,8 @@ const Parser = struct {
     variant_names: []const []const u8,
     options: Options = .{ .scene = "" },
     scene: ?[]const u8 = null,
+    /// A time is asked for.
+    has_time: bool = false,
     /// The explicit `--format`.
     format: ?settings.Format = null,
     /// Set by the flags that print something and end.
@@ -362,6 +396,8 @@ const Parser = struct {
         };
         if (parser.other) |command| return command;
         parser.options.scene = parser.scene orelse return reader.fail("no scene given", .{});
+        const animation = &parser.options.animation;
+        if (parser.has_time and animation.which == .default) animation.which = .{ .index = 0 };
         try parser.checkViewpoint();
         try parser.settleFormat();
         return .{ .render = parser.options };
@@ -370,6 +406,10 @@ const Parser = struct {
     fn positional(parser: *Parser, argument: []const u8) Error!void {
         if (argument.len == 0) return parser.reader.fail("the scene's name is empty", .{});
         if (parser.scene) |scene| {
+            if (nearest(scene, comptime std.meta.fieldNames(Word))) |word|
+                return parser.reader.fail("no command {f}, did you mean '{s}'?", .{
+                    quote(scene), word,
+                });
             return parser.reader.fail("one scene at a time: {f} and {f}", .{
                 quote(scene), quote(argument),
             });
@@ -402,12 +442,12 @@ const Parser = struct {
                 return reader.bad(given, comptimePrint("{s}, a multiple of {d}", .{
                     settings.tile_size.text(), settings.tile_size_step,
                 })),
-            .camera => options.view.camera = cameraOf(given.value) orelse
-                return reader.bad(given, "a camera's name, its index, or auto"),
-            .eye, .target, .up, .orbit, .fov, .ortho => try parser.setViewpoint(given),
+            .camera, .frame_all => try parser.setCamera(given),
+            .eye, .target, .up, .orbit, .fov, .ortho => try parser.setCamera(given),
             .scene, .material_variant, .up_axis, .format_in => try parser.setLoad(given),
             .tessellation, .max_texture_size => try parser.setLoad(given),
             .allow_outside, .strict, .force => try parser.setLoad(given),
+            .animation, .animation_time => try parser.setAnimation(given),
             .background => options.view.background = backgroundOf(given.value) orelse
                 return parser.noBackground(given),
             .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
@@ -475,10 +515,29 @@ const Parser = struct {
         }
     }
 
-    fn setViewpoint(parser: *Parser, given: Reader.Given) Error!void {
-        const viewpoint = &parser.options.view.viewpoint;
+    fn setAnimation(parser: *Parser, given: Reader.Given) Error!void {
+        const animation = &parser.options.animation;
         const reader = &parser.reader;
         switch (given.id) {
+            .animation => animation.which = animationOf(given.value) orelse
+                return reader.bad(given, "an animation's name, its index, or all"),
+            .animation_time => {
+                animation.time_s = numberOf(given.value) orelse
+                    return reader.bad(given, "a number of seconds");
+                parser.has_time = true;
+            },
+            else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    fn setCamera(parser: *Parser, given: Reader.Given) Error!void {
+        const view = &parser.options.view;
+        const viewpoint = &view.viewpoint;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .camera => view.camera = cameraOf(given.value) orelse
+                return reader.bad(given, "a camera's name, its index, or auto"),
+            .frame_all => view.frames_all = true,
             .eye => viewpoint.eye = vectorOf(given.value) orelse
                 return reader.bad(given, "X,Y,Z in metres"),
             .target => viewpoint.target = vectorOf(given.value) orelse
@@ -683,10 +742,20 @@ fn cameraOf(text: []const u8) ?settings.Camera {
     return .{ .index = index };
 }
 
-fn choiceOf(text: []const u8) ?settings.Choice {
+/// By its index or its name; null: it is empty.
+pub fn choiceOf(text: []const u8) ?settings.Choice {
     if (text.len == 0) return null;
     const index = integer(text, any_index) orelse return .{ .name = text };
     return .{ .index = index };
+}
+
+fn animationOf(text: []const u8) ?settings.Animation.Which {
+    if (std.mem.eql(u8, text, "all")) return .all;
+    return switch (choiceOf(text) orelse return null) {
+        .default => unreachable, // Nothing spells it.
+        .index => |index| .{ .index = index },
+        .name => |name| .{ .name = name },
+    };
 }
 
 const any_index: settings.Range = .{ .min = 0, .max = std.math.maxInt(u32) };
@@ -1086,9 +1155,19 @@ test "the help fits a screen and says what flags take and may be" {
 test {
     _ = bench;
     _ = compare;
+    _ = info;
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");
+}
+
+test "info is a command where it comes first, and where it is misspelt" {
+    try std.testing.expectEqual(.info_help, try parseForTest(&.{ "info", "a", "--help" }));
+    const command = try parseForTest(&.{ "info", "info", "--json" });
+    try std.testing.expectEqualStrings("info", command.info.scene);
+    try expectUsage("no command 'inof', did you mean 'info'?", &.{ "inof", "a.glb" });
+    try expectUsage("no command 'benhc', did you mean 'bench'?", &.{ "benhc", "a.glb" });
+    try expectUsage("one scene at a time: 'in.glb' and 'a.glb'", &.{ "in.glb", "a.glb" });
 }
 
 test "bench is a command where it comes first" {

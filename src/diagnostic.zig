@@ -135,6 +135,18 @@ pub const Diagnostic = struct {
         if (diagnostic.refused) return error.InvalidInput;
     }
 
+    /// The texts of all warnings so far.
+    pub fn warningTexts(
+        diagnostic: *const Diagnostic,
+        buffer: *[warning_count_max][]const u8,
+    ) []const []const u8 {
+        const count = diagnostic.warning_count;
+        for (buffer[0..count], diagnostic.warnings[0..count]) |*text, *warning| {
+            text.* = warning.text();
+        }
+        return buffer[0..count];
+    }
+
     fn add(diagnostic: *Diagnostic, message: *const Message, fault: Fault) void {
         for (diagnostic.warnings[0..diagnostic.warning_count]) |*other| {
             if (std.mem.eql(u8, other.text(), message.text())) return;
@@ -241,6 +253,29 @@ pub const Quoted = struct {
 /// Wraps a name for `{f}`.
 pub fn quote(name: []const u8) Quoted {
     return .{ .name = name };
+}
+
+/// Prints things of a file that have names, or empty ones: index and name.
+fn Listed(comptime Thing: type) type {
+    return struct {
+        things: []const Thing,
+
+        /// Called by `{f}`.
+        pub fn format(list: @This(), writer: *std.Io.Writer) std.Io.Writer.Error!void {
+            if (list.things.len == 0) return writer.writeAll("the file has none");
+            try writer.writeAll("the file has ");
+            for (list.things, 0..) |*thing, index| {
+                if (index > 0) try writer.writeAll(", ");
+                try writer.print("{d}", .{index});
+                if (thing.name.len > 0) try writer.print(" {f}", .{quote(thing.name)});
+            }
+        }
+    };
+}
+
+/// Wraps a slice of things with a field `name` for `{f}`.
+pub fn listOf(things: anytype) Listed(std.meta.Elem(@TypeOf(things))) {
+    return .{ .things = things };
 }
 
 test "a message is one line, however long or wild the text" {

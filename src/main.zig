@@ -52,6 +52,7 @@ fn run(init: std.process.Init) ExitCode {
         .help => return print(io, cli.help),
         .bench_help => return print(io, cli.bench_help),
         .compare_help => return print(io, cli.compare_help),
+        .info_help => return print(io, cli.info_help),
         .version => return print(io, "raylane " ++ cli.version ++ "\n"),
         .licenses => return print(io, raylane.licenses),
         .list_variants => return print(io, comptime list: {
@@ -65,6 +66,7 @@ fn run(init: std.process.Init) ExitCode {
         },
         .bench => |*options| return bench(init, options, &diagnostic),
         .compare => |*options| return compare(init.gpa, io, options, &diagnostic),
+        .info => |*options| return info(init.gpa, io, options, &diagnostic),
     }
 }
 
@@ -274,10 +276,57 @@ fn writeHeatMap(
     return target.finish(&.{file}, diagnostic);
 }
 
+/// Says what is in a scene file, or why it cannot be read.
+fn info(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagnostic) ExitCode {
+    var account: Account = .init(gpa, null);
+    var text: Io.Writer.Allocating = .init(account.allocator());
+    defer text.deinit();
+    const outcome = describe(&account, io, options, diagnostic, &text.writer);
+    const title = printable(raylane.parse.title(options.scene));
+    if (!options.quiet) for (diagnostic.warnings[0..diagnostic.warning_count]) |*warning| {
+        say(io, "raylane: {f}: warning: {s}\n", .{ title, warning.text() });
+    };
+    outcome catch |err| switch (err) {
+        error.WriteFailed => return outOfMemory(io),
+        else => |other| {
+            if (other == error.OutOfMemory) account.explain(&diagnostic.message);
+            const place = printable(placeOf(diagnostic, raylane.parse.title(options.scene)));
+            say(io, "raylane: {f}: {s}\n", .{ place, diagnostic.message.text() });
+            return exitCodeOf(other);
+        },
+    };
+    return print(io, text.written());
+}
+
+fn describe(
+    account: *Account,
+    io: Io,
+    options: *const cli.Info,
+    diagnostic: *Diagnostic,
+    writer: *Io.Writer,
+) (Session.Error || Io.Writer.Error)!void {
+    const gpa = account.allocator();
+    const name = options.scene;
+    var scene = try raylane.session.loadScene(gpa, io, name, options.load, diagnostic);
+    defer scene.deinit();
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    defer arena.deinit();
+    var found = try raylane.info.collect(gpa, arena.allocator(), &scene, diagnostic);
+    found.version = cli.version;
+    found.name = name;
+    var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
+    found.warnings = diagnostic.warningTexts(&warnings);
+    return if (options.json)
+        raylane.info.writeJson(&found, writer)
+    else
+        raylane.info.writeText(&found, writer);
+}
+
 fn exitCodeOf(err: (Job.Error || raylane.bench.Error)) ExitCode {
     return switch (err) {
         error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
-        error.CameraUnknown, error.SceneUnknown, error.MaterialVariantUnknown => .usage,
+        error.CameraUnknown, error.SceneUnknown => .usage,
+        error.MaterialVariantUnknown, error.AnimationUnknown => .usage,
         error.InvalidInput, error.SceneTooLarge => .invalid,
         error.ImagesDiffer => .differ,
         error.Canceled => unreachable, // Nobody asks for it here.
@@ -376,11 +425,13 @@ const Job = struct {
         try session.pose(.{
             .lanes = raylane.variant.compiled[options.render.variant].lanes,
             .tree_quality = options.tree_quality,
+            .animation = options.animation,
             .view = options.view,
         });
         try session.view(options.view);
         job.sayWarnings();
         job.sayVariants(session.scene.?.material_variants);
+        job.sayAnimations();
         session.dropScene();
         job.sayFacts(&session.world.?);
         session.checkWrite(options.write) catch return error.OutputFailed;
@@ -450,6 +501,23 @@ const Job = struct {
         }
     }
 
+    /// And of its animations; which one is shown where nobody asked for it.
+    fn sayAnimations(job: *Job) void {
+        if (!job.options.verbose or job.options.animation.which != .default) return;
+        const moment = job.session.posed.?.moment;
+        for (job.session.scene.?.animations, 0..) |*animation, index| {
+            const quoted = raylane.diagnostic.quote(animation.name);
+            const span = animation.span() orelse continue;
+            if (moment.running == .one and moment.running.one == index) {
+                job.sayOfScene("animation {d}: {f} at {d} s, for at rest not all is seen", .{
+                    index, quoted, moment.time_s,
+                });
+            } else job.sayOfScene("animation {d}: {f}, {d} to {d} s, not chosen", .{
+                index, quoted, span[0], span[1],
+            });
+        }
+    }
+
     fn sayOfScene(job: *Job, comptime format: []const u8, arguments: anytype) void {
         const scene = printable(raylane.parse.title(job.options.scene));
         say(job.io, "raylane: {f}: " ++ format ++ "\n", .{scene} ++ arguments);
@@ -462,11 +530,8 @@ const Job = struct {
         const default: cli.Stats = if (options.quiet or !to_stdout) .none else .text;
         var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
         const diagnostic = job.diagnostic;
-        for (diagnostic.warnings[0..diagnostic.warning_count], 0..) |*warning, index| {
-            warnings[index] = warning.text();
-        }
         var report = measured.*;
-        report.warnings = warnings[0..diagnostic.warning_count];
+        report.warnings = diagnostic.warningTexts(&warnings);
 
         var text: Io.Writer.Allocating = .init(job.session.gpa);
         defer text.deinit();
