@@ -80,6 +80,7 @@ const roots = [_][]const u8{
     "build.zig",
     "bench/kernels.zig",
     "bench/lowering.zig",
+    "bench/frames.zig",
     "bench/parse.zig",
     "bench/rays.zig",
     "bench/structures.zig",
