@@ -500,11 +500,15 @@ const Reader = struct {
             return;
         };
         face.cut.clearRetainingCapacity();
-        face.positions.clearRetainingCapacity();
-        for (corners) |corner| {
-            try face.positions.append(reader.gpa, reader.mesh.positions[corner]);
+        if (corners.len == 3) {
+            try face.cut.append(reader.gpa, .{ 0, 1, 2 });
+        } else {
+            face.positions.clearRetainingCapacity();
+            for (corners) |corner| {
+                try face.positions.append(reader.gpa, reader.mesh.positions[corner]);
+            }
+            try reader.cutter.cut(face.positions.items, &face.cut);
         }
-        try reader.cutter.cut(face.positions.items, &face.cut);
         // Where one face has coordinates of its own, all have, or (0, 0).
         const texcoords = face.texcoords.items;
         const has_texcoords = texcoords.len > 0 and texcoords.len == 2 * corners.len;
