@@ -495,6 +495,17 @@ test "PLY: colours of vertices, of faces, and coordinates of corners" {
     try std.testing.expectEqualStrings("image", own.images[0].bytes);
 }
 
+test "PLY: nothing at all is a warning" {
+    var said: Diagnostic = .{};
+    var scene = try read("a", "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n" ++
+        "element face 0\nproperty list uchar int vertex_indices\nend_header\n", &said);
+    defer scene.deinit();
+    try std.testing.expectEqualStrings(
+        "nothing to render: no triangles",
+        said.warnings[0].text(),
+    );
+}
+
 test "PLY: lines that end in returns alone, faces that look as their normals say" {
     var scene = try readClean("a", "ply\rformat binary_little_endian 1.0\rcomment x\r" ++
         "element vertex 3\rproperty char x\rproperty char y\rproperty char z\r" ++

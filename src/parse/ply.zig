@@ -446,6 +446,7 @@ const Reader = struct {
     }
 
     fn readFaces(reader: *Reader, element: *const Element) Error!void {
+        if (element.count == 0) return;
         if (reader.mesh.positions.len == 0) return reader.fail("has faces before vertices", .{});
         try reader.checkCount(element);
         const extras = reader.wants.extras;
@@ -534,6 +535,7 @@ const Reader = struct {
     /// Lists of vertices of which each makes a triangle with the two before it, turned every second
     /// time; -1 begins anew.
     fn readStrips(reader: *Reader, element: *const Element) Error!void {
+        if (element.count == 0) return;
         if (reader.mesh.positions.len == 0) return reader.fail("has faces before vertices", .{});
         try reader.checkCount(element);
         const index_max: u32 = @intCast(reader.mesh.positions.len - 1);
