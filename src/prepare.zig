@@ -1419,6 +1419,7 @@ test {
     _ = tangents;
     _ = texture;
     _ = extent_file;
+    _ = @import("prepare/relief.zig");
     _ = @import("prepare/layers.zig");
     _ = @import("prepare/texture_use.zig");
     _ = @import("prepare/pyramid.zig");
