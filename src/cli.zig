@@ -79,6 +79,7 @@ pub const Options = struct {
     thread_count: ?u32 = null,
     tree_quality: settings.TreeQuality = .default,
     load: settings.Load = .{},
+    animation: settings.Animation = .{},
     view: settings.View = .{},
     render: settings.Render = .{},
     write: settings.Write = .{},
@@ -157,12 +158,26 @@ const sections: []const Section = &.{
         },
         .{ .usage = "--fov DEG", .help = "vertical angle of view, in place of the camera's" },
         .{ .usage = "--ortho", .help = "no perspective" },
+        .{
+            .usage = "--frame-all",
+            .help = "frame all that the animation shows at any time",
+        },
     } },
     .{ .title = "Scene", .options = &.{
         .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
         .{
             .usage = "--material-variant N",
             .help = "name or index of one of its variants of materials",
+        },
+        .{
+            .usage = "--animation WHICH",
+            .help = "name or index of an animation, or all at once\n" ++
+                "(default: none, the scene as it stands)",
+        },
+        .{
+            .usage = "--animation-time S",
+            .help = "seconds since its start (default: 0); by itself of\n" ++
+                "the first animation",
         },
         .{
             .usage = "--up-axis AXIS",
@@ -304,7 +319,7 @@ const Reader = arguments_file.Arguments(sections);
 
 /// What `--help` prints.
 pub const help: []const u8 = "raylane " ++ version ++
-    \\: renders a scene (glTF, PBRT, OBJ, STL, PLY) to an image on the CPU
+    \\: renders glTF, PBRT, OBJ, STL or PLY to an image on the CPU
     \\
     \\usage: raylane [render] SCENE [options]
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
@@ -361,6 +376,8 @@ const Parser = struct {
     variant_names: []const []const u8,
     options: Options = .{ .scene = "" },
     scene: ?[]const u8 = null,
+    /// A time is asked for.
+    has_time: bool = false,
     /// The explicit `--format`.
     format: ?settings.Format = null,
     /// Set by the flags that print something and end.
@@ -379,6 +396,8 @@ const Parser = struct {
         };
         if (parser.other) |command| return command;
         parser.options.scene = parser.scene orelse return reader.fail("no scene given", .{});
+        const animation = &parser.options.animation;
+        if (parser.has_time and animation.which == .default) animation.which = .{ .index = 0 };
         try parser.checkViewpoint();
         try parser.settleFormat();
         return .{ .render = parser.options };
@@ -423,17 +442,12 @@ const Parser = struct {
                 return reader.bad(given, comptimePrint("{s}, a multiple of {d}", .{
                     settings.tile_size.text(), settings.tile_size_step,
                 })),
-            .camera => options.view.camera = cameraOf(given.value) orelse
-                return reader.bad(given, "a camera's name, its index, or auto"),
-            .eye, .target, .up, .orbit, .fov, .ortho => try parser.setViewpoint(given),
-            .scene => options.load.scene = choiceOf(given.value) orelse
-                return reader.bad(given, "a scene's name or its index"),
-            .material_variant => options.load.material_variant = choiceOf(given.value) orelse
-                return reader.bad(given, "a material variant's name or its index"),
-            .up_axis => options.load.up_axis = try reader.choice(given, settings.UpAxis),
-            .format_in => {
-                options.load.format = try reader.choice(given, settings.SceneFormat);
-            },
+            .camera, .frame_all => try parser.setCamera(given),
+            .eye, .target, .up, .orbit, .fov, .ortho => try parser.setCamera(given),
+            .scene, .material_variant, .up_axis, .format_in => try parser.setLoad(given),
+            .tessellation, .max_texture_size => try parser.setLoad(given),
+            .allow_outside, .strict, .force => try parser.setLoad(given),
+            .animation, .animation_time => try parser.setAnimation(given),
             .background => options.view.background = backgroundOf(given.value) orelse
                 return parser.noBackground(given),
             .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
@@ -456,15 +470,6 @@ const Parser = struct {
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
                     settings.point_size.min, settings.point_size.max,
                 })),
-            .tessellation => {
-                options.load.tessellation = try reader.number(given, settings.tessellation);
-            },
-            .max_texture_size => {
-                options.load.texture_side_max = try reader.number(given, settings.texture_side);
-            },
-            .allow_outside => options.load.allow_outside = true,
-            .strict => options.load.strict = true,
-            .force => options.load.force = true,
             .quiet => options.quiet = true,
             .verbose => options.verbose = true,
             .help => parser.other = .help,
@@ -489,10 +494,50 @@ const Parser = struct {
         options.write.tone_mapping = settings.thesis.tone_mapping;
     }
 
-    fn setViewpoint(parser: *Parser, given: Reader.Given) Error!void {
-        const viewpoint = &parser.options.view.viewpoint;
+    fn setLoad(parser: *Parser, given: Reader.Given) Error!void {
+        const load = &parser.options.load;
         const reader = &parser.reader;
         switch (given.id) {
+            .scene => load.scene = choiceOf(given.value) orelse
+                return reader.bad(given, "a scene's name or its index"),
+            .material_variant => load.material_variant = choiceOf(given.value) orelse
+                return reader.bad(given, "a material variant's name or its index"),
+            .up_axis => load.up_axis = try reader.choice(given, settings.UpAxis),
+            .format_in => load.format = try reader.choice(given, settings.SceneFormat),
+            .tessellation => load.tessellation = try reader.number(given, settings.tessellation),
+            .max_texture_size => {
+                load.texture_side_max = try reader.number(given, settings.texture_side);
+            },
+            .allow_outside => load.allow_outside = true,
+            .strict => load.strict = true,
+            .force => load.force = true,
+            else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    fn setAnimation(parser: *Parser, given: Reader.Given) Error!void {
+        const animation = &parser.options.animation;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .animation => animation.which = animationOf(given.value) orelse
+                return reader.bad(given, "an animation's name, its index, or all"),
+            .animation_time => {
+                animation.time_s = numberOf(given.value) orelse
+                    return reader.bad(given, "a number of seconds");
+                parser.has_time = true;
+            },
+            else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    fn setCamera(parser: *Parser, given: Reader.Given) Error!void {
+        const view = &parser.options.view;
+        const viewpoint = &view.viewpoint;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .camera => view.camera = cameraOf(given.value) orelse
+                return reader.bad(given, "a camera's name, its index, or auto"),
+            .frame_all => view.frames_all = true,
             .eye => viewpoint.eye = vectorOf(given.value) orelse
                 return reader.bad(given, "X,Y,Z in metres"),
             .target => viewpoint.target = vectorOf(given.value) orelse
@@ -702,6 +747,15 @@ pub fn choiceOf(text: []const u8) ?settings.Choice {
     if (text.len == 0) return null;
     const index = integer(text, any_index) orelse return .{ .name = text };
     return .{ .index = index };
+}
+
+fn animationOf(text: []const u8) ?settings.Animation.Which {
+    if (std.mem.eql(u8, text, "all")) return .all;
+    return switch (choiceOf(text) orelse return null) {
+        .default => unreachable, // Nothing spells it.
+        .index => |index| .{ .index = index },
+        .name => |name| .{ .name = name },
+    };
 }
 
 const any_index: settings.Range = .{ .min = 0, .max = std.math.maxInt(u32) };

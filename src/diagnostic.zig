@@ -255,6 +255,29 @@ pub fn quote(name: []const u8) Quoted {
     return .{ .name = name };
 }
 
+/// Prints things of a file that have names, or empty ones: index and name.
+fn Listed(comptime Thing: type) type {
+    return struct {
+        things: []const Thing,
+
+        /// Called by `{f}`.
+        pub fn format(list: @This(), writer: *std.Io.Writer) std.Io.Writer.Error!void {
+            if (list.things.len == 0) return writer.writeAll("the file has none");
+            try writer.writeAll("the file has ");
+            for (list.things, 0..) |*thing, index| {
+                if (index > 0) try writer.writeAll(", ");
+                try writer.print("{d}", .{index});
+                if (thing.name.len > 0) try writer.print(" {f}", .{quote(thing.name)});
+            }
+        }
+    };
+}
+
+/// Wraps a slice of things with a field `name` for `{f}`.
+pub fn listOf(things: anytype) Listed(std.meta.Elem(@TypeOf(things))) {
+    return .{ .things = things };
+}
+
 test "a message is one line, however long or wild the text" {
     var diagnostic: Diagnostic = .{};
     const long: [1000]u8 = @splat('x');

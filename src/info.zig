@@ -165,6 +165,162 @@ fn lightsOf(gpa: Allocator, scene: *const Scene) error{OutOfMemory}!Lights {
     return lights;
 }
 
+const testing = std.testing;
+
+/// Two instances of a triangle that emits, cameras of both kinds, a lamp, a picture of 2 x 1, and
+/// points that are in another scene.
+const document_for_test =
+    \\{"asset":{"version":"2.0","generator":"by \"hand\"\u0007"},
+    \\"extensionsUsed":["KHR_lights_punctual","KHR_xmp","KHR_materials_variants","A_b"],
+    \\"extensionsRequired":["KHR_lights_punctual","EXT_lights_ies"],
+    \\"extensions":{"KHR_lights_punctual":{"lights":[{"type":"spot","spot":{}}]},
+    \\"KHR_materials_variants":{"variants":[{"name":"red"},{"name":"blue"}]}},
+    \\"scene":1,"scenes":[{"name":"points","nodes":[4]},{"nodes":[0,1,2,3]}],
+    \\"nodes":[{"mesh":0,"extensions":{"KHR_lights_punctual":{"light":0}}},
+    \\{"mesh":0,"translation":[10,0,0],"scale":[2,2,2]},
+    \\{"camera":0,"name":"at the\tdoor"},{"camera":1},{"mesh":1}],
+    \\"cameras":[{"type":"perspective","perspective":{"yfov":0.5,"znear":1,"aspectRatio":2}},
+    \\{"name":"plan","type":"orthographic","orthographic":{"xmag":4,"ymag":3,"zfar":9,"znear":0}}],
+    \\"materials":[{"emissiveFactor":[0,1,0],"emissiveTexture":{"index":0}},{}],
+    \\"textures":[{"source":0}],
+    \\"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]},
+    \\{"primitives":[{"attributes":{"POSITION":0},"mode":0}]}],
+    \\"accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":3,
+    \\"min":[0,0,-1],"max":[2,1.5,0]}],
+    \\"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,
+    \\"uri":"data:;base64,AAAAAAAAAAAAAAAAAAAAQAAAAAAAAAAAAAAAAAAAwD8AAIC/"}],
+    \\"images":[{"name":"p","uri":"data:image/png;base64,
+++ "iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAIAAAB7QOjdAAAA" ++
+    "DUlEQVR42mMQUDAAIgACZwDBTBoccQAAAABJRU5ErkJggg==\"}]}";
+
+/// What is written of the document.
+fn writeForTest(
+    choices: settings.Load,
+    extensions: ?[]const scene_data.File.Extension,
+    comptime write: anytype,
+    writer: *std.Io.Writer,
+) !void {
+    var diagnostic: Diagnostic = .{};
+    const gpa = testing.allocator;
+    const document = document_for_test;
+    const folder: std.Io.Dir = .cwd();
+    var scene =
+        try parse.parseBytes(gpa, testing.io, document, folder, choices, &diagnostic);
+    defer scene.deinit();
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    defer arena.deinit();
+    var found = try collect(gpa, arena.allocator(), &scene, &diagnostic);
+    found.name = "a\x1b.gltf";
+    scene.file.extensions = extensions orelse scene.file.extensions;
+    found.memory_bytes = 5 << 20;
+    try write(&found, writer);
+}
+
+test "the text" {
+    var text: std.Io.Writer.Allocating = .init(testing.allocator);
+    defer text.deinit();
+    try writeForTest(.{}, null, writeText, &text.writer);
+    try testing.expectEqualStrings(
+        \\file         a?.gltf
+        \\format       glTF 2.0
+        \\generator    by "hand"?
+        \\scene        0 'points'
+        \\             1, shown
+        \\camera       0 'at the?door', perspective, 28.6 degrees, aspect 2.000, default
+        \\             1 'plan', orthographic, 8.000 x 6.000 m
+        \\lights       1 spot, 1 material that emits on 2 triangles
+        \\variant      0 'red'
+        \\             1 'blue'
+        \\image        image 0 'p', PNG, 2 x 1, RGB, 70 bytes
+        \\in the file  5 nodes, 2 meshes, 2 materials, 1 texture, 1 image, 2 cameras, 1 light
+        \\drawn        2 triangles (1 unique)
+        \\bounds       x 0.000 to 14.000, y 0.000 to 3.000, z -2.000 to 0.000 m
+        \\memory       about 5.0 MiB to render 1024 x 512
+        \\extension    KHR_lights_punctual: rendered, see docs/lights.md (required)
+        \\             EXT_lights_ies: ignored, such lights are left out (required)
+        \\             KHR_xmp: ignored, data
+        \\             KHR_materials_variants: rendered, by --material-variant
+        \\             A_b: unknown
+        \\
+    , text.written());
+}
+
+test "the JSON has every key, and what another scene draws" {
+    const Parsed = struct {
+        version: []const u8,
+        file: []const u8,
+        bytes: u64,
+        format: []const u8,
+        format_version: ?[]const u8,
+        generator: ?[]const u8,
+        scenes: []const struct { name: ?[]const u8, shown: bool },
+        cameras: []const struct { name: ?[]const u8, kind: []const u8 },
+        lights: struct {
+            point: u64,
+            spot: u64,
+            directional: u64,
+            emissive_materials: u64,
+            emissive_triangles: u64,
+            environment: ?[]const u8,
+        },
+        material_variants: []const []const u8,
+        images: []const struct {
+            name: []const u8,
+            bytes: u64,
+            format: ?[]const u8,
+            width: ?u32,
+            height: ?u32,
+            channels: ?u8,
+            problem: ?[]const u8,
+        },
+        counts: scene_data.File.Counts,
+        drawn: struct {
+            instances: u64,
+            triangles: u64,
+            unique_triangles: u64,
+            points: u64,
+            lines: u64,
+        },
+        bounds: ?struct { lower: [3]f64, upper: [3]f64 },
+        picture: struct { width: u32, height: u32 },
+        memory_bytes: u64,
+        extensions: []const struct {
+            name: []const u8,
+            required: bool,
+            treatment: []const u8,
+            remark: ?[]const u8,
+        },
+        needs_force: bool,
+        warnings: []const []const u8,
+    };
+    const gpa = testing.allocator;
+    var text: std.Io.Writer.Allocating = .init(gpa);
+    defer text.deinit();
+    const extensions = [_]scene_data.File.Extension{
+        .{ .name = "KHR_accessor_float64", .required = true },
+        .{ .name = "A_b", .required = false },
+    };
+    try writeForTest(.{ .scene = .{ .index = 0 } }, &extensions, writeJson, &text.writer);
+    const line = text.written();
+    try testing.expectEqual(line.len - 1, std.mem.findScalar(u8, line, '\n'));
+    const parsed = try std.json.parseFromSlice(Parsed, gpa, line, .{});
+    defer parsed.deinit();
+    const value = parsed.value;
+    try testing.expectEqualStrings("by \"hand\"\x07", value.generator.?);
+    try testing.expectEqualStrings("points", value.scenes[0].name.?);
+    try testing.expectEqual(null, value.scenes[1].name);
+    try testing.expect(value.scenes[0].shown and !value.scenes[1].shown);
+    try testing.expectEqual(3, value.drawn.points);
+    try testing.expectEqual(0, value.drawn.triangles);
+    try testing.expectEqual([3]f64{ 2, 1.5, 0 }, value.bounds.?.upper);
+    try testing.expectEqual(0, value.cameras.len + value.images.len);
+    try testing.expectEqual(2, value.counts.cameras);
+    try testing.expectEqualStrings("ignored", value.extensions[0].treatment);
+    try testing.expect(value.extensions[0].required and value.needs_force);
+    try testing.expectEqualStrings("unknown", value.extensions[1].treatment);
+    try testing.expectEqual(null, value.extensions[1].remark);
+}
+
 test {
     _ = memory;
     _ = @import("info/text.zig");

@@ -282,7 +282,7 @@ fn info(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagnosti
     var text: Io.Writer.Allocating = .init(account.allocator());
     defer text.deinit();
     const outcome = describe(&account, io, options, diagnostic, &text.writer);
-    const title = printable(options.scene);
+    const title = printable(raylane.parse.title(options.scene));
     if (!options.quiet) for (diagnostic.warnings[0..diagnostic.warning_count]) |*warning| {
         say(io, "raylane: {f}: warning: {s}\n", .{ title, warning.text() });
     };
@@ -290,7 +290,7 @@ fn info(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagnosti
         error.WriteFailed => return outOfMemory(io),
         else => |other| {
             if (other == error.OutOfMemory) account.explain(&diagnostic.message);
-            const place = printable(placeOf(diagnostic, options.scene));
+            const place = printable(placeOf(diagnostic, raylane.parse.title(options.scene)));
             say(io, "raylane: {f}: {s}\n", .{ place, diagnostic.message.text() });
             return exitCodeOf(other);
         },
@@ -325,7 +325,8 @@ fn describe(
 fn exitCodeOf(err: (Job.Error || raylane.bench.Error)) ExitCode {
     return switch (err) {
         error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
-        error.CameraUnknown, error.SceneUnknown, error.MaterialVariantUnknown => .usage,
+        error.CameraUnknown, error.SceneUnknown => .usage,
+        error.MaterialVariantUnknown, error.AnimationUnknown => .usage,
         error.InvalidInput, error.SceneTooLarge => .invalid,
         error.ImagesDiffer => .differ,
         error.Canceled => unreachable, // Nobody asks for it here.
@@ -424,11 +425,13 @@ const Job = struct {
         try session.pose(.{
             .lanes = raylane.variant.compiled[options.render.variant].lanes,
             .tree_quality = options.tree_quality,
+            .animation = options.animation,
             .view = options.view,
         });
         try session.view(options.view);
         job.sayWarnings();
         job.sayVariants(session.scene.?.material_variants);
+        job.sayAnimations();
         session.dropScene();
         job.sayFacts(&session.world.?);
         session.checkWrite(options.write) catch return error.OutputFailed;
@@ -495,6 +498,23 @@ const Job = struct {
         for (names, 0..) |name, index| {
             const quoted = raylane.diagnostic.quote(name);
             job.sayOfScene("material variant {d}: {f}, not chosen", .{ index, quoted });
+        }
+    }
+
+    /// And of its animations; which one is shown where nobody asked for it.
+    fn sayAnimations(job: *Job) void {
+        if (!job.options.verbose or job.options.animation.which != .default) return;
+        const moment = job.session.posed.?.moment;
+        for (job.session.scene.?.animations, 0..) |*animation, index| {
+            const quoted = raylane.diagnostic.quote(animation.name);
+            const span = animation.span() orelse continue;
+            if (moment.running == .one and moment.running.one == index) {
+                job.sayOfScene("animation {d}: {f} at {d} s, for at rest not all is seen", .{
+                    index, quoted, moment.time_s,
+                });
+            } else job.sayOfScene("animation {d}: {f}, {d} to {d} s, not chosen", .{
+                index, quoted, span[0], span[1],
+            });
         }
     }
 

@@ -70,11 +70,11 @@ pub fn parseNamed(
 
 /// Reads what has been opened, by its contents.
 fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Error!Scene {
-    try unpack(opened, diagnostic);
+    diagnostic.strict = opened.resources.settings.strict;
+    try unpack(opened, path, diagnostic);
     const main = &opened.main;
     const resources = &opened.resources;
     const settings = &resources.settings;
-    diagnostic.strict = settings.strict;
     const format = settings.format orelse try formatOf(main.bytes, path, diagnostic);
     if (format != .gltf and format != .glb) try checkOnly(settings.*, diagnostic);
     var scene = try switch (format) {
@@ -91,7 +91,7 @@ fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Err
 }
 
 /// Puts what a gzip file holds in its place.
-fn unpack(opened: *Resources.Scene, diagnostic: *Diagnostic) Error!void {
+fn unpack(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Error!void {
     const packed_bytes = opened.main.bytes;
     if (!gzip.isGzip(packed_bytes)) return;
     const gpa = opened.resources.gpa;
@@ -101,6 +101,9 @@ fn unpack(opened: *Resources.Scene, diagnostic: *Diagnostic) Error!void {
         error.OutOfMemory => |failure| return failure,
         error.InvalidGzip => return error.InvalidInput,
     };
+    if (!std.ascii.endsWithIgnoreCase(path, ".gz") and
+        !std.mem.eql(u8, path, settings_file.standard_input))
+        diagnostic.forgive("is gzip without being called so", .{});
     gpa.free(packed_bytes);
     opened.resources.bytes_read += opened.main.bytes.len;
 }

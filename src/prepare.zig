@@ -15,11 +15,13 @@ const statistics = @import("statistics.zig");
 const world = @import("world.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const alpha = @import("prepare/alpha.zig");
+const animate = @import("prepare/animate.zig");
 const bvh_input = @import("prepare/bvh/input.zig");
 const bvh_refit = @import("prepare/bvh/refit.zig");
 const bvh_wide = @import("prepare/bvh/wide.zig");
 const check = @import("prepare/bvh/check.zig");
 const deform = @import("prepare/deform.zig");
+const Drawn = @import("prepare/drawn.zig");
 const flatten = @import("prepare/flatten.zig");
 const emitter_lights = @import("prepare/emitter_lights.zig");
 const extent_file = @import("prepare/extent.zig");
@@ -27,6 +29,7 @@ const emitters = @import("prepare/emitters.zig");
 const environment = @import("prepare/environment.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
+const motion_file = @import("prepare/motion.zig");
 const place_file = @import("prepare/pose.zig");
 const tangents = @import("prepare/tangents.zig");
 const texture = @import("prepare/texture.zig");
@@ -103,6 +106,8 @@ pub const ViewSettings = struct {
     emitters: bool = true,
     /// What primary rays see in its place.
     backdrop: ?light.EnvironmentSettings = null,
+    /// What is framed in place of the world.
+    motion: ?*const Motion = null,
 };
 
 /// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
@@ -111,7 +116,17 @@ pub const PoseError = error{ OutOfMemory, SceneTooLarge } || parallel.Error;
 /// `CameraUnknown`: no camera has that name or index; the diagnostic says more.
 pub const ViewError = error{ OutOfMemory, CameraUnknown };
 
-pub const Error = LoadError || PoseError || ViewError;
+/// `AnimationUnknown`: none has that name or index; the diagnostic says more.
+pub const AnimateError = animate.Error;
+
+pub const Error = LoadError || PoseError || ViewError || AnimateError;
+
+/// A scene at a moment of its animations, for `pose` and `view`.
+pub const AnimatedScene = animate.Posed;
+/// Makes one.
+pub const animateScene = animate.pose;
+/// All moments of animations at once.
+pub const Motion = motion_file;
 
 /// Makes what does not depend on where things are: textures, and tangents for them. The memory is
 /// the result's and comes from `gpa`. Fills `texture_ns` of `times`.
@@ -227,11 +242,11 @@ pub const PoseCache = struct {
     }
 };
 
-/// Places what is in a scene and builds the tree over it: a world in which nothing shines and that
-/// is seen by nobody yet. Its memory comes from `gpa` by way of arenas: its few large arrays are a
-/// block of `gpa` each, of which an arena asks for half as much again but touches only what is
-/// used. What was loaded of the scene has to live as long. Fills `prepare_ns` and `bvh_build_ns` of
-/// `times`.
+/// Places what is in a scene, as it stands, and builds the tree over it: a world in which nothing
+/// shines and that is seen by nobody yet. Its memory comes from `gpa` by way of arenas: its few
+/// large arrays are a block of `gpa` each, of which an arena asks for half as much again but
+/// touches only what is used. What was loaded of the scene has to live as long. Fills `prepare_ns`
+/// and `bvh_build_ns` of `times`.
 pub fn pose(
     gpa: Allocator,
     io: std.Io,
@@ -284,10 +299,11 @@ pub fn poseAgain(
     defer simd.setFloatControl(mode);
     const start = Clock.awake.now(io);
     const gpa = cache.gpa;
-    const parts = &loaded.parts;
     _ = posed.pose_arena.reset(.retain_capacity);
     const arena = posed.pose_arena.allocator();
     const place = try place_file.compose(arena, from);
+    const drawn: Drawn = try .of(arena, from, &loaded.parts, &loaded.textures);
+    const parts = &drawn.parts;
     var soup = try cache.plan.place(
         gpa,
         arena,
@@ -306,7 +322,7 @@ pub fn poseAgain(
         geometry = geometryOf(&soup, &place);
     }
     const materials =
-        try material.place(arena, parts, &loaded.textures, soup.positions, soup.triangles);
+        try material.place(arena, parts, &drawn.textures, soup.positions, soup.triangles);
     const tree_start = Clock.awake.now(io);
     const tree_facts = try fitTree(&posed.tree_arena, cache, &geometry, settings);
     const end = Clock.awake.now(io);
@@ -353,6 +369,24 @@ fn geometryOf(soup: *const flatten.TriangleSoup, place: *const place_file.Pose) 
     return geometry;
 }
 
+/// All that the animations of a scene show which run at the moment that is posed; null where there
+/// are none. Free with its `deinit`.
+pub fn gatherMotion(
+    gpa: Allocator,
+    from: *const Scene,
+    loaded: *const Loaded,
+    posed: *const AnimatedScene,
+    pool: *parallel.Pool,
+) PoseError!?Motion {
+    const mode = simd.setFlushToZero();
+    defer simd.setFloatControl(mode);
+    const place = try place_file.compose(gpa, &posed.scene);
+    defer place.deinit(gpa);
+    const running = posed.moment.running;
+    const parts = &loaded.parts;
+    return Motion.gather(gpa, from, parts, &loaded.textures, running, place.shift, pool);
+}
+
 fn nanoseconds(duration: std.Io.Duration) u64 {
     return @intCast(@max(duration.toNanoseconds(), 0));
 }
@@ -392,11 +426,12 @@ noinline fn chooseView(
     defer gpa.free(materials);
     for (materials, sources) |*to, source| to.* = from.materials[source];
     shown.materials = materials;
+    const framed = framedOf(&seen.geometry, settings.motion);
     const chosen = try view_file.choose(
         gpa,
         &shown,
         seen.node_maps,
-        &seen.geometry,
+        &framed,
         &.{
             .camera = settings.camera,
             .viewpoint = settings.viewpoint,
@@ -440,6 +475,13 @@ noinline fn chooseView(
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
     seen.facts.environment_is_default = settings.environment.is_default;
+}
+
+fn framedOf(geometry: *const world.Geometry, motion: ?*const Motion) world.Geometry {
+    const all = motion orelse return geometry.*;
+    var framed = all.geometry;
+    framed.sphere_radius = geometry.sphere_radius;
+    return framed;
 }
 
 /// Lights that stand for surfaces which emit: made once for a pose.
@@ -1271,6 +1313,9 @@ test "memory that runs out is an error that leaks nothing" {
 }
 
 test {
+    _ = animate;
+    _ = Drawn;
+    _ = motion_file;
     _ = environment;
     _ = bvh_wide;
     _ = alpha;

@@ -19,7 +19,21 @@ pub const Grid = @import("scene/grid.zig");
 /// What a file says of itself.
 pub const File = @import("scene/file.zig").File;
 
+const animation_file = @import("scene/animation.zig");
 const material_file = @import("scene/material.zig");
+
+pub const Animation = animation_file.Animation;
+pub const CameraProperty = animation_file.CameraProperty;
+pub const Channel = animation_file.Channel;
+pub const Interpolation = animation_file.Interpolation;
+pub const LightProperty = animation_file.LightProperty;
+pub const MaterialProperty = animation_file.MaterialProperty;
+pub const Moving = animation_file.Moving;
+pub const MovingNode = animation_file.MovingNode;
+pub const Sampler = animation_file.Sampler;
+pub const Target = animation_file.Target;
+pub const TextureField = animation_file.TextureField;
+pub const TransformPart = animation_file.TransformPart;
 
 pub const AlphaMode = material_file.AlphaMode;
 pub const Material = material_file.Material;
@@ -74,6 +88,33 @@ pub const TextureView = struct {
     /// Rows of the affine map of texture coordinates (KHR_texture_transform):
     /// u' = row[0] u + row[1] v + row[2].
     transform: [2][3]f32 = .{ .{ 1, 0, 0 }, .{ 0, 1, 0 } },
+    /// What it is made of, where animations move that.
+    parts: TextureTransform = .{},
+};
+
+/// What KHR_texture_transform is made of.
+pub const TextureTransform = struct {
+    offset: [2]f32 = .{ 0, 0 },
+    rotation_rad: f32 = 0,
+    scale: [2]f32 = .{ 1, 1 },
+
+    /// Scaled, turned, moved; null where the angle has no digits left. The turn is
+    /// counter-clockwise on the texture as it is seen, v downwards, as every viewer has it and as
+    /// the sample TextureTransformTest shows; the matrix in the extension's text is its inverse.
+    pub fn rows(parts: TextureTransform) ?[2][3]f32 {
+        if (!(@abs(parts.rotation_rad) <= 1e5)) return null;
+        const cosine: f32 = @floatCast(math.elementary.cos(parts.rotation_rad));
+        const sine: f32 = @floatCast(math.elementary.sin(parts.rotation_rad));
+        const u, const v = parts.scale;
+        var transform: [2][3]f32 = .{
+            .{ cosine * u, sine * v, parts.offset[0] },
+            .{ -sine * u, cosine * v, parts.offset[1] },
+        };
+        for (&transform) |*row| for (row) |*value| {
+            value.* = math.flushDenormal(value.*);
+        };
+        return transform;
+    }
 };
 
 /// What a morph target adds to every vertex of a mesh that has as much itself, times its weight;
@@ -145,6 +186,8 @@ pub const Instance = struct {
     node: u32,
     /// One for each morph target of the mesh; empty: all are 0.
     morph_weights: []const f32 = &.{},
+    /// Index into `Moving.weights`: of those that these are at rest. Or `none`.
+    moving_weights: u32 = none,
     /// Index into `Scene.skins`, of meshes with joints: these place the mesh, not the node. Or
     /// `none`.
     skin: u32 = none,
@@ -192,6 +235,21 @@ pub const Light = struct {
     inner_cone_rad: f32 = 0,
     /// Spot only, radians from the axis: no light beyond, > inner, <= pi / 2.
     outer_cone_rad: f32 = std.math.pi / 4.0,
+
+    /// Sets both angles to the nearest that fit: 0 <= inner < outer <= pi / 2.
+    pub fn setCone(light: *Light, inner_rad: f32, outer_rad: f32) void {
+        const outer_max: f32 = std.math.pi / 2.0;
+        const outer_min: f32 = 1e-3;
+        var outer = outer_rad;
+        if (outer > outer_max) outer = outer_max;
+        if (!(outer > outer_min)) outer = outer_min;
+        var inner = inner_rad;
+        if (!(inner >= 0)) inner = 0;
+        const inner_max = outer * 0.9999;
+        if (inner > inner_max) inner = inner_max;
+        light.inner_cone_rad = inner;
+        light.outer_cone_rad = outer;
+    }
 };
 
 /// A view; it looks from its node's origin along its node's -z, y up.
@@ -230,6 +288,9 @@ pub const Scene = struct {
     textures: []const Texture = &.{},
     environment: ?EnvironmentMap = null,
     file: File = .{},
+    /// In the order of the file, those that move nothing as well.
+    animations: []const Animation = &.{},
+    moving: Moving = .{},
     /// Names of what the file may be shown as, by the materials of its meshes (which are those of
     /// the variant that was asked for); empty ones where it gives none.
     material_variants: []const []const u8 = &.{},
@@ -268,6 +329,11 @@ pub const Scene = struct {
             if (node.parent == none) node.local = rotation.compose(node.local);
         }
         scene.nodes = nodes;
+        const moving = try scene.arena.allocator().dupe(MovingNode, scene.moving.nodes);
+        for (moving) |*node| {
+            if (nodes[node.node].parent == none) node.outer = rotation.compose(node.outer);
+        }
+        scene.moving.nodes = moving;
         if (scene.environment) |*map| {
             const back: AffineD = .{
                 .x = .{ rotation.x[0], rotation.y[0], rotation.z[0] },
@@ -341,6 +407,7 @@ pub const Scene = struct {
         for (scene.lights) |light| assert(light.node < scene.nodes.len);
         for (scene.cameras) |camera| assert(camera.node < scene.nodes.len);
         assert(scene.camera_default == none or scene.camera_default < scene.cameras.len);
+        animation_file.check(scene);
     }
 
     fn checkDeformation(mesh: *const Mesh) void {
@@ -361,6 +428,22 @@ pub const Scene = struct {
 test {
     _ = Builder;
     _ = Grid;
+    _ = animation_file;
+}
+
+test "texture coordinates are scaled, turned and moved" {
+    const half_turn: f32 = std.math.pi;
+    try std.testing.expectEqual(
+        [2][3]f32{ .{ 2, 0, 0.25 }, .{ 0, 3, -0.5 } },
+        (TextureTransform{ .offset = .{ 0.25, -0.5 }, .scale = .{ 2, 3 } }).rows().?,
+    );
+    // A quarter turn counter-clockwise: what was on the right is above, at negative v.
+    const parts: TextureTransform = .{ .rotation_rad = half_turn / 2, .scale = .{ 2, 3 } };
+    const expected = [2][3]f32{ .{ 0, 3, 0 }, .{ -2, 0, 0 } };
+    for (parts.rows().?, expected) |row, wanted| for (row, wanted) |value, one| {
+        try std.testing.expectApproxEqAbs(one, value, 1e-6);
+    };
+    try std.testing.expectEqual(null, (TextureTransform{ .rotation_rad = 1e6 }).rows());
 }
 
 test "a scene turns about the origin, roots first, and its surroundings with it" {
@@ -368,6 +451,11 @@ test "a scene turns about the origin, roots first, and its surroundings with it"
     errdefer builder.deinit();
     const root = try builder.addNode(none, .translate(.{ 1, 2, 3 }));
     _ = try builder.addNode(root, .translate(.{ 5, 0, 0 }));
+    const unturned = [4]f64{ 0, 0, 0, 1 };
+    builder.scene.moving.nodes = &.{
+        .{ .node = 0, .translation = .{ 1, 2, 3 }, .rotation = unturned, .scale = @splat(1) },
+        .{ .node = 1, .translation = .{ 5, 0, 0 }, .rotation = unturned, .scale = @splat(1) },
+    };
     const image = try builder.addImage(.{ .name = "", .bytes = "" });
     builder.scene.environment = .{ .image = image };
     var scene = try builder.finish();
@@ -384,6 +472,9 @@ test "a scene turns about the origin, roots first, and its surroundings with it"
     try std.testing.expectEqual(math.Vec3d{ 1, 3, -2 }, place.translation);
     try std.testing.expectEqual(math.Vec3d{ 0, 1, 0 }, place.direction(.{ 0, 0, 1 }));
     try std.testing.expectEqual(math.Vec3d{ 5, 0, 0 }, scene.nodes[1].local.translation);
+    for (scene.moving.nodes) |*moving| {
+        try std.testing.expectEqual(scene.nodes[moving.node].local, moving.local());
+    }
     // What is above now was at z.
     const map = scene.environment.?.rotation;
     try std.testing.expectEqual(math.Vec3d{ 0, 0, 1 }, map.direction(.{ 0, 1, 0 }));

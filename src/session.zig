@@ -68,6 +68,7 @@ pub const Pose = struct {
     /// Width of the tree: the variant's that is to render.
     lanes: u8,
     tree_quality: settings.TreeQuality = .default,
+    animation: settings.Animation = .{},
     /// What `view` will be asked for: points and lines are as large as its pixels want them, and
     /// stay so until the next pose.
     view: settings.View = .{},
@@ -93,6 +94,10 @@ pub const Session = struct {
     texture_side_max: u32 = settings.texture_side.default,
     /// Made by the first `pose` of a scene.
     loaded: ?prepare.Loaded = null,
+    /// The scene as it is posed.
+    posed: ?prepare.AnimatedScene = null,
+    /// All that moves, where a view frames it: until something else does.
+    motion: ?prepare.Motion = null,
     seen: settings.View = .{},
     world: ?World = null,
     /// What the next pose has a use for; there with the world.
@@ -191,8 +196,20 @@ pub const Session = struct {
 
     /// Frees the scene, for which there is no use after the last `view`.
     pub fn dropScene(session: *Session) void {
+        session.dropPosed();
+        session.dropMotion();
         if (session.ownership == .owned) if (session.scene) |*scene| scene.deinit();
         session.scene = null;
+    }
+
+    fn dropPosed(session: *Session) void {
+        if (session.posed) |*posed| posed.deinit();
+        session.posed = null;
+    }
+
+    fn dropMotion(session: *Session) void {
+        if (session.motion) |*motion| motion.deinit();
+        session.motion = null;
     }
 
     fn dropWorld(session: *Session) void {
@@ -207,10 +224,10 @@ pub const Session = struct {
         session.loaded = null;
     }
 
-    /// Places the geometry and builds the tree over it; the first time, decodes the textures.
-    /// Where nodes, weights and materials of the scene have changed since, and nothing else, it
-    /// may be called again: arrays are written once more, and the tree is fitted. Asserts that
-    /// there is a scene.
+    /// Places the geometry at a moment of the scene's animations and builds the tree over it; the
+    /// first time, decodes the textures. It may be called again, also where nodes, weights and
+    /// materials of a borrowed scene have changed since, and nothing else: arrays are written once
+    /// more, and the tree is fitted. Asserts that there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
         errdefer session.dropWorld();
         const scene = &session.scene.?;
@@ -222,6 +239,15 @@ pub const Session = struct {
             try session.diagnostic.settle();
         }
         const loaded = &session.loaded.?;
+        const diagnostic = session.diagnostic;
+        const moment = try prepare.animateScene(session.gpa, scene, chosen.animation, diagnostic);
+        if (session.posed) |*before| {
+            const is_same = std.meta.eql(before.moment.running, moment.moment.running);
+            if (!is_same) session.dropMotion();
+        }
+        session.dropPosed();
+        session.posed = moment;
+        const shown = &session.posed.?.scene;
         const pose_settings: prepare.PoseSettings = .{
             .lanes = chosen.lanes,
             .pool = &session.pool,
@@ -239,10 +265,10 @@ pub const Session = struct {
                 &session.world.?,
                 cache,
                 session.io,
-                scene,
+                shown,
                 loaded,
                 pose_settings,
-                session.diagnostic,
+                diagnostic,
                 &session.times,
             );
         };
@@ -250,10 +276,10 @@ pub const Session = struct {
         const posed = try prepare.pose(
             session.gpa,
             session.io,
-            scene,
+            shown,
             loaded,
             pose_settings,
-            session.diagnostic,
+            diagnostic,
             &session.times,
         );
         session.world = posed.world;
@@ -281,8 +307,16 @@ pub const Session = struct {
             backdrop = try session.chooseFor(&session.backdrop, &studio);
             backdrop.?.is_seen = true;
         }
+        if (choices.frames_all and session.motion == null) session.motion =
+            try prepare.gatherMotion(
+                session.gpa,
+                &session.scene.?,
+                &session.loaded.?,
+                &session.posed.?,
+                &session.pool,
+            );
         session.times.prepare_ns += session.since(start);
-        try prepare.view(&session.world.?, session.io, &session.scene.?, .{
+        try prepare.view(&session.world.?, session.io, &session.posed.?.scene, .{
             .camera = choices.camera,
             .viewpoint = choices.viewpoint,
             .resolution = choices.resolution,
@@ -293,6 +327,10 @@ pub const Session = struct {
             .floor = choices.floor,
             .emitters = choices.emitters,
             .backdrop = backdrop,
+            .motion = if (!choices.frames_all) null else if (session.motion) |*motion|
+                motion
+            else
+                null,
         }, session.diagnostic, &session.times);
     }
 

@@ -161,6 +161,22 @@ pub const Choice = union(enum) {
     name: []const u8,
 };
 
+/// What of a scene moves, and when it is seen.
+pub const Animation = struct {
+    which: Which = .default,
+    /// Since the start of all animations, finite. Before the first key and after the last all
+    /// stands still.
+    time_s: f32 = 0,
+
+    pub const Which = union(enum) {
+        /// None: the scene at rest, unless something of it is not meant to be seen like that.
+        default,
+        all,
+        index: u32,
+        name: []const u8,
+    };
+};
+
 /// The axis of a scene that points up.
 pub const UpAxis = enum { y, z };
 
@@ -283,6 +299,8 @@ pub const View = struct {
     camera: Camera = .default,
     /// Asserted to be empty but for `fov_degrees` with a camera by index or name.
     viewpoint: Viewpoint = .{},
+    /// What is framed is all that the animations that run show at any time.
+    frames_all: bool = false,
     /// Width and height in pixels; null: the scene's, or its camera's aspect.
     resolution: ?[2]u32 = null,
     /// Within `long_side`, where there is no `resolution`; null: the scene's, or the default.

@@ -1441,6 +1441,37 @@ test "mistakes in what to measure are said before anything is measured" {
     try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 60);
 }
 
+test "info: text, JSON, and the line that rendering ends with" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const text = try sandbox.expectExit(0, &.{ "info", "builtin:cornell" });
+    try testing.expectStringStartsWith(
+        text.stdout,
+        "file         builtin:cornell\nformat       built in\n",
+    );
+    try testing.expectEqualStrings("", text.stderr);
+    const document = "{\"asset\":{\"version\":\"2.0\"},\"extensionsUsed\":[\"A_b\"]}";
+    try sandbox.write("a.gltf", document);
+    const json = try sandbox.expectExit(0, &.{ "info", "a.gltf", "--json" });
+    const found = try std.json.parseFromSliceLeaky(
+        struct { file: []const u8, bytes: u64, warnings: []const []const u8 },
+        sandbox.arena_state.allocator(),
+        json.stdout,
+        .{ .ignore_unknown_fields = true },
+    );
+    try testing.expectEqualStrings("a.gltf", found.file);
+    try testing.expectEqual(document.len, found.bytes);
+    try testing.expectEqual(2, found.warnings.len);
+    try testing.expectStringStartsWith(
+        json.stderr,
+        "raylane: a.gltf: warning: not rendered: the extensions 'A_b'\n",
+    );
+    const absent = try sandbox.expectExit(1, &.{ "info", "b.gltf" });
+    try testing.expectEqualStrings("raylane: b.gltf: does not exist\n", absent.stderr);
+    _ = try sandbox.expectExit(2, &.{ "info", "a.gltf", "--scene=7" });
+    try sandbox.expectFiles(&.{"a.gltf"});
+}
+
 test "compare: figures, a map, thresholds, and images that cannot be compared" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();

@@ -133,7 +133,10 @@ test "OBJ: smoothing groups make normals, each for itself" {
 }
 
 test "OBJ: colours of vertices, lines and points, lines that end as on any system" {
-    var scene = try readClean("a.obj", "v 0 0 0 1 0.5 0\r\nv 1 0 0\r\rv 0 1 0\nf 1 2 3\nl 1 2 3/\np 1 3");
+    var scene = try readClean(
+        "a.obj",
+        "v 0 0 0 1 0.5 0\r\nv 1 0 0\r\rv 0 1 0\nf 1 2 3\nl 1 2 3/\np 1 3",
+    );
     defer scene.deinit();
     try expectEqual(3, scene.meshes.len);
     const code: f32 = @floatCast(srgb.linear(0.5));
@@ -176,7 +179,11 @@ test "OBJ: what can be left out is" {
             "f 1/7/9 2//1 3",
             2,
         },
-        .{ "line 6: 1 normals or coordinates of textures are not finite, left out", "vn 0 nan 0", 1 },
+        .{
+            "line 6: 1 normals or coordinates of textures are not finite, left out",
+            "vn 0 nan 0",
+            1,
+        },
         .{ "line 6: 'quux' is no statement of OBJ, ignored, as 0 others are", "quux 1", 1 },
     }) |case| {
         var buffer: [200]u8 = undefined;

@@ -14,10 +14,13 @@ test {
     _ = @import("decode.zig");
     _ = @import("environment.zig");
     _ = @import("formats.zig");
+    _ = @import("forgiven.zig");
     _ = @import("glass.zig");
+    _ = @import("gltf_animations.zig");
     _ = @import("gltf_materials.zig");
     _ = @import("gltf_instances.zig");
     _ = @import("gltf_poses.zig");
+    _ = @import("gltf_quantization.zig");
     _ = @import("gltf_textures.zig");
     _ = @import("malformed.zig");
     _ = @import("meshes.zig");

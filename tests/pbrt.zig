@@ -168,6 +168,42 @@ test "a disk that shines lights what it looks at as its area does, and is dark f
     try expectColor(.{ 100, 100, 100 }, &below, 16, 16);
 }
 
+test "a lamp of alpha 0 is not seen, stops no light and shines as any other" {
+    // A square above a floor, seen from above through the lamp, and without alpha from the side.
+    const lamp =
+        \\AttributeBegin
+        \\AreaLightSource "diffuse" "rgb L" [1 2 3] "bool twosided" false
+        \\Material "matte" "rgb Kd" [0 0 0]
+        \\Shape "trianglemesh" "integer indices" [0 1 2 0 2 3]
+        \\  "point P" [-1 2 -1 1 2 -1 1 2 1 -1 2 1]
+    ;
+    const floor =
+        \\AttributeEnd
+        \\Material "matte" "rgb Kd" [1 1 1]
+        \\Shape "trianglemesh" "integer indices" [0 1 2 0 2 3]
+        \\  "point P" [-9 0 -9 9 0 -9 9 0 9 -9 0 9]
+    ;
+    const zero = "Texture \"zero\" \"float\" \"constant\" \"float value\" 0";
+    const above = "LookAt 0 4 0  0 0 0  0 0 1\n";
+    const below = "LookAt 0 1 0  0 0 0  0 0 1\n";
+    var shown = try renderText(below ++ world(lamp ++ "\n" ++ floor), 9, 9);
+    defer shown.deinit(gpa);
+    try expect(shown.at(4, 4)[0] > 0.1);
+    for ([_][]const u8{ "\"float alpha\" 0 ", "\"texture alpha\" \"zero\" " }) |alpha| {
+        for ([_][]const u8{ below, above }) |look| {
+            var buffer: [2048]u8 = undefined;
+            const text = try std.mem.print(
+                &buffer,
+                "{s}{s}WorldBegin {s}\n{s} {s}{s}",
+                .{ look, plain_camera, zero, lamp, alpha, floor },
+            );
+            var hidden = try renderText(text, 9, 9);
+            defer hidden.deinit(gpa);
+            try expectColor(shown.at(4, 4)[0..3].*, &hidden, 4, 4);
+        }
+    }
+}
+
 // Shapes.
 
 const Measures = struct { triangles: usize, area: f64, volume: f64, low: Vec3, high: Vec3 };

@@ -61,13 +61,12 @@ const Folder = struct {
     /// With one warning, which is an error where it is not forgiven.
     fn readForgiven(folder: *Folder, text: []const u8, place: []const u8, said: []const u8) !Scene {
         try std.testing.expectError(error.InvalidInput, folder.read(text, true));
-        var buffer: [400]u8 = undefined;
-        var message = try std.mem.print(&buffer, "--strict: {s}", .{said});
-        try expectEqualStrings(message, folder.said.message.text());
+        try expectEqualStrings(said, folder.said.message.text());
         var scene = try folder.read(text, false);
         errdefer scene.deinit();
         try expectEqual(1, folder.said.warning_count);
-        message = try std.mem.print(&buffer, "{s}{s}", .{ place, said });
+        var buffer: [400]u8 = undefined;
+        const message = try std.mem.print(&buffer, "{s}{s}", .{ place, said });
         try expectEqualStrings(message, folder.said.warnings[0].text());
         return scene;
     }
@@ -229,9 +228,20 @@ test "files of gzip are read as what they hold, by content" {
         "'disk.pbrt' is gzip without being called so",
     );
     defer hidden.deinit();
-    var whole = try folder.readForgiven(scene_gzip, "", "is gzip without being called so");
-    defer whole.deinit();
-    try expectEqual(32, whole.triangleCount());
+    for ([_][]const u8{ "a.pbrt", "a.pbrt.gz", "-" }, [_]usize{ 1, 0, 0 }) |name, count| {
+        var said: Diagnostic = .{};
+        const dir = folder.temporary.dir;
+        var whole = try parse.parseNamed(gpa, io, name, scene_gzip, dir, .{}, &said);
+        defer whole.deinit();
+        try expectEqual(32, whole.triangleCount());
+        try expectEqual(count, said.warning_count);
+        const settings: raylane.settings.Load = .{ .strict = true };
+        const strict = parse.parseNamed(gpa, io, name, scene_gzip, dir, settings, &said);
+        if (count > 0) try std.testing.expectError(error.InvalidInput, strict) else {
+            var same = try strict;
+            same.deinit();
+        }
+    }
     try std.testing.expectError(error.InvalidInput, folder.read(ply ++ "\"cut.ply.gz\"", true));
     const text = folder.said.message.text();
     try expect(std.mem.startsWith(u8, text, "'cut.ply.gz' its gzip data is"));

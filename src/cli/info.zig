@@ -26,6 +26,11 @@ const sections: []const Section = &.{
         },
         .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
         .{
+            .usage = "--format-in FORMAT",
+            .help = "how to read the scene where its contents do not tell:\n" ++
+                arguments_file.namesOf(settings.SceneFormat),
+        },
+        .{
             .usage = "--allow-outside",
             .help = "let the scene name files outside of its own folder",
         },
@@ -82,6 +87,7 @@ fn set(reader: *const Reader, info: *Info, given: Reader.Given) cli.Error!void {
         .material_variant => info.load.material_variant = cli.choiceOf(given.value) orelse
             return reader.bad(given, "a material variant's name or its index"),
         .up_axis => info.load.up_axis = try reader.choice(given, settings.UpAxis),
+        .format_in => info.load.format = try reader.choice(given, settings.SceneFormat),
         .allow_outside => info.load.allow_outside = true,
         .quiet => info.quiet = true,
         .help => unreachable, // Asked for before the rest is read.
@@ -108,6 +114,7 @@ test "mistakes name the option" {
         .{ "empty", &.{""} },
         .{ "'--up-axis'", &.{"--up-axis=x"} },
         .{ "'--scene'", &.{"--scene="} },
+        .{ "'--format-in'", &.{"--format-in=fbx"} },
         .{ "did you mean '--json'?", &.{"--jsn"} },
     }) |case| {
         var diagnostic: Diagnostic = .{};

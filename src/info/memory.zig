@@ -153,3 +153,34 @@ fn hasUnlit(scene: *const Scene) bool {
     }
     return false;
 }
+
+test "what is drawn, its textures and the picture count" {
+    const gpa = std.testing.allocator;
+    var diagnostic: Diagnostic = .{};
+    var builder: scene_data.Builder = .init(gpa);
+    errdefer builder.deinit();
+    const material = try builder.addMaterial(.{});
+    const unlit = try builder.addMaterial(.{ .unlit = true });
+    const triangles: [1000][3]u32 = @splat(.{ 0, 1, 2 });
+    const mesh = try builder.addMesh(.{
+        .positions = &.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } },
+        .triangles = &triangles,
+        .material = material,
+    });
+    const node = try builder.addNode(scene_data.none, .identity);
+    for (0..1000) |_| try builder.addInstance(mesh, node);
+    var scene = try builder.finish();
+    defer scene.deinit();
+    const instances = scene.instances;
+    scene.instances = &.{};
+    const empty = try estimate(gpa, &scene, .{ 1000, 1000 }, &diagnostic);
+    try std.testing.expectEqual(base_bytes + 27_000_000, empty);
+    scene.instances = instances;
+    const drawn = try estimate(gpa, &scene, .{ 1, 1 }, &diagnostic);
+    try std.testing.expect(drawn > base_bytes + 100_000_000);
+    const shown = try estimate(gpa, &scene, .{ 4000, 4000 }, &diagnostic);
+    const meshes: [*]scene_data.Mesh = @constCast(scene.meshes.ptr);
+    meshes[0].material = unlit;
+    const layered = try estimate(gpa, &scene, .{ 4000, 4000 }, &diagnostic);
+    try std.testing.expectEqual(shown + 16 * 4000 * 4000, layered);
+}

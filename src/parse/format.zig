@@ -28,6 +28,7 @@ const Signature = struct {
 
 const picture = "; a picture is no scene";
 const convert = "; convert it to glTF";
+const environment = " picture; --env lights a scene with it";
 const unpack = "; unpack it and name a file in it";
 const web_page = "a web page (HTML), perhaps what a failed download left";
 
@@ -45,8 +46,8 @@ const signatures = [_]Signature{
     .{ .bytes = "\xabKTX ", .is = .{ .foreign = "a KTX texture" ++ picture } },
     .{ .bytes = "WEBP", .offset = 8, .is = .{ .foreign = "a WebP" ++ picture } },
     .{ .bytes = "ftypavif", .offset = 4, .is = .{ .foreign = "an AVIF" ++ picture } },
-    .{ .bytes = "v/1\x01", .is = .{ .foreign = "an OpenEXR picture; --env lights a scene with it" } },
-    .{ .bytes = "#?R", .is = .{ .foreign = "a Radiance picture; --env lights a scene with it" } },
+    .{ .bytes = "v/1\x01", .is = .{ .foreign = "an OpenEXR" ++ environment } },
+    .{ .bytes = "#?R", .is = .{ .foreign = "a Radiance" ++ environment } },
     .{ .bytes = "7z\xbc\xaf\x27\x1c", .is = .{ .foreign = "a 7z archive" ++ unpack } },
     .{ .bytes = "Rar!\x1a\x07", .is = .{ .foreign = "a RAR archive" ++ unpack } },
     .{ .bytes = "\xfd7zXZ\x00", .is = .{ .foreign = "an xz file" ++ unpack } },
@@ -174,39 +175,35 @@ fn ofText(start: []const u8) ?Recognized {
         const end = std.mem.findAny(u8, trimmed, " \t#\"[") orelse trimmed.len;
         const word = trimmed[0..end];
         if (word.len == 0) continue;
-        if (isOneOf(word, &pbrt_words)) return .{ .format = .pbrt };
-        if (isOneOf(word, &obj_words)) return .{ .format = .obj };
+        if (isOneOf(word, pbrt_words)) return .{ .format = .pbrt };
+        if (isOneOf(word, obj_words)) return .{ .format = .obj };
         if (std.mem.eql(u8, word, "newmtl"))
             return .{ .foreign = "a material library of an OBJ file; name that file" };
-        if (isOneOf(word, &.{ "OFF", "COFF", "NOFF" }))
+        if (isOneOf(word, "OFF COFF NOFF"))
             return .{ .foreign = "an OFF file" ++ convert };
         return null;
     }
     return null;
 }
 
-fn isOneOf(word: []const u8, words: []const []const u8) bool {
-    for (words) |other| if (std.mem.eql(u8, word, other)) return true;
+fn isOneOf(word: []const u8, words: []const u8) bool {
+    var others = std.mem.tokenizeAny(u8, words, " \n");
+    while (others.next()) |other| if (std.mem.eql(u8, word, other)) return true;
     return false;
 }
 
 /// Words that begin an OBJ file or one of its lines.
-const obj_words = [_][]const u8{
-    "v", "vt", "vn", "vp", "f", "o", "g", "s", "p", "l", "mtllib", "usemtl", "mg",
-};
+const obj_words = "v vt vn vp f o g s p l mtllib usemtl mg";
 
 /// Directives that a PBRT text may begin with.
-const pbrt_words = [_][]const u8{
-    "Accelerator",     "ActiveTransform", "AreaLightSource",    "Attribute",         "AttributeBegin",
-    "Camera",          "ColorSpace",      "ConcatTransform",    "CoordSysTransform", "CoordinateSystem",
-    "Film",            "Identity",        "Import",             "Include",           "Integrator",
-    "LightSource",     "LookAt",          "MakeNamedMaterial",  "MakeNamedMedium",   "Material",
-    "MediumInterface", "NamedMaterial",   "ObjectBegin",        "ObjectInstance",    "Option",
-    "PixelFilter",     "Renderer",        "ReverseOrientation", "Rotate",            "Sampler",
-    "Scale",           "Shape",           "SurfaceIntegrator",  "Texture",           "Transform",
-    "TransformBegin",  "TransformTimes",  "Translate",          "Volume",            "VolumeIntegrator",
-    "WorldBegin",
-};
+const pbrt_words =
+    \\Accelerator ActiveTransform AreaLightSource Attribute AttributeBegin Camera ColorSpace
+    \\ConcatTransform CoordSysTransform CoordinateSystem Film Identity Import Include Integrator
+    \\LightSource LookAt MakeNamedMaterial MakeNamedMedium Material MediumInterface
+    \\NamedMaterial ObjectBegin ObjectInstance Option PixelFilter Renderer ReverseOrientation
+    \\Rotate Sampler Scale Shape SurfaceIntegrator Texture Transform TransformBegin
+    \\TransformTimes Translate Volume VolumeIntegrator WorldBegin
+;
 
 /// Whether the bytes are an STL text; binary ones may begin with "solid" as well.
 pub fn isTextStl(bytes: []const u8) bool {
@@ -265,7 +262,7 @@ test "what is no scene is named" {
     try expectForeign("a web page", "\xef\xbb\xbf\n <!DOCTYPE HTML>\n<title>404</title>");
     try expectForeign("a COLLADA", "<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"\">");
     try expectForeign("an XML file", "<?xml version=\"1.0\"?><a/>");
-    try expectForeign("a Git LFS pointer", "version https://git-lfs.github.com/spec/v1\noid sha256:");
+    try expectForeign("a Git LFS pointer", "version https://git-lfs.github.com/spec/v1\noid");
     try expectForeign("a text in UTF-16", "\xff\xfe{\x00");
     try expectForeign("a material library", "# by hand\n\nnewmtl a\nKd 1 0 0\n");
     try std.testing.expectEqual(.gzip, recognize("\x1f\x8b\x08", ""));

@@ -14,8 +14,10 @@ const instancing = @import("gltf/instancing.zig");
 const limits = @import("gltf/limits.zig");
 const nodes = @import("gltf/nodes.zig");
 const scene_data = @import("../scene.zig");
+const schema = @import("gltf/schema.zig");
 const variants = @import("gltf/variants.zig");
 const views = @import("gltf/views.zig");
+const Animations = @import("gltf/animations.zig");
 const Buffers = @import("gltf/buffers.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Materials = @import("gltf/materials.zig");
@@ -69,7 +71,9 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
     for (buffers.owned.items) |owned| input_bytes += owned.len;
     source.buffers = buffers.list;
     source.decoded_bytes_left = limits.decodedBytesMax(input_bytes);
-    try fill(&source, resources);
+    var animations: Animations = try .read(&source, text.bytes);
+    defer animations.deinit();
+    try fill(&source, resources, &animations);
     try accessors.checkRest(&source);
     try diagnostic.settle();
     const scene = try builder.finish();
@@ -78,7 +82,7 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
 }
 
 /// Puts the parts of the document into the scene.
-fn fill(source: *Source, resources: *Resources) Error!void {
+fn fill(source: *Source, resources: *Resources, animations: *Animations) Error!void {
     const builder = source.builder;
     const settings = &resources.settings;
     const shown = try nodes.choose(source, settings.scene);
@@ -89,40 +93,52 @@ fn fill(source: *Source, resources: *Resources) Error!void {
     defer source.gpa.free(origins);
     var textures: Textures = .init(source, resources);
     defer textures.deinit();
-    var materials: Materials = try .init(source, &textures);
+    var materials: Materials = try .init(source, &textures, animations.moves_material);
     defer materials.deinit();
     var meshes: Meshes = .{ .source = source, .materials = &materials, .variant = variant };
     defer meshes.deinit();
     var skins: Skins = .{ .source = source };
     defer skins.deinit();
-    try skins.collect(origins);
+    try skins.collect(origins, animations);
     for (origins, 0..) |origin, index| {
         const node = Source.item(source.data.nodes, origin);
         const node_index: u32 = @intCast(index);
         const is_hidden = source.isHidden(node_index);
         if (node.mesh != null and !is_hidden) {
-            try addInstances(origin, node_index, &meshes, &skins);
+            try addInstances(origin, node_index, &meshes, &skins, animations);
         }
         if (node.camera) |raw| {
             try builder.addCamera(try views.readCamera(source, raw, node.name, node_index));
+            const camera = Source.indexOf(source.data.cameras, raw);
+            try animations.cameras.append(source.gpa, camera);
         }
         if (node.light) |raw| if (!is_hidden) {
-            try source.need(.lights, Source.indexOf(source.data.lights, raw));
-            if (views.readLight(source, raw, node_index)) |light| try builder.addLight(light);
+            const light_index = Source.indexOf(source.data.lights, raw);
+            try source.need(.lights, light_index);
+            if (views.readLight(source, raw, node_index)) |light| {
+                try builder.addLight(light);
+                try animations.lights.append(source.gpa, light_index);
+            }
         };
     }
+    try animations.finish(origins, skins.places, &materials);
     try materials.finish();
     if (shown) |one| try image_based_light.read(source, &textures, one);
     try skins.checkRest();
-    for (source.lenience.broken.values()) |broken| source.forgiveUnneeded(broken.reason);
+    for (source.lenience.broken.keys(), source.lenience.broken.values()) |element, broken| {
+        const is_image = element.list == @backingInt(schema.List.images);
+        if (is_image and textures.images.contains(element.index)) continue; // It has been said.
+        source.forgiveUnneeded(broken.reason);
+    }
 }
 
-/// Adds what a node draws.
+/// Adds what a node of the file draws, whose number in the scene is `node_index`.
 fn addInstances(
     origin: u32,
     node_index: u32,
     meshes: *Meshes,
     skins: *Skins,
+    animations: *Animations,
 ) Error!void {
     const source = meshes.source;
     const builder = source.builder;
@@ -132,6 +148,7 @@ fn addInstances(
     if (builder.instances.items.len + range.count > limits.instance_count_max)
         return source.fail("over {d} instances of meshes", .{limits.instance_count_max});
     const weights = try skins.instanceWeights(node);
+    const weight_list = try animations.weightList(origin, weights);
     const skin = try skins.instanceSkin(node, range);
     const places = try instancing.place(source, origin, node_index, range.count);
     for (places.first..places.first + places.count) |at| {
@@ -141,6 +158,7 @@ fn addInstances(
                 .mesh = @intCast(drawn),
                 .node = @intCast(at),
                 .morph_weights = weights,
+                .moving_weights = weight_list,
                 .skin = if (has_joints) skin else scene_data.none,
             });
         }

@@ -131,7 +131,8 @@ pub fn checkLeniently(
     graph: ?*Graph,
     said: *Diagnostic,
 ) error{ OutOfMemory, InvalidInput }!Checked {
-    if (!std.unicode.utf8ValidateSlice(text)) return said.invalid("the JSON text is not UTF-8", .{});
+    if (!std.unicode.utf8ValidateSlice(text))
+        return said.invalid("the JSON text is not UTF-8", .{});
     var unheard: Diagnostic = .{};
     var scanner: Scanner = .{
         .text = text,
@@ -555,6 +556,7 @@ const Scanner = struct {
                 return;
             }
             const list = frame.list orelse continue;
+            if (lenience.broken.count() == Lenience.broken_count_max) return err;
             try scanner.skipValue(start);
             const reason = scanner.diagnostic.message.text();
             try lenience.leaveOut(list, @intCast(frame.count - 1), .{ .reason = reason });

@@ -84,7 +84,7 @@ noinline fn slow(text: [:0]const u8, start: *usize) Error!f32 {
     return math.flushDenormal(value);
 }
 
-/// The same where "nan" and "inf" in all spellings, and what is out of range, are no number but NaN.
+/// The same where "nan" and "inf" in all spellings, and what is out of range, are NaN.
 pub inline fn floatOrNan(text: [:0]const u8, start: *usize) error{NotANumber}!f32 {
     return float(text, start) catch |err| switch (err) {
         error.OutOfRange => skipNan(text, start),

@@ -5,12 +5,9 @@
 //! read, and what stands for what is not.
 
 const std = @import("std");
-const decode = @import("../decode.zig");
 const scene_data = @import("../scene.zig");
 const SceneBuilder = @import("pbrt/scene_builder.zig");
-const diagnostic_file = @import("../diagnostic.zig");
-const Diagnostic = diagnostic_file.Diagnostic;
-const Message = diagnostic_file.Message;
+const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Input = @import("pbrt/input.zig");
 const Reader = @import("pbrt/reader.zig");
 const Resources = @import("resource.zig");
@@ -35,9 +32,7 @@ pub fn read(
         .diagnostic = diagnostic,
     };
     defer input.deinit();
-    const plain = try plainOf(&input, path, main.bytes);
-    defer if (plain) |bytes| gpa.free(bytes);
-    try input.push(path, .{ .bytes = plain orelse main.bytes, .identity = main.identity });
+    try input.push(path, main);
     try input.start();
     var scene_builder: scene_data.Builder = .init(gpa);
     errdefer scene_builder.deinit();
@@ -63,20 +58,6 @@ pub fn read(
     const scene = try scene_builder.finish();
     if (scene.triangleCount() == 0) diagnostic.warn("nothing to render: no triangles", .{});
     return scene;
-}
-
-/// What a scene file holds that gzip has compressed, for the caller to free; null: it is plain.
-fn plainOf(input: *Input, path: []const u8, file: []const u8) Error!?[:0]u8 {
-    if (!decode.gzip.isGzip(file)) return null;
-    var reason: Message = .{};
-    const plain = input.inflate(file, &reason) catch |err| switch (err) {
-        error.OutOfMemory => |failure| return failure,
-        error.InvalidGzip => return input.diagnostic.invalid("{s}", .{reason.text()}),
-    };
-    errdefer input.gpa.free(plain);
-    if (!std.ascii.endsWithIgnoreCase(path, ".gz"))
-        try input.forgiveFile("is gzip without being called so", .{});
-    return plain;
 }
 
 test {

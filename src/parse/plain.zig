@@ -1,7 +1,7 @@
 //! Scenes of one mesh: what STL and PLY files hold.
 //!
-//! In: a mesh in the scene's memory, and what it is coloured by. Out: a scene that shows it where it
-//! is, with a material of no particular kind: these formats say nothing of surfaces. What has
+//! In: a mesh in the scene's memory, and what it is coloured by. Out: a scene that shows it where
+//! it is, with a material of no particular kind: these formats say nothing of surfaces. What has
 //! neither faces nor normals is not lit.
 
 const std = @import("std");

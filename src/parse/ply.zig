@@ -546,7 +546,8 @@ const Reader = struct {
                     count = 0;
                     continue;
                 }
-                corners = .{ corners[1], corners[2], try reader.wholeOf(value, index_max, "index") };
+                const corner = try reader.wholeOf(value, index_max, "index");
+                corners = .{ corners[1], corners[2], corner };
                 count += 1;
                 if (count < 3) continue;
                 const is_turned = count % 2 == 0;

@@ -1,8 +1,8 @@
 //! What comes through a pipe, a socket or standard input, read to its end.
 //!
-//! In: an open descriptor. Out: all of its bytes with a zero byte behind them, up to a limit. Memory
-//! grows with what has arrived, twice as much at a time. A pipe is waited for, before its first
-//! writer as well.
+//! In: an open descriptor. Out: all of its bytes with a zero byte behind them, up to a limit.
+//! Memory grows with what has arrived, twice as much at a time. A pipe is waited for, before its
+//! first writer as well.
 
 const std = @import("std");
 const Allocator = std.mem.Allocator;

@@ -120,6 +120,7 @@ const Work = struct {
             is_listed[instance.mesh] = true;
             const mesh = &work.meshes[instance.mesh];
             if (mesh.triangles.len == 0) continue;
+            if (work.materials[mesh.material].in_motion) continue;
             const lookup = work.alphaLookup(mesh.material) orelse continue;
             if (hasAlphaInMotion(mesh, lookup.texcoord_set)) continue;
             const bounds = &work.bounds[lookup.texture];

@@ -44,20 +44,22 @@ pub const Pose = struct {
 /// The pose of a scene's nodes; its memory comes from `gpa`. Asserts that every parent stands
 /// before its children.
 pub fn compose(gpa: std.mem.Allocator, from: *const scene.Scene) error{OutOfMemory}!Pose {
+    return composeShifted(gpa, from, null);
+}
+
+/// The same with a shift that is known.
+pub fn composeShifted(
+    gpa: std.mem.Allocator,
+    from: *const scene.Scene,
+    known_shift: ?Vec3d,
+) error{OutOfMemory}!Pose {
     const maps = try gpa.alloc(AffineD, from.nodes.len);
     errdefer gpa.free(maps);
-    for (from.nodes, maps, 0..) |node, *map, index| {
-        if (node.parent == scene.none) {
-            map.* = node.local;
-        } else {
-            assert(node.parent < index);
-            map.* = .compose(maps[node.parent], node.local);
-        }
-    }
+    composeNodes(from.nodes, maps);
     const joint_maps = try deform.composeJoints(gpa, from.skins, maps);
     var pose: Pose = .{ .maps = maps, .joint_maps = joint_maps, .center = @splat(0), .size = 0 };
     findCenter(from, &pose);
-    const shift = shiftOf(&pose);
+    const shift = known_shift orelse shiftOf(&pose);
     for (maps) |*map| map.translation = vec3d.sub(map.translation, shift);
     for (joint_maps) |of_skin| for (of_skin) |*map| {
         map.translation = vec3d.sub(map.translation, shift);
@@ -65,6 +67,18 @@ pub fn compose(gpa: std.mem.Allocator, from: *const scene.Scene) error{OutOfMemo
     pose.center = vec3d.sub(pose.center, shift);
     pose.shift = shift;
     return pose;
+}
+
+/// Maps into the world, unshifted.
+pub fn composeNodes(nodes: []const scene.Node, maps: []AffineD) void {
+    for (nodes, maps, 0..) |node, *map, index| {
+        if (node.parent == scene.none) {
+            map.* = node.local;
+        } else {
+            assert(node.parent < index);
+            map.* = .compose(maps[node.parent], node.local);
+        }
+    }
 }
 
 /// What is subtracted from all places: the center on a grid of a power of two, if it is far away.

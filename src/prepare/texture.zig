@@ -460,6 +460,8 @@ const Work = struct {
             try lookups.append(arena, lookup);
             if (lookup.slot.isOfLayers()) layer_count += 1;
         }
+        const moves_alpha = material.in_motion and material.alpha_mode != .@"opaque";
+        if (moves_alpha) alpha = .{ .least = 0, .largest = 1 };
         const all = lookups.items[first..];
         return .{
             .first_lookup = @intCast(first),

@@ -65,6 +65,8 @@ pub fn viewOf(material: *const scene.Material, use: Use) ?scene.TextureView {
 
 /// Whether it matters what a texture for this use would say.
 fn counts(material: *const scene.Material, use: Use) bool {
+    // It may matter later.
+    if (material.in_motion and use != .alpha) return true;
     const effects: Effects = .of(material);
     return switch (use) {
         .base_color, .metallic_roughness => true,

@@ -143,30 +143,13 @@ fn find(
     }
 }
 
-/// Prints the cameras of a file: index and name, if any.
-const CameraList = struct {
-    cameras: []const scene.Camera,
-
-    /// Called by `{f}`.
-    pub fn format(list: CameraList, writer: *std.Io.Writer) std.Io.Writer.Error!void {
-        if (list.cameras.len == 0) return writer.writeAll("the file has none");
-        try writer.writeAll("the file has ");
-        for (list.cameras, 0..) |camera, index| {
-            if (index > 0) try writer.writeAll(", ");
-            try writer.print("{d}", .{index});
-            if (camera.name.len == 0) continue;
-            try writer.print(" {f}", .{diagnostic_module.quote(camera.name)});
-        }
-    }
-};
-
 fn unknown(
     from: *const scene.Scene,
     comptime format: []const u8,
     arguments: anytype,
     diagnostic: *Diagnostic,
 ) error{CameraUnknown} {
-    const list: CameraList = .{ .cameras = from.cameras };
+    const list = diagnostic_module.listOf(from.cameras);
     return diagnostic.fail(error.CameraUnknown, format ++ "; {f}", arguments ++ .{list});
 }
 

@@ -19,10 +19,16 @@ pub const Material = struct {
     roughness: f32 = 1,
     /// Radiance emitted, linear RGB, strength included.
     emissive: Vec3 = .{ 0, 0, 0 },
+    /// What it is the product of, where animations move that.
+    emissive_factor: Vec3 = .{ 0, 0, 0 },
+    emissive_strength: f32 = 1,
     alpha_mode: AlphaMode = .@"opaque",
     /// With `AlphaMode.mask`, what has less alpha is a hole.
     alpha_cutoff: f32 = 0.5,
     double_sided: bool = false,
+    /// Its surfaces are not seen and stop no light, but what they emit lights the scene as if they
+    /// were: PBRT's area lights whose alpha is 0. Asserted to blend with alpha 0.
+    is_hidden_lamp: bool = false,
     /// The base colour is shown as it is, without light (KHR_materials_unlit).
     unlit: bool = false,
     /// Index of refraction, >= 1 (KHR_materials_ior).
@@ -113,6 +119,8 @@ pub const Material = struct {
     diffuse_transmission_color_texture: ?TextureView = null,
     /// Red, green, blue (sRGB), multiplied with `multiscatter_color`.
     multiscatter_color_texture: ?TextureView = null,
+    /// Animations move some of its numbers: what these are at rest rules nothing out.
+    in_motion: bool = false,
 
     /// Whether it has any.
     pub fn hasTextures(material: *const Material) bool {

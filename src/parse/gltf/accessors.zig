@@ -18,15 +18,7 @@ const assert = std.debug.assert;
 /// Checks the accessors and views of the file that nothing drawn has needed: what is wrong with
 /// them is no reason to give up.
 pub fn checkRest(source: *Source) Error!void {
-    const views = Source.slice(source.data.buffer_views, source.data.buffer_views_count);
-    for (views, 0..) |*view, index| {
-        if (source.findBroken(.buffer_views, index) != null) continue;
-        buffer_views.check(source, view, index) catch |err| try source.excuse(err);
-        if (view.stride % 4 != 0) source.forgive(
-            "buffer view {d}: byteStride {d} is no multiple of 4",
-            .{ index, view.stride },
-        );
-    }
+    try buffer_views.checkRest(source);
     for (0..source.data.accessors_count) |index| {
         if (source.isResolved(index) or source.findBroken(.accessors, index) != null) continue;
         _ = resolve(source, index) catch |err| try source.excuse(err);
@@ -57,7 +49,6 @@ const Purpose = enum { vertices, indices };
 fn resolveAs(source: *Source, index: usize, purpose: Purpose) Error!?Accessor {
     assert(index < source.data.accessors_count);
     if (source.draco.get(@intCast(index))) |decoded| return decoded.accessor;
-    try source.need(.accessors, index);
     var accessor = try describe(source, index);
     const raw = Source.item(source.data.accessors, index);
     const component = accessor.component;
@@ -76,28 +67,6 @@ fn resolveAs(source: *Source, index: usize, purpose: Purpose) Error!?Accessor {
     }
     try source.noteResolved(index);
     return accessor;
-}
-
-/// The accessor without its data.
-pub fn describe(source: *const Source, index: usize) Error!Accessor {
-    const raw = Source.item(source.data.accessors, index);
-    const component = componentOf(raw.component_type) orelse
-        return source.fail("accessor {d}: unknown componentType", .{index});
-    const component_count = componentCount(raw.type) orelse
-        return source.fail("accessor {d}: unknown type", .{index});
-    if (raw.count == 0) return source.fail("accessor {d}: count is 0", .{index});
-    if (raw.count > limits.accessor_count_max) return source.fail(
-        "accessor {d}: count {d} is over the limit of {d}",
-        .{ index, raw.count, limits.accessor_count_max },
-    );
-    return .{
-        .component = component,
-        .component_count = component_count,
-        .normalized = raw.normalized != 0,
-        .count = @intCast(raw.count),
-        .base = null,
-        .sparse = null,
-    };
 }
 
 /// From one element to the next, in bytes.
@@ -136,6 +105,29 @@ fn strideOf(
         .{ index, view.stride, view_index, accessor.component.bytes() },
     );
     return view.stride;
+}
+
+/// The accessor without its data.
+pub fn describe(source: *const Source, index: usize) Error!Accessor {
+    try source.need(.accessors, index);
+    const raw = Source.item(source.data.accessors, index);
+    const component = componentOf(raw.component_type) orelse
+        return source.fail("accessor {d}: unknown componentType", .{index});
+    const component_count = componentCount(raw.type) orelse
+        return source.fail("accessor {d}: unknown type", .{index});
+    if (raw.count == 0) return source.fail("accessor {d}: count is 0", .{index});
+    if (raw.count > limits.accessor_count_max) return source.fail(
+        "accessor {d}: count {d} is over the limit of {d}",
+        .{ index, raw.count, limits.accessor_count_max },
+    );
+    return .{
+        .component = component,
+        .component_count = component_count,
+        .normalized = raw.normalized != 0,
+        .count = @intCast(raw.count),
+        .base = null,
+        .sparse = null,
+    };
 }
 
 fn resolveBase(
@@ -225,7 +217,7 @@ fn range(
     length: u64,
     alignment: u32,
 ) Error!?[]const u8 {
-    const all = try buffer_views.contents(source, view);
+    const bytes = try buffer_views.contents(source, view);
     const view_bytes: u64 = view.size;
     const excess = (offset +| length) -| view_bytes;
     if (excess > 0) return source.fail(
@@ -237,7 +229,8 @@ fn range(
         "accessor {d}: {s}byte {d} of buffer {d} is not aligned to {d} bytes",
         .{ index, part, start, bufferIndex(source, view), alignment },
     );
-    return (all orelse return null)[@intCast(offset)..][0..@intCast(length)];
+    const all = bytes orelse return null;
+    return all[@intCast(offset)..][0..@intCast(length)];
 }
 
 fn viewIndex(source: *const Source, view: *const c.cgltf_buffer_view) u32 {

@@ -30,9 +30,9 @@ pub const Used = struct {
     weights: [scene.joint_set_count]?u32 = @splat(null),
     /// Whether there are more joints than there are sets for.
     has_more_joints: bool = false,
+    vertex_count: u32 = 0,
     /// Whether its triangles come one by one from Draco, whatever the mode.
     is_draco: bool = false,
-    vertex_count: u32 = 0,
 };
 
 /// Finds the attributes of a primitive and checks those that are always drawn; for the others there
@@ -43,12 +43,12 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
         if (attribute.type != .position or attribute.index != 0) continue;
         break accessorIndex(source, attribute);
     } else return .{};
-    const is_draco = try draco_meshes.decode(source, primitive, place);
+    var used: Used = .{ .is_draco = try draco_meshes.decode(source, primitive, place) };
     const positions = try required(source, position);
     if (positions.base == null and positions.sparse == null)
         return source.fail("accessor {d}: positions without data", .{position});
 
-    var used: Used = .{ .is_draco = is_draco, .vertex_count = positions.count };
+    used.vertex_count = positions.count;
     for (list) |*attribute| {
         const index = accessorIndex(source, attribute);
         if (try hasNoElements(source, attribute.data)) {
@@ -187,6 +187,14 @@ fn noData(source: *const Source, index: u32) Error {
     return source.fail("accessor {d}: its buffer has no data", .{index});
 }
 
+/// An accessor of normals or tangents. KHR_mesh_quantization has whole numbers only as normalised
+/// ones, and so they are taken, or what morph targets add would not be of their size.
+pub fn directions(source: *Source, index: u32) Error!Accessor {
+    var accessor = try required(source, index);
+    accessor.normalized = true;
+    return accessor;
+}
+
 fn accessorIndex(source: *const Source, attribute: *const c.cgltf_attribute) u32 {
     return Source.indexOf(source.data.accessors, attribute.data);
 }
@@ -284,7 +292,7 @@ fn kindOf(accessor: Accessor, attribute: c.cgltf_attribute_type) Kind {
     }
     return switch (attribute) {
         .position => if (small) .quantized else .wrong,
-        // A direction is the same whether its numbers are normalised or not.
+        // Whether it says that they are normalised or not: see `directions`.
         .normal,
         .tangent,
         => if (small_signed) .quantized else .wrong,

@@ -10,25 +10,39 @@ const c = @import("../cgltf.zig");
 const decode = @import("../../decode.zig");
 const diagnostic = @import("../../diagnostic.zig");
 const Allocator = std.mem.Allocator;
+const assert = std.debug.assert;
 const Error = Source.Error;
 const Source = @import("source.zig");
 const meshopt = decode.meshopt;
 
-/// Compares a view with its buffer, and its compressed data with theirs.
-pub fn check(source: *const Source, view: *const c.cgltf_buffer_view, index: usize) Error!void {
+/// Compares every view with its buffer: those that are drawn have been.
+pub fn checkRest(source: *const Source) Error!void {
+    const views = Source.slice(source.data.buffer_views, source.data.buffer_views_count);
+    for (views, 0..) |*view, index| {
+        if (source.findBroken(.buffer_views, index) != null) continue;
+        check(source, view, index) catch |err| try source.excuse(err);
+        if (view.stride > 4 and view.stride % 4 != 0) source.forgive(
+            "buffer view {d}: byteStride {d} is no multiple of 4",
+            .{ index, view.stride },
+        );
+    }
+}
+
+fn check(source: *const Source, view: *const c.cgltf_buffer_view, index: usize) Error!void {
+    try source.need(.buffer_views, index);
     const extent: Extent = .of(source, view);
     if (extent.excess() > 0) return source.fail(
         "buffer view {d}: {d} bytes past its buffer {d}",
         .{ index, extent.excess(), extent.buffer },
     );
     if (view.size == 0) return source.fail("buffer view {d}: byteLength is 0", .{index});
-    if (view.has_meshopt_compression == 0) return source.need(.buffers, extent.buffer);
-    const compressed: Extent = .of(source, &view.meshopt_compression);
-    try source.need(.buffers, compressed.buffer);
-    if (compressed.excess() > 0) return source.fail(
-        "buffer view {d}: its compressed data is {d} bytes past buffer {d}",
-        .{ index, compressed.excess(), compressed.buffer },
-    );
+    if (view.has_meshopt_compression != 0) {
+        const compressed: Extent = .of(source, &view.meshopt_compression);
+        if (compressed.excess() > 0) return source.fail(
+            "buffer view {d}: its compressed data is {d} bytes past buffer {d}",
+            .{ index, compressed.excess(), compressed.buffer },
+        );
+    }
 }
 
 /// A run of bytes in a buffer.
@@ -53,9 +67,11 @@ const Extent = struct {
         return (extent.offset +| extent.size) -| extent.buffer_bytes;
     }
 
-    /// Null where the buffer has no data; fails where it has less than it says.
+    /// Null where the buffer has no data. Asserts that `check` has passed it.
     fn bytes(extent: Extent, source: *const Source) Error!?[]const u8 {
+        try source.need(.buffers, extent.buffer);
         const buffer = source.buffers[extent.buffer] orelse return null;
+        assert(extent.excess() == 0);
         if (extent.offset + extent.size > buffer.len) return source.fail(
             "buffer {d}: has {d} bytes, its byteLength is {d}",
             .{ extent.buffer, buffer.len, extent.buffer_bytes },
@@ -67,7 +83,6 @@ const Extent = struct {
 /// All bytes of a view, valid as long as the source; null where its buffer has no data.
 pub fn contents(source: *Source, view: *const c.cgltf_buffer_view) Error!?[]const u8 {
     const index = Source.indexOf(source.data.buffer_views, view);
-    try source.need(.buffer_views, index);
     try check(source, view, index);
     if (view.has_meshopt_compression == 0) return Extent.of(source, view).bytes(source);
     if (source.decompressed.get(index)) |known| return known;

@@ -115,11 +115,13 @@ const Reader = struct {
             .{reader.raw.size},
         );
         var reason: diagnostic_data.Message = .{};
-        const target = uri.resolve(gpa, gpa, text, &reason) catch |err| return switch (err) {
+        const resolved = uri.resolve(gpa, gpa, text, &reason) catch |err| return switch (err) {
             error.OutOfMemory => error.OutOfMemory,
             error.InvalidInput => reader.fail("{s}", .{reason.text()}),
         };
-        switch (target) {
+        if (resolved.odd.len > 0)
+            reader.diagnostic.forgive("buffer {d}: its URI {s}", .{ reader.index, resolved.odd });
+        switch (resolved.target) {
             .bytes => |bytes| return reader.own(bytes),
             .path => |path| {
                 defer gpa.free(path);

@@ -41,6 +41,7 @@ pub fn readFactors(
     if (raw.has_emissive_strength != 0) {
         const name = "emissiveStrength";
         const strength = factors.clamp(name, raw.emissive_strength, 0, Factors.endless);
+        material.emissive_strength = strength;
         for (&material.emissive) |*value| value.* = math.flushDenormal(value.* * strength);
     }
     if (raw.has_ior != 0)

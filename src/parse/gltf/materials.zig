@@ -18,6 +18,8 @@ const Materials = @This();
 
 source: *const Source,
 textures: *Textures,
+/// By material of the file: whether animations move it; empty: they move none.
+moved: []const bool,
 /// Those of the file as far as they are read, by their indices.
 list: []?scene.Material,
 /// Those that come behind them.
@@ -44,10 +46,14 @@ pub const Lacks = struct {
 const Reduction = struct { material: u32, lacks: Lacks };
 
 /// Nothing is read yet. Free with `deinit`.
-pub fn init(source: *const Source, textures: *Textures) Error!Materials {
+pub fn init(
+    source: *const Source,
+    textures: *Textures,
+    moved: []const bool,
+) Error!Materials {
     const list = try source.gpa.alloc(?scene.Material, source.data.materials_count);
     @memset(list, null);
-    return .{ .source = source, .textures = textures, .list = list };
+    return .{ .source = source, .textures = textures, .moved = moved, .list = list };
 }
 
 /// Frees what is not the scene's.
@@ -108,6 +114,7 @@ pub fn useUnlit(materials: *Materials, index: u32, has_colors: bool) Error!u32 {
         .alpha_cutoff = lit.alpha_cutoff,
         .double_sided = lit.double_sided,
         .unlit = true,
+        .in_motion = lit.in_motion,
     };
     if (!has_colors and lit.base_color_texture == null and lit.emissive_texture == null) {
         for (material.base_color[0..3], lit.emissive) |*channel, emitted| {
@@ -117,6 +124,46 @@ pub fn useUnlit(materials: *Materials, index: u32, has_colors: bool) Error!u32 {
     const shown = try materials.add(material);
     try materials.unlit.put(materials.source.gpa, .{ index, has_colors }, shown);
     return shown;
+}
+
+/// A material of the scene that stands for one of the file.
+pub const Form = struct {
+    material: u32,
+    /// Which of the file's numbers it has: all, those that need no tangents, or a colour and no
+    /// light.
+    kind: enum { whole, without_anisotropy, unlit },
+
+    /// Whether it goes with this number of the file's.
+    pub fn follows(form: Form, property: scene.MaterialProperty) bool {
+        return switch (form.kind) {
+            .whole => true,
+            .without_anisotropy => property != .anisotropy,
+            .unlit => property == .base_color or property == .alpha_cutoff,
+        };
+    }
+};
+
+/// Replaces the list by those that are drawn of a material of the file. One whose colour is in part
+/// emission is not among them.
+pub fn addForms(materials: *const Materials, index: u32, list: *std.ArrayList(Form)) Error!void {
+    const gpa = materials.source.gpa;
+    list.clearRetainingCapacity();
+    const lit = materials.list[index] orelse return;
+    try list.append(gpa, .{ .material = index, .kind = .whole });
+    var reduced = materials.reduced.iterator();
+    while (reduced.next()) |entry| {
+        if (entry.key_ptr.material != index) continue;
+        try list.append(gpa, .{
+            .material = entry.value_ptr.*,
+            .kind = if (entry.key_ptr.lacks.anisotropy) .without_anisotropy else .whole,
+        });
+    }
+    if (math.vec3.maxComponent(lit.emissive) > 0) return;
+    var unlit = materials.unlit.iterator();
+    while (unlit.next()) |entry| {
+        if (entry.key_ptr[0] != index) continue;
+        try list.append(gpa, .{ .material = entry.value_ptr.*, .kind = .unlit });
+    }
 }
 
 fn add(materials: *Materials, material: scene.Material) Error!u32 {
@@ -148,6 +195,7 @@ fn read(materials: *const Materials, index: usize, textures: ?*Textures) Error!s
         try extensions.readTextures(all, raw, index, &material);
     }
     try extensions.readScatter(factors, textures, raw, &material);
+    material.in_motion = materials.moved.len > 0 and materials.moved[index];
     return material;
 }
 
@@ -164,6 +212,7 @@ fn readCore(factors: Factors, raw: *const c.cgltf_material) scene.Material {
         .unlit = raw.unlit != 0,
         .emissive = factors.color3("emissiveFactor", raw.emissive_factor),
     };
+    material.emissive_factor = material.emissive;
     if (raw.has_pbr_metallic_roughness != 0) {
         material.base_color = factors.color4("baseColorFactor", metal.base_color_factor);
         material.metallic = factors.unit("metallicFactor", metal.metallic_factor);

@@ -165,7 +165,11 @@ pub fn get(meshes: *Meshes, mesh_index: u32, deformation: Deformation) Error!Ran
     var range: Range = .{ .first = first, .count = 0, .joint_max = 0 };
     for (Source.slice(mesh.primitives, mesh.primitives_count), 0..) |*primitive, index| {
         const place: Place = .{ .mesh = mesh_index, .primitive = @intCast(index) };
-        const decoded = try meshes.decode(primitive, place) orelse continue;
+        const decoded = meshes.decode(primitive, place) catch |err| {
+            if (err == error.OutOfMemory or !meshes.source.force) return err;
+            try meshes.source.excuse(err);
+            continue;
+        } orelse continue;
         const index_of = try builder.addMesh(decoded.mesh);
         const drawn = &builder.meshes.items[index_of];
         drawn.morph_targets =
@@ -213,7 +217,7 @@ fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Er
     var mesh: scene.Mesh = .{
         .positions = try meshes.decodePositions(position),
         .normals = if (used.normal) |index|
-            try meshes.floats(3, &meshes.normals, index, "normals")
+            try meshes.directions(index, "normals")
         else
             null,
         .colors = if (used.color) |index| try meshes.decodeColors(index) else null,
@@ -281,7 +285,7 @@ fn decodeForTangents(
         }
     }
     const has_tangents = mesh.normals != null and used.tangent != null; // See below.
-    if (material.anisotropy > 0) {
+    if (material.anisotropy > 0 or material.in_motion and material.anisotropy_texture != null) {
         const set = if (material.anisotropy_texture) |view| view.texcoord_set else 0;
         if (!needed and !has_tangents) if (used.texcoords[set]) |index| {
             mesh.texcoords[set] = try meshes.decodeTexcoords(primitive, index, used, place);
@@ -370,8 +374,26 @@ fn floats(
     what: []const u8,
 ) Error![]const [width]f32 {
     if (cache.get(index)) |known| return known;
+    const accessor = try attributes.required(meshes.source, index);
+    return meshes.decodeFloats(width, cache, index, accessor, what);
+}
+
+/// Normals, and what morph targets add to them and to tangents.
+fn directions(meshes: *Meshes, index: u32, what: []const u8) Error![]const Vec3 {
+    if (meshes.normals.get(index)) |known| return known;
+    const accessor = try attributes.directions(meshes.source, index);
+    return meshes.decodeFloats(3, &meshes.normals, index, accessor, what);
+}
+
+fn decodeFloats(
+    meshes: *Meshes,
+    comptime width: u8,
+    cache: *std.AutoHashMapUnmanaged(u32, []const [width]f32),
+    index: u32,
+    accessor: Accessor,
+    what: []const u8,
+) Error![]const [width]f32 {
     const source = meshes.source;
-    const accessor = try attributes.required(source, index);
     try source.charge(@as(u64, accessor.count) * @sizeOf([width]f32));
     const out = try source.arena.alloc([width]f32, accessor.count);
     if (accessors.decodeFloats(width, accessor, out) != null)
@@ -404,7 +426,7 @@ fn tameAll(
 fn decodeTangents(meshes: *Meshes, index: u32) Error!?[]const [4]f32 {
     if (meshes.tangents.get(index)) |known| return known;
     const source = meshes.source;
-    const accessor = try attributes.required(source, index);
+    const accessor = try attributes.directions(source, index);
     try source.charge(@as(u64, accessor.count) * @sizeOf([4]f32));
     const tangents = try source.arena.alloc([4]f32, accessor.count);
     if (accessors.decodeFloats(4, accessor, tangents) != null) {
@@ -476,10 +498,10 @@ fn decodeTargets(
                 try checkPlaces(source, mesh, index, vertices);
         }
         if (mesh.normals != null) if (used.normal) |index| {
-            target.normals = try meshes.floats(3, &meshes.normals, index, "normals");
+            target.normals = try meshes.directions(index, "normals");
         };
         if (mesh.tangents != null) if (used.tangent) |index| {
-            target.tangents = try meshes.floats(3, &meshes.normals, index, "tangents");
+            target.tangents = try meshes.directions(index, "tangents");
         };
         if (mesh.colors != null) if (used.color) |index| {
             target.colors = try meshes.decodeColorDeltas(index);
@@ -710,8 +732,8 @@ fn takeApart(
     return length;
 }
 
-/// The vertices of a primitive in the order of the file. Returns the index behind which strips begin
-/// anew, if there is one (KHR_mesh_primitive_restart; the core has none).
+/// The vertices of a primitive in the order of the file. Returns the index behind which strips
+/// begin anew, if there is one (KHR_mesh_primitive_restart; the core has none).
 fn number(
     source: *const Source,
     connection: Connection,

@@ -137,10 +137,12 @@ fn pushRoots(
     const roots = Source.slice(shown.nodes, shown.nodes_count);
     for (0..roots.len) |reversed| {
         const index = Source.indexOf(data.nodes, roots[roots.len - 1 - reversed]);
-        if (listed.isSet(index)) return source.fail(
-            "scene {d}: lists node {d} twice",
-            .{ Source.indexOf(data.scenes, shown), index },
-        );
+        if (listed.isSet(index)) {
+            source.forgive("scene {d}: lists node {d} twice, counted once", .{
+                Source.indexOf(data.scenes, shown), index,
+            });
+            continue;
+        }
         if (!in_tree.isSet(index)) return source.fail(
             "node {d}: is its own ancestor, or hangs below a node that is",
             .{index},
@@ -210,6 +212,65 @@ fn localTransform(source: *const Source, index: u32) Error!AffineD {
     return local;
 }
 
+/// Translation, rotation and scale of a node that animations move, whose number in the scene is the
+/// caller's to fill in. Such a node has no matrix (glTF 2.0, section 3.5.3), or else it is taken
+/// apart.
+pub fn partsOf(source: *const Source, index: u32) Error!scene.MovingNode {
+    const numbers: Numbers = .of(source, index);
+    if (Source.item(source.data.nodes, index).has_matrix == 0) return .{
+        .node = scene.none,
+        .translation = numbers.translation,
+        .rotation = try unitQuaternion(source, index, numbers.rotation),
+        .scale = numbers.scale,
+    };
+    source.forgive("node {d}: is moved by animations, so its matrix is taken apart", .{index});
+    return takeApart(try localTransform(source, index));
+}
+
+/// Without the shear, if there is any.
+fn takeApart(map: AffineD) scene.MovingNode {
+    var axes = [3]Vec3d{ map.x, map.y, map.z };
+    var scale: Vec3d = undefined;
+    const unit = [3]Vec3d{ .{ 1, 0, 0 }, .{ 0, 1, 0 }, .{ 0, 0, 1 } };
+    for (&axes, &scale, unit) |*axis, *length, other| {
+        length.* = math.vec3d.length(axis.*);
+        axis.* = math.vec3d.normalize(axis.*) orelse other;
+    }
+    if (map.determinant() < 0) {
+        axes[0] = math.vec3d.neg(axes[0]);
+        scale[0] = -scale[0];
+    }
+    return .{
+        .node = scene.none,
+        .translation = map.translation,
+        .rotation = quaternionOf(axes),
+        .scale = scale,
+    };
+}
+
+/// The unit quaternion of a rotation by the images of the axes (Shepperd 1978, Quaternion from
+/// Rotation Matrix): the largest of its numbers by a root, the others by that one.
+fn quaternionOf(axes: [3]Vec3d) [4]f64 {
+    const x, const y, const z = axes;
+    // Four times the squares of x, y, z, w.
+    const squares = [4]f64{
+        1 + x[0] - y[1] - z[2], 1 - x[0] + y[1] - z[2],
+        1 - x[0] - y[1] + z[2], 1 + x[0] + y[1] + z[2],
+    };
+    var largest: usize = 0;
+    for (squares, 0..) |square, index| if (square > squares[largest]) {
+        largest = index;
+    };
+    const q: [4]f64 = switch (largest) {
+        0 => .{ squares[0], x[1] + y[0], z[0] + x[2], y[2] - z[1] },
+        1 => .{ x[1] + y[0], squares[1], y[2] + z[1], z[0] - x[2] },
+        2 => .{ z[0] + x[2], y[2] + z[1], squares[2], x[1] - y[0] },
+        else => .{ y[2] - z[1], z[0] - x[2], x[1] - y[0], squares[3] },
+    };
+    const length = quaternionLength(q);
+    return .{ q[0] / length, q[1] / length, q[2] / length, q[3] / length };
+}
+
 /// A node's numbers in double precision, as the file has them, each at its slot.
 const Numbers = extern struct {
     matrix: [16]f64,
@@ -264,4 +325,30 @@ fn unitQuaternion(source: *const Source, index: u32, rotation: [4]f64) Error![4]
 pub fn quaternionLength(rotation: [4]f64) f64 {
     const x, const y, const z, const w = rotation;
     return @sqrt(((x * x + y * y) + z * z) + w * w);
+}
+
+test "maps are taken apart into what they were made of" {
+    const rotations = [_][4]f64{
+        .{ 0, 0, 0, 1 },     .{ 1, 0, 0, 0 },          .{ 0, 0.6, 0, 0.8 },
+        .{ 0, 0.8, 0.6, 0 }, .{ 0.5, -0.5, 0.5, 0.5 }, .{ 0.1, 0.7, -0.7, 0.1 },
+        .{ 0.6, 0, 0.8, 0 }, .{ -0.5, 0.5, 0.5, 0.5 },
+    };
+    for (rotations) |rotation| for ([_]f64{ 2, -2 }) |first| {
+        const scale: Vec3d = .{ first, 3, 0.5 };
+        const map: AffineD = .fromTrs(.{ 1, 2, 3 }, rotation, scale);
+        const parts = takeApart(map);
+        for (scale, parts.scale) |wanted, number| {
+            try std.testing.expectApproxEqAbs(wanted, number, 1e-12);
+        }
+        const again = parts.local();
+        inline for (.{ "x", "y", "z", "translation" }) |name| {
+            for (@field(map, name), @field(again, name)) |wanted, number| {
+                try std.testing.expectApproxEqAbs(wanted, number, 1e-12);
+            }
+        }
+    };
+    // A scale of 0 leaves a rotation.
+    const flat = takeApart(.scale(.{ 1, 0, 1 }));
+    try std.testing.expectEqual([4]f64{ 0, 0, 0, 1 }, flat.rotation);
+    try std.testing.expectEqual(Vec3d{ 1, 0, 1 }, flat.scale);
 }

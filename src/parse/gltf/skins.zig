@@ -15,6 +15,7 @@ const nodes = @import("nodes.zig");
 const Meshes = @import("meshes.zig");
 const Source = @import("source.zig");
 const AffineD = math.AffineD;
+const Animations = @import("animations.zig");
 const Error = Source.Error;
 const Skins = @This();
 
@@ -90,11 +91,15 @@ fn checkNode(skins: *Skins, node: *const c.cgltf_node) Error!void {
     try checkWeights(skins.source, "node", index, node.weights_count, facts.target_count);
 }
 
-/// Notes what the drawn nodes ask of their meshes. `origins` are the glTF nodes of the scene's.
-pub fn collect(skins: *Skins, origins: []const u32) Error!void {
+/// Notes what the drawn nodes ask of their meshes, at rest or when they move. `origins` are the
+/// glTF nodes of the scene's.
+pub fn collect(
+    skins: *Skins,
+    origins: []const u32,
+    animations: *const Animations,
+) Error!void {
     const source = skins.source;
     const data = source.data;
-    if (data.animations_count > 0) source.warn("animations are not applied yet", .{});
     for (origins, 0..) |origin, shown| {
         const node = Source.item(data.nodes, origin);
         const mesh = node.mesh orelse continue;
@@ -104,19 +109,26 @@ pub fn collect(skins: *Skins, origins: []const u32) Error!void {
         const deformation = &facts.deformation;
         if (node.skin != null) deformation.has_skin = true;
         for (weightsOf(node), 0..) |weight, target| {
-            if (math.flushDenormal(weight) == 0) continue;
-            if (deformation.targets.len == 0) {
-                const targets = try source.gpa.alloc(bool, facts.target_count);
-                @memset(targets, false);
-                deformation.targets = targets;
-            }
-            deformation.targets[target] = true;
+            if (math.flushDenormal(weight) != 0) try skins.want(facts, target);
         }
+        for (animations.targetsOf(origin)) |list| if (list) |moves| {
+            for (moves, 0..) |moved, target| if (moved) try skins.want(facts, target);
+        };
         if (node.skin == null or skins.places.len > 0) continue;
         skins.places = try source.gpa.alloc(u32, data.nodes_count);
         @memset(skins.places, scene.none);
         for (origins, 0..) |one, place| skins.places[one] = @intCast(place);
     }
+}
+
+fn want(skins: *const Skins, facts: *Facts, target: usize) error{OutOfMemory}!void {
+    const deformation = &facts.deformation;
+    if (deformation.targets.len == 0) {
+        const targets = try skins.source.gpa.alloc(bool, facts.target_count);
+        @memset(targets, false);
+        deformation.targets = targets;
+    }
+    deformation.targets[target] = true;
 }
 
 /// What drawn nodes ask of a mesh.
@@ -131,8 +143,11 @@ pub fn instanceWeights(skins: *Skins, node: *const c.cgltf_node) Error![]const f
     if (facts.deformation.targets.len == 0) return &.{};
     const is_own = node.weights_count > 0;
     if (!is_own) if (facts.weights) |weights| return weights;
-    const weights = try source.arena.dupe(f32, weightsOf(node));
-    for (weights) |*weight| weight.* = math.flushDenormal(weight.*);
+    const weights = try source.arena.alloc(f32, facts.target_count);
+    @memset(weights, 0);
+    for (weights[0..weightsOf(node).len], weightsOf(node)) |*to, weight| {
+        to.* = math.flushDenormal(weight);
+    }
     if (!is_own) facts.weights = weights;
     return weights;
 }

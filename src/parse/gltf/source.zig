@@ -45,6 +45,8 @@ pub const Error = @import("../resource.zig").Error;
 
 /// Frees what the reader has noted.
 pub fn deinit(source: *Source) void {
+    source.resolved.deinit(source.gpa);
+    source.hidden.deinit(source.gpa);
     var contents = source.decompressed.valueIterator();
     while (contents.next()) |bytes| source.gpa.free(bytes.*);
     source.decompressed.deinit(source.gpa);
@@ -54,8 +56,6 @@ pub fn deinit(source: *Source) void {
         source.gpa.free(bytes);
     }
     source.draco.deinit(source.gpa);
-    source.resolved.deinit(source.gpa);
-    source.hidden.deinit(source.gpa);
     source.* = undefined;
 }
 
@@ -96,7 +96,7 @@ pub fn findBroken(source: *const Source, list: schema.List, index: usize) ?Lenie
     return source.lenience.broken.get(.{ .list = @backingInt(list), .index = @intCast(index) });
 }
 
-/// Makes an error of what is not drawn a warning.
+/// Makes an error of what is not drawn, or must not stop the rest, a warning.
 pub fn excuse(source: *const Source, err: Error) Error!void {
     if (err == error.OutOfMemory) return err;
     const diagnostic = source.diagnostic;

@@ -10,7 +10,6 @@ const buffer_views = @import("buffer_views.zig");
 const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
 const escapes = @import("../json/escapes.zig");
-const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const uri = @import("uri.zig");
 const Error = Source.Error;
@@ -78,11 +77,16 @@ pub fn view(
         return null;
     }
     const index = Source.indexOf(source.data.textures, raw.texture);
+    const parts: scene.TextureTransform = if (raw.has_transform == 0) .{} else .{
+        .offset = transform.offset,
+        .rotation_rad = transform.rotation,
+        .scale = transform.scale,
+    };
     return .{
         .texture = try textures.get(index) orelse return null,
         .texcoord_set = @intCast(set),
         .transform = if (raw.has_transform != 0)
-            compose(transform.offset, transform.rotation, transform.scale) orelse {
+            parts.rows() orelse {
                 source.forgive("material {d}: {s}: its rotation is out of range, left out", .{
                     material, slot,
                 });
@@ -90,6 +94,7 @@ pub fn view(
             }
         else
             .{ .{ 1, 0, 0 }, .{ 0, 1, 0 } },
+        .parts = parts,
     };
 }
 
@@ -104,24 +109,6 @@ fn hasTexcoords(source: *const Source, set: c_int) bool {
         }
     }
     return false;
-}
-
-/// KHR_texture_transform: scaled, turned, moved; null where the angle has no digits left. The turn
-/// is counter-clockwise on the texture as it is seen, v downwards, as every viewer has it and as
-/// the sample TextureTransformTest shows; the matrix in the extension's text is its inverse.
-fn compose(offset: [2]f32, rotation_rad: f32, scaling: [2]f32) ?[2][3]f32 {
-    if (!(@abs(rotation_rad) <= 1e5)) return null;
-    const cosine: f32 = @floatCast(math.elementary.cos(rotation_rad));
-    const sine: f32 = @floatCast(math.elementary.sin(rotation_rad));
-    const u, const v = scaling;
-    var rows: [2][3]f32 = .{
-        .{ cosine * u, sine * v, offset[0] },
-        .{ -sine * u, cosine * v, offset[1] },
-    };
-    for (&rows) |*row| for (row) |*value| {
-        value.* = math.flushDenormal(value.*);
-    };
-    return rows;
 }
 
 /// The scene's texture for the file's with this index.
@@ -238,9 +225,7 @@ fn fromView(textures: *Textures, index: u32, raw: *const c.cgltf_buffer_view) Er
             return null;
         },
     } orelse {
-        source.forgiveEach("image {d}: its buffer has no data, left out", .{
-            index,
-        });
+        source.forgiveEach("image {d}: its buffer has no data, left out", .{index});
         return null;
     };
     if (range.size > textures.view_bytes_left) {
@@ -258,13 +243,16 @@ fn fromUri(textures: *Textures, index: u32, encoded: []const u8) Error!?u32 {
     const source = textures.source;
     if (textures.uris.get(encoded)) |image| return image;
     var reason: diagnostic.Message = .{};
-    const resolved = uri.resolve(source.gpa, source.arena, encoded, &reason);
-    const image = if (resolved) |target| switch (target) {
-        .bytes => |bytes| try textures.addImage(index, bytes),
-        .path => |path| file: {
-            defer source.gpa.free(path);
-            break :file try textures.fromFile(index, path);
-        },
+    const image = if (uri.resolve(source.gpa, source.arena, encoded, &reason)) |resolved| image: {
+        if (resolved.odd.len > 0)
+            source.forgive("image {d}: its URI {s}", .{ index, resolved.odd });
+        switch (resolved.target) {
+            .bytes => |bytes| break :image try textures.addImage(index, bytes),
+            .path => |path| {
+                defer source.gpa.free(path);
+                break :image try textures.fromFile(index, path);
+            },
+        }
     } else |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidInput => none: {
@@ -311,19 +299,4 @@ fn addImage(textures: *Textures, index: u32, bytes: []const u8) Error!u32 {
         .name = try source.arena.dupe(u8, name.text()),
         .bytes = bytes,
     });
-}
-
-test compose {
-    const half_turn: f32 = std.math.pi;
-    try std.testing.expectEqual(
-        [2][3]f32{ .{ 2, 0, 0.25 }, .{ 0, 3, -0.5 } },
-        compose(.{ 0.25, -0.5 }, 0, .{ 2, 3 }).?,
-    );
-    // A quarter turn counter-clockwise: what was on the right is above, at negative v.
-    const quarter = compose(.{ 0, 0 }, half_turn / 2, .{ 2, 3 }).?;
-    const expected = [2][3]f32{ .{ 0, 3, 0 }, .{ -2, 0, 0 } };
-    for (quarter, expected) |row, wanted| for (row, wanted) |value, one| {
-        try std.testing.expectApproxEqAbs(one, value, 1e-6);
-    };
-    try std.testing.expectEqual(null, compose(.{ 0, 0 }, 1e6, .{ 1, 1 }));
 }

@@ -113,21 +113,15 @@ fn readCone(
     light: *scene.Light,
 ) void {
     const outer_max: f32 = std.math.pi / 2.0;
-    const outer_min: f32 = 1e-3;
-    var outer = raw.spot_outer_cone_angle;
-    var inner = math.flushDenormal(raw.spot_inner_cone_angle);
+    const outer = raw.spot_outer_cone_angle;
+    const inner = math.flushDenormal(raw.spot_inner_cone_angle);
     // Half an ulp of rounding in the file is no reason to complain.
-    if (outer > outer_max + 1e-6 or !(outer > 0) or !(inner >= 0) or !(inner < outer)) source.forgive(
+    const fits = outer > 0 and outer <= outer_max + 1e-6 and inner >= 0 and inner < outer;
+    if (!fits) source.forgive(
         "light {d}: cone angles {d} and {d} do not fit 0 <= inner < outer <= pi / 2, clamped",
         .{ index, inner, outer },
     );
-    if (outer > outer_max) outer = outer_max;
-    if (!(outer > outer_min)) outer = outer_min;
-    if (!(inner >= 0)) inner = 0;
-    const inner_max = outer * 0.9999;
-    if (inner > inner_max) inner = inner_max;
-    light.inner_cone_rad = inner;
-    light.outer_cone_rad = outer;
+    light.setCone(inner, outer);
 }
 
 fn notNegative(source: *const Source, index: u32, name: []const u8, value: f32) f32 {

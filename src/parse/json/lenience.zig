@@ -17,6 +17,9 @@ edits: std.ArrayList(Edit) = .empty,
 /// The numbers of lists that replace others.
 numbers: std.ArrayList(u8) = .empty,
 
+/// Elements that are left out; a document with more is refused.
+pub const broken_count_max = 1 << 16;
+
 /// An element of a counted list.
 pub const Element = struct { list: u8, index: u32 };
 

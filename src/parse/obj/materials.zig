@@ -1,8 +1,8 @@
 //! Materials of an OBJ file: what MTL says, as the scene's metallic-roughness materials.
 //!
-//! In: the names of libraries and of materials. Out: the scene's materials, those that are used, and
-//! their textures. docs/meshes.md has the table of what stands for what. A library, a material or an
-//! image that is missing is a warning; what has no material is grey.
+//! In: the names of libraries and of materials. Out: the scene's materials, those that are used,
+//! and their textures. docs/meshes.md has the table of what stands for what. A library, a material
+//! or an image that is missing is a warning; what has no material is grey.
 
 const std = @import("std");
 const math = @import("../../math.zig");

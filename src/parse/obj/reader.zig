@@ -2,8 +2,9 @@
 //!
 //! In: a text. Out: lists of positions, normals and coordinates, and elements whose corners are
 //! numbers into them, each within its range. Format: Wavefront, "Object Files (.obj)", appendix B1
-//! of the Advanced Visualizer's manual; colours behind positions as MeshLab and scanners write them.
-//! Groups and objects say nothing that is seen. Curves and surfaces are left out, with a warning.
+//! of the Advanced Visualizer's manual; colours behind positions as MeshLab and scanners write
+//! them. Groups and objects say nothing that is seen. Curves and surfaces are left out, with a
+//! warning.
 
 const std = @import("std");
 const math = @import("../../math.zig");

@@ -259,7 +259,7 @@ pub fn forgive(
     arguments: anytype,
 ) Error!void {
     if (!input.resources.settings.strict) return input.warn(position, kind, format, arguments);
-    return input.fail(position, "--strict: " ++ format, arguments);
+    return input.fail(position, format, arguments);
 }
 
 /// The same about the file that the user named, as a whole.
@@ -269,7 +269,7 @@ pub fn forgiveFile(
     arguments: anytype,
 ) error{InvalidInput}!void {
     if (input.resources.settings.strict)
-        return input.diagnostic.invalid("--strict: " ++ format, arguments);
+        return input.diagnostic.invalid(format, arguments);
     input.diagnostic.warn(format, arguments);
 }
 

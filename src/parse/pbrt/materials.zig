@@ -25,6 +25,18 @@ pub const Material = struct {
 /// Diffuse reflectance where nothing is said.
 pub const matte_default: scene.Material = matte(@splat(0.5));
 
+/// What reflects nothing.
+pub const black: scene.Material = matte(.{ 0, 0, 0 });
+
+/// What is not seen; the emission is to be set.
+pub const hidden_lamp: scene.Material = .{
+    .base_color = .{ 0, 0, 0, 0 },
+    .alpha_mode = .blend,
+    .metallic = 0,
+    .ior = 1,
+    .is_hidden_lamp = true,
+};
+
 const Kind = enum {
     matte,
     diffuse,

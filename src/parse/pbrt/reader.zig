@@ -710,16 +710,26 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
         "Shape {f} is not supported and left out",
         .{quote(name)},
     );
-    if (graphics.material) |material| if (material.is_boundary) return;
-    const material = try reader.shapeMaterial() orelse return;
-    const surface = &reader.builder.scene.materials.items[material];
+    const is_boundary = if (graphics.material) |material| material.is_boundary else false;
+    const seen = if (is_boundary) null else try reader.shapeMaterial();
     const has_picture = if (graphics.area_light) |light| light.picture != null else false;
-    reader.tessellator.wants_texcoords =
-        surface.hasTextures() or surface.anisotropy > 0 or has_picture;
-    if (graphics.area_light) |area_light| {
-        if (reader.object == null) return reader.addAreaLight(kind, material, area_light);
-        try input.warnHere("area light", "Shape: objects do not shine", .{});
+    reader.tessellator.wants_texcoords = has_picture;
+    if (seen) |seen_index| {
+        const surface = &reader.builder.scene.materials.items[seen_index];
+        if (surface.hasTextures() or surface.anisotropy > 0)
+            reader.tessellator.wants_texcoords = true;
     }
+    if (graphics.area_light) |area_light| {
+        if (reader.object != null) {
+            try input.warnHere("area light", "Shape: objects do not shine", .{});
+        } else if (!is_boundary) {
+            return reader.addAreaLight(kind, seen, area_light);
+        } else if (!reader.colors.is_version_4) {
+            const black = try reader.builder.scene.addMaterial(materials.black);
+            return reader.addAreaLight(kind, black, area_light);
+        } else try input.warnHere("boundary", "Shape: what bounds a medium does not shine", .{});
+    }
+    const material = seen orelse return;
     const mesh = try reader.meshOf(kind, material);
     if (reader.object == null)
         try reader.builder.instantiate(mesh, &graphics.transform)
@@ -780,17 +790,20 @@ fn meshOf(reader: *Reader, kind: shapes.Kind, material: u32) Error!u32 {
     return mesh;
 }
 
-/// A shape that is an area light: bright from its front, plain from behind.
+/// A shape that is an area light: bright from its front, plain from behind; null: it is not seen.
 fn addAreaLight(
     reader: *Reader,
     kind: shapes.Kind,
-    material: u32,
+    material: ?u32,
     area_light: AreaLight,
 ) Error!void {
     const builder = reader.builder;
     const place = &reader.graphics.transform;
     const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
-    var bright = builder.scene.materials.items[material];
+    var bright = if (material) |seen|
+        builder.scene.materials.items[seen]
+    else
+        materials.hidden_lamp;
     const sides: f64 = if (area_light.two_sided) 2 else 1;
     const of_unit = sides * std.math.pi * lights.areaOf(&geometry, place);
     bright.emissive = area_light.emission.by(area_light.power, of_unit);
@@ -798,14 +811,15 @@ fn addAreaLight(
     bright.double_sided = area_light.two_sided;
     const front = try builder.addMesh(geometry, try builder.scene.addMaterial(bright));
     try builder.instantiate(front, place);
+    builder.scene.scene.has_area_lights = true;
+    const seen = material orelse return;
     if (!area_light.two_sided) {
-        var plain = builder.scene.materials.items[material];
+        var plain = builder.scene.materials.items[seen];
         plain.double_sided = false;
         const back = try shapes.turned(&reader.tessellator, &geometry);
         const mesh = try builder.addMesh(back, try builder.scene.addMaterial(plain));
         try builder.instantiate(mesh, place);
     }
-    builder.scene.scene.has_area_lights = true;
 }
 
 /// Completes the scene with what is known at the end of the text.
