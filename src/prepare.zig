@@ -1361,6 +1361,41 @@ test "memory that runs out is an error that leaks nothing" {
     try std.testing.checkAllAllocationFailures(gpa, one, .{&from});
 }
 
+test "memory that runs out when a scene is posed again is an error that leaks nothing" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    const nodes = try from.arena.allocator().alloc(scene.Node, 2);
+    nodes[0] = from.nodes[0];
+    from.nodes = nodes;
+    from.instances = &.{ .{ .mesh = 0, .node = 0 }, .{ .mesh = 0, .node = 1 } };
+    const one = struct {
+        fn one(failing: std.mem.Allocator, shown: *const Scene, second: *scene.Node) !void {
+            var pool: parallel.Pool = .init(1);
+            defer pool.deinit();
+            var diagnostic: Diagnostic = .{};
+            var times: StageTimes = .{};
+            const io = std.testing.io;
+            var loaded = try load(failing, io, shown, .{ .pool = &pool }, &diagnostic, &times);
+            defer loaded.deinit();
+            const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
+            second.* = .{ .parent = scene.none, .local = .scale(@splat(0)) };
+            var posed = try pose(failing, io, shown, &loaded, settings, &diagnostic, &times);
+            defer posed.deinit();
+            // Fitted; with a triangle that the tree lacks; and fitted again.
+            for ([_]f64{ 0, 1, 2 }) |scale| {
+                second.local = .scale(@splat(scale));
+                const cache = &posed.cache;
+                const again = &posed.world;
+                try poseAgain(again, cache, io, shown, &loaded, settings, &diagnostic, &times);
+                const dropped: u32 = if (scale > 0) 0 else 1;
+                try std.testing.expectEqual(dropped, again.geometry.dropped_count);
+            }
+        }
+    }.one;
+    try std.testing.checkAllAllocationFailures(gpa, one, .{ &from, &nodes[1] });
+}
+
 test {
     _ = animate;
     _ = Drawn;
