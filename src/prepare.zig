@@ -281,8 +281,8 @@ pub fn pose(
 }
 
 /// Makes a world that `pose` made of the scene what it would be if `pose` had been called now: but
-/// for the shape of the tree, which no picture depends on. Nodes and weights may have moved, and
-/// materials changed; meshes and instances are the same, and `cache` fits the settings. Where this
+/// for the shape of the tree, which no picture depends on. Nodes, weights and materials in motion
+/// may be others; meshes and instances are the same, and `cache` fits the settings. Where this
 /// fails, world and cache are of no use but to be freed.
 pub fn poseAgain(
     posed: *World,
