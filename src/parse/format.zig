@@ -19,6 +19,21 @@ pub const Recognized = union(enum) {
     unknown,
 };
 
+/// What stands in the place of a file that Git LFS has not fetched.
+const pointer_start = "version https://git-lfs.";
+const pointer = "a Git LFS pointer, not the file itself; git lfs pull fetches that";
+
+/// What stands where a file of any other kind should be; null: nothing of that sort.
+pub fn misplaced(bytes: []const u8) ?[]const u8 {
+    if (std.mem.startsWith(u8, bytes, pointer_start)) return pointer;
+    const start = std.mem.trimStart(u8, bytes[0..@min(bytes.len, 64)], " \t\r\n");
+    for (tags) |one| {
+        const is_page = std.mem.eql(u8, one.is, web_page);
+        if (is_page and std.ascii.startsWithIgnoreCase(start, one.tag)) return web_page;
+    }
+    return null;
+}
+
 const Signature = struct {
     bytes: []const u8,
     /// Where it stands.
@@ -70,9 +85,7 @@ const signatures = [_]Signature{
     .{ .bytes = "#VRML", .is = .{ .foreign = "a VRML file" ++ convert } },
     .{ .bytes = "//Maya", .is = .{ .foreign = "a Maya scene" ++ convert } },
     .{ .bytes = "ISO-10303-21", .is = .{ .foreign = "a STEP file" ++ convert } },
-    .{ .bytes = "version https://git-lfs.", .is = .{
-        .foreign = "a Git LFS pointer, not the file itself; git lfs pull fetches that",
-    } },
+    .{ .bytes = pointer_start, .is = .{ .foreign = pointer } },
     .{ .bytes = "%PDF", .is = .{ .foreign = "a PDF document, no scene" } },
     .{ .bytes = "\x7fELF", .is = .{ .foreign = "a program, no scene" } },
     .{ .bytes = "SQLite format 3", .is = .{ .foreign = "a database, no scene" } },
@@ -265,6 +278,8 @@ test "what is no scene is named" {
     try expectForeign("a Git LFS pointer", "version https://git-lfs.github.com/spec/v1\noid");
     try expectForeign("a text in UTF-16", "\xff\xfe{\x00");
     try expectForeign("a material library", "# by hand\n\nnewmtl a\nKd 1 0 0\n");
+    try std.testing.expectEqualStrings(web_page, misplaced("\n<!DOCTYPE html><html>").?);
+    try std.testing.expectEqual(null, misplaced("<htm"));
     try std.testing.expectEqual(.gzip, recognize("\x1f\x8b\x08", ""));
 }
 

@@ -8,6 +8,7 @@
 
 const std = @import("std");
 const math = @import("../../math.zig");
+const orientation = @import("../orientation.zig");
 const scene = @import("../../scene.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
@@ -288,12 +289,14 @@ fn finishMesh(
             downwards(reader.texcoords.items[vertex.texcoord]);
         if (colors) |all| all[index] = linearColor(reader.colors.items, vertex.position);
     }
+    const triangles = try arena.dupe([3]u32, assembly.triangles.items);
+    if (normals) |all| orientation.orient(positions, all, triangles);
     try assembly.builder.addWorldMesh(.{
         .positions = positions,
         .normals = normals,
         .texcoords = .{ texcoords, null, null, null },
         .colors = colors,
-        .triangles = try arena.dupe([3]u32, assembly.triangles.items),
+        .triangles = triangles,
         .segments = try arena.dupe([2]u32, assembly.segments.items),
         .points = try arena.dupe(u32, assembly.points.items),
         .material = material,
