@@ -22,8 +22,8 @@ const tree_triangle_bytes = 50;
 const build_triangle_bytes = 48;
 /// Triangles of a cluster, which an instance of a shared mesh has in place of its own, and bytes of
 /// each: a box, and its part of the tree over all clusters.
-const cluster_triangles = 128;
-const cluster_bytes = 160;
+const cluster_triangles = 80;
+const cluster_bytes = 240;
 /// A map of the surroundings: what is decoded, radiance, its levels; by texel of the image.
 const environment_texel_bytes = 56;
 /// What else is made of it.
