@@ -38,6 +38,7 @@ pub fn build(b: *std.Build) void {
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
         .bench_rays = b.step("bench:rays", "Time rays: zig build bench:rays -- SCENE [options]"),
         .bench_parse = b.step("bench:parse", "Time parsing: zig build bench:parse -- SCENE.pbrt"),
+        .bench_poses = b.step("bench:poses", "Posed triangles: -- SCENE ANIMATION SECONDS"),
         .bench_structures = b.step("bench:structures", "Trees beside each other: -- SCENE"),
         .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
@@ -65,6 +66,7 @@ pub fn build(b: *std.Build) void {
 
     addBenchmark(steps.check, steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
     addBenchmark(steps.check, steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
+    addBenchmark(steps.check, steps.bench_poses, package.benchmark("poses", "bench/poses.zig"));
     const structures = package.benchmark("structures", "bench/structures.zig");
     addBenchmark(steps.check, steps.bench_structures, structures);
     const full: Package = .init(b, target, optimize orelse .fast, vendor.headers, all);

@@ -77,6 +77,7 @@ const roots = [_][]const u8{
     "bench/kernels.zig",
     "bench/lowering.zig",
     "bench/parse.zig",
+    "bench/poses.zig",
     "bench/rays.zig",
     "bench/structures.zig",
     "src/kernel.zig",
