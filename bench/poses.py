@@ -7,9 +7,8 @@ each the number of triangles and the largest distance of a corner over the size 
 exit code is 4 where that is over 1e-4, or where the triangles are not as many.
 
 By the text of glTF 2.0 alone: sections 3.5 to 3.7, 3.11 and appendix C. It knows plain accessors,
-sparse ones and normalised integers, lists of triangles, strips and fans, EXT_mesh_gpu_instancing
-not. Buffer views that are compressed by EXT_meshopt_compression are read by the package
-`meshoptimizer`, if it is there.
+sparse ones and normalised integers, lists of triangles, strips and fans, and buffer views of
+EXT_meshopt_compression (meshopt.py); no instancing.
 """
 
 import base64
@@ -20,6 +19,7 @@ import subprocess
 import sys
 import urllib.parse
 
+import meshopt
 import numpy as np
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -32,6 +32,7 @@ class File:
 
     def __init__(self, path):
         self.path = pathlib.Path(path)
+        self.unpacked = {}
         data = self.path.read_bytes()
         binary = None
         if data[:4] == b"glTF":
@@ -58,10 +59,16 @@ class File:
     def view(self, index):
         """Bytes of a view, and their stride or 0."""
         view = self.json["bufferViews"][index]
+        if index in self.unpacked:
+            return self.unpacked[index], view.get("byteStride", 0)
         packed = view.get("extensions", {})
         for name in ("EXT_meshopt_compression", "KHR_meshopt_compression"):
             if name in packed:
-                return unpack(self, packed[name]), packed[name]["byteStride"]
+                packed = packed[name]
+                start = packed.get("byteOffset", 0)
+                data = self.buffers[packed["buffer"]][start : start + packed["byteLength"]]
+                self.unpacked[index] = meshopt.unpack(data, packed)
+                return self.unpacked[index], packed["byteStride"]
         start = view.get("byteOffset", 0)
         data = self.buffers[view["buffer"]][start : start + view["byteLength"]]
         return data, view.get("byteStride", 0)
@@ -98,58 +105,6 @@ class File:
 def table(data, offset, stride, kind, width, count):
     strides = (stride or kind.itemsize * width, kind.itemsize)
     return np.ndarray((count, width), kind, data, offset, strides)
-
-
-def unpack(file, packed):
-    try:
-        import meshoptimizer
-    except ImportError:
-        sys.exit("EXT_meshopt_compression needs the package meshoptimizer")
-    start = packed.get("byteOffset", 0)
-    data = file.buffers[packed["buffer"]][start : start + packed["byteLength"]]
-    count, stride = packed["count"], packed["byteStride"]
-    if packed["mode"] == "ATTRIBUTES":
-        rows = meshoptimizer.decode_vertex_buffer(count, stride, data)
-        data = np.ascontiguousarray(rows).tobytes()
-    else:
-        read = {
-            "TRIANGLES": meshoptimizer.decode_index_buffer,
-            "INDICES": meshoptimizer.decode_index_sequence,
-        }[packed["mode"]]
-        kind = "<u2" if stride == 2 else "<u4"
-        data = np.asarray(read(count, stride, data)).astype(kind).tobytes()
-    return unfilter(data, packed.get("filter", "NONE"), count, stride)
-
-
-def unfilter(data, name, count, stride):
-    """The filters of EXT_meshopt_compression that animations and positions use."""
-    if name == "NONE":
-        return data
-    if name == "EXPONENTIAL":
-        words = np.frombuffer(data, "<i4")
-        return np.ldexp((words << 8) >> 8, words >> 24).astype("<f4").tobytes()
-    kind = {4: "<i1", 8: "<i2"}[stride]
-    rows = np.frombuffer(data, kind).reshape(count, 4).astype(np.float64)
-    most = np.iinfo(kind).max
-    if name == "QUATERNION":
-        bits = rows[:, 3].astype(np.int64)
-        scale = 1 / ((bits | 3) * np.sqrt(2))
-        parts = rows[:, :3] * scale[:, None]
-        rest = np.sqrt(np.maximum(1 - (parts**2).sum(1), 0))
-        out = np.zeros((count, 4))
-        lost = bits & 3
-        for axis in range(3):
-            out[np.arange(count), (lost + 1 + axis) % 4] = parts[:, axis]
-        out[np.arange(count), lost] = rest
-    else:  # OCTAHEDRAL
-        one = rows[:, 2]
-        x, y = rows[:, 0] / one, rows[:, 1] / one
-        z = 1 - abs(x) - abs(y)
-        t = np.maximum(-z, 0)
-        out = np.stack([x - np.copysign(t, x), y - np.copysign(t, y), z], 1)
-        out /= np.linalg.norm(out, axis=1)[:, None]
-        out = np.concatenate([out, rows[:, 3:] / most], 1)
-    return np.rint(out * most).astype(kind).tobytes()
 
 
 def matrix(node):
