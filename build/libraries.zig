@@ -154,7 +154,6 @@ pub const draco: Library = .{
     .flags = &.{"-fno-aligned-allocation"},
 };
 
-
 /// The decoder in plain C. Threads are ours, but its tables are set up under locks. Its one place
 /// of allocations is given names of ours.
 pub const libwebp: Library = .{

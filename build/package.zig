@@ -203,7 +203,12 @@ pub fn addKernels(package: Package, root: *Module) void {
 
 /// The program.
 pub fn program(package: Package) *Compile {
-    const exe = package.addProgram("raylane", "src/main.zig");
+    return package.renderer("raylane", "src/main.zig");
+}
+
+/// A program that renders.
+pub fn renderer(package: Package, name: []const u8, root: []const u8) *Compile {
+    const exe = package.addProgram(name, root);
     package.addKernels(exe.root_module);
     return exe;
 }

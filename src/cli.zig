@@ -7,6 +7,7 @@
 const std = @import("std");
 const bench = @import("cli/bench.zig");
 const compare = @import("cli/compare.zig");
+const info = @import("cli/info.zig");
 const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
@@ -35,6 +36,8 @@ pub const Command = union(enum) {
     bench_help,
     compare: Compare,
     compare_help,
+    info: Info,
+    info_help,
 };
 
 /// What `raylane bench` is to do.
@@ -45,6 +48,13 @@ pub const bench_help = bench.help;
 pub const Compare = compare.Compare;
 /// What `raylane compare --help` prints.
 pub const compare_help = compare.help;
+/// What `raylane info` is to do.
+pub const Info = info.Info;
+/// What `raylane info --help` prints.
+pub const info_help = info.help;
+
+/// Words that stand before all others, but for `render`, which may stand among flags.
+const Word = enum { bench, compare, info };
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -169,7 +179,15 @@ const sections: []const Section = &.{
             .help = "seconds since its start (default: 0); by itself of\n" ++
                 "the first animation",
         },
-        .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
+        .{
+            .usage = "--up-axis AXIS",
+            .help = "y or z: which axis of the file points up (STL: z)",
+        },
+        .{
+            .usage = "--format-in FORMAT",
+            .help = "how to read the scene where its contents do not tell:\n" ++
+                namesOf(settings.SceneFormat),
+        },
         .{
             .usage = "--env FILE",
             .help = "light from all around: an equirectangular image of\n" ++
@@ -301,16 +319,17 @@ const Reader = arguments_file.Arguments(sections);
 
 /// What `--help` prints.
 pub const help: []const u8 = "raylane " ++ version ++
-    \\: renders a glTF or PBRT scene to an image on the CPU
+    \\: renders glTF, PBRT, OBJ, STL or PLY to an image on the CPU
     \\
     \\usage: raylane [render] SCENE [options]
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
+    \\       raylane info SCENE [options]          (see raylane info --help)
     \\
-    \\SCENE is a glTF 2.0 file (.gltf, .glb), a PBRT scene (.pbrt) or builtin:NAME,
-    \\NAME being cornell, atrium, nave or handles. The image is written to the
-    \\working directory under the scene's name, as a whole or not at all; a report
-    \\goes to standard output.
+    \\SCENE is a file in glTF 2.0 (JSON or GLB), PBRT, OBJ, STL or PLY, - for standard
+    \\input, or builtin:NAME, NAME being cornell, atrium, nave or handles. The image
+    \\is written to the working directory under the scene's name, as a whole or not
+    \\at all; a report goes to standard output.
     \\
 ++ arguments_file.helpOf(sections) ++
     \\
@@ -329,16 +348,22 @@ pub fn parse(
     diagnostic: *Diagnostic,
 ) Error!Command {
     assert(variant_names.len >= 1);
-    const is_bench = arguments.len > 0 and std.mem.eql(u8, arguments[0], "bench");
-    const is_compare = arguments.len > 0 and std.mem.eql(u8, arguments[0], "compare");
+    const first = if (arguments.len > 0) std.meta.stringToEnum(Word, arguments[0]) else null;
     // Help wins over everything, for it is what somebody asks for who got the rest wrong.
     for (arguments) |argument| {
         if (std.mem.eql(u8, argument, "--")) break;
         if (std.mem.eql(u8, argument, "-h") or std.mem.eql(u8, argument, "--help"))
-            return if (is_bench) .bench_help else if (is_compare) .compare_help else .help;
+            return if (first) |word| switch (word) {
+                .bench => .bench_help,
+                .compare => .compare_help,
+                .info => .info_help,
+            } else .help;
     }
-    if (is_bench) return .{ .bench = try bench.parse(arguments[1..], diagnostic) };
-    if (is_compare) return .{ .compare = try compare.parse(arguments[1..], diagnostic) };
+    if (first) |word| return switch (word) {
+        .bench => .{ .bench = try bench.parse(arguments[1..], diagnostic) },
+        .compare => .{ .compare = try compare.parse(arguments[1..], diagnostic) },
+        .info => .{ .info = try info.parse(arguments[1..], diagnostic) },
+    };
     var parser: Parser = .{
         .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
         .variant_names = variant_names,
@@ -381,6 +406,10 @@ const Parser = struct {
     fn positional(parser: *Parser, argument: []const u8) Error!void {
         if (argument.len == 0) return parser.reader.fail("the scene's name is empty", .{});
         if (parser.scene) |scene| {
+            if (nearest(scene, comptime std.meta.fieldNames(Word))) |word|
+                return parser.reader.fail("no command {f}, did you mean '{s}'?", .{
+                    quote(scene), word,
+                });
             return parser.reader.fail("one scene at a time: {f} and {f}", .{
                 quote(scene), quote(argument),
             });
@@ -415,7 +444,7 @@ const Parser = struct {
                 })),
             .camera, .frame_all => try parser.setCamera(given),
             .eye, .target, .up, .orbit, .fov, .ortho => try parser.setCamera(given),
-            .scene, .material_variant, .up_axis => try parser.setLoad(given),
+            .scene, .material_variant, .up_axis, .format_in => try parser.setLoad(given),
             .tessellation, .max_texture_size => try parser.setLoad(given),
             .allow_outside, .strict, .force => try parser.setLoad(given),
             .animation, .animation_time => try parser.setAnimation(given),
@@ -474,6 +503,7 @@ const Parser = struct {
             .material_variant => load.material_variant = choiceOf(given.value) orelse
                 return reader.bad(given, "a material variant's name or its index"),
             .up_axis => load.up_axis = try reader.choice(given, settings.UpAxis),
+            .format_in => load.format = try reader.choice(given, settings.SceneFormat),
             .tessellation => load.tessellation = try reader.number(given, settings.tessellation),
             .max_texture_size => {
                 load.texture_side_max = try reader.number(given, settings.texture_side);
@@ -587,7 +617,11 @@ const Parser = struct {
     fn settleFormat(parser: *Parser) Error!void {
         const options = &parser.options;
         options.write.format = parser.format orelse .png;
-        const output = options.output orelse return;
+        const output = options.output orelse {
+            if (!std.mem.eql(u8, options.scene, settings.standard_input)) return;
+            return parser.reader.fail("a scene from standard input has no name for the image: " ++
+                "say one by -o", .{});
+        };
         if (options.toStdout()) return;
         const extension = std.fs.path.extension(output);
         const implied = if (extension.len == 0) null else formatOf(extension[1..]);
@@ -708,7 +742,8 @@ fn cameraOf(text: []const u8) ?settings.Camera {
     return .{ .index = index };
 }
 
-fn choiceOf(text: []const u8) ?settings.Choice {
+/// By its index or its name; null: it is empty.
+pub fn choiceOf(text: []const u8) ?settings.Choice {
     if (text.len == 0) return null;
     const index = integer(text, any_index) orelse return .{ .name = text };
     return .{ .index = index };
@@ -799,11 +834,14 @@ test "a scene alone is rendered by the defaults" {
 
 test "after -- everything is a scene, and a lone dash always" {
     for ([_][:0]const u8{ "-q", "--help", "render", "--", "-" }) |name| {
-        const command = try parseForTest(&.{ "--", name });
+        const command = try parseForTest(&.{ "-oa.png", "--", name });
         try std.testing.expectEqualStrings(name, command.render.scene);
         try std.testing.expect(!command.render.quiet);
     }
-    try std.testing.expectEqualStrings("-", (try parseForTest(&.{"-"})).render.scene);
+    const piped = try parseForTest(&.{ "-", "-o", "-", "--format-in=stl" });
+    try std.testing.expectEqualStrings("-", piped.render.scene);
+    try std.testing.expectEqual(.stl, piped.render.load.format.?);
+    try expectUsage("say one by -o", &.{"-"});
 }
 
 test "help wins over mistakes, the other questions do not" {
@@ -928,6 +966,11 @@ test "numbers keep to their ranges" {
         .{ .flag = "--scene", .good = &.{ "0", "4294967296", "b c", "auto" }, .bad = &.{""} },
         .{ .flag = "--material-variant", .good = &.{ "0", "b c" }, .bad = &.{""} },
         .{ .flag = "--up-axis", .good = &.{ "y", "z" }, .bad = &.{ "", "x", "Z", "-y" } },
+        .{
+            .flag = "--format-in",
+            .good = &.{ "gltf", "glb", "pbrt", "obj", "stl", "ply" },
+            .bad = &.{ "", "GLB", "fbx" },
+        },
         .{ .flag = "--output", .good = &.{ "-", "a.png", "b/A.PPM" }, .bad = &.{ "", "png" } },
     };
     for (cases) |case| {
@@ -957,7 +1000,7 @@ test "values arrive as they were meant" {
     try std.testing.expectEqualStrings("red", painted.name);
     const named_scene = (try optionsForTest(&.{"--scene=auto"})).load.scene;
     try std.testing.expectEqualStrings("auto", named_scene.name);
-    try std.testing.expectEqual(.z, (try optionsForTest(&.{"--up-axis=z"})).load.up_axis);
+    try std.testing.expectEqual(.z, (try optionsForTest(&.{"--up-axis=z"})).load.up_axis.?);
     const background = (try optionsForTest(&.{"--background=#FF8001"})).view.background;
     try std.testing.expectEqual([3]u8{ 255, 128, 1 }, background.srgb);
     try expectUsage("no colour 'rod', did you mean 'red'?", &.{ "--background=rod", "s" });
@@ -1131,9 +1174,19 @@ test "the help fits a screen and says what flags take and may be" {
 test {
     _ = bench;
     _ = compare;
+    _ = info;
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");
+}
+
+test "info is a command where it comes first, and where it is misspelt" {
+    try std.testing.expectEqual(.info_help, try parseForTest(&.{ "info", "a", "--help" }));
+    const command = try parseForTest(&.{ "info", "info", "--json" });
+    try std.testing.expectEqualStrings("info", command.info.scene);
+    try expectUsage("no command 'inof', did you mean 'info'?", &.{ "inof", "a.glb" });
+    try expectUsage("no command 'benhc', did you mean 'bench'?", &.{ "benhc", "a.glb" });
+    try expectUsage("one scene at a time: 'in.glb' and 'a.glb'", &.{ "in.glb", "a.glb" });
 }
 
 test "bench is a command where it comes first" {

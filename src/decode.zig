@@ -2,9 +2,9 @@
 //!
 //! In: a file in memory, of a kind that its first bytes tell. Out: its texels in the channels that
 //! the file has, bytes or floats, the same on every target; or what gzip has compressed. The C
-//! libraries see no file that has not passed our own checks, and every limit is one before memory is
-//! asked for. Threads may decode at once; no state outlives a call. Geometry is asked for by its
-//! codec.
+//! libraries of images see no file that has not passed our own checks, and every limit is one
+//! before memory is asked for. Threads may decode at once; no state outlives a call. Geometry is
+//! asked for by its codec.
 
 const std = @import("std");
 const Allocator = std.mem.Allocator;

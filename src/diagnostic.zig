@@ -135,6 +135,18 @@ pub const Diagnostic = struct {
         if (diagnostic.refused) return error.InvalidInput;
     }
 
+    /// The texts of all warnings so far.
+    pub fn warningTexts(
+        diagnostic: *const Diagnostic,
+        buffer: *[warning_count_max][]const u8,
+    ) []const []const u8 {
+        const count = diagnostic.warning_count;
+        for (buffer[0..count], diagnostic.warnings[0..count]) |*text, *warning| {
+            text.* = warning.text();
+        }
+        return buffer[0..count];
+    }
+
     fn add(diagnostic: *Diagnostic, message: *const Message, fault: Fault) void {
         for (diagnostic.warnings[0..diagnostic.warning_count]) |*other| {
             if (std.mem.eql(u8, other.text(), message.text())) return;

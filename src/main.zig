@@ -52,6 +52,7 @@ fn run(init: std.process.Init) ExitCode {
         .help => return print(io, cli.help),
         .bench_help => return print(io, cli.bench_help),
         .compare_help => return print(io, cli.compare_help),
+        .info_help => return print(io, cli.info_help),
         .version => return print(io, "raylane " ++ cli.version ++ "\n"),
         .licenses => return print(io, raylane.licenses),
         .list_variants => return print(io, comptime list: {
@@ -65,6 +66,7 @@ fn run(init: std.process.Init) ExitCode {
         },
         .bench => |*options| return bench(init, options, &diagnostic),
         .compare => |*options| return compare(init.gpa, io, options, &diagnostic),
+        .info => |*options| return info(init.gpa, io, options, &diagnostic),
     }
 }
 
@@ -274,6 +276,52 @@ fn writeHeatMap(
     return target.finish(&.{file}, diagnostic);
 }
 
+/// Says what is in a scene file, or why it cannot be read.
+fn info(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagnostic) ExitCode {
+    var account: Account = .init(gpa, null);
+    var text: Io.Writer.Allocating = .init(account.allocator());
+    defer text.deinit();
+    const outcome = describe(&account, io, options, diagnostic, &text.writer);
+    const title = printable(raylane.parse.title(options.scene));
+    if (!options.quiet) for (diagnostic.warnings[0..diagnostic.warning_count]) |*warning| {
+        say(io, "raylane: {f}: warning: {s}\n", .{ title, warning.text() });
+    };
+    outcome catch |err| switch (err) {
+        error.WriteFailed => return outOfMemory(io),
+        else => |other| {
+            if (other == error.OutOfMemory) account.explain(&diagnostic.message);
+            const place = printable(placeOf(diagnostic, raylane.parse.title(options.scene)));
+            say(io, "raylane: {f}: {s}\n", .{ place, diagnostic.message.text() });
+            return exitCodeOf(other);
+        },
+    };
+    return print(io, text.written());
+}
+
+fn describe(
+    account: *Account,
+    io: Io,
+    options: *const cli.Info,
+    diagnostic: *Diagnostic,
+    writer: *Io.Writer,
+) (Session.Error || Io.Writer.Error)!void {
+    const gpa = account.allocator();
+    const name = options.scene;
+    var scene = try raylane.session.loadScene(gpa, io, name, options.load, diagnostic);
+    defer scene.deinit();
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    defer arena.deinit();
+    var found = try raylane.info.collect(gpa, arena.allocator(), &scene, diagnostic);
+    found.version = cli.version;
+    found.name = name;
+    var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
+    found.warnings = diagnostic.warningTexts(&warnings);
+    return if (options.json)
+        raylane.info.writeJson(&found, writer)
+    else
+        raylane.info.writeText(&found, writer);
+}
+
 fn exitCodeOf(err: (Job.Error || raylane.bench.Error)) ExitCode {
     return switch (err) {
         error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
@@ -339,7 +387,7 @@ fn renderAndReport(
         const file = if (err == error.OutputFailed)
             job.outputTitle()
         else
-            placeOf(diagnostic, options.scene);
+            placeOf(diagnostic, raylane.parse.title(options.scene));
         if (err == error.OutOfMemory) account.explain(&diagnostic.message);
         const text = diagnostic.message.text();
         assert(text.len > 0);
@@ -471,7 +519,7 @@ const Job = struct {
     }
 
     fn sayOfScene(job: *Job, comptime format: []const u8, arguments: anytype) void {
-        const scene = printable(job.options.scene);
+        const scene = printable(raylane.parse.title(job.options.scene));
         say(job.io, "raylane: {f}: " ++ format ++ "\n", .{scene} ++ arguments);
     }
 
@@ -482,11 +530,8 @@ const Job = struct {
         const default: cli.Stats = if (options.quiet or !to_stdout) .none else .text;
         var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
         const diagnostic = job.diagnostic;
-        for (diagnostic.warnings[0..diagnostic.warning_count], 0..) |*warning, index| {
-            warnings[index] = warning.text();
-        }
         var report = measured.*;
-        report.warnings = warnings[0..diagnostic.warning_count];
+        report.warnings = diagnostic.warningTexts(&warnings);
 
         var text: Io.Writer.Allocating = .init(job.session.gpa);
         defer text.deinit();

@@ -1,14 +1,21 @@
 //! Stage 1: a scene file becomes a `Scene`.
 //!
-//! In: the path of a glTF 2.0 file, JSON or binary, or of a PBRT scene. Out: a checked `Scene`, or
-//! one line that says what is wrong. The format is chosen here and nowhere else.
+//! In: the path of a file, or standard input: glTF 2.0, JSON or binary, or a PBRT scene. Out: a
+//! checked `Scene`, or one line that says what is wrong. What format it is, its contents tell, and
+//! that is found out here and nowhere else.
 
 const std = @import("std");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Scene = @import("scene.zig").Scene;
+const gzip = @import("decode.zig").gzip;
+const format_file = @import("parse/format.zig");
 const gltf = @import("parse/gltf.zig");
+const obj = @import("parse/obj.zig");
 const pbrt = @import("parse/pbrt.zig");
-const Settings = @import("settings.zig").Load;
+const ply_scene = @import("parse/ply_scene.zig");
+const settings_file = @import("settings.zig");
+const stl = @import("parse/stl.zig");
+const Settings = settings_file.Load;
 const Allocator = std.mem.Allocator;
 const Resources = @import("parse/resource.zig");
 
@@ -19,6 +26,12 @@ pub const extensions = @import("parse/gltf/extensions.zig");
 /// what it should be, or it needs what is not supported. `SceneUnknown`,
 /// `MaterialVariantUnknown`: none of its scenes, or variants, is the one that is asked for.
 pub const Error = Resources.Error || error{ SceneUnknown, MaterialVariantUnknown };
+
+/// What messages call the scene that the user names so.
+pub fn title(path: []const u8) []const u8 {
+    const is_input = std.mem.eql(u8, path, settings_file.standard_input);
+    return if (is_input) "standard input" else path;
+}
 
 /// Reads the scene at `path`. On an error the diagnostic holds one line without the path in it;
 /// what is odd but harmless becomes warnings there. The caller frees the scene with `deinit`.
@@ -31,13 +44,85 @@ pub fn parse(
 ) Error!Scene {
     var opened = try Resources.open(gpa, io, path, settings, diagnostic);
     defer opened.close();
+    return read(&opened, path, diagnostic);
+}
+
+/// Reads a file that is in memory and is called `name`; what it names is looked for in `folder`.
+/// Otherwise like `parse`.
+pub fn parseNamed(
+    gpa: Allocator,
+    io: std.Io,
+    name: []const u8,
+    bytes: []const u8,
+    folder: std.Io.Dir,
+    settings: Settings,
+    diagnostic: *Diagnostic,
+) Error!Scene {
+    const copy = try gpa.dupeSentinel(u8, bytes, 0);
+    var opened: Resources.Scene = .{
+        .main = .{ .bytes = copy, .identity = null },
+        .resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings },
+    };
+    defer gpa.free(opened.main.bytes);
+    opened.resources.bytes_read = bytes.len;
+    return read(&opened, name, diagnostic);
+}
+
+/// Reads what has been opened, by its contents.
+fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Error!Scene {
+    diagnostic.strict = opened.resources.settings.strict;
+    try unpack(opened, path, diagnostic);
+    const main = &opened.main;
     const resources = &opened.resources;
-    var scene = if (std.ascii.endsWithIgnoreCase(path, ".pbrt")) scene: {
-        try checkOnly(settings, diagnostic);
-        break :scene try pbrt.read(resources, path, opened.main, diagnostic);
-    } else try gltf.read(resources, opened.main.bytes, diagnostic);
+    const settings = &resources.settings;
+    const format = settings.format orelse try formatOf(main.bytes, path, diagnostic);
+    if (format != .gltf and format != .glb) try checkOnly(settings.*, diagnostic);
+    var scene = try switch (format) {
+        .gltf, .glb => gltf.read(resources, main.bytes, diagnostic),
+        .pbrt => pbrt.read(resources, title(path), main.*, diagnostic),
+        .obj => obj.read(resources, path, main.bytes, diagnostic),
+        .stl => stl.read(resources, main.bytes, diagnostic),
+        .ply => ply_scene.read(resources, main.bytes, diagnostic),
+    };
+    errdefer scene.deinit();
+    try diagnostic.settle();
     scene.file.byte_count = resources.bytes_read;
     return scene;
+}
+
+/// Puts what a gzip file holds in its place.
+fn unpack(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Error!void {
+    const packed_bytes = opened.main.bytes;
+    if (!gzip.isGzip(packed_bytes)) return;
+    const gpa = opened.resources.gpa;
+    const limit = Resources.file_bytes_max;
+    const reason = &diagnostic.message;
+    opened.main.bytes = gzip.inflate(gpa, packed_bytes, limit, reason) catch |err| switch (err) {
+        error.OutOfMemory => |failure| return failure,
+        error.InvalidGzip => return error.InvalidInput,
+    };
+    if (!std.ascii.endsWithIgnoreCase(path, ".gz") and
+        !std.mem.eql(u8, path, settings_file.standard_input))
+        diagnostic.forgive("is gzip without being called so", .{});
+    gpa.free(packed_bytes);
+    opened.resources.bytes_read += opened.main.bytes.len;
+}
+
+/// What a file is to be read as, or what else it is.
+fn formatOf(
+    bytes: []const u8,
+    path: []const u8,
+    diagnostic: *Diagnostic,
+) Error!settings_file.SceneFormat {
+    return switch (format_file.recognize(bytes, path)) {
+        .format => |format| format,
+        .gzip => diagnostic.invalid("is a gzip file within another one; unpack it", .{}),
+        .foreign => |what| diagnostic.invalid("is {s}", .{what}),
+        .unknown => diagnostic.invalid(
+            "is no glTF, PBRT, OBJ, STL or PLY file by its contents (see --format-in)",
+            .{},
+        ),
+    };
 }
 
 /// Whether what has but one scene, without a name, and no variants is asked for that.
@@ -88,11 +173,21 @@ pub fn parsePbrt(
 test {
     _ = Resources;
     _ = @import("parse/cgltf.zig");
+    _ = format_file;
     _ = gltf;
     _ = pbrt;
+    _ = @import("parse/named_images.zig");
+    _ = @import("parse/number.zig");
+    _ = @import("parse/plain.zig");
+    _ = @import("parse/ply.zig");
+    _ = obj;
+    _ = ply_scene;
+    _ = @import("parse/polygon.zig");
+    _ = stl;
+    _ = @import("parse/stream.zig");
 }
 
-test "a format is chosen by its extension" {
+test "what does not exist is of no format" {
     const gpa = std.testing.allocator;
     const io = std.testing.io;
     var diagnostic: Diagnostic = .{};

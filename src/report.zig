@@ -155,8 +155,9 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
     try writer.print("image hash   {x:0>16}\n", .{report.image_hash});
 }
 
-/// A size in KiB or MiB, whichever is readable.
+/// A size in bytes, KiB or MiB, whichever is readable.
 pub fn writeBytes(writer: *Writer, bytes: u64) Writer.Error!void {
+    if (bytes < 1 << 10) return writer.print("{d} bytes", .{bytes});
     const is_large = bytes >= 1 << 20;
     const unit: f64 = if (is_large) 1 << 20 else 1 << 10;
     try writer.print("{d:.1} {s}", .{ float(bytes) / unit, if (is_large) "MiB" else "KiB" });

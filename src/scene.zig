@@ -294,6 +294,8 @@ pub const Scene = struct {
     /// Names of what the file may be shown as, by the materials of its meshes (which are those of
     /// the variant that was asked for); empty ones where it gives none.
     material_variants: []const []const u8 = &.{},
+    /// Its format has z point up, unless the user says otherwise.
+    is_z_up: bool = false,
     /// Index of the camera that the file itself would use, `none` without cameras.
     camera_default: u32 = none,
     /// Surfaces that emit are all of the lights that the file says, each to be lit by in full.

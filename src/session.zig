@@ -50,7 +50,8 @@ pub fn loadScene(
     } else try parse.parse(gpa, io, name, choices, diagnostic);
     errdefer scene.deinit();
     try diagnostic.settle();
-    if (choices.up_axis == .z) try scene.turn(z_to_y);
+    const is_z_up = if (choices.up_axis) |axis| axis == .z else scene.is_z_up;
+    if (is_z_up) try scene.turn(z_to_y);
     return scene;
 }
 
@@ -224,9 +225,9 @@ pub const Session = struct {
     }
 
     /// Places the geometry at a moment of the scene's animations and builds the tree over it; the
-    /// first time, decodes the textures. Where nodes, weights and materials of the scene have
-    /// changed since, and nothing else, it may be called again, as for other moments: arrays are
-    /// written once more, and the tree is fitted. Asserts that there is a scene.
+    /// first time, decodes the textures. It may be called again, also where nodes, weights and
+    /// materials of a borrowed scene have changed since, and nothing else: arrays are written once
+    /// more, and the tree is fitted. Asserts that there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
         errdefer session.dropWorld();
         const scene = &session.scene.?;

@@ -180,6 +180,12 @@ pub const Animation = struct {
 /// The axis of a scene that points up.
 pub const UpAxis = enum { y, z };
 
+/// File formats of scenes, by their extensions.
+pub const SceneFormat = enum { gltf, glb, pbrt, obj, stl, ply };
+
+/// Name of a scene that comes from standard input.
+pub const standard_input = "-";
+
 /// What is seen where there is nothing.
 pub const Background = union(enum) {
     /// The scene's own, else a quiet gradient.
@@ -280,8 +286,10 @@ pub const Load = struct {
     texture_side_max: u32 = texture_side.default,
     scene: Choice = .default,
     material_variant: Choice = .default,
-    /// Where it is not y, the scene is turned about x until it is.
-    up_axis: UpAxis = .y,
+    /// Null: what the file's contents and its name tell.
+    format: ?SceneFormat = null,
+    /// Where it is not y, the scene is turned about x until it is; null: as the format has it.
+    up_axis: ?UpAxis = null,
     /// A file that is about to be replaced: a scene that is read from it is refused.
     output: ?Identity = null,
 };

@@ -13,6 +13,9 @@ const io = testing.io;
 /// A run that takes longer is ended, and is an error.
 const run_s_max = 300;
 
+/// Where the light does not matter: making the studio is most of a small picture's time.
+const dark = "--env=none";
+
 /// What the program left when it ended.
 const Ending = struct {
     exit_code: u8,
@@ -396,7 +399,8 @@ test "the camera stands where the options say" {
 
 fn cubePicture(sandbox: *Sandbox, options: []const []const u8) ![]const u8 {
     const arguments = try std.mem.concat(sandbox.arena_state.allocator(), []const u8, &.{
-        &.{ "cube.gltf", "-r64x64", "-qo-", "--format=ppm", "--spp=1", "--background=#000000" },
+        &.{ "cube.gltf", dark, "-r64x64", "-qo-", "--format=ppm", "--spp=1" },
+        &.{"--background=#000000"},
         options,
     });
     return (try sandbox.expectExit(0, arguments)).stdout;
@@ -565,7 +569,9 @@ test "every variant is listed, accepted, and gives the same picture" {
     const listed = try sandbox.expectExit(0, &.{"--list-variants"});
     try testing.expectEqualStrings("", listed.stderr);
     var names = std.mem.tokenizeScalar(u8, listed.stdout, '\n');
-    const scene_arguments = [_][]const u8{ "builtin:cornell", "-r9x7", "-q", "--stats=json" };
+    const scene_arguments = [_][]const u8{
+        "builtin:cornell", dark, "-r9x7", "-q", "--stats=json",
+    };
     const first = try sandbox.expectExit(0, &scene_arguments);
     const expected = try statsOf(&sandbox, first.stdout);
     try testing.expectEqualStrings(expected.variant, names.peek().?);
@@ -603,11 +609,13 @@ test "every format by its name or by --format, JPEG smaller with less quality" {
         .{ "a.pfm", "PF\n16 9\n" }, .{ "a.tga", "\x00\x00\x0a" },
     }) |case| {
         errdefer std.debug.print("{s}\n", .{case[0]});
-        _ = try sandbox.expectExit(0, &.{ "builtin:cornell", "-r16x9", "-q", "-o", case[0] });
+        _ = try sandbox.expectExit(0, &.{ "builtin:cornell", dark, "-r16x9", "-q", "-o", case[0] });
         try testing.expectStringStartsWith(try sandbox.read(case[0]), case[1]);
         try sandbox.folder.dir.deleteFile(io, case[0]);
     }
-    const to_stdout = [_][]const u8{ "builtin:cornell", "-r64x64", "-o-", "--format=jpeg" };
+    const to_stdout = [_][]const u8{
+        "builtin:cornell", dark, "-r64x64", "-o-", "--format=jpeg",
+    };
     const usual = try sandbox.expectExit(0, &to_stdout);
     const ninety = try sandbox.expectExit(0, &(to_stdout ++ .{"--jpeg-quality=90"}));
     try testing.expectEqualSlices(u8, usual.stdout, ninety.stdout);
@@ -704,9 +712,10 @@ test "an unlit surface comes out as it is painted, whatever the exposure and the
     for ([_][]const u8{ "neutral", "aces", "agx", "linear" }) |curve| {
         for ([_][]const u8{ "0", "-5", "4", "auto" }) |exposure| {
             errdefer std.debug.print("{s} {s}\n", .{ curve, exposure });
+            const is_metered = std.mem.eql(u8, exposure, "auto");
             const ending = try sandbox.expectExit(0, &.{
                 "u.gltf",     "-q",     "-r3x2",     "-o-", "--format=ppm",
-                "--exposure", exposure, "--tonemap", curve,
+                "--exposure", exposure, "--tonemap", curve, if (is_metered) "-q" else dark,
             });
             const pixels = ending.stdout["P6\n3 2\n255\n".len..];
             for (0..6) |index| {
@@ -958,7 +967,7 @@ test "a stdout that takes nothing is an error in one line" {
         for ([_][]const []const u8{
             &.{"--help"},
             &.{"--list-variants"},
-            &.{ "builtin:cornell", "-r64x64", "-o-" },
+            &.{ "builtin:cornell", dark, "-r64x64", "-o-" },
         }) |arguments| {
             errdefer std.debug.print("{s} {s}\n", .{ script, arguments[0] });
             const ending = try sandbox.runShell(script, arguments);
@@ -1200,7 +1209,7 @@ test "what is protected against writing is not replaced, but overwritten in a pr
 test "descriptors, pipes and devices take the picture where they stand" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
-    const arguments = [_][]const u8{ "builtin:cornell", "-r8x8", "--format=ppm", "-o" };
+    const arguments = [_][]const u8{ "builtin:cornell", dark, "-r8x8", "--format=ppm", "-o" };
     const expected = (try sandbox.expectExit(0, &(arguments ++ .{"-"}))).stdout;
     // Without a report behind it.
     const stdout = try sandbox.expectExit(0, &(arguments ++ .{"/dev/stdout"}));
@@ -1256,7 +1265,7 @@ test "an output over its own input is refused" {
 }
 
 test "a report that is lost spoils the picture only where it was asked for" {
-    const arguments = [_][]const u8{ "builtin:cornell", "-r8x8", "-oa.png" };
+    const arguments = [_][]const u8{ "builtin:cornell", dark, "-r8x8", "-oa.png" };
     for ([_][]const u8{ "exec \"$@\" >/dev/full", "exec \"$@\" >&-" }) |script| {
         var sandbox: Sandbox = .init();
         defer sandbox.deinit();
@@ -1430,6 +1439,37 @@ test "mistakes in what to measure are said before anything is measured" {
     try testing.expectStringStartsWith(bad.stderr, "raylane: bad.pbrt:2:3: ");
     const help = try sandbox.expectExit(0, &.{ "bench", "--help" });
     try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 60);
+}
+
+test "info: text, JSON, and the line that rendering ends with" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const text = try sandbox.expectExit(0, &.{ "info", "builtin:cornell" });
+    try testing.expectStringStartsWith(
+        text.stdout,
+        "file         builtin:cornell\nformat       built in\n",
+    );
+    try testing.expectEqualStrings("", text.stderr);
+    const document = "{\"asset\":{\"version\":\"2.0\"},\"extensionsUsed\":[\"A_b\"]}";
+    try sandbox.write("a.gltf", document);
+    const json = try sandbox.expectExit(0, &.{ "info", "a.gltf", "--json" });
+    const found = try std.json.parseFromSliceLeaky(
+        struct { file: []const u8, bytes: u64, warnings: []const []const u8 },
+        sandbox.arena_state.allocator(),
+        json.stdout,
+        .{ .ignore_unknown_fields = true },
+    );
+    try testing.expectEqualStrings("a.gltf", found.file);
+    try testing.expectEqual(document.len, found.bytes);
+    try testing.expectEqual(2, found.warnings.len);
+    try testing.expectStringStartsWith(
+        json.stderr,
+        "raylane: a.gltf: warning: not rendered: the extensions 'A_b'\n",
+    );
+    const absent = try sandbox.expectExit(1, &.{ "info", "b.gltf" });
+    try testing.expectEqualStrings("raylane: b.gltf: does not exist\n", absent.stderr);
+    _ = try sandbox.expectExit(2, &.{ "info", "a.gltf", "--scene=7" });
+    try sandbox.expectFiles(&.{"a.gltf"});
 }
 
 test "compare: figures, a map, thresholds, and images that cannot be compared" {

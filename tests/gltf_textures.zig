@@ -251,7 +251,8 @@ test "the same picture is one image, the same texture one texture" {
         var scene = try folder.read(&.{case[0]}, &said);
         defer scene.deinit();
         errdefer std.debug.print("{s}\n", .{case[0].@"1"});
-        try testing.expectEqual(0, said.warning_count);
+        const is_odd = std.mem.find(u8, case[0].@"1", "%5C") != null;
+        try testing.expectEqual(@intFromBool(is_odd), said.warning_count);
         try testing.expectEqual(case[1], scene.images.len);
         try testing.expectEqual(case[2], scene.textures.len);
     }
@@ -292,15 +293,16 @@ test "specular-glossiness: the diffuse texture is the base colour's" {
 
 const second_image = "{\"uri\":\"data:image/png;base64,c2Vjb25k\"}";
 
+const base_set = "\"texCoord\":2}";
+
 test "a texture that cannot be had is a warning and its factor" {
     var folder: Folder = try .make();
     defer folder.free();
-    const base_set = "\"texCoord\":2}";
     const cases = [_]struct { Replacement, []const u8 }{
         .{ .{ "a%20b.png", "no.png" }, "image 2: 'no.png' does not exist, left out" },
         .{ .{ "a%20b.png", "sub" }, "image 2: 'sub' is a folder, left out" },
         .{ .{ "a%20b.png", "" }, "image 2: '' is not a valid path, left out" },
-        .{ .{ "a%20b.png", "a%2" }, "image 2: 'a%2' is not a valid path, left out" },
+        .{ .{ "a%20b.png", "a%00" }, "image 2: 'a?' is not a valid path, left out" },
         .{
             .{ "a%20b.png", "../a" },
             "image 2: '../a' is outside the scene's folder (see --allow-outside), left out",
@@ -311,10 +313,10 @@ test "a texture that cannot be had is a warning and its factor" {
         .{ .{ "{\"uri\":\"a%20b.png\"}", "{}" }, "image 2: has neither bufferView nor uri, " ++
             "left out" },
         .{ .{ "{\"source\":2,", "{" }, "texture 2: has no image that can be read, left out" },
-        .{ .{ base_set, "\"texCoord\":4}" }, "material 0: baseColorTexture: only TEXCOORD_0 to " ++
-            "TEXCOORD_3 are read, left out" },
-        .{ .{ base_set, "\"texCoord\":9007199254740991}" }, "material 0: baseColorTexture: " ++
-            "only TEXCOORD_0 to TEXCOORD_3 are read, left out" },
+        .{ .{ "{\"bufferView\":7}],", "{\"bufferView\":9}]," }, "images[4].bufferView: " ++
+            "9 of 9; nothing drawn needs it" },
+        .{ .{ "180,\"byteLength\":5}],", "180,\"byteLength\":9}]," }, "buffer view 8: 1 bytes " ++
+            "past its buffer 0; nothing drawn needs it" },
         .{ .{ base_set, "\"rotation\":1e9}" }, "material 0: baseColorTexture: its rotation is " ++
             "out of range, left out" },
         .{ .{ "\"magFilter\":9728", "\"magFilter\":9984" }, "texture 1: its sampler's magFilter " ++
@@ -329,7 +331,6 @@ test "a texture that cannot be had is a warning and its factor" {
             "material's textures look: taken as 0" },
     };
     for (cases) |case| {
-        if (@sizeOf(usize) == 4 and std.mem.find(u8, case[0].@"1", "9007") != null) continue;
         var said: Diagnostic = .{};
         errdefer std.debug.print("{s}: {s}\n", .{ case[0].@"1", said.message.text() });
         var scene = try folder.read(&.{case[0]}, &said);
@@ -417,9 +418,25 @@ test "a scene with an image-based light is surrounded by its finest cube" {
     try testing.expectEqual(2, missing.warning_count);
 }
 
+test "coordinates of a set that is not read are left out, of one that is not there an error" {
+    var folder: Folder = try .make();
+    defer folder.free();
+    var said: Diagnostic = .{};
+    var scene = try folder.read(&.{
+        .{ ",\"TEXCOORD_3\":6", ",\"TEXCOORD_3\":6,\"TEXCOORD_4\":6" },
+        .{ base_set, "\"texCoord\":4}" },
+    }, &said);
+    defer scene.deinit();
+    try testing.expectEqual(1, said.warning_count);
+    const expected = "material 0: baseColorTexture: only TEXCOORD_0 to TEXCOORD_3 are read, " ++
+        "left out";
+    try testing.expectEqualStrings(expected, said.warnings[0].text());
+}
+
 test "what is wrong in the document itself is an error" {
     var folder: Folder = try .make();
     defer folder.free();
+    const no_set = "material 0: baseColorTexture: there is no TEXCOORD of its texCoord";
     const cases = [_]struct { Replacement, []const u8 }{
         .{ .{ "{\"source\":2,", "{\"source\":5," }, "textures[2].source: 5 of 5" },
         .{ .{ "\"sampler\":1}", "\"sampler\":3}" }, "textures[2].sampler: 3 of 3" },
@@ -428,13 +445,10 @@ test "what is wrong in the document itself is an error" {
         .{ .{ "{\"index\":2,", "{\"index\":5," }, "materials[0].occlusionTexture.index: 5 of 5" },
         .{ .{ "\"texCoord\":3", "\"texCoord\":-1" }, "materials[0].occlusionTexture.texCoord: " ++
             "-1 is not a whole number from 0 to 2^53 - 1" },
-        .{ .{ "{\"bufferView\":7}],", "{\"bufferView\":9}]," }, "images[4].bufferView: 9 of 9" },
+        .{ .{ base_set, "\"texCoord\":4}" }, no_set },
+        .{ .{ base_set, "\"texCoord\":2147483648}" }, no_set },
         .{ .{ "\"scale\":[2,3]", "\"scale\":[2]" }, "materials[0].pbrMetallicRoughness." ++
             "baseColorTexture.extensions.KHR_texture_transform.scale: 2 numbers are expected" },
-        .{
-            .{ "180,\"byteLength\":5}],", "180,\"byteLength\":9}]," },
-            "buffer view 8: 1 bytes past its buffer 0",
-        },
         .{
             .{ "3,\"componentType\":5126", "3,\"componentType\":5125" },
             "mesh 0, primitive 0: accessor 3 has no type for 'TEXCOORD_0'",
@@ -445,7 +459,12 @@ test "what is wrong in the document itself is an error" {
     };
     for (cases) |case| {
         var said: Diagnostic = .{};
-        try testing.expectError(error.InvalidInput, folder.read(&.{case[0]}, &said));
+        errdefer std.debug.print("{s}: {s}\n", .{ case[0].@"1", said.warnings[0].text() });
+        if (folder.read(&.{case[0]}, &said)) |read_one| {
+            var scene = read_one;
+            scene.deinit();
+            return error.TestUnexpectedResult;
+        } else |err| try testing.expectEqual(error.InvalidInput, err);
         try testing.expectEqualStrings(case[1], said.message.text());
     }
 }

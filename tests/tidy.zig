@@ -31,6 +31,10 @@ const directions = [_]Row{
     .{ .part = "kernel", .may_import = &.{ "module:config", "trace", "variant" } },
     .{ .part = "bench", .may_import = &.{ "session", "variant", "energy" } },
     .{ .part = "compare", .may_import = &.{ "decode", "parse" } },
+    .{
+        .part = "info",
+        .may_import = &.{ "decode", "parse", "prepare", "report", "scene", "world" },
+    },
     .{ .part = "variant", .may_import = &.{"module:config"} },
     .{ .part = "simd", .may_import = &.{"variant"} },
     .{ .part = "parallel", .may_import = &.{"simd"} },
@@ -76,6 +80,7 @@ const roots = [_][]const u8{
     "build.zig",
     "bench/kernels.zig",
     "bench/lowering.zig",
+    "bench/frames.zig",
     "bench/parse.zig",
     "bench/poses.zig",
     "bench/rays.zig",

@@ -182,9 +182,9 @@ const unsigned short rl_cgltf_layout[] = {
     STRUCTURE(cgltf_asset, copyright, generator, version, min_version, extras),
     OFFSETS(cgltf_data, file_type, asset, meshes, meshes_count, materials, materials_count,
             accessors, accessors_count, buffer_views, buffer_views_count, buffers,
-            buffers_count, images, images_count, textures, textures_count, samplers, skins,
-            skins_count, cameras, cameras_count, lights, lights_count, nodes, nodes_count,
-            scenes, scenes_count, scene, animations, animations_count, variants,
+            buffers_count, images, images_count, textures, textures_count, samplers,
+            samplers_count, skins, skins_count, cameras, cameras_count, lights, lights_count,
+            nodes, nodes_count, scenes, scenes_count, scene, animations, animations_count, variants,
             variants_count, extras, data_extensions_count, data_extensions, extensions_used,
             extensions_used_count, extensions_required, extensions_required_count),
 };

@@ -14,6 +14,7 @@ const instancing = @import("gltf/instancing.zig");
 const limits = @import("gltf/limits.zig");
 const nodes = @import("gltf/nodes.zig");
 const scene_data = @import("../scene.zig");
+const schema = @import("gltf/schema.zig");
 const variants = @import("gltf/variants.zig");
 const views = @import("gltf/views.zig");
 const Animations = @import("gltf/animations.zig");
@@ -58,16 +59,22 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
     const is_binary = std.mem.startsWith(u8, bytes, container.magic);
     builder.scene.file.format = if (is_binary) .glb else .gltf;
     try asset.check(&source);
-    var buffers: Buffers = try .load(resources, document.data, parts.binary, diagnostic);
+    var buffers: Buffers = try .load(
+        resources,
+        document.data,
+        parts.binary,
+        &text.lenience,
+        diagnostic,
+    );
     defer buffers.deinit();
     var input_bytes: u64 = bytes.len;
     for (buffers.owned.items) |owned| input_bytes += owned.len;
     source.buffers = buffers.list;
     source.decoded_bytes_left = limits.decodedBytesMax(input_bytes);
-    try accessors.checkAll(&source);
     var animations: Animations = try .read(&source, text.bytes);
     defer animations.deinit();
     try fill(&source, resources, &animations);
+    try accessors.checkRest(&source);
     try diagnostic.settle();
     const scene = try builder.finish();
     warnOfGaps(&source, &scene);
@@ -79,6 +86,7 @@ fn fill(source: *Source, resources: *Resources, animations: *Animations) Error!v
     const builder = source.builder;
     const settings = &resources.settings;
     const shown = try nodes.choose(source, settings.scene);
+    if (shown) |one| try source.need(.scenes, Source.indexOf(source.data.scenes, one));
     builder.scene.file = try description.read(source, builder.scene.file.format, shown);
     const variant = try variants.choose(source, settings.material_variant);
     const origins = try nodes.collect(source, shown);
@@ -91,25 +99,37 @@ fn fill(source: *Source, resources: *Resources, animations: *Animations) Error!v
     defer meshes.deinit();
     var skins: Skins = .{ .source = source };
     defer skins.deinit();
-    try skins.checkAll();
     try skins.collect(origins, animations);
     for (origins, 0..) |origin, index| {
         const node = Source.item(source.data.nodes, origin);
         const node_index: u32 = @intCast(index);
-        if (node.mesh != null) try addInstances(origin, node_index, &meshes, &skins, animations);
+        const is_hidden = source.isHidden(node_index);
+        if (node.mesh != null and !is_hidden) {
+            try addInstances(origin, node_index, &meshes, &skins, animations);
+        }
         if (node.camera) |raw| {
             try builder.addCamera(try views.readCamera(source, raw, node.name, node_index));
             const camera = Source.indexOf(source.data.cameras, raw);
             try animations.cameras.append(source.gpa, camera);
         }
-        if (node.light) |raw| if (views.readLight(source, raw, node_index)) |light| {
-            try builder.addLight(light);
-            try animations.lights.append(source.gpa, Source.indexOf(source.data.lights, raw));
+        if (node.light) |raw| if (!is_hidden) {
+            const light_index = Source.indexOf(source.data.lights, raw);
+            try source.need(.lights, light_index);
+            if (views.readLight(source, raw, node_index)) |light| {
+                try builder.addLight(light);
+                try animations.lights.append(source.gpa, light_index);
+            }
         };
     }
     try animations.finish(origins, skins.places, &materials);
     try materials.finish();
     if (shown) |one| try image_based_light.read(source, &textures, one);
+    try skins.checkRest();
+    for (source.lenience.broken.keys(), source.lenience.broken.values()) |element, broken| {
+        const is_image = element.list == @backingInt(schema.List.images);
+        if (is_image and textures.images.contains(element.index)) continue; // It has been said.
+        source.forgiveUnneeded(broken.reason);
+    }
 }
 
 /// Adds what a node of the file draws, whose number in the scene is `node_index`.

@@ -131,7 +131,8 @@ pub fn checkLeniently(
     graph: ?*Graph,
     said: *Diagnostic,
 ) error{ OutOfMemory, InvalidInput }!Checked {
-    if (!std.unicode.utf8ValidateSlice(text)) return said.invalid("the JSON text is not UTF-8", .{});
+    if (!std.unicode.utf8ValidateSlice(text))
+        return said.invalid("the JSON text is not UTF-8", .{});
     var unheard: Diagnostic = .{};
     var scanner: Scanner = .{
         .text = text,
@@ -310,6 +311,13 @@ const Scanner = struct {
             if (!std.mem.eql(u8, field.name, frame.key)) continue;
             const bit = @as(u64, 1) << @intCast(index);
             if (frame.seen & bit != 0) {
+                if (field.is_spare) if (scanner.lenience) |lenience| {
+                    try lenience.hideKey(frame.key_start);
+                    scanner.said.forgive("{f}: stands twice, the first one counts", .{
+                        Path{ .scanner = scanner },
+                    });
+                    return &.any;
+                };
                 frame.count += 1;
                 return scanner.wrong("stands twice", .{});
             }
@@ -548,9 +556,10 @@ const Scanner = struct {
                 return;
             }
             const list = frame.list orelse continue;
+            if (lenience.broken.count() == Lenience.broken_count_max) return err;
             try scanner.skipValue(start);
             const reason = scanner.diagnostic.message.text();
-            try lenience.leaveOut(list, @intCast(frame.count - 1), reason);
+            try lenience.leaveOut(list, @intCast(frame.count - 1), .{ .reason = reason });
             return lenience.replaceElement(start, scanner.offset, frame.substitute);
         }
         return err;

@@ -33,6 +33,7 @@ pub fn read(
     };
     defer input.deinit();
     try input.push(path, main);
+    try input.start();
     var scene_builder: scene_data.Builder = .init(gpa);
     errdefer scene_builder.deinit();
     scene_builder.scene.file.format = .pbrt;
@@ -61,9 +62,9 @@ pub fn read(
 
 test {
     _ = @import("pbrt/colors.zig");
+    _ = @import("pbrt/defaults.zig");
     _ = @import("pbrt/lights.zig");
     _ = @import("pbrt/materials.zig");
-    _ = @import("pbrt/number.zig");
     _ = @import("pbrt/parameters.zig");
     _ = @import("pbrt/shapes.zig");
     _ = @import("pbrt/spectra.zig");

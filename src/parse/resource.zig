@@ -4,7 +4,8 @@
 //! and below it unless the user allows others. Out: the bytes, with a zero byte behind them.
 //!
 //! Regular files only, up to a limit. A file is looked at through its handle, so that no other one
-//! can take its place in between, and a pipe or a device can neither block nor flood us.
+//! can take its place in between, and a pipe or a device can neither block nor flood us. The user
+//! alone may name a pipe as the scene, or standard input, which are read to their end.
 //!
 //! It is read rather than mapped. What was checked must still be so when it is used, and of a
 //! mapped file another program can change every byte in between, also where the mapping is private:
@@ -21,12 +22,17 @@ const Identity = @import("../identity.zig").Identity;
 const Io = std.Io;
 const Reason = diagnostic_data.Message;
 const Settings = @import("../settings.zig").Load;
+const standard_input = @import("../settings.zig").standard_input;
+const stream = @import("stream.zig");
 const assert = std.debug.assert;
 
 const Resources = @This();
 
 /// See parse.zig.
 pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
+
+/// What is said of a file that would be replaced.
+pub const overwritten = "would be overwritten by the output";
 
 /// Largest file that is read, in bytes.
 pub const file_bytes_max: u64 = 2 << 30;
@@ -56,7 +62,8 @@ pub const Scene = struct {
     }
 };
 
-/// Reads the scene file at `path` and opens its folder.
+/// Reads the scene file at `path`, or standard input, and opens its folder, which is the working
+/// directory for what comes from standard input.
 pub fn open(
     gpa: Allocator,
     io: Io,
@@ -66,7 +73,8 @@ pub fn open(
 ) Error!Scene {
     var resources: Resources = .{ .gpa = gpa, .io = io, .folder = .cwd(), .settings = settings };
     resources.settings.allow_outside = true; // The user may name any file.
-    const main = resources.load(gpa, path, &diagnostic.message) catch |err| return switch (err) {
+    const main = resources.loadMain(path, &diagnostic.message) catch |err| return switch (err) {
+        error.IsFolder => error.InvalidInput,
         error.NotRegular, error.Overwritten => error.InputOutput,
         else => |other| other,
     };
@@ -80,7 +88,7 @@ pub fn open(
 /// Reads a file that the scene names. On an error `reason` says why not, as what follows the name.
 pub fn read(resources: *Resources, path: []const u8, reason: *Reason) Error!File {
     return resources.readNamed(resources.gpa, path, reason) catch |err| switch (err) {
-        error.NotRegular => error.InvalidInput,
+        error.NotRegular, error.IsFolder => error.InvalidInput,
         error.Overwritten => error.InputOutput,
         else => |other| other,
     };
@@ -98,12 +106,16 @@ pub fn readOptional(
     reason: *Reason,
 ) OptionalError!File {
     return resources.readNamed(allocator, path, reason) catch |err| switch (err) {
-        error.InvalidInput, error.InputOutput, error.NotRegular => error.Unreadable,
+        error.InvalidInput,
+        error.InputOutput,
+        error.NotRegular,
+        error.IsFolder,
+        => error.Unreadable,
         else => |other| other,
     };
 }
 
-const LoadError = Error || error{ NotRegular, Overwritten };
+const LoadError = Error || error{ NotRegular, IsFolder, Overwritten };
 
 fn readNamed(
     resources: *Resources,
@@ -121,37 +133,87 @@ fn readNamed(
     return resources.load(allocator, path, reason);
 }
 
+/// The scene itself.
+fn loadMain(resources: *Resources, path: []const u8, reason: *Reason) LoadError!File {
+    if (std.mem.eql(u8, path, standard_input)) return resources.loadStream(.stdin(), reason);
+    const file = try resources.openFile(path, reason);
+    defer file.close(resources.io);
+    const stat = file.stat(resources.io) catch |err| return refuseError(reason, err);
+    return switch (stat.kind) {
+        .named_pipe, .unix_domain_socket => resources.loadStream(file, reason),
+        else => resources.loadFile(resources.gpa, file, reason),
+    };
+}
+
+/// What is not necessarily a file.
+fn loadStream(resources: *Resources, file: Io.File, reason: *Reason) LoadError!File {
+    const io = resources.io;
+    const identity = try resources.identify(file, reason);
+    const stat = file.stat(io) catch |err| return refuseError(reason, err);
+    if (stat.kind == .directory) return refuse(reason, error.IsFolder, "is a folder");
+    if (file.isTty(io) catch false) return refuse(
+        reason,
+        error.InputOutput,
+        "is a terminal: a scene comes by a pipe, or from a file by <",
+    );
+    const guess = if (stat.kind == .file) stat.size else 0;
+    const limit = bytesMax();
+    const bytes = stream.readAll(resources.gpa, file.handle, guess, limit) catch |err|
+        return switch (err) {
+            error.OutOfMemory => error.OutOfMemory,
+            error.TooLarge => refuseSize(reason),
+            else => |other| refuseError(reason, other),
+        };
+    resources.bytes_read += bytes.len;
+    return .{ .bytes = bytes, .identity = identity };
+}
+
 fn load(
     resources: *Resources,
     allocator: Allocator,
     path: []const u8,
     reason: *Reason,
 ) LoadError!File {
-    const io = resources.io;
+    const file = try resources.openFile(path, reason);
+    defer file.close(resources.io);
+    return resources.loadFile(allocator, file, reason);
+}
+
+fn openFile(resources: *const Resources, path: []const u8, reason: *Reason) LoadError!Io.File {
     const handle = std.posix.openat(resources.folder.handle, path, .{
         .ACCMODE = .RDONLY,
         .NONBLOCK = true, // A pipe without a writer would block us.
         .NOCTTY = true,
         .CLOEXEC = true,
     }, 0) catch |err| return refuseError(reason, err);
-    const file: Io.File = .{ .handle = handle, .flags = .{ .nonblocking = true } };
-    defer file.close(io);
-    const identity: ?Identity = .of(handle);
+    return .{ .handle = handle, .flags = .{ .nonblocking = true } };
+}
+
+/// Which file it is, unless it is the output.
+fn identify(resources: *const Resources, file: Io.File, reason: *Reason) LoadError!?Identity {
+    const identity: ?Identity = .of(file.handle);
     if (Identity.eql(resources.settings.output, identity))
-        return refuse(reason, error.Overwritten, "would be overwritten by the output");
+        return refuse(reason, error.Overwritten, overwritten);
+    return identity;
+}
+
+fn loadFile(
+    resources: *Resources,
+    allocator: Allocator,
+    file: Io.File,
+    reason: *Reason,
+) LoadError!File {
+    const io = resources.io;
+    const identity = try resources.identify(file, reason);
     const stat = file.stat(io) catch |err| return refuseError(reason, err);
-    if (stat.kind == .directory) return refuse(reason, error.NotRegular, "is a folder");
+    if (stat.kind == .directory) return refuse(reason, error.IsFolder, "is a folder");
     if (stat.kind != .file) return refuse(reason, error.NotRegular, "is not a regular file");
     if (!resources.settings.allow_outside and !resources.isBelow(file)) return refuse(
         reason,
         error.InvalidInput,
         "is a link that leads outside the scene's folder (see --allow-outside)",
     );
-    if (stat.size > @min(file_bytes_max, std.math.maxInt(usize) / 2)) return refuse(
-        reason,
-        error.InvalidInput,
-        std.fmt.comptimePrint("is over the limit of {d} bytes", .{file_bytes_max}),
-    );
+    if (stat.size > bytesMax()) return refuseSize(reason);
     const bytes = try allocator.allocSentinel(u8, @intCast(stat.size), 0);
     errdefer allocator.free(bytes);
     const count = file.readPositionalAll(io, bytes, 0) catch |err|
@@ -159,6 +221,16 @@ fn load(
     if (count < bytes.len) return refuse(reason, error.InputOutput, "changed while it was read");
     resources.bytes_read += bytes.len;
     return .{ .bytes = bytes, .identity = identity };
+}
+
+/// Of one file, as far as memory reaches.
+fn bytesMax() u64 {
+    return @min(file_bytes_max, std.math.maxInt(usize) / 2);
+}
+
+fn refuseSize(reason: *Reason) error{InvalidInput} {
+    const text = std.fmt.comptimePrint("is over the limit of {d} bytes", .{file_bytes_max});
+    return refuse(reason, error.InvalidInput, text);
 }
 
 fn refuse(reason: *Reason, err: anytype, comptime text: []const u8) @TypeOf(err) {

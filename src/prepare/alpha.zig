@@ -136,12 +136,18 @@ const Work = struct {
         }
     }
 
+    /// Of the one texture that alpha is in, beside colours; null: it is in none, or elsewhere.
     fn alphaLookup(work: *const Work, material: u32) ?*const world.Lookup {
+        var found: ?*const world.Lookup = null;
         for (work.set.lookupsOf(material)) |*lookup| {
             if (lookup.slot != .base_color) continue;
-            if (lookup.channels[3] != texture_use.missing) return lookup;
+            switch (lookup.channels[3]) {
+                texture_use.missing => {},
+                3 => found = lookup,
+                else => return null, // A number of its own.
+            }
         }
-        return null;
+        return found;
     }
 
     fn run(work: *Work, index: usize, _: usize) void {

@@ -149,7 +149,8 @@ const Finder = struct {
         part: *const [3][2]f64,
     ) Vec3d {
         const material = &finder.materials.all[triangle.material];
-        const opacity: f64 = if (material.blend > 0) material.base_color[3] else 1;
+        const is_seen_through = material.blend > 0 and !material.is_hidden_lamp;
+        const opacity: f64 = if (is_seen_through) material.base_color[3] else 1;
         var result: Vec3d = undefined;
         for (&result, material.emissive) |*to, factor| to.* = std.math.pi * opacity * factor;
         const lookups =

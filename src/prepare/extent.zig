@@ -1,8 +1,8 @@
 //! The extent of a scene: the box of all vertices that it draws, posed, by each of them.
 //!
-//! In: a scene. Out: the box in the scene's own coordinates, in metres, in double precision, however
-//! far away it is. Vertices that nothing uses, or that have no finite place, do not count; points
-//! and lines have no width.
+//! In: a scene. Out: the box in the scene's own coordinates, in metres, in double precision,
+//! however far away it is. Vertices that nothing uses, or that have no finite place, do not count;
+//! points and lines have no width.
 
 const std = @import("std");
 const math = @import("../math.zig");

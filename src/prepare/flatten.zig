@@ -581,6 +581,11 @@ const Work = struct {
             "{d} triangles left out: they reach farther than 2^40 m from the origin",
             .{outside_count},
         );
+        const count = work.size.triangle_count;
+        if (count > 0 and dropped_count == count and outside_count == 0) diagnostic.warn(
+            "nothing to render of {d} triangles: none has an area that can be told from 0",
+            .{count},
+        );
         return .{
             .positions = work.positions,
             .normals = work.normals,

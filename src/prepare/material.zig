@@ -65,9 +65,9 @@ pub fn place(
     };
 }
 
-/// Whether there is any place where a surface of this material can be seen.
+/// Whether there is any place where a surface of this material can be seen, or shines.
 pub fn isVisible(from: *const scene.Material, use: *const MaterialUse) bool {
-    if (from.in_motion) return true;
+    if (from.in_motion or from.is_hidden_lamp) return true;
     return switch (from.alpha_mode) {
         .@"opaque" => true,
         .mask => use.alpha.largest >= from.alpha_cutoff,
@@ -83,6 +83,7 @@ fn isTransparent(material: *const world.Material) bool {
 /// Alpha counts where the mode says so, and some place of the material is not all there.
 fn convert(from: *const scene.Material, use: *const MaterialUse) world.Material {
     assert(from.ior >= 1);
+    assert(!from.is_hidden_lamp or (from.alpha_mode == .blend and from.base_color[3] == 0));
     const has_holes = from.alpha_mode == .mask and use.alpha.least < from.alpha_cutoff;
     const blends = from.alpha_mode == .blend and use.alpha.least < 1;
     var base_color = from.base_color;
@@ -111,6 +112,7 @@ fn convert(from: *const scene.Material, use: *const MaterialUse) world.Material 
         .first_lookup = use.first_lookup,
         .lookup_count = use.lookup_count,
         .layer_lookup_count = use.layer_lookup_count,
+        .is_hidden_lamp = from.is_hidden_lamp,
     };
 }
 

@@ -159,8 +159,8 @@ pub fn load(
     return work.finish();
 }
 
-/// Bytes that the textures of a scene take at most, and what `load` decodes at once besides.
-pub const Plan = struct { byte_count: u64 = 0, decode_byte_count: u64 = 0 };
+/// Bytes that the textures of a scene take at most, and how much that is while they are made.
+pub const Plan = struct { byte_count: u64, peak_byte_count: u64 };
 
 /// What `load` would ask for, by the headers of the images alone.
 pub fn plan(
@@ -172,11 +172,20 @@ pub fn plan(
     var work: Work = .{ .gpa = gpa, .from = from, .side_max = side_max };
     defer work.deinit();
     try work.collect();
-    var planned: Plan = .{ .byte_count = try work.plan(diagnostic) };
-    const at_once = @max(decode_bytes_max, planned.byte_count / 2);
-    const tasks = work.tasks.items;
-    for (tasks[0..batchCount(tasks, at_once)]) |*task| planned.decode_byte_count += task.bytes();
-    return planned;
+    const byte_count = try work.plan(diagnostic);
+    const at_once = @max(decode_bytes_max, byte_count / 2);
+    var peak: u64 = byte_count;
+    var done: u64 = 0;
+    var rest: []const Task = work.tasks.items;
+    while (rest.len > 0) {
+        const count = batchCount(rest, at_once);
+        var decoding: u64 = 0;
+        for (rest[0..count]) |*task| decoding += task.bytes();
+        peak = @max(peak, done + decoding);
+        for (rest[0..count]) |*task| done += work.pyramidBytes(&task.info, task.requests);
+        rest = rest[count..];
+    }
+    return .{ .byte_count = byte_count, .peak_byte_count = peak };
 }
 
 /// How many of the tasks, in this order, are decoded at once: they need no more than `bytes_max`,
@@ -295,13 +304,7 @@ const Work = struct {
                 work.reasons[image] = reason;
                 continue;
             };
-            const size = pyramid_file.sizeWithin(info.width, info.height, work.side_max);
-            for (requests) |index| {
-                if (index == scene.none) continue;
-                const request = &work.requests.items[index];
-                const count = storedChannels(info.channel_count, request, true).count;
-                total += pyramid_file.byteCount(size[0], size[1], count);
-            }
+            total += work.pyramidBytes(&info, requests);
             try work.tasks.append(work.gpa, .{
                 .image = @intCast(image),
                 .info = info,
@@ -314,6 +317,19 @@ const Work = struct {
             .{ total >> 20, texture_bytes_max >> 20 },
         );
         std.mem.sortUnstable(Task, work.tasks.items, {}, Task.isLarger);
+        return total;
+    }
+
+    /// Bytes that an image's textures take at most.
+    fn pyramidBytes(work: *const Work, info: *const decode.Info, requests: [2]u32) u64 {
+        const size = pyramid_file.sizeWithin(info.width, info.height, work.side_max);
+        var total: u64 = 0;
+        for (requests) |index| {
+            if (index == scene.none) continue;
+            const request = &work.requests.items[index];
+            const count = storedChannels(info.channel_count, request, true).count;
+            total += pyramid_file.byteCount(size[0], size[1], count);
+        }
         return total;
     }
 

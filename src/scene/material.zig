@@ -26,6 +26,9 @@ pub const Material = struct {
     /// With `AlphaMode.mask`, what has less alpha is a hole.
     alpha_cutoff: f32 = 0.5,
     double_sided: bool = false,
+    /// Its surfaces are not seen and stop no light, but what they emit lights the scene as if they
+    /// were: PBRT's area lights whose alpha is 0. Asserted to blend with alpha 0.
+    is_hidden_lamp: bool = false,
     /// The base colour is shown as it is, without light (KHR_materials_unlit).
     unlit: bool = false,
     /// Index of refraction, >= 1 (KHR_materials_ior).

@@ -134,8 +134,8 @@ pub const AnyTree = union(enum) {
     }
 };
 
-/// Three corners and a material; its index in `Geometry.triangles` is the primitive number. One that
-/// has no area or no finite place is dropped: it keeps its number, but the tree has none of it.
+/// Three corners and a material; its index in `Geometry.triangles` is the primitive number. One
+/// that has no area or no finite place is dropped: it keeps its number, but the tree lacks it.
 pub const Triangle = extern struct {
     /// Indices into `Geometry.positions` and the other arrays by vertex, counter-clockwise in
     /// front.

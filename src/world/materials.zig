@@ -43,6 +43,8 @@ pub const Material = struct {
     lookup_count: u32 = 0,
     /// Those of slots of layers: that many, directly behind them.
     layer_lookup_count: u32 = 0,
+    /// Surfaces emit in full, though alpha is 0; for the making of lights alone.
+    is_hidden_lamp: bool = false,
 
     /// Whether no light passes, wherever a surface of it is hit. Its textures are `lookups`.
     pub fn stopsLight(material: *const Material, lookups: []const Lookup) bool {

@@ -15,16 +15,38 @@ const Component = accessors.Component;
 const Error = Source.Error;
 const assert = std.debug.assert;
 
-/// Checks every accessor and view of the file, drawn or not.
-pub fn checkAll(source: *Source) Error!void {
-    try buffer_views.checkAll(source);
-    for (0..source.data.accessors_count) |index| _ = try resolve(source, index);
-    source.sparse_checked = true;
+/// Checks the accessors and views of the file that nothing drawn has needed: what is wrong with
+/// them is no reason to give up.
+pub fn checkRest(source: *Source) Error!void {
+    try buffer_views.checkRest(source);
+    for (0..source.data.accessors_count) |index| {
+        if (source.isResolved(index) or source.findBroken(.accessors, index) != null) continue;
+        _ = resolve(source, index) catch |err| try source.excuse(err);
+    }
+    for (source.buffers, 0..) |buffer, index| if (buffer) |bytes| {
+        const byte_length = source.data.buffers[index].size;
+        if (bytes.len < byte_length) source.forgive(
+            "buffer {d}: has {d} bytes, its byteLength is {d}; nothing drawn needs more",
+            .{ index, bytes.len, byte_length },
+        );
+    };
 }
 
 /// The accessor with this index; null where its buffer has no data, which is no error as long as
 /// nobody needs it.
 pub fn resolve(source: *Source, index: usize) Error!?Accessor {
+    return resolveAs(source, index, .vertices);
+}
+
+/// The same, of indices: these are not interleaved, but there are writers that give their view a
+/// byteStride. It counts where the view is long enough for it.
+pub fn resolveIndices(source: *Source, index: usize) Error!?Accessor {
+    return resolveAs(source, index, .indices);
+}
+
+const Purpose = enum { vertices, indices };
+
+fn resolveAs(source: *Source, index: usize, purpose: Purpose) Error!?Accessor {
     assert(index < source.data.accessors_count);
     if (source.draco.get(@intCast(index))) |decoded| return decoded.accessor;
     var accessor = try describe(source, index);
@@ -32,7 +54,8 @@ pub fn resolve(source: *Source, index: usize) Error!?Accessor {
     const component = accessor.component;
     const element_bytes = paddedBytes(raw.type, component, accessor.component_count);
     if (raw.buffer_view) |view| {
-        const base = try resolveBase(source, index, raw, view, component, element_bytes);
+        const stride = try strideOf(source, index, raw, view, accessor, element_bytes, purpose);
+        const base = try resolveBase(source, index, raw, view, component, stride, element_bytes);
         accessor.base = base orelse return null;
     } else if (raw.count > limits.zero_count_max) return source.fail(
         "accessor {d}: {d} elements without data are over the limit of {d}",
@@ -42,11 +65,51 @@ pub fn resolve(source: *Source, index: usize) Error!?Accessor {
         accessor.sparse = (try resolveSparse(source, index, accessor, element_bytes)) orelse
             return null;
     }
+    try source.noteResolved(index);
     return accessor;
+}
+
+/// From one element to the next, in bytes.
+fn strideOf(
+    source: *const Source,
+    index: usize,
+    raw: *const c.cgltf_accessor,
+    view: *const c.cgltf_buffer_view,
+    accessor: Accessor,
+    element_bytes: u32,
+    purpose: Purpose,
+) Error!u64 {
+    const view_index = viewIndex(source, view);
+    if (view.stride == 0) return element_bytes;
+    if (purpose == .indices) {
+        source.forgive(
+            "buffer view {d}: has a byteStride, which views of indices have not",
+            .{view_index},
+        );
+        const length = @as(u64, view.stride) *| (accessor.count - 1) +| element_bytes;
+        const fits = length +| raw.offset <= view.size and view.stride <= 252;
+        const is_aligned = view.stride % accessor.component.bytes() == 0;
+        if (!fits or !is_aligned or view.stride < element_bytes) return element_bytes;
+        return view.stride;
+    }
+    if (view.stride < 4 or view.stride > 252) return source.fail(
+        "buffer view {d}: byteStride {d} is not in 4..252",
+        .{ view_index, view.stride },
+    );
+    if (view.stride < element_bytes) return source.fail(
+        "accessor {d}: elements of {d} bytes do not fit the byteStride {d} of buffer view {d}",
+        .{ index, element_bytes, view.stride, view_index },
+    );
+    if (view.stride % accessor.component.bytes() != 0) return source.fail(
+        "accessor {d}: the byteStride {d} of buffer view {d} is no multiple of {d}",
+        .{ index, view.stride, view_index, accessor.component.bytes() },
+    );
+    return view.stride;
 }
 
 /// The accessor without its data.
 pub fn describe(source: *const Source, index: usize) Error!Accessor {
+    try source.need(.accessors, index);
     const raw = Source.item(source.data.accessors, index);
     const component = componentOf(raw.component_type) orelse
         return source.fail("accessor {d}: unknown componentType", .{index});
@@ -73,17 +136,9 @@ fn resolveBase(
     raw: *const c.cgltf_accessor,
     view: *const c.cgltf_buffer_view,
     component: Component,
+    stride: u64,
     element_bytes: u32,
 ) Error!?accessors.Strided {
-    const stride: u64 = if (view.stride == 0) element_bytes else view.stride;
-    if (stride < element_bytes) return source.fail(
-        "accessor {d}: elements of {d} bytes do not fit the byteStride {d} of buffer view {d}",
-        .{ index, element_bytes, stride, viewIndex(source, view) },
-    );
-    if (stride % component.bytes() != 0) return source.fail(
-        "accessor {d}: the byteStride {d} of buffer view {d} is no multiple of {d}",
-        .{ index, stride, viewIndex(source, view), component.bytes() },
-    );
     const length = stride * (@as(u64, raw.count) - 1) + element_bytes;
     const bytes = try range(source, index, "", view, raw.offset, length, component.bytes());
     return .{ .bytes = bytes orelse return null, .stride = @intCast(stride) };
@@ -131,7 +186,7 @@ fn resolveSparse(
         .index_component = index_component,
         .values = values orelse return null,
     };
-    if (!source.sparse_checked) try checkSparse(source, index, accessor.count, sparse);
+    if (!source.isResolved(index)) try checkSparse(source, index, accessor.count, sparse);
     return sparse;
 }
 
@@ -152,17 +207,6 @@ fn checkSparse(source: *Source, index: usize, count: u32, sparse: accessors.Spar
     }
 }
 
-/// Fails where a number of the accessor is not finite. For those that are not decoded.
-pub fn checkFinite(source: *Source, index: u32, accessor: Accessor) Error!void {
-    if (source.finite.contains(index)) return;
-    try source.charge(@as(u64, accessor.count) * accessor.elementBytes());
-    if (accessors.findNotFinite(accessor)) |bad| return source.fail(
-        "accessor {d}: element {d} is not finite",
-        .{ index, bad },
-    );
-    try source.finite.put(source.gpa, index, {});
-}
-
 /// `length` bytes of a view from `offset`; null where its buffer has no data.
 fn range(
     source: *Source,
@@ -173,19 +217,20 @@ fn range(
     length: u64,
     alignment: u32,
 ) Error!?[]const u8 {
+    const bytes = try buffer_views.contents(source, view);
     const view_bytes: u64 = view.size;
     const excess = (offset +| length) -| view_bytes;
     if (excess > 0) return source.fail(
         "accessor {d}: {s}{d} bytes past its buffer view {d}",
         .{ index, part, excess, viewIndex(source, view) },
     );
-    const start = @as(u64, view.offset) + offset;
+    const start = @as(u64, view.offset) +| offset;
     if (start % alignment != 0) return source.fail(
         "accessor {d}: {s}byte {d} of buffer {d} is not aligned to {d} bytes",
         .{ index, part, start, bufferIndex(source, view), alignment },
     );
-    const bytes = try buffer_views.contents(source, view) orelse return null;
-    return bytes[@intCast(offset)..][0..@intCast(length)];
+    const all = bytes orelse return null;
+    return all[@intCast(offset)..][0..@intCast(length)];
 }
 
 fn viewIndex(source: *const Source, view: *const c.cgltf_buffer_view) u32 {

@@ -322,7 +322,7 @@ fn decode(animations: *Animations, index: u32) Error!Decoded {
 fn decodeNew(animations: *Animations, index: u32) Error!Decoded {
     const source = animations.source;
     if (index >= source.data.accessors_count) return .{ .wrong = "names no accessor" };
-    if (source.isBroken(.accessors, index)) |reason| return .{ .wrong = reason };
+    if (source.findBroken(.accessors, index)) |broken| return .{ .wrong = broken.reason };
     const before = source.diagnostic.message;
     const resolved = gltf_accessors.resolve(source, index) catch |err| switch (err) {
         error.InvalidInput => {

@@ -1,8 +1,8 @@
 //! Version and extensions of a document: whether this reader may read it at all.
 //!
 //! In: `asset`, `extensionsRequired` and `extensionsUsed` (glTF 2.0, sections 3.2 and 3.12). Out:
-//! an error that names what is required and not supported, and one warning that names whatever else
-//! the picture will lack.
+//! an error that names what is required and not supported, unless it is to be drawn by force, and
+//! one warning that names whatever else the picture will lack.
 
 const std = @import("std");
 const c = @import("../cgltf.zig");
@@ -32,27 +32,51 @@ pub fn check(source: *const Source) Error!void {
     for (Source.slice(data.extensions_required, data.extensions_required_count)) |raw| {
         const name = std.mem.span(@as([*:0]const u8, raw));
         const is_accepted = if (extensions.find(name)) |known| known.mayBeRequired() else false;
-        if (!is_accepted) return source.fail("the required extension {f} is not supported", .{
-            diagnostic.quote(name),
-        });
+        if (source.force) continue;
+        if (!is_accepted) return source.fail(
+            "the required extension {f} is not supported (see --force)",
+            .{diagnostic.quote(name)},
+        );
         if (!draco.is_held and std.mem.eql(u8, name, "KHR_draco_mesh_compression"))
-            return source.fail("{f} needs a build with Draco (-Ddraco)", .{diagnostic.quote(name)});
+            return source.fail(
+                "the required extension {f} needs a build with Draco (-Ddraco)",
+                .{diagnostic.quote(name)},
+            );
     }
-    warnOfUnrendered(source);
+    const required = Source.slice(data.extensions_required, data.extensions_required_count);
+    const used = Source.slice(data.extensions_used, data.extensions_used_count);
+    warnOf(source, &.{required}, isUnknown, "not supported, and yet required: the extensions ");
+    warnOf(source, &.{required}, isIdle, "without a part in the picture: the required extensions ");
+    warnOf(source, &.{ required, used }, isMissed, "not rendered: the extensions ");
 }
 
-/// Names the extensions that the file uses and the picture lacks.
-fn warnOfUnrendered(source: *const Source) void {
-    const data = source.data;
+/// Rendered by force alone.
+fn isUnknown(known: ?*const extensions.Extension) bool {
+    return if (known) |extension| !extension.mayBeRequired() else true;
+}
+
+fn isIdle(known: ?*const extensions.Extension) bool {
+    const extension = known orelse return false;
+    return extension.treatment == .ignored and extension.lack == .nothing;
+}
+
+fn isMissed(known: ?*const extensions.Extension) bool {
+    return if (known) |extension| extension.isMissed() else true;
+}
+
+/// Names the extensions of the lists that are like that in one warning.
+fn warnOf(
+    source: *const Source,
+    lists: []const []const [*c]u8,
+    isOne: *const fn (?*const extensions.Extension) bool,
+    comptime what: []const u8,
+) void {
     var names: [named_count_max][]const u8 = undefined;
     var count: usize = 0;
-    for ([_][]const [*c]u8{
-        Source.slice(data.extensions_required, data.extensions_required_count),
-        Source.slice(data.extensions_used, data.extensions_used_count),
-    }) |list| for (list) |raw| {
+    for (lists) |list| for (list) |raw| {
         const name = std.mem.span(@as([*:0]const u8, raw));
-        const is_missed = if (extensions.find(name)) |known| known.isMissed() else true;
-        if (!is_missed or contains(names[0..@min(count, names.len)], name)) continue;
+        if (!isOne(extensions.find(name))) continue;
+        if (contains(names[0..@min(count, names.len)], name)) continue;
         if (count < names.len) names[count] = name;
         count += 1;
     };
@@ -65,7 +89,7 @@ fn warnOfUnrendered(source: *const Source) void {
         writer.print("{f}", .{diagnostic.quote(name)}) catch unreachable;
     }
     const more = if (count > names.len) " and others" else "";
-    source.warn("not rendered: the extensions {s}{s}", .{ writer.buffered(), more });
+    source.warn(what ++ "{s}{s}", .{ writer.buffered(), more });
 }
 
 /// Whether the file says that it uses the extension.

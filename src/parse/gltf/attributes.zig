@@ -2,8 +2,8 @@
 //!
 //! In: a primitive's attributes, indices and morph targets. Out: the accessors of its positions,
 //! normals, colours, texture coordinates, tangents, joints and their weights. The kinds are those
-//! of glTF 2.0, sections 3.7.2.1, 3.7.2.2 and 3.7.3.3, and of KHR_mesh_quantization; an attribute
-//! that is not drawn has to be of its kind as well.
+//! of glTF 2.0, sections 3.7.2.1, 3.7.2.2 and 3.7.3.3, and of KHR_mesh_quantization. What is wrong
+//! with an attribute that is not drawn is a warning.
 
 const std = @import("std");
 const c = @import("../cgltf.zig");
@@ -30,12 +30,13 @@ pub const Used = struct {
     weights: [scene.joint_set_count]?u32 = @splat(null),
     /// Whether there are more joints than there are sets for.
     has_more_joints: bool = false,
+    vertex_count: u32 = 0,
     /// Whether its triangles come one by one from Draco, whatever the mode.
     is_draco: bool = false,
 };
 
-/// Finds and checks the attributes of a primitive, and those of its morph targets. Without
-/// positions nothing is found.
+/// Finds the attributes of a primitive and checks those that are always drawn; for the others there
+/// is `check`. Without positions nothing is found.
 pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) Error!Used {
     const list = Source.slice(primitive.attributes, primitive.attributes_count);
     const position = for (list) |*attribute| {
@@ -47,9 +48,13 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
     if (positions.base == null and positions.sparse == null)
         return source.fail("accessor {d}: positions without data", .{position});
 
+    used.vertex_count = positions.count;
     for (list) |*attribute| {
         const index = accessorIndex(source, attribute);
-        try checkAttribute(source, attribute, index, positions.count, place);
+        if (try hasNoElements(source, attribute.data)) {
+            source.forgive("{f}: {f} is empty, left out", .{ place, quote(attribute) });
+            continue;
+        }
         if (attribute.type == .joints and attribute.index >= scene.joint_set_count) {
             used.has_more_joints = true;
         }
@@ -58,19 +63,80 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
             return source.fail("{f}: {f} stands twice", .{ place, quote(attribute) });
         }
         slot.* = index;
-    }
-    for (Source.slice(primitive.targets, primitive.targets_count)) |*target| {
-        for (Source.slice(target.attributes, target.attributes_count)) |*attribute| {
-            try checkTarget(source, attribute, positions.count, place);
+        switch (attribute.type) {
+            .position, .normal, .color => {
+                try checkAttribute(source, attribute, index, positions.count, place);
+            },
+            else => {},
         }
     }
     return used;
 }
 
-/// The attributes of a morph target, which `find` has checked.
-pub fn ofTarget(source: *const Source, target: *const c.cgltf_morph_target) Used {
+/// Whether a primitive has an accessor of no elements where there is nothing to draw without them.
+pub fn isEmpty(source: *Source, primitive: *const c.cgltf_primitive) Error!bool {
+    if (primitive.indices) |accessor| if (try hasNoElements(source, accessor)) return true;
+    for (Source.slice(primitive.attributes, primitive.attributes_count)) |*attribute| {
+        const is_position = attribute.type == .position and attribute.index == 0;
+        if (is_position and try hasNoElements(source, attribute.data)) return true;
+    }
+    return false;
+}
+
+/// Whether an accessor is empty, and not just left out of the document.
+fn hasNoElements(source: *Source, accessor: *const c.cgltf_accessor) Error!bool {
+    if (accessor.count > 0) return false;
+    const index = Source.indexOf(source.data.accessors, accessor);
+    if (source.findBroken(.accessors, index) != null) return false;
+    try source.noteResolved(index); // It has been said what becomes of it.
+    return true;
+}
+
+/// Checks an attribute that is drawn by its accessor.
+pub fn check(
+    source: *Source,
+    primitive: *const c.cgltf_primitive,
+    index: u32,
+    vertex_count: u32,
+    place: Place,
+) Error!void {
+    for (Source.slice(primitive.attributes, primitive.attributes_count)) |*attribute| {
+        if (accessorIndex(source, attribute) != index) continue;
+        try checkAttribute(source, attribute, index, vertex_count, place);
+    }
+}
+
+/// Checks all attributes of a primitive and of its morph targets: those that are drawn have been.
+pub fn checkRest(
+    source: *Source,
+    primitive: *const c.cgltf_primitive,
+    vertex_count: u32,
+    place: Place,
+) Error!void {
+    for (Source.slice(primitive.attributes, primitive.attributes_count)) |*attribute| {
+        const index = accessorIndex(source, attribute);
+        if (attribute.data[0].count == 0) continue; // Has been said.
+        checkAttribute(source, attribute, index, vertex_count, place) catch |err|
+            try source.excuse(err);
+    }
+    for (Source.slice(primitive.targets, primitive.targets_count)) |*target| {
+        for (Source.slice(target.attributes, target.attributes_count)) |*attribute| {
+            checkTarget(source, attribute, vertex_count, place) catch |err|
+                try source.excuse(err);
+        }
+    }
+}
+
+/// The attributes of a morph target that is drawn.
+pub fn ofTarget(
+    source: *Source,
+    target: *const c.cgltf_morph_target,
+    vertex_count: u32,
+    place: Place,
+) Error!Used {
     var used: Used = .{};
     for (Source.slice(target.attributes, target.attributes_count)) |*attribute| {
+        try checkTarget(source, attribute, vertex_count, place);
         const slot = slotOf(&used, attribute) orelse continue;
         slot.* = accessorIndex(source, attribute);
     }
@@ -99,7 +165,8 @@ fn slotOf(used: *Used, attribute: *const c.cgltf_attribute) ?*?u32 {
 
 /// The accessor of a primitive's indices.
 pub fn indices(source: *Source, index: u32) Error!Accessor {
-    const accessor = try required(source, index);
+    const accessor = try gltf_accessors.resolveIndices(source, index) orelse
+        return noData(source, index);
     const unsigned = switch (accessor.component) {
         .u8, .u16, .u32 => true,
         .i8, .i16, .f32 => false,
@@ -113,8 +180,19 @@ pub fn indices(source: *Source, index: u32) Error!Accessor {
 
 /// An accessor that something drawn needs.
 pub fn required(source: *Source, index: u32) Error!Accessor {
-    return try gltf_accessors.resolve(source, index) orelse
-        source.fail("accessor {d}: its buffer has no data", .{index});
+    return try gltf_accessors.resolve(source, index) orelse noData(source, index);
+}
+
+fn noData(source: *const Source, index: u32) Error {
+    return source.fail("accessor {d}: its buffer has no data", .{index});
+}
+
+/// An accessor of normals or tangents. KHR_mesh_quantization has whole numbers only as normalised
+/// ones, and so they are taken, or what morph targets add would not be of their size.
+pub fn directions(source: *Source, index: u32) Error!Accessor {
+    var accessor = try required(source, index);
+    accessor.normalized = true;
+    return accessor;
 }
 
 fn accessorIndex(source: *const Source, attribute: *const c.cgltf_attribute) u32 {
@@ -137,7 +215,7 @@ fn checkAttribute(
     const fits = fits: switch (kindOf(accessor, attribute.type)) {
         .core => true,
         .quantized => {
-            if (!asset.uses(source, "KHR_mesh_quantization")) source.warn(
+            if (!asset.uses(source, "KHR_mesh_quantization")) source.forgive(
                 "accessor {d}: its type needs KHR_mesh_quantization, which the file does not name",
                 .{index},
             );
@@ -148,9 +226,6 @@ fn checkAttribute(
     if (!fits) return source.fail("{f}: accessor {d} has no type for {f}", .{
         place, index, quote(attribute),
     });
-    if (attribute.type == .texcoord) {
-        try gltf_accessors.checkFinite(source, index, accessor);
-    }
 }
 
 fn checkTarget(
@@ -217,7 +292,7 @@ fn kindOf(accessor: Accessor, attribute: c.cgltf_attribute_type) Kind {
     }
     return switch (attribute) {
         .position => if (small) .quantized else .wrong,
-        // A direction is the same whether its numbers are normalised or not.
+        // Whether it says that they are normalised or not: see `directions`.
         .normal,
         .tangent,
         => if (small_signed) .quantized else .wrong,

@@ -1,7 +1,8 @@
 //! The bytes of glTF's buffers: from the GLB, from data URIs, from files beside the scene.
 //!
 //! In: the document, the GLB's binary chunk, the files of the scene. Out: for each buffer as many
-//! bytes as its byteLength says (glTF 2.0, section 3.6.1). Images: textures.zig.
+//! bytes as its byteLength says (glTF 2.0, section 3.6.1), or those that there are. One that cannot
+//! be had is left out of the document: who needs it fails. Images: textures.zig.
 
 const std = @import("std");
 const buffer_views = @import("buffer_views.zig");
@@ -13,6 +14,8 @@ const diagnostic_data = @import("../../diagnostic.zig");
 const Source = @import("source.zig");
 const Resources = @import("../resource.zig");
 const Allocator = std.mem.Allocator;
+const Lenience = @import("../json/lenience.zig");
+const List = @import("schema.zig").List;
 const Diagnostic = diagnostic_data.Diagnostic;
 const Error = Source.Error;
 const quote = diagnostic_data.quote;
@@ -20,7 +23,7 @@ const quote = diagnostic_data.quote;
 const Buffers = @This();
 
 gpa: Allocator,
-/// As many bytes as byteLength says; null where the file gives none.
+/// As many bytes as byteLength says, or all there are; null where the file gives none.
 list: []?[]const u8,
 /// What `list` points into, other than the GLB.
 owned: std.ArrayList([:0]const u8) = .empty,
@@ -38,6 +41,7 @@ pub fn load(
     resources: *Resources,
     data: *const c.cgltf_data,
     binary: ?[]const u8,
+    lenience: *Lenience,
     diagnostic: *Diagnostic,
 ) Error!Buffers {
     const gpa = resources.gpa;
@@ -56,20 +60,21 @@ pub fn load(
             .index = index,
         };
         bytes.* = null;
-        if (raw.size == 0) return reader.fail("byteLength is 0", .{});
         if (is_fallback[index]) continue;
         total +|= raw.size;
         if (total > limits.buffer_bytes_max) return reader.fail(
             "{d} bytes of buffers are over the limit of {d}",
             .{ total, limits.buffer_bytes_max },
         );
-        bytes.* = if (raw.uri != null)
-            try reader.whole(try reader.fromUri())
-        else if (index == 0 and binary != null)
-            // A buffer without URI is the GLB's if it is the first, else an extension's.
-            try reader.whole(binary.?)
-        else
-            null;
+        bytes.* = reader.read(binary) catch |err| none: {
+            if (err == error.OutOfMemory or reader.isOverwritten()) return err;
+            try lenience.leaveOut(@backingInt(List.buffers), @intCast(index), .{
+                .reason = diagnostic.message.text(),
+                .is_missing = err == error.InputOutput,
+            });
+            diagnostic.message.set("", .{});
+            break :none null;
+        };
     }
     return buffers;
 }
@@ -81,6 +86,20 @@ const Reader = struct {
     diagnostic: *Diagnostic,
     raw: *const c.cgltf_buffer,
     index: usize,
+
+    fn read(reader: Reader, binary: ?[]const u8) Error!?[]const u8 {
+        if (reader.raw.size == 0) return reader.fail("byteLength is 0", .{});
+        if (reader.raw.uri != null) return reader.whole(try reader.fromUri());
+        // A buffer without URI is the GLB's if it is the first, else an extension's.
+        if (reader.index == 0) if (binary) |bytes| return reader.whole(bytes);
+        return null;
+    }
+
+    /// Whether the error is one that counts whoever needs the file.
+    fn isOverwritten(reader: Reader) bool {
+        const said = reader.diagnostic.message.text();
+        return std.mem.endsWith(u8, said, Resources.overwritten);
+    }
 
     fn fail(reader: Reader, comptime format: []const u8, arguments: anytype) error{InvalidInput} {
         return reader.diagnostic.invalid("buffer {d}: " ++ format, .{reader.index} ++ arguments);
@@ -96,11 +115,13 @@ const Reader = struct {
             .{reader.raw.size},
         );
         var reason: diagnostic_data.Message = .{};
-        const target = uri.resolve(gpa, gpa, text, &reason) catch |err| return switch (err) {
+        const resolved = uri.resolve(gpa, gpa, text, &reason) catch |err| return switch (err) {
             error.OutOfMemory => error.OutOfMemory,
             error.InvalidInput => reader.fail("{s}", .{reason.text()}),
         };
-        switch (target) {
+        if (resolved.odd.len > 0)
+            reader.diagnostic.forgive("buffer {d}: its URI {s}", .{ reader.index, resolved.odd });
+        switch (resolved.target) {
             .bytes => |bytes| return reader.own(bytes),
             .path => |path| {
                 defer gpa.free(path);
@@ -128,10 +149,8 @@ const Reader = struct {
         return reader.own(file.bytes);
     }
 
-    /// As many of the bytes as byteLength says.
-    fn whole(reader: Reader, bytes: []const u8) error{InvalidInput}![]const u8 {
-        const byte_length: u64 = reader.raw.size;
-        if (bytes.len >= byte_length) return bytes[0..@intCast(byte_length)];
-        return reader.fail("has {d} bytes, its byteLength is {d}", .{ bytes.len, byte_length });
+    /// As many of the bytes as byteLength says, or as there are.
+    fn whole(reader: Reader, bytes: []const u8) []const u8 {
+        return bytes[0..@intCast(@min(bytes.len, reader.raw.size))];
     }
 };

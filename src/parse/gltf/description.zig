@@ -61,7 +61,10 @@ fn extensionsOf(source: *const Source) Error![]const scene.File.Extension {
     };
     const extensions = try source.arena.alloc(scene.File.Extension, known.count());
     for (extensions, known.keys(), known.values()) |*extension, name, required| {
-        extension.* = .{ .name = try escapes.decodeString(source.arena, name), .required = required };
+        extension.* = .{
+            .name = try escapes.decodeString(source.arena, name),
+            .required = required,
+        };
     }
     return extensions;
 }

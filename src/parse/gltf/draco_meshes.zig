@@ -104,6 +104,7 @@ const Decoder = struct {
             inline else => |tag| @field(draco.Component, @tagName(tag)),
         };
         if (!decoder.mesh.attribute(id, component, accessor.component_count, bytes)) {
+            @memset(bytes, 0); // Others may draw with it.
             return source.fail("accessor {d}: its compressed data has no attribute {d}, " ++
                 "or one that does not fit its type", .{ index, id });
         }

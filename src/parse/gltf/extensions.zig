@@ -109,6 +109,7 @@ pub const all: []const Extension = &.{
     rendered("KHR_materials_variants", "by --material-variant"),
     rendered("KHR_materials_volume", "traced; thickness only says that there is a volume"),
     approximated("KHR_materials_volume_scatter", "one scattering traced, more are estimated"),
+    rendered("KHR_mesh_primitive_restart", "strips, fans and loops begin anew"),
     rendered("KHR_mesh_quantization", "every type of component"),
     rendered("KHR_meshopt_compression", "all modes and filters"),
     ignored("KHR_node_hoverability", .nothing, "behaviour"),
@@ -162,6 +163,22 @@ test "names are in order, each once" {
     for (all[0 .. all.len - 1], all[1..]) |*one, *next| {
         errdefer std.debug.print("{s} stands before {s}\n", .{ one.name, next.name });
         try std.testing.expect(std.ascii.orderIgnoreCase(one.name, next.name) == .lt);
+    }
+}
+
+test "docs/formats.md has every row" {
+    const gpa = std.testing.allocator;
+    const folder: std.Io.Dir = .cwd();
+    const limit: std.Io.Limit = .limited(1 << 20);
+    const text = try folder.readFileAlloc(std.testing.io, "docs/formats.md", gpa, limit);
+    defer gpa.free(text);
+    var buffer: [256]u8 = undefined;
+    for (all) |*extension| {
+        const row = try std.mem.print(&buffer, "\n| {s} | {t} | {s} |\n", .{
+            extension.name, extension.treatment, extension.remark,
+        });
+        errdefer std.debug.print("missing:{s}", .{row});
+        try std.testing.expect(std.mem.find(u8, text, row) != null);
     }
 }
 

@@ -43,10 +43,10 @@ pub fn unit(factors: Factors, name: []const u8, value: f32) f32 {
 /// One of `low`..`high`.
 pub fn clamp(factors: Factors, name: []const u8, value: f32, low: f32, high: f32) f32 {
     if (value >= low and value <= high) return math.flushDenormal(value);
-    if (high == endless) factors.source.warn(
+    if (high == endless) factors.source.forgive(
         "material {d}: {s} {d} is below {d}, clamped",
         .{ factors.index, name, value, low },
-    ) else factors.source.warn(
+    ) else factors.source.forgive(
         "material {d}: {s} {d} is not in {d}..{d}, clamped",
         .{ factors.index, name, value, low, high },
     );

@@ -38,6 +38,8 @@ pub fn read(source: *Source, textures: *Textures, shown: *const c.cgltf_scene) E
     const lights = try text.parse(Lights, arena, described) orelse
         return leaveOut(source, "is not as it should be");
     if (use.light >= lights.lights.len) return leaveOut(source, "names a light that is not there");
+    if (source.findBroken(.image_based_lights, use.light) != null)
+        return leaveOut(source, "is not as it should be");
     const light = &lights.lights[use.light];
     const levels = light.specularImages;
     if (levels.len == 0 or levels[0].len != 6)
@@ -62,7 +64,7 @@ pub fn read(source: *Source, textures: *Textures, shown: *const c.cgltf_scene) E
 }
 
 fn leaveOut(source: *const Source, comptime reason: []const u8) void {
-    source.warn(extension_name ++ " " ++ reason ++ ", left out", .{});
+    source.forgive(extension_name ++ " " ++ reason ++ ", left out", .{});
 }
 
 /// From the world's directions to the cube's: the inverse of the light's rotation.

@@ -100,7 +100,7 @@ fn readVolume(factors: Factors, raw: *const c.cgltf_volume, material: *scene.Mat
         // cgltf says FLT_MAX where the file says nothing.
         const is_endless = distance == Factors.endless;
         material.attenuation_distance = if (is_endless) std.math.inf(f32) else distance;
-    } else factors.source.warn(
+    } else factors.source.forgive(
         "material {d}: attenuationDistance {d} is not above 0, left out",
         .{ factors.index, raw.attenuation_distance },
     );
@@ -131,7 +131,7 @@ fn readAnisotropy(
     const rotation_rad = raw.anisotropy_rotation;
     if (@abs(rotation_rad) <= angle_rad_max) {
         material.anisotropy_rotation_rad = math.flushDenormal(rotation_rad);
-    } else factors.source.warn(
+    } else factors.source.forgive(
         "material {d}: anisotropyRotation {d} is out of range, left out",
         .{ factors.index, rotation_rad },
     );
@@ -234,7 +234,7 @@ pub fn readScatter(
     var arena_state: std.heap.ArenaAllocator = .init(source.gpa);
     defer arena_state.deinit();
     const scatter = try text.parse(Scatter, arena_state.allocator(), described) orelse
-        return source.warn(
+        return source.forgive(
             "material {d}: KHR_materials_volume_scatter is not as it should be, left out",
             .{factors.index},
         );
@@ -248,7 +248,7 @@ pub fn readScatter(
     const info = scatter.multiscatterColorTexture orelse return;
     const name = "multiscatterColorTexture";
     const all = textures orelse return;
-    if (info.index >= source.data.textures_count) return source.warn(
+    if (info.index >= source.data.textures_count) return source.forgive(
         "material {d}: {s}: there is no texture {d}, left out",
         .{ factors.index, name, info.index },
     );

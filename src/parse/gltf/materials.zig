@@ -72,6 +72,7 @@ pub fn use(materials: *Materials, index: u32) Error!*const scene.Material {
     if (index >= file_count) return &materials.added.items[index - file_count];
     const slot = &materials.list[index];
     if (slot.* == null) {
+        try materials.source.need(.materials, index);
         slot.* = try materials.read(index, materials.textures);
     }
     return &slot.*.?;

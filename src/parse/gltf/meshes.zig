@@ -12,6 +12,7 @@ const c = @import("../cgltf.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const accessors = @import("../accessor.zig");
+const asset = @import("asset.zig");
 const attributes = @import("attributes.zig");
 const Materials = @import("materials.zig");
 const Source = @import("source.zig");
@@ -39,6 +40,8 @@ joints: std.AutoHashMapUnmanaged(JointAccessors, Joints) = .empty,
 triangles: std.AutoHashMapUnmanaged(Connection, []const [3]u32) = .empty,
 segments: std.AutoHashMapUnmanaged(Connection, []const [2]u32) = .empty,
 points: std.AutoHashMapUnmanaged(Connection, []const u32) = .empty,
+/// Of positions: the vertices that are not finite, where there are any.
+nowhere: std.AutoHashMapUnmanaged(u32, []const u32) = .empty,
 /// Whether a mesh without the coordinates of its textures has been met.
 coordinates_missed: bool = false,
 
@@ -121,6 +124,14 @@ const Mode = enum {
         };
     }
 
+    /// Whether an index can begin it anew.
+    fn restarts(mode: Mode) bool {
+        return switch (mode) {
+            .line_loop, .line_strip, .strip, .fan => true,
+            .points, .lines, .triangles => false,
+        };
+    }
+
     /// Whether vertices are left over.
     fn leavesRest(mode: Mode, vertex_count: u32) bool {
         if (vertex_count < mode.size()) return true;
@@ -137,7 +148,7 @@ pub fn deinit(meshes: *Meshes) void {
     inline for (.{
         "ranges",   "positions",    "normals", "colors",    "texcoords",
         "tangents", "color_deltas", "joints",  "triangles", "segments",
-        "points",
+        "points",   "nowhere",
     }) |name| @field(meshes, name).deinit(gpa);
     meshes.* = undefined;
 }
@@ -147,20 +158,29 @@ pub fn deinit(meshes: *Meshes) void {
 pub fn get(meshes: *Meshes, mesh_index: u32, deformation: Deformation) Error!Range {
     const gpa = meshes.source.gpa;
     if (meshes.ranges.get(mesh_index)) |range| return range;
+    try meshes.source.need(.meshes, mesh_index);
     const mesh = Source.item(meshes.source.data.meshes, mesh_index);
     const builder = meshes.source.builder;
     const first: u32 = @intCast(builder.meshes.items.len);
     var range: Range = .{ .first = first, .count = 0, .joint_max = 0 };
     for (Source.slice(mesh.primitives, mesh.primitives_count), 0..) |*primitive, index| {
         const place: Place = .{ .mesh = mesh_index, .primitive = @intCast(index) };
-        const decoded = try meshes.decode(primitive, place) orelse continue;
+        const decoded = meshes.decode(primitive, place) catch |err| {
+            if (err == error.OutOfMemory or !meshes.source.force) return err;
+            try meshes.source.excuse(err);
+            continue;
+        } orelse continue;
         const index_of = try builder.addMesh(decoded.mesh);
         const drawn = &builder.meshes.items[index_of];
-        drawn.morph_targets = try meshes.decodeTargets(drawn, primitive, deformation.targets);
-        if (!deformation.has_skin) continue;
-        const joints = try meshes.decodeJoints(&decoded.used, drawn.positions.len, place);
-        drawn.joint_sets = joints.sets;
-        range.joint_max = @max(range.joint_max, joints.largest);
+        drawn.morph_targets =
+            try meshes.decodeTargets(drawn, primitive, deformation.targets, place);
+        if (deformation.has_skin) {
+            const joints = try meshes.decodeJoints(primitive, &decoded.used, place);
+            drawn.joint_sets = joints.sets;
+            range.joint_max = @max(range.joint_max, joints.largest);
+        }
+        const vertex_count = decoded.used.vertex_count;
+        try attributes.checkRest(meshes.source, primitive, vertex_count, place);
     }
     range.count = @intCast(builder.meshes.items.len - first);
     try meshes.ranges.put(gpa, mesh_index, range);
@@ -184,16 +204,20 @@ const Decoded = struct { mesh: scene.Mesh, used: attributes.Used };
 fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Error!?Decoded {
     const source = meshes.source;
     const named = Mode.of(primitive) orelse return source.fail("{f}: unknown mode", .{place});
+    if (try attributes.isEmpty(source, primitive)) {
+        source.forgive("{f}: its vertices or indices are empty, not drawn", .{place});
+        return null;
+    }
     const used = try attributes.find(source, primitive, place);
     const mode: Mode = if (used.is_draco) .triangles else named;
     const position = used.position orelse {
-        source.warn("{f}: without POSITION, not drawn", .{place});
+        source.forgive("{f}: without POSITION, not drawn", .{place});
         return null;
     };
     var mesh: scene.Mesh = .{
-        .positions = try meshes.floats(3, &meshes.positions, position),
+        .positions = try meshes.decodePositions(position),
         .normals = if (used.normal) |index|
-            try meshes.floats(3, &meshes.normals, index)
+            try meshes.directions(index, "normals")
         else
             null,
         .colors = if (used.color) |index| try meshes.decodeColors(index) else null,
@@ -203,10 +227,13 @@ fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Er
     };
     try meshes.connect(&mesh, primitive, mode, place);
     if (mesh.isEmpty()) return null;
+    if (meshes.nowhere.get(position)) |vertices| {
+        try checkPlaces(source, &mesh, position, vertices);
+    }
     if (mesh.normals == null and mode.size() < 3) {
         mesh.material = try meshes.materials.useUnlit(mesh.material, mesh.colors != null);
     }
-    try meshes.decodeForTextures(&mesh, &used, place);
+    try meshes.decodeForTextures(&mesh, primitive, &used, place);
     return .{ .mesh = mesh, .used = used };
 }
 
@@ -214,6 +241,7 @@ fn decode(meshes: *Meshes, primitive: *const c.cgltf_primitive, place: Place) Er
 fn decodeForTextures(
     meshes: *Meshes,
     mesh: *scene.Mesh,
+    primitive: *const c.cgltf_primitive,
     used: *const attributes.Used,
     place: Place,
 ) Error!void {
@@ -222,17 +250,18 @@ fn decodeForTextures(
         const set = view.texcoord_set;
         if (mesh.texcoords[set] == null) {
             if (used.texcoords[set]) |index| {
-                mesh.texcoords[set] = try meshes.floats(2, &meshes.texcoords, index);
+                mesh.texcoords[set] =
+                    try meshes.decodeTexcoords(primitive, index, used, place);
             } else if (!meshes.coordinates_missed) {
                 meshes.coordinates_missed = true;
-                meshes.source.warn(
+                meshes.source.forgive(
                     "{f}: without TEXCOORD_{d}, where its material's textures look: taken as 0",
                     .{ place, set },
                 );
             }
         }
     };
-    try meshes.decodeForTangents(mesh, used, material);
+    try meshes.decodeForTangents(mesh, primitive, used, material, place);
 }
 
 /// What bends normals, or has a direction along the surface, needs tangents, or coordinates to make
@@ -240,8 +269,10 @@ fn decodeForTextures(
 fn decodeForTangents(
     meshes: *Meshes,
     mesh: *scene.Mesh,
+    primitive: *const c.cgltf_primitive,
     used: *const attributes.Used,
     material: *const scene.Material,
+    place: Place,
 ) Error!void {
     var lacks: Materials.Lacks = .{};
     var needed = false;
@@ -257,46 +288,151 @@ fn decodeForTangents(
     if (material.anisotropy > 0 or material.in_motion and material.anisotropy_texture != null) {
         const set = if (material.anisotropy_texture) |view| view.texcoord_set else 0;
         if (!needed and !has_tangents) if (used.texcoords[set]) |index| {
-            mesh.texcoords[set] = try meshes.floats(2, &meshes.texcoords, index);
+            mesh.texcoords[set] = try meshes.decodeTexcoords(primitive, index, used, place);
         };
         lacks.anisotropy = !needed and !has_tangents and mesh.texcoords[set] == null;
         if (!lacks.anisotropy) needed = true;
     }
     if (lacks.any()) mesh.material = try meshes.materials.useWithout(mesh.material, lacks);
     // Tangents of a mesh without normals count for nothing (glTF 2.0, section 3.7.2.1).
-    if (needed and has_tangents) mesh.tangents = try meshes.decodeTangents(used.tangent.?);
+    if (!needed or !has_tangents) return;
+    const index = used.tangent.?;
+    try attributes.check(meshes.source, primitive, index, used.vertex_count, place);
+    mesh.tangents = try meshes.decodeTangents(index);
 }
 
+fn decodeTexcoords(
+    meshes: *Meshes,
+    primitive: *const c.cgltf_primitive,
+    index: u32,
+    used: *const attributes.Used,
+    place: Place,
+) Error![]const [2]f32 {
+    try attributes.check(meshes.source, primitive, index, used.vertex_count, place);
+    return meshes.floats(2, &meshes.texcoords, index, "texture coordinates");
+}
+
+/// Positions, finite ones in the place of those that are not; see `nowhere`.
+fn decodePositions(meshes: *Meshes, index: u32) Error![]const Vec3 {
+    if (meshes.positions.get(index)) |known| return known;
+    const source = meshes.source;
+    const accessor = try attributes.required(source, index);
+    try source.charge(@as(u64, accessor.count) * @sizeOf(Vec3));
+    const positions = try source.arena.alloc(Vec3, accessor.count);
+    if (accessors.decodeFloats(3, accessor, positions) != null) {
+        var vertices: std.ArrayList(u32) = .empty;
+        var other: Vec3 = .{ 0, 0, 0 };
+        for (positions, 0..) |position, vertex| {
+            if (allFinite(3, position))
+                other = position
+            else
+                try vertices.append(source.arena, @intCast(vertex));
+        }
+        for (vertices.items) |vertex| positions[vertex] = other;
+        try meshes.nowhere.put(source.gpa, index, vertices.items);
+    }
+    try meshes.positions.put(source.gpa, index, positions);
+    return positions;
+}
+
+/// Vertices that are nowhere do no harm as long as nothing has a corner there.
+fn checkPlaces(
+    source: *const Source,
+    mesh: *const scene.Mesh,
+    position: u32,
+    vertices: []const u32,
+) Error!void {
+    const lists = [_][]const u32{
+        @ptrCast(mesh.triangles), @ptrCast(mesh.segments), mesh.points,
+    };
+    for (lists) |list| for (list) |vertex| {
+        const found = std.sort.binarySearch(u32, vertices, vertex, orderOf) orelse continue;
+        return source.fail("accessor {d}: element {d} is not finite", .{
+            position, vertices[found],
+        });
+    };
+    source.forgive("accessor {d}: {d} positions are not finite; nothing drawn needs them", .{
+        position, vertices.len,
+    });
+}
+
+fn orderOf(wanted: u32, vertex: u32) std.math.Order {
+    return std.math.order(wanted, vertex);
+}
+
+fn allFinite(comptime width: u8, element: [width]f32) bool {
+    for (element) |value| if (!std.math.isFinite(value)) return false;
+    return true;
+}
+
+/// What is not finite becomes 0: no normal, a corner of the texture, no change.
 fn floats(
     meshes: *Meshes,
     comptime width: u8,
     cache: *std.AutoHashMapUnmanaged(u32, []const [width]f32),
     index: u32,
+    what: []const u8,
 ) Error![]const [width]f32 {
     if (cache.get(index)) |known| return known;
+    const accessor = try attributes.required(meshes.source, index);
+    return meshes.decodeFloats(width, cache, index, accessor, what);
+}
+
+/// Normals, and what morph targets add to them and to tangents.
+fn directions(meshes: *Meshes, index: u32, what: []const u8) Error![]const Vec3 {
+    if (meshes.normals.get(index)) |known| return known;
+    const accessor = try attributes.directions(meshes.source, index);
+    return meshes.decodeFloats(3, &meshes.normals, index, accessor, what);
+}
+
+fn decodeFloats(
+    meshes: *Meshes,
+    comptime width: u8,
+    cache: *std.AutoHashMapUnmanaged(u32, []const [width]f32),
+    index: u32,
+    accessor: Accessor,
+    what: []const u8,
+) Error![]const [width]f32 {
     const source = meshes.source;
-    const accessor = try attributes.required(source, index);
     try source.charge(@as(u64, accessor.count) * @sizeOf([width]f32));
     const out = try source.arena.alloc([width]f32, accessor.count);
-    if (accessors.decodeFloats(width, accessor, out)) |bad| return source.fail(
-        "accessor {d}: element {d} is not finite",
-        .{ index, bad },
-    );
+    if (accessors.decodeFloats(width, accessor, out) != null)
+        tameAll(width, source, index, out, @splat(0), what);
     try cache.put(source.gpa, index, out);
     return out;
 }
 
-/// Tangents whose fourth number is 1 or -1.
-fn decodeTangents(meshes: *Meshes, index: u32) Error![]const [4]f32 {
+/// Puts something in the place of elements that are not finite.
+fn tameAll(
+    comptime width: u8,
+    source: *const Source,
+    index: u32,
+    elements_of: [][width]f32,
+    other: [width]f32,
+    what: []const u8,
+) void {
+    var count: usize = 0;
+    for (elements_of) |*element| {
+        if (allFinite(width, element.*)) continue;
+        element.* = other;
+        count += 1;
+    }
+    source.forgive("accessor {d}: {d} of {d} {s} are not finite, left out", .{
+        index, count, elements_of.len, what,
+    });
+}
+
+/// Tangents whose fourth number is 1 or -1; null where they are not finite, for they can be made.
+fn decodeTangents(meshes: *Meshes, index: u32) Error!?[]const [4]f32 {
     if (meshes.tangents.get(index)) |known| return known;
     const source = meshes.source;
-    const accessor = try attributes.required(source, index);
+    const accessor = try attributes.directions(source, index);
     try source.charge(@as(u64, accessor.count) * @sizeOf([4]f32));
     const tangents = try source.arena.alloc([4]f32, accessor.count);
-    if (accessors.decodeFloats(4, accessor, tangents)) |bad| return source.fail(
-        "accessor {d}: element {d} is not finite",
-        .{ index, bad },
-    );
+    if (accessors.decodeFloats(4, accessor, tangents) != null) {
+        source.forgive("accessor {d}: tangents are not finite, made anew", .{index});
+        return null;
+    }
     for (tangents) |*tangent| tangent[3] = if (tangent[3] < 0) -1 else 1;
     try meshes.tangents.put(source.gpa, index, tangents);
     return tangents;
@@ -306,16 +442,21 @@ fn decodeTangents(meshes: *Meshes, index: u32) Error![]const [4]f32 {
 fn decodeColors(meshes: *Meshes, index: u32) Error![]const [4]f32 {
     if (meshes.colors.get(index)) |known| return known;
     const source = meshes.source;
-    const colors = try meshes.decodeRgba(index, 1);
+    const colors = try meshes.decodeRgba(index, 1, @splat(1));
     if (clampColors(colors)) {
-        source.warn("accessor {d}: colours out of range are clamped", .{index});
+        source.forgive("accessor {d}: colours out of range are clamped", .{index});
     }
     try meshes.colors.put(source.gpa, index, colors);
     return colors;
 }
 
-/// Colours as RGBA, with this alpha where the file has none.
-fn decodeRgba(meshes: *Meshes, index: u32, missing_alpha: f32) Error![][4]f32 {
+/// Colours as RGBA, with this alpha where the file has none, `other` where they are not finite.
+fn decodeRgba(
+    meshes: *Meshes,
+    index: u32,
+    missing_alpha: f32,
+    other: [4]f32,
+) Error![][4]f32 {
     const source = meshes.source;
     const accessor = try attributes.required(source, index);
     try source.charge(@as(u64, accessor.count) * @sizeOf([4]f32));
@@ -329,10 +470,7 @@ fn decodeRgba(meshes: *Meshes, index: u32, missing_alpha: f32) Error![][4]f32 {
         for (colors, opaque_colors) |*color, rgb| color.* = rgb ++ [1]f32{missing_alpha};
         break :not_finite first;
     };
-    if (not_finite) |bad| return source.fail(
-        "accessor {d}: element {d} is not finite",
-        .{ index, bad },
-    );
+    if (not_finite != null) tameAll(4, source, index, colors, other, "colours");
     return colors;
 }
 
@@ -342,6 +480,7 @@ fn decodeTargets(
     mesh: *const scene.Mesh,
     primitive: *const c.cgltf_primitive,
     weighted: []const bool,
+    place: Place,
 ) Error![]const scene.MorphTarget {
     if (weighted.len == 0) return &.{};
     const source = meshes.source;
@@ -351,22 +490,25 @@ fn decodeTargets(
     for (targets, raw_targets, weighted) |*target, *raw, is_weighted| {
         target.* = .{};
         if (!is_weighted) continue;
-        const used = attributes.ofTarget(source, raw);
+        const vertex_count: u32 = @intCast(mesh.positions.len);
+        const used = try attributes.ofTarget(source, raw, vertex_count, place);
         if (used.position) |index| {
-            target.positions = try meshes.floats(3, &meshes.positions, index);
+            target.positions = try meshes.decodePositions(index);
+            if (meshes.nowhere.get(index)) |vertices|
+                try checkPlaces(source, mesh, index, vertices);
         }
         if (mesh.normals != null) if (used.normal) |index| {
-            target.normals = try meshes.floats(3, &meshes.normals, index);
+            target.normals = try meshes.directions(index, "normals");
         };
         if (mesh.tangents != null) if (used.tangent) |index| {
-            target.tangents = try meshes.floats(3, &meshes.normals, index);
+            target.tangents = try meshes.directions(index, "tangents");
         };
         if (mesh.colors != null) if (used.color) |index| {
             target.colors = try meshes.decodeColorDeltas(index);
         };
         for (&target.texcoords, mesh.texcoords, used.texcoords) |*to, set, accessor| {
             if (set != null) if (accessor) |index| {
-                to.* = try meshes.floats(2, &meshes.texcoords, index);
+                to.* = try meshes.floats(2, &meshes.texcoords, index, "texture coordinates");
             };
         }
     }
@@ -375,7 +517,7 @@ fn decodeTargets(
 
 fn decodeColorDeltas(meshes: *Meshes, index: u32) Error![]const [4]f32 {
     if (meshes.color_deltas.get(index)) |known| return known;
-    const deltas = try meshes.decodeRgba(index, 0);
+    const deltas = try meshes.decodeRgba(index, 0, @splat(0));
     try meshes.color_deltas.put(meshes.source.gpa, index, deltas);
     return deltas;
 }
@@ -383,8 +525,8 @@ fn decodeColorDeltas(meshes: *Meshes, index: u32) Error![]const [4]f32 {
 /// The joints of a primitive's vertices, none with a warning where it has none.
 fn decodeJoints(
     meshes: *Meshes,
+    primitive: *const c.cgltf_primitive,
     used: *const attributes.Used,
-    vertex_count: usize,
     place: Place,
 ) Error!Joints {
     const source = meshes.source;
@@ -397,18 +539,21 @@ fn decodeJoints(
     for (used.joints, used.weights, 0..) |joints, weights, set| {
         if (joints != null and weights != null) {
             key[count] = .{ joints.?, weights.? };
+            for (key[count]) |index| {
+                try attributes.check(source, primitive, index, used.vertex_count, place);
+            }
             count += 1;
-        } else if (joints != null or weights != null) source.warn(
+        } else if (joints != null or weights != null) source.forgive(
             "{f}: JOINTS_{d} or WEIGHTS_{d} stands alone, and is left out",
             .{ place, set, set },
         );
     }
     if (count == 0) {
-        source.warn("{f}: has a skin but no joints, its node places it", .{place});
+        source.forgive("{f}: has a skin but no joints, its node places it", .{place});
         return .{ .sets = &.{}, .largest = 0 };
     }
     if (meshes.joints.get(key)) |known| return known;
-    try source.charge(@as(u64, vertex_count) * count * (@sizeOf([4]u16) + @sizeOf([4]f32)));
+    try source.charge(@as(u64, used.vertex_count) * count * (@sizeOf([4]u16) + @sizeOf([4]f32)));
     var joints: [scene.joint_set_count][][4]u16 = undefined;
     var weights: [scene.joint_set_count][][4]f32 = undefined;
     const sets = try source.arena.alloc(scene.JointSet, count);
@@ -440,16 +585,14 @@ fn decodeJointNumbers(source: *Source, index: u32) Error![][4]u16 {
 fn decodeJointWeights(source: *Source, index: u32) Error![][4]f32 {
     const accessor = try attributes.required(source, index);
     const weights = try source.arena.alloc([4]f32, accessor.count);
-    if (accessors.decodeFloats(4, accessor, weights)) |bad| return source.fail(
-        "accessor {d}: element {d} is not finite",
-        .{ index, bad },
-    );
+    if (accessors.decodeFloats(4, accessor, weights) != null)
+        tameAll(4, source, index, weights, @splat(0), "weights");
     var clamped = false;
     for (weights) |*four| for (four) |*weight| if (weight.* < 0) {
         weight.* = 0;
         clamped = true;
     };
-    if (clamped) source.warn("accessor {d}: weights below 0 are taken as 0", .{index});
+    if (clamped) source.forgive("accessor {d}: weights below 0 are taken as 0", .{index});
     return weights;
 }
 
@@ -529,49 +672,97 @@ fn elements(
         null;
     const count = if (accessor) |indexed| indexed.count else connection.vertex_count;
     const mode = connection.mode;
-    if (mode.leavesRest(count)) source.warn(
+    if (mode.leavesRest(count)) source.forgive(
         "{f}: {d} vertices do not make whole {s}, the rest is left out",
         .{ place, count, mode.name() },
     );
     const element_count = mode.count(count);
     try source.charge(@as(u64, element_count) * @sizeOf(Element));
-    const list = try source.arena.alloc(Element, element_count);
+    var list = try source.arena.alloc(Element, element_count);
     const is_whole = switch (mode) {
         .points, .lines, .triangles => !mode.leavesRest(count),
         else => false,
     };
     if (is_whole) {
-        try number(source, connection, accessor, @ptrCast(list));
+        _ = try number(source, connection, accessor, @ptrCast(list));
     } else {
         const vertices = try source.gpa.alloc(u32, count);
         defer source.gpa.free(vertices);
-        try number(source, connection, accessor, vertices);
-        switch (Element) {
-            u32 => @memcpy(list, vertices[0..element_count]),
-            [2]u32 => join(mode, vertices, list),
-            else => assemble(mode, vertices, list),
-        }
+        const restart = try number(source, connection, accessor, vertices);
+        list = list[0..takeApart(Element, mode, vertices, restart, list)];
     }
     try cache.put(source.gpa, connection, list);
     return list;
 }
 
-/// The vertices of a primitive in the order of the file.
+/// The index that no vertex has: the largest of its type (glTF 2.0, section 3.7.2.1).
+fn restartIndex(accessor: Accessor) u32 {
+    return switch (accessor.component) {
+        .u8 => std.math.maxInt(u8),
+        .u16 => std.math.maxInt(u16),
+        else => std.math.maxInt(u32),
+    };
+}
+
+/// Makes elements of vertices, anew behind each that is `restart`. Returns how many there are.
+fn takeApart(
+    comptime Element: type,
+    mode: Mode,
+    vertices: []const u32,
+    restart: ?u32,
+    list: []Element,
+) usize {
+    var length: usize = 0;
+    var rest = vertices;
+    while (rest.len > 0) {
+        const end = if (restart) |wanted|
+            std.mem.findScalar(u32, rest, wanted) orelse rest.len
+        else
+            rest.len;
+        const run = rest[0..end];
+        const part = list[length..][0..mode.count(@intCast(run.len))];
+        switch (Element) {
+            u32 => @memcpy(part, run),
+            [2]u32 => join(mode, run, part),
+            else => assemble(mode, run, part),
+        }
+        length += part.len;
+        rest = rest[@min(end + 1, rest.len)..];
+    }
+    return length;
+}
+
+/// The vertices of a primitive in the order of the file. Returns the index behind which strips
+/// begin anew, if there is one (KHR_mesh_primitive_restart; the core has none).
 fn number(
     source: *const Source,
     connection: Connection,
     accessor: ?Accessor,
     vertices: []u32,
-) Error!void {
+) Error!?u32 {
     const indexed = accessor orelse {
         for (vertices, 0..) |*vertex, index| vertex.* = @intCast(index);
-        return;
+        return null;
     };
-    const largest = accessors.decodeIndices(indexed, vertices);
-    if (largest >= connection.vertex_count) return source.fail(
-        "accessor {d}: index {d} with {d} vertices",
-        .{ connection.indices, largest, connection.vertex_count },
-    );
+    var largest = accessors.decodeIndices(indexed, vertices);
+    if (largest < connection.vertex_count) return null;
+    const restart = restartIndex(indexed);
+    if (largest == restart and connection.mode.restarts()) {
+        largest = 0;
+        for (vertices) |vertex| if (vertex != restart) {
+            largest = @max(largest, vertex);
+        };
+        if (largest < connection.vertex_count) {
+            if (!asset.uses(source, "KHR_mesh_primitive_restart")) source.forgive(
+                "accessor {d}: the index {d} is no vertex, what is drawn begins anew there",
+                .{ connection.indices, restart },
+            );
+            return restart;
+        }
+    }
+    return source.fail("accessor {d}: index {d} with {d} vertices", .{
+        connection.indices, largest, connection.vertex_count,
+    });
 }
 
 /// The last segment of a loop goes back to the first vertex.
@@ -633,6 +824,24 @@ test assemble {
     try std.testing.expectEqual(fan, triangles);
     assemble(.triangles, &.{ 0, 1, 2, 3, 4, 5, 6 }, triangles[0..2]);
     try std.testing.expectEqual([3]u32{ 3, 4, 5 }, triangles[1]);
+}
+
+test takeApart {
+    const rest = 0xffff;
+    const vertices = [_]u32{ rest, 0, 1, 2, 3, rest, rest, 4, 5, rest, 6, 7, 8 };
+    var triangles: [11][3]u32 = undefined;
+    const expected = [_][3]u32{ .{ 0, 1, 2 }, .{ 1, 3, 2 }, .{ 6, 7, 8 } };
+    const count = takeApart([3]u32, .strip, &vertices, rest, &triangles);
+    try std.testing.expectEqualSlices([3]u32, &expected, triangles[0..count]);
+    var segments: [13][2]u32 = undefined;
+    const loops = takeApart([2]u32, .line_loop, &vertices, rest, &segments);
+    const wanted = [_][2]u32{
+        .{ 0, 1 }, .{ 1, 2 }, .{ 2, 3 }, .{ 3, 0 },
+        .{ 4, 5 }, .{ 6, 7 }, .{ 7, 8 }, .{ 8, 6 },
+    };
+    try std.testing.expectEqualSlices([2]u32, &wanted, segments[0..loops]);
+    const whole = takeApart([2]u32, .line_strip, vertices[1..5], null, &segments);
+    try std.testing.expectEqualSlices([2]u32, wanted[0..3], segments[0..whole]);
 }
 
 test join {

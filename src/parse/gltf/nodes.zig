@@ -9,6 +9,7 @@ const json = @import("../json.zig");
 const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
 const choice = @import("choice.zig");
+const extension_text = @import("extension_text.zig");
 const Choice = @import("../../settings.zig").Choice;
 const c = @import("../cgltf.zig");
 const Source = @import("source.zig");
@@ -23,8 +24,8 @@ const assert = std.debug.assert;
 const Pending = struct { origin: u32, parent: u32 };
 
 /// Adds the nodes of a scene, or every root where there is none. Returns the index of the glTF node
-/// of each, which the caller frees with the source's `gpa`.
-pub fn collect(source: *const Source, shown: ?*const c.cgltf_scene) Error![]const u32 {
+/// of each, which the caller frees with the source's `gpa`; the source knows which are hidden.
+pub fn collect(source: *Source, shown: ?*const c.cgltf_scene) Error![]const u32 {
     const gpa = source.gpa;
     const node_count = source.data.nodes_count;
     var in_tree = try findTrees(source);
@@ -41,6 +42,7 @@ pub fn collect(source: *const Source, shown: ?*const c.cgltf_scene) Error![]cons
         const local = try localTransform(source, pending.origin);
         const index = try source.builder.addNode(pending.parent, local);
         try origins.append(gpa, pending.origin);
+        try hide(source, pending, index);
         const node = Source.item(source.data.nodes, pending.origin);
         const children = Source.slice(node.children, node.children_count);
         try stack.ensureUnusedCapacity(gpa, children.len);
@@ -51,6 +53,25 @@ pub fn collect(source: *const Source, shown: ?*const c.cgltf_scene) Error![]cons
     }
     assert(origins.items.len <= node_count);
     return origins.toOwnedSlice(gpa);
+}
+
+/// KHR_node_visibility: a node that is not visible hides all below it, whatever these say.
+fn hide(source: *Source, pending: Pending, index: u32) Error!void {
+    const is_below = pending.parent != scene.none and source.isHidden(pending.parent);
+    if (!is_below) {
+        const node = Source.item(source.data.nodes, pending.origin);
+        const list = Source.slice(node.extensions, node.extensions_count);
+        const text = extension_text.find(list, "KHR_node_visibility") orelse return;
+        var arena_state: std.heap.ArenaAllocator = .init(source.gpa);
+        defer arena_state.deinit();
+        const Visibility = struct { visible: bool = true };
+        const known = try extension_text.parse(Visibility, arena_state.allocator(), text) orelse
+            return;
+        if (known.visible) return;
+    }
+    const hidden = &source.hidden;
+    if (hidden.bit_length == 0) try hidden.resize(source.gpa, source.data.nodes_count, false);
+    hidden.set(index);
 }
 
 /// The scene's node of a glTF node. It is added, with those that it hangs below, where `places`
@@ -116,10 +137,12 @@ fn pushRoots(
     const roots = Source.slice(shown.nodes, shown.nodes_count);
     for (0..roots.len) |reversed| {
         const index = Source.indexOf(data.nodes, roots[roots.len - 1 - reversed]);
-        if (listed.isSet(index)) return source.fail(
-            "scene {d}: lists node {d} twice",
-            .{ Source.indexOf(data.scenes, shown), index },
-        );
+        if (listed.isSet(index)) {
+            source.forgive("scene {d}: lists node {d} twice, counted once", .{
+                Source.indexOf(data.scenes, shown), index,
+            });
+            continue;
+        }
         if (!in_tree.isSet(index)) return source.fail(
             "node {d}: is its own ancestor, or hangs below a node that is",
             .{index},
@@ -149,7 +172,7 @@ fn findTrees(source: *const Source) Error!std.DynamicBitSetUnmanaged {
         }
     }
     var missing = reached.iterator(.{ .kind = .unset });
-    if (missing.next()) |index| source.warn(
+    if (missing.next()) |index| source.forgive(
         "node {d}: is its own ancestor, or hangs below a node that is; not shown",
         .{index},
     );
@@ -158,12 +181,13 @@ fn findTrees(source: *const Source) Error!std.DynamicBitSetUnmanaged {
 
 /// A node's map into its parent's space: its matrix, or translation, rotation and scale.
 fn localTransform(source: *const Source, index: u32) Error!AffineD {
+    try source.need(.nodes, index);
     const node = Source.item(source.data.nodes, index);
     const numbers: Numbers = .of(source, index);
     var local: AffineD = undefined;
     if (node.has_matrix != 0) {
         const also = node.has_translation != 0 or node.has_rotation != 0 or node.has_scale != 0;
-        if (also) source.warn(
+        if (also) source.forgive(
             "node {d}: has a matrix, so its other transforms are ignored",
             .{index},
         );
@@ -288,11 +312,11 @@ fn unitQuaternion(source: *const Source, index: u32, rotation: [4]f64) Error![4]
         return source.fail("node {d}: rotation is not finite", .{index});
     }
     if (length < std.math.floatMin(f32)) {
-        source.warn("node {d}: rotation is zero, taken as none", .{index});
+        source.forgive("node {d}: rotation is zero, taken as none", .{index});
         return .{ 0, 0, 0, 1 };
     }
     if (@abs(length - 1) > 1e-3) {
-        source.warn("node {d}: rotation is not a unit quaternion, made one", .{index});
+        source.forgive("node {d}: rotation is not a unit quaternion, made one", .{index});
     }
     return .{ x / length, y / length, z / length, w / length };
 }

@@ -47,30 +47,48 @@ pub fn deinit(skins: *Skins) void {
     skins.* = undefined;
 }
 
-/// Checks every skin's matrices and every mesh's weights.
-pub fn checkAll(skins: *Skins) Error!void {
+/// Checks the skins, meshes and weights that nothing drawn has needed.
+pub fn checkRest(skins: *Skins) Error!void {
     const source = skins.source;
     const data = source.data;
-    for (Source.slice(data.skins, data.skins_count), 0..) |*skin, index| {
-        const matrices = skin.inverse_bind_matrices orelse continue;
-        const accessor_index = Source.indexOf(data.accessors, matrices);
-        const accessor = try gltf_accessors.resolve(source, accessor_index) orelse continue;
-        if (accessor.component != .f32 or accessor.component_count != 16) return source.fail(
-            "skin {d}: inverseBindMatrices have to be 4 x 4 floats",
-            .{index},
-        );
-        if (accessor.count < skin.joints_count) return source.fail(
-            "skin {d}: {d} inverseBindMatrices for {d} joints",
-            .{ index, accessor.count, skin.joints_count },
-        );
-        try gltf_accessors.checkFinite(source, accessor_index, accessor);
+    for (0..data.skins_count) |index| {
+        if (skins.indices.contains(@intCast(index))) continue;
+        if (source.findBroken(.skins, index) != null) continue;
+        skins.checkSkin(@intCast(index)) catch |err| try source.excuse(err);
     }
-    for (0..data.meshes_count) |index| _ = try skins.get(@intCast(index));
-    for (Source.slice(data.nodes, data.nodes_count), 0..) |*node, index| {
+    for (0..data.meshes_count) |index| {
+        if (source.findBroken(.meshes, index) != null) continue;
+        _ = skins.get(@intCast(index)) catch |err| try source.excuse(err);
+    }
+    for (Source.slice(data.nodes, data.nodes_count)) |*node| {
         const mesh = node.mesh orelse continue;
-        const facts = try skins.get(Source.indexOf(data.meshes, mesh));
-        try checkWeights(source, "node", index, node.weights_count, facts.target_count);
+        if (!skins.known.contains(Source.indexOf(data.meshes, mesh))) continue;
+        skins.checkNode(node) catch |err| try source.excuse(err);
     }
+}
+
+fn checkSkin(skins: *const Skins, index: u32) Error!void {
+    const source = skins.source;
+    const skin = Source.item(source.data.skins, index);
+    const matrices = skin.inverse_bind_matrices orelse return;
+    const accessor_index = Source.indexOf(source.data.accessors, matrices);
+    const accessor = try gltf_accessors.resolve(source, accessor_index) orelse return;
+    if (accessor.component != .f32 or accessor.component_count != 16) return source.fail(
+        "skin {d}: inverseBindMatrices have to be 4 x 4 floats",
+        .{index},
+    );
+    if (accessor.count < skin.joints_count) return source.fail(
+        "skin {d}: {d} inverseBindMatrices for {d} joints",
+        .{ index, accessor.count, skin.joints_count },
+    );
+}
+
+fn checkNode(skins: *Skins, node: *const c.cgltf_node) Error!void {
+    const mesh = node.mesh orelse return;
+    const data = skins.source.data;
+    const facts = try skins.get(Source.indexOf(data.meshes, mesh));
+    const index = Source.indexOf(data.nodes, node);
+    try checkWeights(skins.source, "node", index, node.weights_count, facts.target_count);
 }
 
 /// Notes what the drawn nodes ask of their meshes, at rest or when they move. `origins` are the
@@ -82,9 +100,11 @@ pub fn collect(
 ) Error!void {
     const source = skins.source;
     const data = source.data;
-    for (origins) |origin| {
+    for (origins, 0..) |origin, shown| {
         const node = Source.item(data.nodes, origin);
         const mesh = node.mesh orelse continue;
+        if (source.isHidden(@intCast(shown))) continue;
+        try skins.checkNode(node);
         const facts = try skins.get(Source.indexOf(data.meshes, mesh));
         const deformation = &facts.deformation;
         if (node.skin != null) deformation.has_skin = true;
@@ -97,7 +117,7 @@ pub fn collect(
         if (node.skin == null or skins.places.len > 0) continue;
         skins.places = try source.gpa.alloc(u32, data.nodes_count);
         @memset(skins.places, scene.none);
-        for (origins, 0..) |shown, place| skins.places[shown] = @intCast(place);
+        for (origins, 0..) |one, place| skins.places[one] = @intCast(place);
     }
 }
 
@@ -136,6 +156,7 @@ pub fn instanceWeights(skins: *Skins, node: *const c.cgltf_node) Error![]const f
 pub fn instanceSkin(skins: *Skins, node: *const c.cgltf_node, range: Meshes.Range) Error!u32 {
     const skin = node.skin orelse return scene.none;
     const source = skins.source;
+    try source.need(.skins, Source.indexOf(source.data.skins, skin));
     if (range.joint_max >= skin[0].joints_count) return source.fail(
         "mesh {d}: joint {d} of {d}",
         .{
@@ -153,6 +174,7 @@ fn decode(skins: *Skins, index: u32) Error!scene.Skin {
     const source = skins.source;
     const skin = Source.item(source.data.skins, index);
     const count = skin.joints_count;
+    try skins.checkSkin(index);
     try source.charge(@as(u64, count) * (@sizeOf(u32) + @sizeOf(AffineD)));
     const joints = try source.arena.alloc(u32, count);
     for (joints, Source.slice(skin.joints, count)) |*joint, node| {
@@ -172,8 +194,10 @@ fn decodeMatrices(skins: *Skins, index: u32, accessor_index: u32, maps: []Affine
     try source.charge(@as(u64, accessor.count) * @sizeOf([16]f32));
     const matrices = try source.gpa.alloc([16]f32, accessor.count);
     defer source.gpa.free(matrices);
-    // `checkAll` has found all numbers finite.
-    std.debug.assert(accessors.decodeFloats(16, accessor, matrices) == null);
+    if (accessors.decodeFloats(16, accessor, matrices)) |bad| return source.fail(
+        "accessor {d}: element {d} is not finite",
+        .{ accessor_index, bad },
+    );
     var is_affine = true;
     for (maps, matrices[0..maps.len]) |*map, m| {
         for ([4]f32{ m[3], m[7], m[11], m[15] }, [4]f32{ 0, 0, 0, 1 }) |value, wanted| {
@@ -186,7 +210,7 @@ fn decodeMatrices(skins: *Skins, index: u32, accessor_index: u32, maps: []Affine
             .translation = .{ m[12], m[13], m[14] },
         };
     }
-    if (!is_affine) source.warn(
+    if (!is_affine) source.forgive(
         "skin {d}: inverseBindMatrices are not affine, their last rows are ignored",
         .{index},
     );
@@ -202,6 +226,7 @@ fn weightsOf(node: *const c.cgltf_node) []const f32 {
 fn get(skins: *Skins, mesh_index: u32) Error!*Facts {
     if (skins.known.getPtr(mesh_index)) |facts| return facts;
     const source = skins.source;
+    try source.need(.meshes, mesh_index);
     const mesh = Source.item(source.data.meshes, mesh_index);
     var facts: Facts = .{ .target_count = 0 };
     for (Source.slice(mesh.primitives, mesh.primitives_count), 0..) |*primitive, index| {

@@ -35,17 +35,18 @@ lenience: *const Lenience,
 force: bool = false,
 /// Bytes that decoded vertices and triangles may still take, and undrawn ones that are looked at.
 decoded_bytes_left: u64 = 0,
-/// Whether sparse indices are known to be in order and in range.
-sparse_checked: bool = false,
-/// Accessors without a number that is not finite, other than those that have been decoded.
-finite: std.AutoHashMapUnmanaged(u32, void) = .empty,
+/// Accessors that have been resolved, their sparse indices in order and in range.
+resolved: std.DynamicBitSetUnmanaged = .{},
+/// Nodes of the scene that are not shown (KHR_node_visibility), if there are any.
+hidden: std.DynamicBitSetUnmanaged = .{},
 
 /// See parse.zig.
 pub const Error = @import("../resource.zig").Error;
 
 /// Frees what the reader has noted.
 pub fn deinit(source: *Source) void {
-    source.finite.deinit(source.gpa);
+    source.resolved.deinit(source.gpa);
+    source.hidden.deinit(source.gpa);
     var contents = source.decompressed.valueIterator();
     while (contents.next()) |bytes| source.gpa.free(bytes.*);
     source.decompressed.deinit(source.gpa);
@@ -77,15 +78,53 @@ pub fn forgive(source: *const Source, comptime format: []const u8, arguments: an
     source.diagnostic.forgive(format, arguments);
 }
 
-/// Fails where the element is one that is left out.
-pub fn need(source: *const Source, list: schema.List, index: usize) error{InvalidInput}!void {
+/// The same for what has names of its own; see `Diagnostic.forgiveEach`.
+pub fn forgiveEach(source: *const Source, comptime format: []const u8, arguments: anytype) void {
+    source.diagnostic.forgiveEach(format, arguments);
+}
+
+/// Fails where the element is one that is left out of the document, and is to be drawn.
+pub fn need(source: *const Source, list: schema.List, index: usize) Error!void {
     if (source.lenience.broken.count() == 0) return;
-    if (source.isBroken(list, index)) |reason| return source.fail("{s}", .{reason});
+    const broken = source.findBroken(list, index) orelse return;
+    const err: Error = if (broken.is_missing) error.InputOutput else error.InvalidInput;
+    return source.diagnostic.fail(err, "{s}", .{broken.reason});
 }
 
 /// Why the element is left out; null: it is not.
-pub fn isBroken(source: *const Source, list: schema.List, index: usize) ?[]const u8 {
+pub fn findBroken(source: *const Source, list: schema.List, index: usize) ?Lenience.Broken {
     return source.lenience.broken.get(.{ .list = @backingInt(list), .index = @intCast(index) });
+}
+
+/// Makes an error of what is not drawn, or must not stop the rest, a warning.
+pub fn excuse(source: *const Source, err: Error) Error!void {
+    if (err == error.OutOfMemory) return err;
+    const diagnostic = source.diagnostic;
+    const said = diagnostic.message;
+    if (!diagnostic.refused) diagnostic.message.set("", .{});
+    source.forgiveUnneeded(said.text());
+}
+
+/// Says what is wrong with what is not drawn.
+pub fn forgiveUnneeded(source: *const Source, reason: []const u8) void {
+    source.forgive("{s}; nothing drawn needs it", .{reason});
+}
+
+/// Notes that all has been said of an accessor.
+pub fn noteResolved(source: *Source, index: usize) error{OutOfMemory}!void {
+    const count = source.data.accessors_count;
+    if (source.resolved.bit_length < count) try source.resolved.resize(source.gpa, count, false);
+    source.resolved.set(index);
+}
+
+/// Whether it has.
+pub fn isResolved(source: *const Source, index: usize) bool {
+    return index < source.resolved.bit_length and source.resolved.isSet(index);
+}
+
+/// Whether a node of the scene is not shown.
+pub fn isHidden(source: *const Source, node: u32) bool {
+    return node < source.hidden.bit_length and source.hidden.isSet(node);
 }
 
 /// Counts decoded data before it is allocated.

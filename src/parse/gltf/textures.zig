@@ -67,6 +67,10 @@ pub fn view(
     const has_own_set = raw.has_transform != 0 and transform.has_texcoord != 0;
     const set = if (has_own_set) transform.texcoord else raw.texcoord;
     if (set < 0 or set >= scene.texcoord_set_count) {
+        if (!hasTexcoords(source, set)) return source.fail(
+            "material {d}: {s}: there is no TEXCOORD of its texCoord",
+            .{ material, slot },
+        );
         source.warn("material {d}: {s}: only TEXCOORD_0 to TEXCOORD_{d} are read, left out", .{
             material, slot, scene.texcoord_set_count - 1,
         });
@@ -83,7 +87,7 @@ pub fn view(
         .texcoord_set = @intCast(set),
         .transform = if (raw.has_transform != 0)
             parts.rows() orelse {
-                source.warn("material {d}: {s}: its rotation is out of range, left out", .{
+                source.forgive("material {d}: {s}: its rotation is out of range, left out", .{
                     material, slot,
                 });
                 return null;
@@ -94,10 +98,24 @@ pub fn view(
     };
 }
 
+/// Whether a mesh of the file has coordinates of this set.
+fn hasTexcoords(source: *const Source, set: c_int) bool {
+    for (Source.slice(source.data.meshes, source.data.meshes_count)) |*mesh| {
+        for (Source.slice(mesh.primitives, mesh.primitives_count)) |*primitive| {
+            const list = Source.slice(primitive.attributes, primitive.attributes_count);
+            for (list) |*attribute| {
+                if (attribute.type == .texcoord and attribute.index == set) return true;
+            }
+        }
+    }
+    return false;
+}
+
 /// The scene's texture for the file's with this index.
 fn get(textures: *Textures, index: u32) Error!?u32 {
     const source = textures.source;
     if (textures.known.get(index)) |texture| return texture;
+    try source.need(.textures, index);
     const raw = Source.item(source.data.textures, index);
     // What a file offers besides the image of the core is there to be preferred.
     var named = false;
@@ -109,10 +127,10 @@ fn get(textures: *Textures, index: u32) Error!?u32 {
         const image_index = Source.indexOf(source.data.images, candidate);
         if (try textures.getImage(image_index)) |image| break image;
     } else null;
-    if (!named) source.warn("texture {d}: has no image that can be read, left out", .{index});
+    if (!named) source.forgive("texture {d}: has no image that can be read, left out", .{index});
     var texture: ?u32 = null;
     if (image) |present| {
-        var complete = textures.readSampler(raw);
+        var complete = try textures.readSampler(raw);
         complete.image = present;
         texture = try source.builder.addTexture(complete);
     }
@@ -121,10 +139,11 @@ fn get(textures: *Textures, index: u32) Error!?u32 {
 }
 
 /// How a texture is looked up, without its image.
-fn readSampler(textures: *const Textures, raw: *const c.cgltf_texture) scene.Texture {
+fn readSampler(textures: *const Textures, raw: *const c.cgltf_texture) Error!scene.Texture {
     var texture: scene.Texture = .{ .image = scene.none };
     if (raw.sampler == null) return texture;
     const source = textures.source;
+    try source.need(.samplers, Source.indexOf(source.data.samplers, raw.sampler));
     const sampler = Source.item(raw.sampler, 0);
     switch (sampler.mag_filter) {
         .undefined, .linear => {},
@@ -164,20 +183,25 @@ fn warnOfSampler(
 ) void {
     const index = Source.indexOf(source.data.textures, raw);
     const parts = .{ index, name, value };
-    source.warn("texture {d}: its sampler's {s} {d} is not known, ignored", parts);
+    source.forgive("texture {d}: its sampler's {s} {d} is not known, ignored", parts);
 }
 
 /// The scene's image for the file's with this index; null, with a warning, where it has none.
 pub fn getImage(textures: *Textures, index: u32) Error!?u32 {
     const source = textures.source;
     if (textures.images.get(index)) |image| return image;
+    if (source.findBroken(.images, index)) |broken| {
+        source.forgiveEach("image {d}: {s}, left out", .{ index, broken.reason });
+        try textures.images.put(source.gpa, index, null);
+        return null;
+    }
     const raw = Source.item(source.data.images, index);
     const image = if (raw.buffer_view != null)
         try textures.fromView(index, Source.item(raw.buffer_view, 0))
     else if (raw.uri != null)
         try textures.fromUri(index, std.mem.span(@as([*:0]const u8, raw.uri)))
     else no_data: {
-        source.warn("image {d}: has neither bufferView nor uri, left out", .{index});
+        source.forgiveEach("image {d}: has neither bufferView nor uri, left out", .{index});
         break :no_data null;
     };
     try textures.images.put(source.gpa, index, image);
@@ -192,12 +216,20 @@ fn fromView(textures: *Textures, index: u32, raw: *const c.cgltf_buffer_view) Er
         .size = raw.size,
     };
     if (textures.ranges.get(range)) |image| return image;
-    const view_bytes = try buffer_views.contents(source, raw) orelse {
-        source.warn("image {d}: its buffer has no data, left out", .{index});
+    const view_bytes = buffer_views.contents(source, raw) catch |err| switch (err) {
+        error.OutOfMemory => |failure| return failure,
+        error.InvalidInput, error.InputOutput => {
+            const said = source.diagnostic.message;
+            if (!source.diagnostic.refused) source.diagnostic.message.set("", .{});
+            source.forgiveEach("image {d}: {s}, left out", .{ index, said.text() });
+            return null;
+        },
+    } orelse {
+        source.forgiveEach("image {d}: its buffer has no data, left out", .{index});
         return null;
     };
     if (range.size > textures.view_bytes_left) {
-        source.warn("image {d}: images of the file overlap, left out", .{index});
+        source.forgiveEach("image {d}: images of the file overlap, left out", .{index});
         return null;
     }
     textures.view_bytes_left -= range.size;
@@ -211,17 +243,20 @@ fn fromUri(textures: *Textures, index: u32, encoded: []const u8) Error!?u32 {
     const source = textures.source;
     if (textures.uris.get(encoded)) |image| return image;
     var reason: diagnostic.Message = .{};
-    const resolved = uri.resolve(source.gpa, source.arena, encoded, &reason);
-    const image = if (resolved) |target| switch (target) {
-        .bytes => |bytes| try textures.addImage(index, bytes),
-        .path => |path| file: {
-            defer source.gpa.free(path);
-            break :file try textures.fromFile(index, path);
-        },
+    const image = if (uri.resolve(source.gpa, source.arena, encoded, &reason)) |resolved| image: {
+        if (resolved.odd.len > 0)
+            source.forgive("image {d}: its URI {s}", .{ index, resolved.odd });
+        switch (resolved.target) {
+            .bytes => |bytes| break :image try textures.addImage(index, bytes),
+            .path => |path| {
+                defer source.gpa.free(path);
+                break :image try textures.fromFile(index, path);
+            },
+        }
     } else |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidInput => none: {
-            source.warn("image {d}: {s}, left out", .{ index, reason.text() });
+            source.forgiveEach("image {d}: {s}, left out", .{ index, reason.text() });
             break :none null;
         },
     };
@@ -242,7 +277,7 @@ fn fromFile(textures: *Textures, index: u32, path: []const u8) Error!?u32 {
             .{ index, diagnostic.quote(path), reason.text() },
         ),
         error.Unreadable => {
-            source.warn("image {d}: {f} {s}, left out", .{
+            source.forgiveEach("image {d}: {f} {s}, left out", .{
                 index, diagnostic.quote(path), reason.text(),
             });
             return null;

@@ -25,6 +25,7 @@ pub fn readCamera(
     node: u32,
 ) Error!scene.Camera {
     const index = Source.indexOf(source.data.cameras, raw);
+    try source.need(.cameras, index);
     const projection: scene.Camera.Projection = switch (raw.type) {
         .perspective => projection: {
             const perspective = &raw.data.perspective;
@@ -41,7 +42,7 @@ pub fn readCamera(
                 .{ index, aspect },
             );
             const far_ok = perspective.has_zfar == 0 or perspective.zfar > perspective.znear;
-            if (!(perspective.znear > 0) or !far_ok) source.warn(
+            if (!(perspective.znear > 0) or !far_ok) source.forgive(
                 "camera {d}: znear and zfar make no sense; they are not used",
                 .{index},
             );
@@ -72,7 +73,7 @@ fn magnification(source: *const Source, index: u32, name: []const u8, value: f32
     if (!(size >= std.math.floatMin(f32))) {
         return source.fail("camera {d}: {s} is 0", .{ index, name });
     }
-    if (value < 0) source.warn(
+    if (value < 0) source.forgive(
         "camera {d}: {s} is negative, its sign is ignored",
         .{ index, name },
     );
@@ -88,7 +89,7 @@ pub fn readLight(source: *const Source, raw: *const c.cgltf_light, node: u32) ?s
             .spot => .spot,
             .directional => .directional,
             else => {
-                source.warn("light {d}: unknown type, left out", .{index});
+                source.forgive("light {d}: unknown type, left out", .{index});
                 return null;
             },
         },
@@ -115,7 +116,8 @@ fn readCone(
     const outer = raw.spot_outer_cone_angle;
     const inner = math.flushDenormal(raw.spot_inner_cone_angle);
     // Half an ulp of rounding in the file is no reason to complain.
-    if (outer > outer_max + 1e-6 or !(outer > 0) or !(inner >= 0) or !(inner < outer)) source.warn(
+    const fits = outer > 0 and outer <= outer_max + 1e-6 and inner >= 0 and inner < outer;
+    if (!fits) source.forgive(
         "light {d}: cone angles {d} and {d} do not fit 0 <= inner < outer <= pi / 2, clamped",
         .{ index, inner, outer },
     );
@@ -124,6 +126,6 @@ fn readCone(
 
 fn notNegative(source: *const Source, index: u32, name: []const u8, value: f32) f32 {
     if (value >= 0) return math.flushDenormal(value);
-    source.warn("light {d}: {s} {d} is below 0, taken as 0", .{ index, name, value });
+    source.forgive("light {d}: {s} {d} is below 0, taken as 0", .{ index, name, value });
     return 0;
 }

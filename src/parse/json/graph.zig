@@ -17,11 +17,17 @@ is_first: bool = true,
 parents: []u32,
 /// The list that is being read.
 members: std.ArrayList(u32) = .empty,
-/// Elements of the list, and elements below one of it.
+/// Elements of the list.
 listed: std.DynamicBitSetUnmanaged,
-below: std.DynamicBitSetUnmanaged,
+/// What has been found out about elements, for one list of roots, and about which ones.
+places: []Place,
+placed: std.ArrayList(u32) = .empty,
 
 const none = std.math.maxInt(u32);
+
+/// Whether an element hangs below one of a list, or of none, which is assumed on the way up as
+/// well: that may be a circle.
+const Place = enum { unknown, below, stray };
 
 /// What of a list is not as it should be.
 pub const Odd = struct {
@@ -38,15 +44,16 @@ pub fn init(gpa: Allocator, lengths: json.Lengths, list: u8) error{OutOfMemory}!
     const parents = try gpa.alloc(u32, count);
     errdefer gpa.free(parents);
     @memset(parents, none);
-    var listed: std.DynamicBitSetUnmanaged = try .initEmpty(gpa, count);
-    errdefer listed.deinit(gpa);
-    const below: std.DynamicBitSetUnmanaged = try .initEmpty(gpa, count);
+    const places = try gpa.alloc(Place, count);
+    errdefer gpa.free(places);
+    @memset(places, .unknown);
+    const listed: std.DynamicBitSetUnmanaged = try .initEmpty(gpa, count);
     return .{
         .gpa = gpa,
         .lengths = lengths,
         .parents = parents,
         .listed = listed,
-        .below = below,
+        .places = places,
     };
 }
 
@@ -55,7 +62,8 @@ pub fn deinit(graph: *Graph) void {
     graph.gpa.free(graph.parents);
     graph.members.deinit(graph.gpa);
     graph.listed.deinit(graph.gpa);
-    graph.below.deinit(graph.gpa);
+    graph.gpa.free(graph.places);
+    graph.placed.deinit(graph.gpa);
     graph.* = undefined;
 }
 
@@ -95,13 +103,16 @@ pub fn tidyRoots(graph: *Graph) error{OutOfMemory}!Odd {
     defer for (all) |member| {
         graph.listed.unset(member);
     };
-    graph.below.unsetAll();
+    defer {
+        for (graph.placed.items) |element| graph.places[element] = .unknown;
+        graph.placed.clearRetainingCapacity();
+    }
     var kept: usize = 0;
     for (all) |member| {
         if (graph.parents[member] == none) {
             members[kept] = member;
             kept += 1;
-        } else if (graph.hangsBelow(member)) {
+        } else if (try graph.hangsBelow(member)) {
             odd.child = odd.child orelse member;
         } else odd.stray = odd.stray orelse member;
     }
@@ -110,18 +121,23 @@ pub fn tidyRoots(graph: *Graph) error{OutOfMemory}!Odd {
 }
 
 /// Whether something of the list is above, which in turn hangs below none.
-fn hangsBelow(graph: *Graph, member: u32) bool {
-    var at = member;
-    // No way up is longer, unless it is a circle.
-    for (0..graph.parents.len) |_| {
-        const parent = graph.parents[at];
+fn hangsBelow(graph: *Graph, member: u32) error{OutOfMemory}!bool {
+    var top = member;
+    while (graph.places[top] == .unknown) {
+        const parent = graph.parents[top];
         if (parent == none) break;
-        at = parent;
-        if (graph.below.isSet(at)) break;
-    } else return false;
-    if (!graph.listed.isSet(at) and !graph.below.isSet(at)) return false;
+        graph.places[top] = .stray;
+        try graph.placed.append(graph.gpa, top);
+        top = parent;
+    }
+    const is_below = switch (graph.places[top]) {
+        .unknown => graph.listed.isSet(top),
+        .below => true,
+        .stray => false,
+    };
+    if (!is_below) return false;
     var next = member;
-    while (next != at) : (next = graph.parents[next]) graph.below.set(next);
+    while (next != top) : (next = graph.parents[next]) graph.places[next] = .below;
     return true;
 }
 

@@ -12,13 +12,23 @@ gpa: Allocator,
 /// Keeps what is said of broken elements.
 arena: std.heap.ArenaAllocator,
 /// What is wrong with each element that is left out.
-broken: std.AutoArrayHashMapUnmanaged(Element, []const u8) = .empty,
+broken: std.AutoArrayHashMapUnmanaged(Element, Broken) = .empty,
 edits: std.ArrayList(Edit) = .empty,
 /// The numbers of lists that replace others.
 numbers: std.ArrayList(u8) = .empty,
 
+/// Elements that are left out; a document with more is refused.
+pub const broken_count_max = 1 << 16;
+
 /// An element of a counted list.
 pub const Element = struct { list: u8, index: u32 };
+
+/// Why an element is left out.
+pub const Broken = struct {
+    reason: []const u8,
+    /// Whether a file is missing or cannot be read.
+    is_missing: bool = false,
+};
 
 /// Bytes `start..end` of a text that become others.
 const Edit = struct {
@@ -55,12 +65,13 @@ pub fn leaveOut(
     lenience: *Lenience,
     list: u8,
     index: u32,
-    reason: []const u8,
+    broken: Broken,
 ) error{OutOfMemory}!void {
     const element: Element = .{ .list = list, .index = index };
-    const entry = try lenience.broken.getOrPutValue(lenience.gpa, element, "");
-    if (entry.value_ptr.len > 0) return;
-    entry.value_ptr.* = try lenience.arena.allocator().dupe(u8, reason);
+    if (lenience.broken.contains(element)) return;
+    var kept = broken;
+    kept.reason = try lenience.arena.allocator().dupe(u8, broken.reason);
+    try lenience.broken.put(lenience.gpa, element, kept);
 }
 
 /// Makes the key at `start` one that is not known.

@@ -105,6 +105,7 @@ const Mender = struct {
         const is_uri = std.mem.eql(u8, mender.key, "uri");
         try out.writeByte('"');
         mender.offset = start;
+        var is_foreign = false;
         while (mender.offset < text.len) {
             const byte = text[mender.offset];
             switch (byte) {
@@ -121,7 +122,9 @@ const Mender = struct {
                     if (sequence) |length| {
                         try out.writeAll(text[mender.offset..][0..length]);
                     } else {
-                        mender.note("strings are not UTF-8, their other bytes shown as \\xNN");
+                        if (!is_foreign)
+                            mender.note("strings are not UTF-8, their other bytes shown as \\xNN");
+                        is_foreign = true;
                         try out.print("{s}{X:0>2}", .{ if (is_uri) "%" else "\\\\x", byte });
                     }
                     mender.offset += sequence orelse 1;

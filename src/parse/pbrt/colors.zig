@@ -5,14 +5,15 @@
 
 const std = @import("std");
 const quote = @import("../../diagnostic.zig").quote;
-const number = @import("number.zig");
+const number = @import("../number.zig");
 const spectra = @import("spectra.zig");
 const Input = @import("input.zig");
 const Parameters = @import("parameters.zig");
 const Textures = @import("textures.zig");
 const Texture = Textures.Texture;
 const Error = Input.Error;
-const Vec3 = @import("../../math.zig").Vec3;
+const math = @import("../../math.zig");
+const Vec3 = math.Vec3;
 
 const Colors = @This();
 
@@ -22,6 +23,11 @@ input: *Input,
 textures: Textures,
 /// Spectra by the name of their file.
 files: std.StringHashMapUnmanaged(?Vec3) = .empty,
+/// What RGB of the text is in.
+space: spectra.Space = .srgb,
+/// The film is one of version 4, whose lights are as bright as "scale" says, whatever the luminance
+/// of their spectrum: it counts as 1.
+is_version_4: bool = false,
 
 /// The colour of that name, or `default` where it is absent or not read.
 pub fn rgb(
@@ -65,7 +71,7 @@ fn textureOf(
     if (strings.len == 0)
         return colors.input.fail(parameter.offset, "{f} has no name", .{quote(parameter.name)});
     if (colors.textures.named.get(strings[0])) |known| return known;
-    try colors.input.warn(
+    try colors.input.forgive(
         parameter.offset,
         "texture that is not there",
         "texture {f} is not defined: the default of {f} stands for it",
@@ -83,7 +89,7 @@ fn valueOf(
     const values = parameters.floatsOf(parameter);
     const strings = parameters.stringsOf(parameter);
     switch (parameter.type) {
-        .rgb => if (values.len >= 3) return values[0..3].*,
+        .rgb => if (values.len >= 3) return colors.space.toOurs(values[0..3].*),
         .xyz => if (values.len >= 3)
             return spectra.fromXyz(.{ values[0], values[1], values[2] }),
         .float => if (values.len >= 1) return @splat(values[0]),
@@ -94,8 +100,7 @@ fn valueOf(
         .blackbody => if (values.len >= 1) {
             // Temperature and scale; the newest dialect has the temperature alone.
             const color = spectra.fromBlackbody(values[0]);
-            const scale = if (values.len >= 2) values[1] else 1;
-            return .{ color[0] * scale, color[1] * scale, color[2] * scale };
+            return math.vec3.scale(color, if (values.len >= 2) values[1] else 1);
         },
         .spectrum => {
             if (strings.len >= 1) return colors.spectrumFile(parameter.offset, strings[0]);
@@ -122,14 +127,21 @@ fn valueOf(
 }
 
 /// A spectrum by name, or from a file of pairs; null with a warning where it cannot be read.
-fn spectrumFile(colors: *Colors, position: usize, name: []const u8) Error!?Vec3 {
+fn spectrumFile(colors: *Colors, position: u64, name: []const u8) Error!?Vec3 {
     if (spectra.fromName(name)) |known| return known;
     const input = colors.input;
     if (colors.files.get(name)) |known| return known;
     var value: ?Vec3 = null;
     if (input.readFile(position, name)) |file| {
         defer input.gpa.free(file.bytes);
-        value = try colors.parsePairs(file.bytes);
+        const has_mark = std.mem.startsWith(u8, file.bytes, Input.byte_order_mark);
+        if (has_mark) try input.forgive(
+            position,
+            "mark",
+            "{f}: a byte order mark (BOM) is passed over",
+            .{quote(name)},
+        );
+        value = try colors.parsePairs(file.bytes[if (has_mark) 3 else 0.. :0]);
         if (value == null) try input.warn(
             position,
             "spectrum file",

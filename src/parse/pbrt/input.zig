@@ -1,13 +1,19 @@
 //! A stack of texts: the file that is read, the files that include it, and where we are.
 //!
-//! In: the first text, names of files to include. Out: a cursor over the top text, and errors and
-//! warnings with file, line and column. Included files lie on a stack of our own, at most
-//! `limits.include_depth_max` of them; none may include itself, however far around.
+//! In: the first text, names of files to include. Out: a cursor over one text that they make
+//! together, and errors and warnings with file, line and column. Included files lie on a stack of
+//! our own, at most `limits.include_depth_max` of them; none may include itself, however far
+//! around.
+//!
+//! An included text stands in its Include's place, in the middle of a directive too: what goes on
+//! behind its end does so behind the Include. Texts that have ended stay until the directive has,
+//! for its strings point into them. A position is a number for a byte of any text.
 
 const std = @import("std");
+const decode = @import("../../decode.zig");
 const diagnostic_file = @import("../../diagnostic.zig");
 const limits = @import("limits.zig");
-const number = @import("number.zig");
+const number = @import("../number.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = diagnostic_file.Diagnostic;
 const Identity = @import("../../identity.zig").Identity;
@@ -29,6 +35,10 @@ const Text = struct {
     cursor: usize = 0,
     /// Null for a text that is no file.
     identity: ?Identity,
+    /// Position of its first byte.
+    start: u64,
+    /// What follows is not read as if it belonged to it.
+    is_apart: bool,
 };
 
 gpa: Allocator,
@@ -37,33 +47,76 @@ resources: *Resources,
 folder_name: []const u8,
 diagnostic: *Diagnostic,
 texts: std.ArrayList(Text) = .empty,
+/// Those that have ended in the directive that is read. There is always room for all.
+ended: std.ArrayList(Text) = .empty,
+/// Position of the next text.
+next_start: u64 = 0,
 included_count: u32 = 0,
-/// Where the directive that is read stands in the top text.
-directive: usize = 0,
+/// Where the directive that is read stands.
+directive: u64 = 0,
 /// Hashes of the kinds of warnings that have been given.
 warned: std.AutoHashMapUnmanaged(u64, void) = .empty,
 
 /// Frees everything.
 pub fn deinit(input: *Input) void {
     while (input.texts.items.len > 0) input.pop();
+    input.freeEnded();
     input.texts.deinit(input.gpa);
+    input.ended.deinit(input.gpa);
     input.warned.deinit(input.gpa);
     input.* = undefined;
 }
 
 /// Reads from a file next; `name` is copied. The bytes of all but the first are taken over.
 pub fn push(input: *Input, name: []const u8, file: Resources.File) Error!void {
+    return input.pushText(name, file, false);
+}
+
+fn pushText(input: *Input, name: []const u8, file: Resources.File, is_apart: bool) Error!void {
+    try input.ended.ensureTotalCapacity(
+        input.gpa,
+        input.ended.items.len + input.texts.items.len + 1,
+    );
     const copy = try input.gpa.dupe(u8, name);
     errdefer input.gpa.free(copy);
-    const text: Text = .{ .name = copy, .bytes = file.bytes, .identity = file.identity };
-    try input.texts.append(input.gpa, text);
+    try input.texts.append(input.gpa, .{
+        .name = copy,
+        .bytes = file.bytes,
+        .identity = file.identity,
+        .start = input.next_start,
+        .is_apart = is_apart,
+    });
+    input.next_start += @as(u64, file.bytes.len) + 1;
+}
+
+/// Passes over what may stand before the top text.
+pub fn start(input: *Input) Error!void {
+    const text = input.top();
+    for ([_][]const u8{ "\xff\xfe", "\xfe\xff" }) |mark| {
+        if (std.mem.startsWith(u8, text.bytes, mark))
+            return input.fail(text.start, "is in UTF-16, not in UTF-8", .{});
+    }
+    if (!std.mem.startsWith(u8, text.bytes, byte_order_mark)) return;
+    text.cursor = byte_order_mark.len;
+    try input.forgive(text.start, "mark", "a byte order mark (BOM) is passed over", .{});
 }
 
 /// Leaves the top text for the one that included it.
 pub fn pop(input: *Input) void {
-    const text = input.texts.pop().?;
-    input.gpa.free(text.name);
-    if (input.texts.items.len > 0) input.gpa.free(text.bytes);
+    input.ended.appendAssumeCapacity(input.texts.pop().?);
+}
+
+/// Makes the position the directive's, and frees what the one before has left.
+pub fn beginDirective(input: *Input) void {
+    input.freeEnded();
+    input.directive = input.offset();
+}
+
+fn freeEnded(input: *Input) void {
+    while (input.ended.pop()) |text| {
+        input.gpa.free(text.name);
+        if (text.start > 0) input.gpa.free(text.bytes);
+    }
 }
 
 /// The text that is read.
@@ -71,21 +124,47 @@ pub inline fn top(input: *const Input) *Text {
     return &input.texts.items[input.texts.items.len - 1];
 }
 
-/// Position of the next byte in the top text.
-pub inline fn offset(input: *const Input) usize {
-    return input.top().cursor;
+/// Position of the next byte.
+pub inline fn offset(input: *const Input) u64 {
+    const text = input.top();
+    return text.start + text.cursor;
 }
 
-/// Passes over white space and comments and returns the byte that follows, 0 at the end.
+/// Passes over white space and comments, and over the ends of included texts, and returns the byte
+/// that follows, 0 at the end.
 pub inline fn peek(input: *Input) u8 {
     const text = input.top();
     text.cursor = skip(text.bytes, text.cursor);
-    return text.bytes[text.cursor];
+    const byte = text.bytes[text.cursor];
+    return if (byte == 0) input.peekBelow() else byte;
 }
 
-/// Position of the first byte from `start` on that is neither white space nor within a comment.
-pub inline fn skip(bytes: [:0]const u8, start: usize) usize {
-    var index = start;
+fn peekBelow(input: *Input) u8 {
+    while (true) {
+        const text = input.top();
+        text.cursor = skip(text.bytes, text.cursor);
+        if (text.cursor < text.bytes.len or input.texts.items.len == 1 or text.is_apart)
+            return text.bytes[text.cursor];
+        input.pop();
+    }
+}
+
+/// As `peek`, within a list: a file whose Include stands there is read in its place.
+pub fn peekInList(input: *Input) Error!u8 {
+    while (true) {
+        const byte = input.peek();
+        if (byte != 'I') return byte;
+        const text = input.top();
+        const end = number.endOf(text.bytes, text.cursor);
+        if (!std.mem.eql(u8, text.bytes[text.cursor..end], "Include")) return byte;
+        text.cursor = end;
+        try input.includeNext(false);
+    }
+}
+
+/// Index of the first byte from `from` on that is neither white space nor within a comment.
+pub inline fn skip(bytes: [:0]const u8, from: usize) usize {
+    var index = from;
     while (true) {
         switch (bytes[index]) {
             ' ', '\n', '\t', '\r' => index += 1,
@@ -97,7 +176,7 @@ pub inline fn skip(bytes: [:0]const u8, start: usize) usize {
     }
 }
 
-/// Whether the top text has nothing more to say.
+/// Whether the top text, and what includes it, have nothing more to say.
 pub fn atEnd(input: *Input) bool {
     _ = input.peek();
     return input.top().cursor == input.top().bytes.len;
@@ -107,37 +186,47 @@ pub fn atEnd(input: *Input) bool {
 pub fn word(input: *Input) []const u8 {
     _ = input.peek();
     const text = input.top();
-    const start = text.cursor;
-    text.cursor = number.endOf(text.bytes, start);
-    return text.bytes[start..text.cursor];
+    const first = text.cursor;
+    text.cursor = number.endOf(text.bytes, first);
+    return text.bytes[first..text.cursor];
 }
 
-/// Reads a string in quotes, which the next byte opens; valid as long as the text is.
+/// Reads a string in quotes, which the next byte opens; valid as long as the directive is read.
 pub fn string(input: *Input) Error![]const u8 {
     const text = input.top();
     assert(text.bytes[text.cursor] == '"');
-    const start = text.cursor + 1;
-    var index = start;
+    const first = text.cursor + 1;
+    var index = first;
     while (true) : (index += 1) switch (text.bytes[index]) {
         '"' => break,
         '\\' => if (text.bytes[index + 1] == '"') {
             index += 1;
         },
-        '\n', 0 => return input.fail(text.cursor, "the string is not closed", .{}),
+        '\n', 0 => return input.fail(input.offset(), "the string is not closed", .{}),
         else => {},
     };
     text.cursor = index + 1;
-    return text.bytes[start..index];
+    return text.bytes[first..index];
 }
 
-/// Fails at `position` of the top text.
+/// A string that has to stand there, and its position.
+pub fn expectString(input: *Input) Error!struct { u64, []const u8 } {
+    if (input.peek() != '"') return input.fail(input.offset(), "a string is expected", .{});
+    return .{ input.offset(), try input.string() };
+}
+
+/// Fails at a position.
 pub fn fail(
     input: *Input,
-    position: usize,
+    position: u64,
     comptime format: []const u8,
     arguments: anytype,
 ) error{InvalidInput} {
-    input.locate(position);
+    const text = input.textAt(position);
+    const place = placeOf(text.bytes, position - text.start);
+    input.diagnostic.place.set("{f}:{d}:{d}", .{
+        printable(text.name), place.line, place.column,
+    });
     return input.diagnostic.invalid(format, arguments);
 }
 
@@ -160,19 +249,53 @@ pub fn warnHere(
     return input.warn(input.directive, kind, format, arguments);
 }
 
-/// Makes the diagnostic name `position` of the top text.
-fn locate(input: *Input, position: usize) void {
-    const text = input.top();
-    const place = placeOf(text.bytes, position);
-    input.diagnostic.place.set("{f}:{d}:{d}", .{
-        printable(text.name), place.line, place.column,
-    });
+/// Says what PBRT refuses and the picture can do without, once for each `kind`: a warning, with
+/// `--strict` an error.
+pub fn forgive(
+    input: *Input,
+    position: u64,
+    kind: []const u8,
+    comptime format: []const u8,
+    arguments: anytype,
+) Error!void {
+    if (!input.resources.settings.strict) return input.warn(position, kind, format, arguments);
+    return input.fail(position, format, arguments);
 }
 
-/// Says a warning about what stands at `position` of the top text, once for each `kind`.
+/// The same about the file that the user named, as a whole.
+pub fn forgiveFile(
+    input: *Input,
+    comptime format: []const u8,
+    arguments: anytype,
+) error{InvalidInput}!void {
+    if (input.resources.settings.strict)
+        return input.diagnostic.invalid(format, arguments);
+    input.diagnostic.warn(format, arguments);
+}
+
+/// How a warning names a position.
+pub fn nameOf(input: *const Input, arena: Allocator, position: u64) Allocator.Error![]u8 {
+    const text = input.textAt(position);
+    const line = placeOf(text.bytes, position - text.start).line;
+    // The scene's own name stands before every warning about it.
+    if (text.start == 0) return arena.print("line {d}", .{line});
+    // The end of a name says most where there is no room for all of it.
+    const name = text.name[text.name.len -| diagnostic_file.name_bytes_max..];
+    return arena.print("{f}:{d}", .{ printable(name), line });
+}
+
+/// The text that has a position. It is one that is read, or has ended in this directive.
+fn textAt(input: *const Input, position: u64) *const Text {
+    for ([_][]const Text{ input.texts.items, input.ended.items }) |list| for (list) |*text| {
+        if (position >= text.start and position <= text.start + text.bytes.len) return text;
+    };
+    unreachable;
+}
+
+/// Says a warning about what stands at a position, once for each `kind`.
 pub fn warn(
     input: *Input,
-    position: usize,
+    position: u64,
     kind: []const u8,
     comptime format: []const u8,
     arguments: anytype,
@@ -184,22 +307,14 @@ pub fn warn(
         input.diagnostic.warning_dropped_count += 1;
         return;
     }
-    const text = input.top();
-    const line = placeOf(text.bytes, position).line;
-    // The scene's own name stands before every warning about it.
-    if (input.texts.items.len == 1) {
-        input.diagnostic.warn("line {d}: " ++ format, .{line} ++ arguments);
-        return;
-    }
-    // The end of a name says most where there is no room for all of it.
-    const room = diagnostic_file.name_bytes_max;
-    const name = text.name[text.name.len -| room..];
-    input.diagnostic.warn("{f}:{d}: " ++ format, .{ printable(name), line } ++ arguments);
+    const place = try input.nameOf(input.gpa, position);
+    defer input.gpa.free(place);
+    input.diagnostic.warn("{s}: " ++ format, .{place} ++ arguments);
 }
 
 /// Line and column, from 1; the column counts bytes.
-fn placeOf(bytes: []const u8, position: usize) struct { line: usize, column: usize } {
-    const before = bytes[0..@min(position, bytes.len)];
+fn placeOf(bytes: []const u8, index: u64) struct { line: usize, column: usize } {
+    const before = bytes[0..@intCast(@min(index, bytes.len))];
     const line_start = if (std.mem.findScalarLast(u8, before, '\n')) |end| end + 1 else 0;
     return .{
         .line = std.mem.countScalar(u8, before, '\n') + 1,
@@ -207,8 +322,10 @@ fn placeOf(bytes: []const u8, position: usize) struct { line: usize, column: usi
     };
 }
 
-/// Goes on with the file that the string at `position` names, then returns here.
-pub fn include(input: *Input, position: usize, path: []const u8) Error!void {
+/// Goes on with the file that the string which follows names, then returns behind it. Where it
+/// `is_apart`, its end is one for `peek`, and `pop` is the caller's.
+pub fn includeNext(input: *Input, is_apart: bool) Error!void {
+    const position, const path = try input.expectString();
     if (input.texts.items.len >= limits.include_depth_max) return input.fail(
         position,
         "files include each other more than {d} deep",
@@ -221,18 +338,22 @@ pub fn include(input: *Input, position: usize, path: []const u8) Error!void {
         .{limits.include_count_max},
     );
     const file = try input.readFile(position, path);
-    errdefer input.gpa.free(file.bytes);
-    for (input.texts.items) |text| {
-        if (!Identity.eql(text.identity, file.identity)) continue;
-        return input.fail(position, "{f} includes itself", .{quote(path)});
+    {
+        errdefer input.gpa.free(file.bytes);
+        for (input.texts.items) |text| {
+            if (!Identity.eql(text.identity, file.identity)) continue;
+            return input.fail(position, "{f} includes itself", .{quote(path)});
+        }
+        const name = try std.fs.path.join(input.gpa, &.{ input.folder_name, path });
+        defer input.gpa.free(name);
+        try input.pushText(name, file, is_apart);
     }
-    const name = try std.fs.path.join(input.gpa, &.{ input.folder_name, path });
-    defer input.gpa.free(name);
-    try input.push(name, file);
+    try input.start();
 }
 
-/// Reads a file that the scene names at `position`. The caller frees its bytes.
-pub fn readFile(input: *Input, position: usize, path: []const u8) Error!Resources.File {
+/// Reads a file that the scene names at `position`, and what gzip has made of it. The caller frees
+/// its bytes.
+pub fn readFile(input: *Input, position: u64, path: []const u8) Error!Resources.File {
     var reason: diagnostic_file.Message = .{};
     const file = input.resources.read(path, &reason) catch |err| {
         if (err == error.OutOfMemory) return err;
@@ -245,8 +366,34 @@ pub fn readFile(input: *Input, position: usize, path: []const u8) Error!Resource
         "the files of the scene are over {d} bytes together",
         .{limits.text_bytes_max},
     );
-    return file;
+    if (!decode.gzip.isGzip(file.bytes)) return file;
+    if (!std.ascii.endsWithIgnoreCase(path, ".gz"))
+        try input.forgive(position, "gzip", "{f} is gzip without being called so", .{quote(path)});
+    const plain = input.inflate(file.bytes, &reason) catch |err| switch (err) {
+        error.OutOfMemory => |failure| return failure,
+        error.InvalidGzip => return input.fail(position, "{f} {s}", .{
+            quote(path), reason.text(),
+        }),
+    };
+    input.gpa.free(file.bytes);
+    return .{ .bytes = plain, .identity = file.identity };
 }
+
+/// What a gzip file holds; it counts as text that is read. The caller frees it.
+pub fn inflate(
+    input: *Input,
+    file: []const u8,
+    reason: *diagnostic_file.Message,
+) decode.gzip.Error![:0]u8 {
+    const left = limits.text_bytes_max -| input.resources.bytes_read;
+    const bytes_max = @min(left, Resources.file_bytes_max);
+    const plain = try decode.gzip.inflate(input.gpa, file, bytes_max, reason);
+    input.resources.bytes_read += plain.len;
+    return plain;
+}
+
+/// What some editors put before a text: RFC 3629, section 6.
+pub const byte_order_mark = "\xef\xbb\xbf";
 
 test placeOf {
     const text = "a\nbc\n\nd";

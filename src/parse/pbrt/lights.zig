@@ -35,7 +35,7 @@ pub const Source = struct {
     place: *const Transform,
 
     fn color(source: *const Source, name: []const u8) Error!Vec3 {
-        return scaledColor(source.colors, source.parameters, name, std.math.floatMax(f32));
+        return source.colorBy(name, null, 1);
     }
 
     /// The same, or as much as makes `quantity` what the text says, if it does: of a light of this
@@ -43,14 +43,13 @@ pub const Source = struct {
     fn colorBy(
         source: *const Source,
         name: []const u8,
-        quantity: []const u8,
+        quantity: ?[]const u8,
         of_unit: f64,
     ) Error!Vec3 {
-        const rgb = try source.color(name);
-        const asked = source.parameters.float(quantity, 0);
-        if (!(asked > 0 and of_unit > 0)) return rgb;
-        const factor = try normalization(source.colors, source.parameters, name);
-        return scaled(rgb, factor * asked / of_unit);
+        const largest = std.math.floatMax(f32);
+        const emission: Emission = try .read(source.colors, source.parameters, name, largest);
+        const asked = if (quantity) |key| source.parameters.float(key, 0) else 0;
+        return emission.by(asked, of_unit);
     }
 
     fn noteOf(source: *const Source, kind: []const u8, quantity: []const u8) Error!void {
@@ -70,31 +69,47 @@ pub const Source = struct {
     }
 };
 
-/// The colour `name` times the one of "scale", each component from 0 to `largest`.
-pub fn scaledColor(
-    colors: *Colors,
-    parameters: *const Parameters,
-    name: []const u8,
-    largest: f32,
-) Error!Vec3 {
-    const rgb = try colors.rgb(parameters, name, .{ 1, 1, 1 });
-    const scale = try colors.rgb(parameters, "scale", .{ 1, 1, 1 });
-    var result: Vec3 = undefined;
-    for (&result, rgb, scale) |*to, a, b| {
-        const product = a * b;
-        to.* = if (product > 0) @min(product, largest) else 0;
-    }
-    return result;
-}
+/// What a light emits.
+pub const Emission = struct {
+    /// The colour times the one of "scale".
+    color: Vec3,
+    /// What makes the luminance of the colour 1: RGB tells its colour beside white, all else tells
+    /// the emission itself.
+    normalization: f64 = 1,
+    is_normalized: bool,
 
-/// What makes the luminance of an emission 1: RGB tells its colour beside white, all else tells
-/// the emission itself.
-pub fn normalization(colors: *Colors, parameters: *const Parameters, name: []const u8) Error!f64 {
-    const parameter = parameters.find(name) orelse return 1;
-    if (parameter.type == .rgb) return 1;
-    const luminance = spectra.luminance(try colors.rgb(parameters, name, .{ 1, 1, 1 }));
-    return if (luminance > 0) 1 / @as(f64, luminance) else 1;
-}
+    /// By the parameter `name`, white where it is absent; each component from 0 to `largest`.
+    pub fn read(
+        colors: *Colors,
+        parameters: *const Parameters,
+        name: []const u8,
+        largest: f32,
+    ) Error!Emission {
+        const rgb = try colors.rgb(parameters, name, .{ 1, 1, 1 });
+        const scale = try colors.rgb(parameters, "scale", .{ 1, 1, 1 });
+        var result: Emission = .{ .color = undefined, .is_normalized = colors.is_version_4 };
+        for (&result.color, rgb, scale) |*to, a, b| {
+            const product = a * b;
+            to.* = if (product > 0) @min(product, largest) else 0;
+        }
+        const parameter = parameters.find(name) orelse return result;
+        if (parameter.type == .rgb) return result;
+        // Only version 4 has black bodies without a scale of their own.
+        if (parameter.type == .blackbody and parameter.count == 1) result.is_normalized = true;
+        const luminance = spectra.luminance(rgb);
+        if (luminance > 0) result.normalization = 1 / @as(f64, luminance);
+        return result;
+    }
+
+    /// The colour as it is meant; or, where `asked` for more than 0, so bright that the light has
+    /// that much of what a light of luminance 1 has `of_unit` of.
+    pub fn by(emission: *const Emission, asked: f64, of_unit: f64) Vec3 {
+        if (asked > 0 and of_unit > 0)
+            return scaled(emission.color, emission.normalization * asked / of_unit);
+        if (!emission.is_normalized or emission.normalization == 1) return emission.color;
+        return scaled(emission.color, emission.normalization);
+    }
+};
 
 /// A colour times a factor, finite.
 pub fn scaled(color: Vec3, factor: f64) Vec3 {

@@ -25,6 +25,18 @@ pub const Material = struct {
 /// Diffuse reflectance where nothing is said.
 pub const matte_default: scene.Material = matte(@splat(0.5));
 
+/// What reflects nothing.
+pub const black: scene.Material = matte(.{ 0, 0, 0 });
+
+/// What is not seen; the emission is to be set.
+pub const hidden_lamp: scene.Material = .{
+    .base_color = .{ 0, 0, 0, 0 },
+    .alpha_mode = .blend,
+    .metallic = 0,
+    .ior = 1,
+    .is_hidden_lamp = true,
+};
+
 const Kind = enum {
     matte,
     diffuse,
@@ -59,15 +71,9 @@ pub fn convert(colors: *Colors, name: []const u8, parameters: *const Parameters)
         "Material {f}: bumps are not supported, its surfaces are smooth",
         .{quote(name)},
     );
-    const kind = std.meta.stringToEnum(Kind, name) orelse {
-        try colors.input.warnHere(
-            name,
-            "Material {f} is not supported: grey matte stands for it",
-            .{quote(name)},
-        );
-        return .{ .surface = matte_default };
-    };
     var reader: Reader = .{ .colors = colors, .parameters = parameters };
+    const kind = std.meta.stringToEnum(Kind, name) orelse
+        return .{ .surface = try reader.unknown(name) };
     var surface = bounded(try reader.read(kind));
     surface.base_color_texture = reader.base_texture;
     surface.normal_texture = try reader.normalTexture();
@@ -100,6 +106,32 @@ const Reader = struct {
             .disney => reader.disney(),
             .hair => reader.hair(),
         };
+    }
+
+    /// Matte, as in version 3, of whatever colour there is.
+    fn unknown(reader: *Reader, name: []const u8) Error!scene.Material {
+        const input = reader.colors.input;
+        const measured: std.StaticStringMap(void) = .initComptime(.{ .{"measured"}, .{"fourier"} });
+        if (measured.has(name)) {
+            try input.warnHere(
+                name,
+                "Material {f} is not supported: grey matte stands for it",
+                .{quote(name)},
+            );
+            return matte_default;
+        }
+        try input.forgive(
+            input.directive,
+            name,
+            "Material {f} is not one of PBRT's: matte stands for it",
+            .{quote(name)},
+        );
+        const color_name = for ([_][]const u8{ "Kd", "reflectance", "color" }) |key| {
+            if (reader.has(key)) break key;
+        } else return matte_default;
+        var surface = bounded(matte(try reader.baseColor(color_name, 0.5)));
+        surface.base_color_texture = reader.base_texture;
+        return surface;
     }
 
     fn rgb(reader: *Reader, name: []const u8, default: f32) Error!Vec3 {

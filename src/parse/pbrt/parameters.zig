@@ -7,9 +7,10 @@
 const std = @import("std");
 const quote = @import("../../diagnostic.zig").quote;
 const limits = @import("limits.zig");
-const number = @import("number.zig");
+const number = @import("../number.zig");
 const Input = @import("input.zig");
 const Resources = @import("../resource.zig");
+const Allocator = std.mem.Allocator;
 const Error = Input.Error;
 const Vec3 = @import("../../math.zig").Vec3;
 
@@ -55,8 +56,8 @@ const type_names: std.StaticStringMap(Type) = .initComptime(.{
 pub const Parameter = struct {
     type: Type,
     name: []const u8,
-    /// Where it stands in the top text.
-    offset: usize,
+    /// Where it stands.
+    offset: u64,
     /// Values are strings: of strings, textures, and spectra by name.
     is_text: bool,
     first: usize,
@@ -70,7 +71,7 @@ integers: std.ArrayList(i32) = .empty,
 strings: std.ArrayList([]const u8) = .empty,
 
 /// Frees everything.
-pub fn deinit(parameters: *Parameters, gpa: std.mem.Allocator) void {
+pub fn deinit(parameters: *Parameters, gpa: Allocator) void {
     parameters.items.deinit(gpa);
     parameters.floats.deinit(gpa);
     parameters.integers.deinit(gpa);
@@ -84,7 +85,7 @@ pub fn read(parameters: *Parameters, input: *Input) Error!void {
     parameters.floats.clearRetainingCapacity();
     parameters.integers.clearRetainingCapacity();
     parameters.strings.clearRetainingCapacity();
-    while (input.peek() == '"') {
+    while (try input.peekInList() == '"') {
         if (parameters.items.items.len == limits.parameter_count_max) return input.fail(
             input.offset(),
             "over {d} parameters",
@@ -106,15 +107,14 @@ fn readOne(parameters: *Parameters, input: *Input) Error!void {
     );
     const type_ = type_names.get(type_name) orelse
         return input.fail(offset, "{f} is no type of parameters", .{quote(type_name)});
-    const first_byte = input.peek();
-    const bracketed = first_byte == '[';
+    const bracketed = try input.peekInList() == '[';
     if (bracketed) input.top().cursor += 1;
+    const is_string = try input.peekInList() == '"';
     var parameter: Parameter = .{
         .type = type_,
         .name = name,
         .offset = offset,
-        .is_text = type_ == .string or type_ == .texture or
-            (type_ == .spectrum and input.peek() == '"'),
+        .is_text = type_ == .string or type_ == .texture or (type_ == .spectrum and is_string),
         .first = undefined,
         .count = undefined,
     };
@@ -156,17 +156,27 @@ fn readNumbers(
     input: *Input,
     bracketed: bool,
 ) Error!void {
-    const text = input.top();
-    const bytes = text.bytes;
+    var text = input.top();
+    var bytes = text.bytes;
     var cursor = text.cursor;
     while (true) {
         if (bytes[cursor] <= ' ' or bytes[cursor] == '#') cursor = Input.skip(bytes, cursor);
+        if (bytes[cursor] == 0 or bytes[cursor] == 'I') {
+            // The end of an included text, or another one.
+            text.cursor = cursor;
+            _ = try input.peekInList();
+            text = input.top();
+            bytes = text.bytes;
+            cursor = text.cursor;
+        }
         if (bytes[cursor] == ']' and bracketed) break;
         const value = (if (Number == f32)
             number.float(bytes, &cursor)
         else
-            number.integer(bytes, &cursor)) catch |err|
-            return failNumber(input, cursor, err, if (Number == f32) "number" else "whole number");
+            number.integer(bytes, &cursor)) catch |err| {
+            text.cursor = cursor;
+            return failNumber(input, err, if (Number == f32) "number" else "whole number");
+        };
         if (list.items.len == list.capacity) try list.ensureUnusedCapacity(input.gpa, 1);
         list.appendAssumeCapacity(value);
         if (!bracketed) break;
@@ -175,19 +185,16 @@ fn readNumbers(
 }
 
 /// Says what stands where a number should.
-pub fn failNumber(
-    input: *Input,
-    position: usize,
-    err: number.Error,
-    expected: []const u8,
-) error{InvalidInput} {
+pub fn failNumber(input: *Input, err: number.Error, expected: []const u8) error{InvalidInput} {
+    const position = input.offset();
     const bytes = input.top().bytes;
-    if (position == bytes.len) return input.fail(
+    const cursor = input.top().cursor;
+    if (cursor == bytes.len) return input.fail(
         position,
         "a {s} is expected, the text ends",
         .{expected},
     );
-    const word = bytes[position..@max(number.endOf(bytes, position), position + 1)];
+    const word = bytes[cursor..@max(number.endOf(bytes, cursor), cursor + 1)];
     return switch (err) {
         error.NotANumber => input.fail(position, "a {s} is expected, not {f}", .{
             expected, quote(word),
@@ -199,7 +206,7 @@ pub fn failNumber(
 /// Booleans are words, or strings in the older dialects.
 fn readBools(parameters: *Parameters, input: *Input, bracketed: bool) Error!void {
     while (true) {
-        const byte = input.peek();
+        const byte = try input.peekInList();
         if (bracketed and byte == ']') return;
         const offset = input.offset();
         const word = if (byte == '"') try input.string() else input.word();
@@ -216,11 +223,52 @@ fn readBools(parameters: *Parameters, input: *Input, bracketed: bool) Error!void
 
 fn readStrings(parameters: *Parameters, input: *Input, bracketed: bool) Error!void {
     while (true) {
-        const byte = input.peek();
+        const byte = try input.peekInList();
         if (bracketed and byte == ']') return;
         if (byte != '"') return input.fail(input.offset(), "a string is expected", .{});
         try parameters.strings.append(input.gpa, try input.string());
         if (!bracketed) return;
+    }
+}
+
+/// A copy that outlives the text, all of it from `arena`.
+pub fn clone(parameters: *const Parameters, arena: Allocator) Allocator.Error!Parameters {
+    const copy: Parameters = .{
+        .items = try parameters.items.clone(arena),
+        .floats = try parameters.floats.clone(arena),
+        .integers = try parameters.integers.clone(arena),
+        .strings = try parameters.strings.clone(arena),
+    };
+    for (copy.items.items) |*item| item.name = try arena.dupe(u8, item.name);
+    for (copy.strings.items) |*text| text.* = try arena.dupe(u8, text.*);
+    return copy;
+}
+
+/// Adds what others have by names that are not here; messages about it name `position`.
+pub fn addMissing(
+    parameters: *Parameters,
+    gpa: Allocator,
+    others: *const Parameters,
+    position: u64,
+) Allocator.Error!void {
+    var index = others.items.items.len;
+    while (index > 0 and parameters.items.items.len < limits.parameter_count_max) {
+        index -= 1;
+        const item = others.items.items[index];
+        if (parameters.find(item.name) != null) continue;
+        var added = item;
+        added.offset = position;
+        if (item.is_text) {
+            added.first = parameters.strings.items.len;
+            try parameters.strings.appendSlice(gpa, others.stringsOf(&item));
+        } else if (item.type == .integer or item.type == .bool) {
+            added.first = parameters.integers.items.len;
+            try parameters.integers.appendSlice(gpa, others.integersOf(&item));
+        } else {
+            added.first = parameters.floats.items.len;
+            try parameters.floats.appendSlice(gpa, others.floatsOf(&item));
+        }
+        try parameters.items.append(gpa, added);
     }
 }
 

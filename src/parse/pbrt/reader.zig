@@ -9,12 +9,13 @@ const lights = @import("lights.zig");
 const choices = @import("../../settings.zig");
 const limits = @import("limits.zig");
 const materials = @import("materials.zig");
-const number = @import("number.zig");
+const number = @import("../number.zig");
 const scene_data = @import("../../scene.zig");
 const shapes = @import("shapes.zig");
 const spectra = @import("spectra.zig");
 const SceneBuilder = @import("scene_builder.zig");
 const Colors = @import("colors.zig");
+const Defaults = @import("defaults.zig");
 const Input = @import("input.zig");
 const Tessellator = @import("shapes/tessellator.zig");
 const Textures = @import("textures.zig");
@@ -40,24 +41,30 @@ const Graphics = struct {
     reverse: bool = false,
     /// Whether transformations are those of the time when the shutter opens.
     at_start: bool = true,
+    space: spectra.Space = .srgb,
+    defaults: Defaults = .{},
 };
 
 /// What AreaLightSource says of the shapes after it.
 const AreaLight = struct {
-    radiance: Vec3,
+    emission: lights.Emission,
     two_sided: bool,
-    /// What each shape emits in all, of luminance 1 in place of the radiance's; 0: as it is.
+    /// What each shape emits in all; 0: as its emission says.
     power: f32 = 0,
-    normalization: f64 = 1,
     picture: ?scene_data.TextureView = null,
 };
 
+/// Transformations that a block has begun with.
 const Kept = struct {
     const Kind = enum { Attribute, Transform, Object };
 
     kind: Kind,
-    graphics: Graphics,
+    transform: Transform,
+    at_start: bool,
 };
+
+/// What an imported text leaves as it was.
+const Outside = struct { graphics: Graphics, kept_count: usize, stack_count: usize };
 
 const Material = struct {
     /// In the scene.
@@ -65,6 +72,8 @@ const Material = struct {
     /// Surfaces only bound a medium and are not shown.
     is_boundary: bool,
 };
+
+const Undefined = struct { index: u32, place: []const u8 };
 
 const Phase = enum { options, world, done };
 
@@ -76,7 +85,11 @@ colors: Colors,
 tessellator: Tessellator,
 parameters: Parameters = .{},
 graphics: Graphics = .{},
-stack: std.ArrayList(Kept) = .empty,
+/// Of blocks that are begun and not ended, but for those of transformations.
+stack: std.ArrayList(Graphics) = .empty,
+/// Of all of them.
+kept: std.ArrayList(Kept) = .empty,
+imports: std.ArrayList(Outside) = .empty,
 phase: Phase = .options,
 /// A world has ended that is kept only if no other follows: its renderer makes no picture.
 is_preparation: bool = false,
@@ -88,6 +101,8 @@ object: ?struct { name: []const u8, first: usize } = null,
 objects: std.StringHashMapUnmanaged(SceneBuilder.Object) = .empty,
 spaces: std.StringHashMapUnmanaged(Transform) = .empty,
 named: std.StringHashMapUnmanaged(Material) = .empty,
+/// Materials that are named and not yet defined, and where that was.
+undefined_materials: std.StringHashMapUnmanaged(Undefined) = .empty,
 /// Meshes of curved shapes by all that they depend on.
 known_meshes: std.AutoHashMapUnmanaged(u64, u32) = .empty,
 default_material: u32 = scene_data.none,
@@ -100,6 +115,8 @@ pub fn deinit(reader: *Reader) void {
     reader.parameters.deinit(gpa);
     reader.colors.textures.deinit();
     reader.stack.deinit(gpa);
+    reader.kept.deinit(gpa);
+    reader.imports.deinit(gpa);
     reader.* = undefined;
 }
 
@@ -153,6 +170,18 @@ const Directive = enum {
     TransformEnd,
     Translate,
 
+    /// Whose defaults its parameters have.
+    fn target(directive: Directive) ?Defaults.Target {
+        return switch (directive) {
+            .Shape => .shape,
+            .LightSource, .AreaLightSource => .light,
+            .Material, .MakeNamedMaterial => .material,
+            .MakeNamedMedium => .medium,
+            .Texture => .texture,
+            else => null,
+        };
+    }
+
     fn allowedIn(directive: Directive, phase: Phase) bool {
         const place = @backingInt(directive);
         if (place <= @backingInt(Directive.WorldBegin)) return phase == .options;
@@ -164,12 +193,13 @@ const Directive = enum {
 pub fn run(reader: *Reader) Error!void {
     const input = reader.input;
     while (true) {
-        if (input.atEnd()) {
+        const is_end = input.atEnd();
+        input.beginDirective();
+        if (is_end) {
             if (input.texts.items.len == 1) break;
-            input.pop();
+            try reader.endImport();
             continue;
         }
-        input.directive = input.offset();
         const word = input.word();
         if (word.len == 0) return input.failHere("a directive is expected", .{});
         const directive = std.meta.stringToEnum(Directive, word) orelse
@@ -188,15 +218,38 @@ pub fn run(reader: *Reader) Error!void {
         try reader.perform(directive);
     }
     if (reader.phase == .options)
-        return input.fail(input.top().bytes.len, "there is no WorldBegin", .{});
-    try reader.warnOfBlocks(input.top().bytes.len);
+        return input.fail(input.offset(), "there is no WorldBegin", .{});
+    try reader.endBlocks(0, 0);
 }
 
-fn warnOfBlocks(reader: *Reader, position: usize) Error!void {
-    const count = reader.stack.items.len;
-    if (count == 0) return;
-    try reader.input.warn(position, "end", "{d} blocks are begun and not ended", .{count});
-    reader.stack.clearRetainingCapacity();
+/// Ends all blocks but so many, which a text should have done.
+fn endBlocks(reader: *Reader, kept_count: usize, stack_count: usize) Error!void {
+    const count = reader.kept.items.len -| kept_count;
+    if (count > 0) try reader.input.forgive(
+        reader.input.offset(),
+        "end",
+        "{d} blocks are begun and not ended",
+        .{count},
+    );
+    reader.kept.shrinkRetainingCapacity(@min(kept_count, reader.kept.items.len));
+    reader.stack.shrinkRetainingCapacity(@min(stack_count, reader.stack.items.len));
+}
+
+/// Reads a text that changes nothing of what it stands in but the world and what has names.
+fn beginImport(reader: *Reader) Error!void {
+    try reader.imports.append(reader.input.gpa, .{
+        .graphics = reader.graphics,
+        .kept_count = reader.kept.items.len,
+        .stack_count = reader.stack.items.len,
+    });
+    try reader.input.includeNext(true);
+}
+
+fn endImport(reader: *Reader) Error!void {
+    const outside = reader.imports.pop().?;
+    try reader.endBlocks(outside.kept_count, outside.stack_count);
+    reader.graphics = outside.graphics;
+    reader.input.pop();
 }
 
 fn perform(reader: *Reader, directive: Directive) Error!void {
@@ -223,9 +276,8 @@ fn perform(reader: *Reader, directive: Directive) Error!void {
         },
         .CoordSysTransform => {
             const name = try reader.text();
-            const space = reader.spaces.get(name) orelse
-                return reader.input.failHere("no coordinate system {f}", .{quote(name)});
-            try reader.setTransform(space);
+            if (reader.spaces.get(name)) |space| try reader.setTransform(space) else try reader
+                .forgive("space", "no coordinate system {f}: nothing changes", .{quote(name)});
         },
         .ActiveTransform => try reader.activeTransform(),
         .TransformTimes => _ = try reader.numbers(2),
@@ -239,34 +291,53 @@ fn perform(reader: *Reader, directive: Directive) Error!void {
         .ObjectInstance => try reader.objectInstance(),
         .WorldBegin => try reader.worldBegin(),
         .WorldEnd => try reader.worldEnd(),
-        .Include, .Import => {
-            const at = try reader.expectString();
-            const path = try reader.input.string();
-            try reader.input.include(at, path);
+        .Include => try reader.input.includeNext(false),
+        .Import => try reader.beginImport(),
+        .ColorSpace => {
+            const name = try reader.text();
+            if (spectra.Space.named(name)) |space| graphics.space = space else try reader
+                .forgive("color space", "no color space {f}: nothing changes", .{quote(name)});
         },
-        .ColorSpace => _ = try reader.text(),
         .MediumInterface => {
             _ = try reader.text();
             if (reader.input.peek() == '"') _ = try reader.input.string();
             try reader.note(directive, "participating media are not supported");
         },
         .NamedMaterial => try reader.namedMaterial(),
-        .Option => try reader.parameters.read(reader.input),
+        .Option => try reader.option(),
         .Texture => {
             const name = try reader.text();
             _ = try reader.text(); // Its type: all of them are colours here.
             const class = try reader.text();
-            try reader.parameters.read(reader.input);
+            try reader.readParameters(directive);
             const textures = &reader.colors.textures;
             const made = try textures.make(&reader.colors, class, &reader.parameters);
             try reader.keep(Textures.Texture, &textures.named, name, made);
         },
         else => {
             const name = try reader.text();
-            try reader.parameters.read(reader.input);
+            try reader.readParameters(directive);
             try reader.performNamed(directive, name);
         },
     }
+}
+
+fn readParameters(reader: *Reader, directive: Directive) Error!void {
+    const input = reader.input;
+    try reader.parameters.read(input);
+    reader.colors.space = reader.graphics.space;
+    const target = directive.target() orelse return;
+    try reader.graphics.defaults.complete(input.gpa, target, &reader.parameters, input.directive);
+}
+
+/// Forgives what is wrong with the directive.
+fn forgive(
+    reader: *Reader,
+    kind: []const u8,
+    comptime format: []const u8,
+    arguments: anytype,
+) Error!void {
+    return reader.input.forgive(reader.input.directive, kind, format, arguments);
 }
 
 /// Directives of the form `Directive "name" parameters`.
@@ -278,7 +349,10 @@ fn performNamed(reader: *Reader, directive: Directive, name: []const u8) Error!v
             try reader.view.setCamera(reader.input, name, parameters, to_camera);
             try reader.keep(Transform, &reader.spaces, "camera", reader.view.place.?);
         },
-        .Film => try reader.view.setFilm(reader.input, parameters),
+        .Film => {
+            try reader.view.setFilm(reader.input, parameters, name);
+            reader.colors.is_version_4 = reader.view.is_version_4;
+        },
         .Sampler => try reader.sampler(),
         .Integrator, .SurfaceIntegrator => try reader.integrator(name),
         .Renderer => {
@@ -288,10 +362,7 @@ fn performNamed(reader: *Reader, directive: Directive, name: []const u8) Error!v
         },
         .Material => reader.graphics.material = try reader.makeMaterial(name),
         .MakeNamedMaterial => {
-            const type_name = parameters.string("type") orelse
-                return reader.input.failHere("the material has no type", .{});
-            const made = try reader.makeMaterial(type_name);
-            try reader.keep(Material, &reader.named, name, made);
+            try reader.makeNamedMaterial(name);
         },
         .LightSource => try lights.add(&.{
             .colors = &reader.colors,
@@ -304,7 +375,10 @@ fn performNamed(reader: *Reader, directive: Directive, name: []const u8) Error!v
         .Volume, .MakeNamedMedium => {
             try reader.note(directive, "participating media are not supported");
         },
-        .Attribute => try reader.note(directive, "defaults of parameters are not read"),
+        .Attribute => if (std.meta.stringToEnum(Defaults.Target, name)) |target|
+            try reader.graphics.defaults.add(reader.arena, target, parameters)
+        else
+            try reader.forgive("attribute", "Attribute of {f}, which is nothing", .{quote(name)}),
         else => {}, // What remains changes how PBRT computes the picture.
     }
 }
@@ -321,10 +395,10 @@ fn numbers(reader: *Reader, comptime count: usize) Error![count]f64 {
     if (bracketed) input.top().cursor += 1;
     var result: [count]f64 = undefined;
     for (&result) |*to| {
-        _ = input.peek();
+        _ = try input.peekInList();
         const top = input.top();
         to.* = number.float(top.bytes, &top.cursor) catch |err|
-            return Parameters.failNumber(input, top.cursor, err, "number");
+            return Parameters.failNumber(input, err, "number");
     }
     if (!bracketed) return result;
     if (input.peek() != ']') return input.fail(input.offset(), "']' is expected", .{});
@@ -338,16 +412,10 @@ fn matrix(reader: *Reader) Error!Transform {
         reader.input.failHere("the matrix is not affine", .{});
 }
 
-/// Position of the string that follows.
-fn expectString(reader: *Reader) Error!usize {
-    if (reader.input.peek() == '"') return reader.input.offset();
-    return reader.input.fail(reader.input.offset(), "a string is expected", .{});
-}
-
 /// A string.
 fn text(reader: *Reader) Error![]const u8 {
-    _ = try reader.expectString();
-    return reader.input.string();
+    _, const string = try reader.input.expectString();
+    return string;
 }
 
 /// Puts a value under a name that the text gives, which is copied.
@@ -387,24 +455,39 @@ fn activeTransform(reader: *Reader) Error!void {
 }
 
 fn begin(reader: *Reader, kind: Kept.Kind) Error!void {
-    if (reader.stack.items.len == limits.attribute_depth_max) return reader.input.failHere(
+    if (reader.kept.items.len == limits.attribute_depth_max) return reader.input.failHere(
         "over {d} blocks within each other",
         .{limits.attribute_depth_max},
     );
-    const graphics = reader.graphics;
-    try reader.stack.append(reader.input.gpa, .{ .kind = kind, .graphics = graphics });
+    const gpa = reader.input.gpa;
+    const graphics = &reader.graphics;
+    try reader.kept.append(gpa, .{
+        .kind = kind,
+        .transform = graphics.transform,
+        .at_start = graphics.at_start,
+    });
+    if (kind != .Transform) try reader.stack.append(gpa, graphics.*);
 }
 
+/// Ends the block that was begun last. Of what kind it is does not matter but to PBRT's version 4:
+/// version 3 has one stack of transformations, one of all else, and looks at neither's kind.
 fn end(reader: *Reader, kind: Kept.Kind) Error!void {
-    const kept = reader.stack.getLastOrNull() orelse
+    const outside: Outside = reader.imports.getLastOrNull() orelse
+        .{ .graphics = undefined, .kept_count = 0, .stack_count = 0 };
+    const stack = &reader.stack;
+    if (reader.kept.items.len <= outside.kept_count or
+        (kind != .Transform and stack.items.len <= outside.stack_count))
         return reader.input.failHere("{t}End without {0t}Begin", .{kind});
-    if (kept.kind != kind)
-        return reader.input.failHere("{t}End, but {t}Begin came last", .{ kind, kept.kind });
-    _ = reader.stack.pop();
-    if (kind == .Transform) {
-        reader.graphics.transform = kept.graphics.transform;
-        reader.graphics.at_start = kept.graphics.at_start;
-    } else reader.graphics = kept.graphics;
+    const kept = reader.kept.pop().?;
+    if (kept.kind != kind) try reader.input.forgive(
+        reader.input.directive,
+        "misnested",
+        "{t}End, but {t}Begin came last: the order does not count",
+        .{ kind, kept.kind },
+    );
+    if (kind != .Transform) reader.graphics = stack.pop().?;
+    reader.graphics.transform = kept.transform;
+    reader.graphics.at_start = kept.at_start;
 }
 
 fn objectBegin(reader: *Reader) Error!void {
@@ -456,7 +539,7 @@ fn worldBegin(reader: *Reader) Error!void {
 
 /// The state is that of a new text; the view stays, for it is this world's.
 fn worldEnd(reader: *Reader) Error!void {
-    try reader.warnOfBlocks(reader.input.offset());
+    try reader.endBlocks(0, 0);
     reader.object = null;
     reader.phase = .done;
     reader.graphics = .{};
@@ -471,7 +554,26 @@ fn sampler(reader: *Reader) Error!void {
     else
         parameters.integer("pixelsamples") orelse return;
     const range = choices.sample_count;
-    reader.sample_count = @intCast(std.math.clamp(asked, range.min, range.max));
+    const count = std.math.clamp(asked, range.min, range.max);
+    if (count != asked) try reader.input.warnHere(
+        "samples",
+        "Sampler: {d} samples a pixel are taken as {d}",
+        .{ asked, count },
+    );
+    reader.sample_count = @intCast(count);
+}
+
+/// `Option "type name" value`: none of them has to do with what is seen, but for one.
+fn option(reader: *Reader) Error!void {
+    try reader.parameters.read(reader.input);
+    const known: std.StaticStringMap(void) = .initComptime(.{
+        .{"disablepixeljitter"},    .{"disabletexturefiltering"}, .{"disablewavelengthjitter"},
+        .{"displacementedgescale"}, .{"msereferenceimage"},       .{"msereferenceout"},
+        .{"rendercoordsys"},        .{"seed"},                    .{"pixelstats"},
+        .{"wavefront"},
+    });
+    for (reader.parameters.items.items) |*item| if (!known.has(item.name))
+        try reader.input.warnHere(item.name, "Option {f} is not read", .{quote(item.name)});
 }
 
 /// All integrators are Whitted's here; "maxdepth" counts rays in his and in direct lighting,
@@ -487,7 +589,31 @@ fn integrator(reader: *Reader, name: []const u8) Error!void {
     const asked = reader.parameters.integer("maxdepth") orelse return;
     const counts_rays = std.mem.eql(u8, name, "whitted") or std.mem.eql(u8, name, "directlighting");
     const bounces = @as(i64, asked) - @intFromBool(counts_rays);
-    reader.depth = @intCast(std.math.clamp(bounces, choices.depth.min, choices.depth.max));
+    const depth = std.math.clamp(bounces, choices.depth.min, choices.depth.max);
+    if (depth != bounces) try reader.input.warnHere(
+        "depth",
+        "{f}: maxdepth {d} is taken as {d}",
+        .{ quote(name), asked, depth + @intFromBool(counts_rays) },
+    );
+    reader.depth = @intCast(depth);
+}
+
+/// A material that has been named before becomes what is defined now.
+fn makeNamedMaterial(reader: *Reader, name: []const u8) Error!void {
+    const type_name = reader.parameters.string("type") orelse "";
+    if (type_name.len == 0)
+        try reader.forgive("material type", "the material has no type: it is matte", .{});
+    var made = try reader.makeMaterial(if (type_name.len == 0) "matte" else type_name);
+    if (reader.undefined_materials.fetchRemove(name)) |used| {
+        const all = reader.builder.scene.materials.items;
+        all[used.value.index] = all[made.index];
+        if (made.is_boundary) {
+            all[used.value.index].alpha_mode = .mask;
+            all[used.value.index].base_color[3] = 0;
+        }
+        made.index = used.value.index;
+    }
+    try reader.keep(Material, &reader.named, name, made);
 }
 
 fn makeMaterial(reader: *Reader, name: []const u8) Error!Material {
@@ -525,18 +651,40 @@ fn namedMaterial(reader: *Reader) Error!void {
     reader.graphics.material = try reader.materialNamed(try reader.text());
 }
 
+/// One that is not defined is matte until it is.
 fn materialNamed(reader: *Reader, name: []const u8) Error!Material {
-    return reader.named.get(name) orelse
-        reader.input.failHere("no material {f}", .{quote(name)});
+    if (reader.named.get(name)) |known| return known;
+    if (reader.undefined_materials.get(name)) |known|
+        return .{ .index = known.index, .is_boundary = false };
+    const index = try reader.builder.scene.addMaterial(materials.matte_default);
+    const place = try reader.input.nameOf(reader.arena, reader.input.directive);
+    try reader.keep(Undefined, &reader.undefined_materials, name, .{
+        .index = index,
+        .place = place,
+    });
+    return .{ .index = index, .is_boundary = false };
+}
+
+/// Version 4 allows that a material is named before it is defined, but not that it never is.
+fn forgiveUndefined(reader: *Reader) Error!void {
+    var names = reader.undefined_materials.iterator();
+    var first: ?[]const u8 = null;
+    while (names.next()) |entry| {
+        const name = entry.key_ptr.*;
+        if (first == null or std.mem.lessThan(u8, name, first.?)) first = name;
+    }
+    const name = first orelse return;
+    try reader.input.forgiveFile("{s}: material {f} is not defined: grey matte stands for it", .{
+        reader.undefined_materials.get(name).?.place, quote(name),
+    });
 }
 
 fn areaLightSource(reader: *Reader) Error!void {
     const parameters = &reader.parameters;
     var area_light: AreaLight = .{
-        .radiance = try lights.scaledColor(&reader.colors, parameters, "L", 1e30),
+        .emission = try .read(&reader.colors, parameters, "L", 1e30),
         .two_sided = parameters.boolean("twosided", false),
         .power = parameters.float("power", 0),
-        .normalization = try lights.normalization(&reader.colors, parameters, "L"),
     };
     if (parameters.string("filename")) |path| {
         const shown = try reader.colors.textures.show(&.{ .path = path });
@@ -562,16 +710,26 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
         "Shape {f} is not supported and left out",
         .{quote(name)},
     );
-    if (graphics.material) |material| if (material.is_boundary) return;
-    const material = try reader.shapeMaterial() orelse return;
-    const surface = &reader.builder.scene.materials.items[material];
+    const is_boundary = if (graphics.material) |material| material.is_boundary else false;
+    const seen = if (is_boundary) null else try reader.shapeMaterial();
     const has_picture = if (graphics.area_light) |light| light.picture != null else false;
-    reader.tessellator.wants_texcoords =
-        surface.hasTextures() or surface.anisotropy > 0 or has_picture;
-    if (graphics.area_light) |area_light| {
-        if (reader.object == null) return reader.addAreaLight(kind, material, area_light);
-        try input.warnHere("area light", "Shape: objects do not shine", .{});
+    reader.tessellator.wants_texcoords = has_picture;
+    if (seen) |seen_index| {
+        const surface = &reader.builder.scene.materials.items[seen_index];
+        if (surface.hasTextures() or surface.anisotropy > 0)
+            reader.tessellator.wants_texcoords = true;
     }
+    if (graphics.area_light) |area_light| {
+        if (reader.object != null) {
+            try input.warnHere("area light", "Shape: objects do not shine", .{});
+        } else if (!is_boundary) {
+            return reader.addAreaLight(kind, seen, area_light);
+        } else if (!reader.colors.is_version_4) {
+            const black = try reader.builder.scene.addMaterial(materials.black);
+            return reader.addAreaLight(kind, black, area_light);
+        } else try input.warnHere("boundary", "Shape: what bounds a medium does not shine", .{});
+    }
+    const material = seen orelse return;
     const mesh = try reader.meshOf(kind, material);
     if (reader.object == null)
         try reader.builder.instantiate(mesh, &graphics.transform)
@@ -632,37 +790,36 @@ fn meshOf(reader: *Reader, kind: shapes.Kind, material: u32) Error!u32 {
     return mesh;
 }
 
-/// A shape that is an area light: bright from its front, plain from behind.
+/// A shape that is an area light: bright from its front, plain from behind; null: it is not seen.
 fn addAreaLight(
     reader: *Reader,
     kind: shapes.Kind,
-    material: u32,
+    material: ?u32,
     area_light: AreaLight,
 ) Error!void {
     const builder = reader.builder;
     const place = &reader.graphics.transform;
     const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
-    var bright = builder.scene.materials.items[material];
-    const radiance = if (area_light.power > 0) radiance: {
-        const sides: f64 = if (area_light.two_sided) 2 else 1;
-        const of_unit = sides * std.math.pi * lights.areaOf(&geometry, place);
-        if (!(of_unit > 0)) break :radiance area_light.radiance;
-        const factor = area_light.normalization * area_light.power / of_unit;
-        break :radiance lights.scaled(area_light.radiance, factor);
-    } else area_light.radiance;
-    bright.emissive = radiance;
+    var bright = if (material) |seen|
+        builder.scene.materials.items[seen]
+    else
+        materials.hidden_lamp;
+    const sides: f64 = if (area_light.two_sided) 2 else 1;
+    const of_unit = sides * std.math.pi * lights.areaOf(&geometry, place);
+    bright.emissive = area_light.emission.by(area_light.power, of_unit);
     bright.emissive_texture = area_light.picture;
     bright.double_sided = area_light.two_sided;
     const front = try builder.addMesh(geometry, try builder.scene.addMaterial(bright));
     try builder.instantiate(front, place);
+    builder.scene.scene.has_area_lights = true;
+    const seen = material orelse return;
     if (!area_light.two_sided) {
-        var plain = builder.scene.materials.items[material];
+        var plain = builder.scene.materials.items[seen];
         plain.double_sided = false;
         const back = try shapes.turned(&reader.tessellator, &geometry);
         const mesh = try builder.addMesh(back, try builder.scene.addMaterial(plain));
         try builder.instantiate(mesh, place);
     }
-    builder.scene.scene.has_area_lights = true;
 }
 
 /// Completes the scene with what is known at the end of the text.
@@ -670,10 +827,11 @@ pub fn finish(reader: *Reader) Error!void {
     const builder = reader.builder;
     const scene = &builder.scene.scene;
     const view = &reader.view;
+    try reader.forgiveUndefined();
     if (view.place == null) {
         view.place = .identity;
         try reader.input.warn(
-            reader.input.top().bytes.len,
+            reader.input.offset(),
             "camera",
             "no Camera: PBRT's own at the origin looks along z with fov 90",
             .{},
@@ -688,6 +846,7 @@ pub fn finish(reader: *Reader) Error!void {
     const has_lights = builder.scene.lights.items.len > 0 or scene.has_area_lights;
     if (builder.has_unknown_sky and builder.sky == null and has_lights)
         builder.sky = @splat(lights.unknown_sky);
+    builder.brighten(view.exposure());
     if (builder.sky) |sky| {
         if (scene.environment == null) scene.background = sky;
         scene.ambient = spectra.luminance(sky);

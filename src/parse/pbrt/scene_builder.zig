@@ -6,6 +6,7 @@
 //! the camera does not mirror itself, and the picture is the same as PBRT's in both cases.
 
 const std = @import("std");
+const lights = @import("lights.zig");
 const limits = @import("limits.zig");
 const math = @import("../../math.zig");
 const scene_data = @import("../../scene.zig");
@@ -143,6 +144,17 @@ pub fn addLight(
     var placed = light;
     placed.node = try builder.scene.addNode(root, place);
     try builder.scene.addLight(placed);
+}
+
+/// Makes all light so much brighter.
+pub fn brighten(builder: *SceneBuilder, factor: f32) void {
+    if (factor == 1) return;
+    const scene = builder.scene;
+    for (scene.lights.items) |*light| light.color = lights.scaled(light.color, factor);
+    for (scene.materials.items) |*material|
+        material.emissive = lights.scaled(material.emissive, factor);
+    if (scene.scene.environment) |*map| map.scale = lights.scaled(map.scale, factor);
+    if (builder.sky) |*sky| sky.* = lights.scaled(sky.*, factor);
 }
 
 /// Adds the camera and gives the world its hand. `camera` maps the camera's space, x right, y up

@@ -52,6 +52,44 @@ pub fn fromXyz(xyz: [3]f64) Vec3 {
     });
 }
 
+/// A space of linear RGB; all of them have D65 for white here, ACES' own is adapted (Bradford).
+pub const Space = enum {
+    srgb,
+    @"dci-p3",
+    rec2020,
+    @"aces2065-1",
+
+    /// By the name that PBRT's ColorSpace has for it.
+    pub fn named(name: []const u8) ?Space {
+        return std.meta.stringToEnum(Space, name);
+    }
+
+    /// Linear RGB with the primaries of sRGB.
+    pub fn toOurs(space: Space, rgb: Vec3) Vec3 {
+        const rows: [3]Vec3 = switch (space) {
+            .srgb => return rgb,
+            .@"dci-p3" => .{
+                .{ 1.224940, -0.224940, 0 },
+                .{ -0.042057, 1.042057, 0 },
+                .{ -0.019638, -0.078636, 1.098274 },
+            },
+            .rec2020 => .{
+                .{ 1.660491, -0.587641, -0.072850 },
+                .{ -0.124550, 1.132900, -0.008350 },
+                .{ -0.018151, -0.100579, 1.118730 },
+            },
+            .@"aces2065-1" => .{
+                .{ 2.521686, -1.134131, -0.387555 },
+                .{ -0.276480, 1.372719, -0.096239 },
+                .{ -0.015378, -0.152975, 1.168353 },
+            },
+        };
+        var result: Vec3 = undefined;
+        for (&result, rows) |*to, row| to.* = math.vec3.dot(row, rgb);
+        return finite(.{ result[0], result[1], result[2] });
+    }
+};
+
 /// In f32, what is too large as the largest, denormals as zeros.
 fn finite(rgb: [3]f64) Vec3 {
     const largest: f64 = std.math.floatMax(f32);
@@ -171,6 +209,16 @@ test "a spectrum of ones has luminance one and the tint of the equal-energy whit
     try std.testing.expect(red[0] > 4 * @abs(red[1]) and red[0] > 4 * @abs(red[2]));
     for ([_][]const f32{ &.{}, &.{1}, &.{ 500, 1, 400, 1 }, &.{ 500, 1, 500, 2 } }) |bad| {
         try std.testing.expectEqual(null, fromPairs(bad));
+    }
+}
+
+test "white is white in every space, and their primaries are beyond ours" {
+    for (std.enums.values(Space)) |space| {
+        for (space.toOurs(.{ 1, 1, 1 })) |channel|
+            try std.testing.expectApproxEqAbs(1, channel, 2e-6);
+        const red = space.toOurs(.{ 1, 0, 0 });
+        try std.testing.expect(red[0] >= 1 and red[1] <= 0 and red[2] <= 0);
+        try std.testing.expectEqual(space, Space.named(@tagName(space)).?);
     }
 }
 

@@ -17,8 +17,18 @@ const Error = Input.Error;
 
 const View = @This();
 
+/// What sees as the eye does: the other sensors of version 4 are cameras'.
+const plain_sensor = "cie1931";
+const film_scale_max = 1e6;
+
 /// Of the film, in pixels.
 size: [2]u32 = .{ 640, 480 },
+/// The film is not one of the older dialects.
+is_version_4: bool = false,
+/// What the film multiplies radiance with.
+film_scale: f32 = 1,
+/// How long the shutter is open, which counts in version 4 alone.
+open_time: f32 = 1,
 kind: enum { perspective, orthographic } = .perspective,
 /// Angle over the shorter side.
 fov_deg: f64 = 90,
@@ -30,18 +40,35 @@ aspect: ?f64 = null,
 place: ?Transform = null,
 
 /// `Film "name" ...`.
-pub fn setFilm(view: *View, input: *Input, parameters: *const Parameters) Error!void {
+pub fn setFilm(
+    view: *View,
+    input: *Input,
+    parameters: *const Parameters,
+    name: []const u8,
+) Error!void {
     var size: [2]u32 = .{ 640, 480 };
-    for (&size, [_][]const u8{ "xresolution", "yresolution" }) |*side, name| {
-        const value = parameters.integer(name) orelse continue;
+    for (&size, [_][]const u8{ "xresolution", "yresolution" }) |*side, key| {
+        const value = parameters.integer(key) orelse continue;
         if (!settings.side.holds(value))
-            return input.failHere("{s} is {d}, not " ++ settings.side.text(), .{ name, value });
+            return input.failHere("{s} is {d}, not " ++ settings.side.text(), .{ key, value });
         side.* = @intCast(value);
     }
     if (@as(u64, size[0]) * size[1] > settings.pixel_count_max)
         return input.failHere("the film has over {d} pixels", .{settings.pixel_count_max});
     if (parameters.find("cropwindow") != null or parameters.find("pixelbounds") != null)
         try input.warnHere("cropwindow", "Film: crop windows are not supported", .{});
+    view.is_version_4 = !std.mem.eql(u8, name, "image");
+    view.film_scale = parameters.float("scale", 1);
+    if (view.is_version_4) {
+        view.film_scale = parameters.float("iso", 100) / 100;
+        const sensor = parameters.string("sensor") orelse plain_sensor;
+        if (!std.mem.eql(u8, sensor, plain_sensor) or parameters.float("whitebalance", 0) != 0)
+            try input.warnHere("sensor", "Film: sensors and white balance are not read", .{});
+    }
+    if (!(view.film_scale > 0 and view.film_scale <= film_scale_max)) {
+        try input.warnHere("film scale", "Film: its scale is {d}, taken as 1", .{view.film_scale});
+        view.film_scale = 1;
+    }
     view.size = size;
 }
 
@@ -57,7 +84,15 @@ pub fn setCamera(
         return input.failHere("the camera's transformation has no inverse", .{});
     if (!transforms.fitsSingle(&place))
         return input.failHere("the camera is too far away", .{});
-    var result: View = .{ .size = view.size, .place = place };
+    var result: View = .{
+        .size = view.size,
+        .is_version_4 = view.is_version_4,
+        .film_scale = view.film_scale,
+        .place = place,
+    };
+    const opens = parameters.float("shutteropen", 0);
+    const open_time = @abs(parameters.float("shutterclose", 1) - opens);
+    if (open_time > 0 and open_time <= film_scale_max) result.open_time = open_time;
     if (std.mem.eql(u8, name, "orthographic")) {
         result.kind = .orthographic;
     } else if (!std.mem.eql(u8, name, "perspective")) {
@@ -86,6 +121,11 @@ pub fn setCamera(
     if (parameters.float("lensradius", 0) > 0)
         try input.warnHere("lensradius", "Camera: lenses are not supported, all is in focus", .{});
     view.* = result;
+}
+
+/// What light is multiplied with on its way to the picture.
+pub fn exposure(view: *const View) f32 {
+    return if (view.is_version_4) view.film_scale * view.open_time else view.film_scale;
 }
 
 /// The projection, and where it is seen from: windows beside the middle move an orthographic

@@ -94,6 +94,21 @@ const Item = struct {
     begin: u32,
 };
 
+/// A stretch of the tree that one thread counts and writes.
+const Share = struct {
+    item: Item,
+    depth: u32,
+    node_begin: u32 = 0,
+    pack_begin: u32 = 0,
+    node_count: u32 = 0,
+    pack_count: u32 = 0,
+    depth_max: u32 = 0,
+    cost: f64 = 0,
+};
+
+/// A wide node to be written.
+const Visit = struct { item: Item, depth: u32, index: u32 };
+
 fn Collapse(comptime width: u32) type {
     return struct {
         input: *const Input,
@@ -331,21 +346,6 @@ fn Collapse(comptime width: u32) type {
                 std.mem.reverse(Share, waiting.items[bottom..]);
             }
         }
-
-        /// A stretch of the tree that one thread counts and writes.
-        const Share = struct {
-            item: Item,
-            depth: u32,
-            node_begin: u32 = 0,
-            pack_begin: u32 = 0,
-            node_count: u32 = 0,
-            pack_count: u32 = 0,
-            depth_max: u32 = 0,
-            cost: f64 = 0,
-        };
-
-        /// A wide node to be written.
-        const Visit = struct { item: Item, depth: u32, index: u32 };
 
         const EmitWork = struct {
             collapse: *const Self,

@@ -8,7 +8,7 @@
 //! the standard library reads the text again.
 
 const std = @import("std");
-const math = @import("../../math.zig");
+const math = @import("../math.zig");
 
 /// `NotANumber`: something else stands there. `OutOfRange`: it has no finite value in the type.
 pub const Error = error{ NotANumber, OutOfRange };
@@ -84,6 +84,31 @@ noinline fn slow(text: [:0]const u8, start: *usize) Error!f32 {
     return math.flushDenormal(value);
 }
 
+/// The same where "nan" and "inf" in all spellings, and what is out of range, are NaN.
+pub inline fn floatOrNan(text: [:0]const u8, start: *usize) error{NotANumber}!f32 {
+    return float(text, start) catch |err| switch (err) {
+        error.OutOfRange => skipNan(text, start),
+        error.NotANumber => if (isNan(text[start.*..endOf(text, start.*)]))
+            skipNan(text, start)
+        else
+            error.NotANumber,
+    };
+}
+
+fn skipNan(text: [:0]const u8, start: *usize) f32 {
+    start.* = endOf(text, start.*);
+    return std.math.nan(f32);
+}
+
+/// Whether C's libraries print what is not finite so: `-nan`, `nan(ind)`, `Infinity`.
+fn isNan(word: []const u8) bool {
+    const digits = std.mem.trimStart(u8, word, "+-");
+    for ([_][]const u8{ "nan", "inf" }) |name| {
+        if (std.ascii.startsWithIgnoreCase(digits, name)) return true;
+    }
+    return false;
+}
+
 /// Where the word that starts at `start` ends.
 pub fn endOf(text: [:0]const u8, start: usize) usize {
     var index = start;
@@ -139,6 +164,19 @@ test "numbers in all their forms" {
     }
     var start: usize = 0;
     try std.testing.expectError(error.OutOfRange, float("1e999", &start));
+}
+
+test "what is not finite may be NaN" {
+    for ([_][:0]const u8{ "nan", "-NaN(ind)", "inf", "-Infinity", "1e99", "-1e999" }) |word| {
+        var start: usize = 0;
+        try std.testing.expect(std.math.isNan(try floatOrNan(word, &start)));
+        try std.testing.expectEqual(word.len, start);
+    }
+    for ([_][:0]const u8{ "", "x", "-", "1x" }) |word| {
+        var start: usize = 0;
+        try std.testing.expectError(error.NotANumber, floatOrNan(word, &start));
+        try std.testing.expectEqual(0, start);
+    }
 }
 
 test "the quick way rounds once: as the standard library does" {

@@ -1,0 +1,130 @@
+//! The command line of `raylane info`: arguments -> `Info`, or one line that says what is wrong.
+
+const std = @import("std");
+const arguments_file = @import("arguments.zig");
+const cli = @import("../cli.zig");
+const settings = @import("../settings.zig");
+const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const Section = arguments_file.Section;
+
+/// What to look at.
+pub const Info = struct {
+    scene: []const u8 = "",
+    /// Such a file is described all the same.
+    load: settings.Load = .{ .force = true },
+    json: bool = false,
+    quiet: bool = false,
+};
+
+const sections: []const Section = &.{
+    .{ .title = "Options", .options = &.{
+        .{ .usage = "--json", .help = "one JSON object in one line, see docs/info.md" },
+        .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
+        .{
+            .usage = "--material-variant N",
+            .help = "name or index of one of its variants of materials",
+        },
+        .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
+        .{
+            .usage = "--format-in FORMAT",
+            .help = "how to read the scene where its contents do not tell:\n" ++
+                arguments_file.namesOf(settings.SceneFormat),
+        },
+        .{
+            .usage = "--allow-outside",
+            .help = "let the scene name files outside of its own folder",
+        },
+        .{ .usage = "-q, --quiet", .help = "no warnings" },
+        .{ .usage = "-h, --help", .help = "print this" },
+    } },
+};
+
+const Reader = arguments_file.Arguments(sections);
+
+/// What `raylane info --help` prints.
+pub const help: []const u8 = "raylane " ++ cli.version ++
+    \\: says what is in a scene file
+    \\
+    \\usage: raylane info SCENE [options]
+    \\
+    \\Scenes, cameras, lights, variants and images with their sizes, how much is
+    \\drawn and where, about how much memory that takes, and what becomes of the
+    \\extensions that the file uses. Nothing is rendered and no image is decoded.
+    \\
+++ arguments_file.helpOf(sections) ++
+    \\
+    \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
+    \\supported. A file that is rendered only with --force is described.
+    \\
+;
+
+/// Reads the arguments after `info`.
+pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error!Info {
+    var reader: Reader = .{
+        .arguments = arguments,
+        .diagnostic = diagnostic,
+        .help = "raylane info --help",
+    };
+    var info: Info = .{};
+    var scene: ?[]const u8 = null;
+    while (try reader.next()) |argument| switch (argument) {
+        .word => |word| {
+            if (word.len == 0) return reader.fail("the scene's name is empty", .{});
+            if (scene != null) return reader.fail("one scene at a time", .{});
+            scene = word;
+        },
+        .flag => |flag| try set(&reader, &info, flag),
+    };
+    info.scene = scene orelse return reader.fail("no scene given", .{});
+    return info;
+}
+
+fn set(reader: *const Reader, info: *Info, given: Reader.Given) cli.Error!void {
+    switch (given.id) {
+        .json => info.json = true,
+        .scene => info.load.scene = cli.choiceOf(given.value) orelse
+            return reader.bad(given, "a scene's name or its index"),
+        .material_variant => info.load.material_variant = cli.choiceOf(given.value) orelse
+            return reader.bad(given, "a material variant's name or its index"),
+        .up_axis => info.load.up_axis = try reader.choice(given, settings.UpAxis),
+        .format_in => info.load.format = try reader.choice(given, settings.SceneFormat),
+        .allow_outside => info.load.allow_outside = true,
+        .quiet => info.quiet = true,
+        .help => unreachable, // Asked for before the rest is read.
+    }
+}
+
+const testing = std.testing;
+
+test "a scene and how to look at it" {
+    var diagnostic: Diagnostic = .{};
+    const info = try parse(&.{
+        "--json", "a.glb", "--scene=1", "--up-axis=z", "-q", "--material-variant", "red",
+    }, &diagnostic);
+    try testing.expectEqualStrings("a.glb", info.scene);
+    try testing.expect(info.json and info.quiet and info.load.force);
+    try testing.expectEqual(1, info.load.scene.index);
+    try testing.expectEqualStrings("red", info.load.material_variant.name);
+}
+
+test "mistakes name the option" {
+    for ([_]struct { []const u8, []const [:0]const u8 }{
+        .{ "no scene given (see raylane info --help)", &.{"--json"} },
+        .{ "one scene at a time", &.{ "a", "b" } },
+        .{ "empty", &.{""} },
+        .{ "'--up-axis'", &.{"--up-axis=x"} },
+        .{ "'--scene'", &.{"--scene="} },
+        .{ "'--format-in'", &.{"--format-in=fbx"} },
+        .{ "did you mean '--json'?", &.{"--jsn"} },
+    }) |case| {
+        var diagnostic: Diagnostic = .{};
+        try testing.expectError(error.UsageInvalid, parse(case[1], &diagnostic));
+        errdefer std.debug.print("{s}\n", .{diagnostic.message.text()});
+        try testing.expect(std.mem.find(u8, diagnostic.message.text(), case[0]) != null);
+    }
+}
+
+test "the help fits a screen" {
+    var lines = std.mem.splitScalar(u8, help, '\n');
+    while (lines.next()) |line| try testing.expect(line.len <= 80);
+}
