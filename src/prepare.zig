@@ -253,11 +253,11 @@ pub const PoseCache = struct {
     }
 };
 
-/// Places what is in a scene and builds the tree over it: a world in which nothing shines and that
-/// is seen by nobody yet. Its memory comes from `gpa` by way of arenas: its few large arrays are a
-/// block of `gpa` each, of which an arena asks for half as much again but touches only what is
-/// used. What was loaded of the scene has to live as long. Fills `prepare_ns` and `bvh_build_ns` of
-/// `times`.
+/// Places what is in a scene, as it stands, and builds the tree over it: a world in which nothing
+/// shines and that is seen by nobody yet. Its memory comes from `gpa` by way of arenas: its few
+/// large arrays are a block of `gpa` each, of which an arena asks for half as much again but
+/// touches only what is used. What was loaded of the scene has to live as long. Fills `prepare_ns`
+/// and `bvh_build_ns` of `times`.
 pub fn pose(
     gpa: Allocator,
     io: std.Io,
@@ -355,9 +355,9 @@ fn placeAll(
     const gpa = cache.gpa;
     _ = posed.pose_arena.reset(.retain_capacity);
     const arena = posed.pose_arena.allocator();
+    const place = try place_file.compose(arena, from);
     const drawn: Drawn = try .of(arena, from, &loaded.parts, &loaded.textures);
     const parts = &drawn.parts;
-    const place = try place_file.compose(arena, from);
     var soup = try cache.plan.place(
         gpa,
         arena,
