@@ -96,6 +96,20 @@ pub const pictureSize = view_file.pictureSize;
 /// Bytes that textures take.
 pub const planTextures = texture.plan;
 
+/// Which meshes of a scene its instances share, unless the user says; false: none.
+pub fn chooseShared(
+    gpa: Allocator,
+    from: *const Scene,
+    chosen: []bool,
+) error{OutOfMemory}!bool {
+    return sharing_file.choose(gpa, &.{
+        .sources = &.{},
+        .materials = from.materials,
+        .meshes = from.meshes,
+        .instances = from.instances,
+    }, .{}, chosen);
+}
+
 /// What is seen of it, and in what light.
 pub const ViewSettings = struct {
     camera: choices.Camera = .default,

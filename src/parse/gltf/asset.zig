@@ -15,8 +15,9 @@ const Error = Source.Error;
 /// Names of extensions in one warning.
 const named_count_max = 6;
 
-/// Checks the version and the required extensions.
-pub fn check(source: *const Source) Error!void {
+/// Checks the version and the required extensions. What can be drawn without force is: then it has
+/// no effect.
+pub fn check(source: *Source) Error!void {
     const data = source.data;
     const version = try parseVersion(source, "version", data.asset.version);
     const wanted = if (data.asset.min_version == null)
@@ -32,17 +33,19 @@ pub fn check(source: *const Source) Error!void {
     for (Source.slice(data.extensions_required, data.extensions_required_count)) |raw| {
         const name = std.mem.span(@as([*:0]const u8, raw));
         const is_accepted = if (extensions.find(name)) |known| known.mayBeRequired() else false;
+        const lacks_draco = !draco.is_held and std.mem.eql(u8, name, "KHR_draco_mesh_compression");
+        if (is_accepted and !lacks_draco) continue;
+        source.builder.scene.file.needs_force = true;
         if (source.force) continue;
-        if (!is_accepted) return source.fail(
+        return if (lacks_draco) source.fail(
+            "the required extension {f} needs a build with Draco (-Ddraco)",
+            .{diagnostic.quote(name)},
+        ) else source.fail(
             "the required extension {f} is not supported (see --force)",
             .{diagnostic.quote(name)},
         );
-        if (!draco.is_held and std.mem.eql(u8, name, "KHR_draco_mesh_compression"))
-            return source.fail(
-                "the required extension {f} needs a build with Draco (-Ddraco)",
-                .{diagnostic.quote(name)},
-            );
     }
+    if (!source.builder.scene.file.needs_force) source.force = false;
     const required = Source.slice(data.extensions_required, data.extensions_required_count);
     const used = Source.slice(data.extensions_used, data.extensions_used_count);
     warnOf(source, &.{required}, isForced, "not supported, and yet required: the extensions ");
