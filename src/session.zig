@@ -68,6 +68,8 @@ pub const Pose = struct {
     /// Width of the tree: the variant's that is to render.
     lanes: u8,
     tree_quality: settings.TreeQuality = .default,
+    /// When instances share their meshes.
+    sharing: prepare.SharingRule = .{},
     animation: settings.Animation = .{},
     /// What `view` will be asked for: points and lines are as large as its pixels want them, and
     /// stay so until the next pose.
@@ -225,9 +227,9 @@ pub const Session = struct {
     }
 
     /// Places the geometry at a moment of the scene's animations and builds the tree over it; the
-    /// first time, decodes the textures. It may be called again, also where nodes, weights and
-    /// materials of a borrowed scene have changed since, and nothing else: arrays are written once
-    /// more, and the tree is fitted. Asserts that there is a scene.
+    /// first time, decodes the textures. It may be called again, also where nodes and weights of a
+    /// borrowed scene have changed since, and nothing else: arrays are written once more, and the
+    /// tree is fitted. Asserts that there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
         errdefer session.dropWorld();
         const scene = &session.scene.?;
@@ -239,19 +241,12 @@ pub const Session = struct {
             try session.diagnostic.settle();
         }
         const loaded = &session.loaded.?;
-        const diagnostic = session.diagnostic;
-        const moment = try prepare.animateScene(session.gpa, scene, chosen.animation, diagnostic);
-        if (session.posed) |*before| {
-            const is_same = std.meta.eql(before.moment.running, moment.moment.running);
-            if (!is_same) session.dropMotion();
-        }
-        session.dropPosed();
-        session.posed = moment;
-        const shown = &session.posed.?.scene;
+        const shown = try session.animate(chosen.animation);
         const pose_settings: prepare.PoseSettings = .{
             .lanes = chosen.lanes,
             .pool = &session.pool,
             .tree_quality = chosen.tree_quality,
+            .sharing = chosen.sharing,
             .point_size = chosen.view.point_size,
             .view = .{
                 .camera = chosen.view.camera,
@@ -268,7 +263,7 @@ pub const Session = struct {
                 shown,
                 loaded,
                 pose_settings,
-                diagnostic,
+                session.diagnostic,
                 &session.times,
             );
         };
@@ -279,11 +274,24 @@ pub const Session = struct {
             shown,
             loaded,
             pose_settings,
-            diagnostic,
+            session.diagnostic,
             &session.times,
         );
         session.world = posed.world;
         session.pose_cache = posed.cache;
+    }
+
+    /// The scene at a moment, until the next one.
+    fn animate(session: *Session, chosen: settings.Animation) Error!*const Scene {
+        const scene = &session.scene.?;
+        const posed = try prepare.animateScene(session.gpa, scene, chosen, session.diagnostic);
+        if (session.posed) |*before| {
+            const is_same = std.meta.eql(before.moment.running, posed.moment.running);
+            if (!is_same) session.dropMotion();
+        }
+        session.dropPosed();
+        session.posed = posed;
+        return &session.posed.?.scene;
     }
 
     /// Chooses what is seen, from where and by what light; the tree stays. Asserts that there is a

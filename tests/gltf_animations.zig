@@ -251,7 +251,7 @@ test "what cannot be read of an animation is left out with a warning, and the re
     const cases = comptime [_]Case{
         .{
             animation(node("1", "translation"), falling_times, vectors, "LINEAR"),
-            start ++ "sampler 0: its times do not ascend, left out",
+            start ++ "sampler 0: its times fall, left out",
         },
         .{
             animation(node("1", "translation"), broken_times, vectors, "LINEAR"),

@@ -60,7 +60,16 @@ pub fn gather(
     const most: usize = @intCast(std.math.clamp(vertex_count_max / vertex_count, 2, all.len));
     var motion: Motion = .{ .arena = .init(gpa), .geometry = .empty };
     errdefer motion.deinit();
-    var gathered: Gathered = .{ .arena = motion.arena.allocator() };
+    var scratch_state: std.heap.ArenaAllocator = .init(gpa);
+    defer scratch_state.deinit();
+    const scratch = scratch_state.allocator();
+    var unheard: Diagnostic = .{}; // The pose that is shown says what there is to say.
+    const plan: flatten.Plan = try .init(scratch, parts.instances, parts.meshes, 1, &unheard);
+    var gathered: Gathered = .{
+        .arena = motion.arena.allocator(),
+        .arrays = try plan.alloc(scratch, .{}),
+        .plan = plan,
+    };
     const count = @min(most, all.len);
     for (0..count) |index| {
         const place = if (count == 1) 0 else index * (all.len - 1) / (count - 1);
@@ -79,6 +88,9 @@ pub fn gather(
 
 const Gathered = struct {
     arena: Allocator,
+    plan: flatten.Plan,
+    /// Of one moment after the other.
+    arrays: flatten.Arrays,
     positions: std.ArrayList([3]f32) = .empty,
     colors: std.ArrayList([4]f32) = .empty,
     triangles: std.ArrayList(world.Triangle) = .empty,
@@ -100,13 +112,17 @@ const Gathered = struct {
         const shown = try animate.at(scratch, from, moment);
         const drawn: Drawn = try .of(scratch, &shown, parts, textures);
         const place = try pose_file.composeShifted(scratch, &shown, shift);
-        var unheard: Diagnostic = .{}; // The pose that is shown says what there is to say.
-        const instances = drawn.parts.instances;
-        const meshes = drawn.parts.meshes;
-        var plan: flatten.Plan = try .init(scratch, instances, meshes, 1, &unheard);
-        const arrays = try plan.alloc(scratch, .{});
-        const soup =
-            try plan.place(gpa, scratch, &arrays, instances, meshes, &place, pool, &unheard);
+        var unheard: Diagnostic = .{};
+        const soup = try gathered.plan.place(
+            gpa,
+            scratch,
+            &gathered.arrays,
+            drawn.parts.instances,
+            drawn.parts.meshes,
+            &place,
+            pool,
+            &unheard,
+        );
         const first: u32 = @intCast(gathered.positions.items.len);
         const own = soup.positions[0..soup.room.vertex_first];
         if (first + own.len > flatten.element_count_max) return error.SceneTooLarge;

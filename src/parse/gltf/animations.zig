@@ -283,10 +283,7 @@ fn readSampler(animations: *Animations, place: Place, index: u32, width: u32) Er
     var repeats = false;
     for (times[1..], times[0 .. times.len - 1]) |next, time| {
         if (next < time) {
-            source.forgive(
-                "{f}: sampler {d}: its times do not ascend, left out",
-                .{ place, index },
-            );
+            source.forgive("{f}: sampler {d}: its times fall, left out", .{ place, index });
             return null;
         }
         if (next == time) repeats = true;
