@@ -635,7 +635,8 @@ fn joinClusters(
         inline else => |*tree, tag| {
             const width = comptime std.fmt.parseInt(u32, @tagName(tag)[1..], 10) catch unreachable;
             sharing_file.renumber(width, tree, geometry);
-            tree.* = try join.join(cache.gpa, arena, &input, boxes, width, tree, facts);
+            const depth_max = join.depthMax(width);
+            tree.* = try join.join(cache.gpa, arena, &input, boxes, width, tree, depth_max, facts);
         },
     }
     facts.bytes += cache.sharing.bytes;
@@ -1507,6 +1508,7 @@ test {
     _ = bvh_wide;
     _ = alpha;
     _ = check;
+    _ = join;
     _ = deform;
     _ = emitter_lights;
     _ = flatten;
