@@ -111,6 +111,27 @@ test "OBJ: corners that share what they have are one vertex, polygons of all kin
     try expectEqual(0, scene.materials[0].metallic);
 }
 
+test "OBJ: a position may have any number of normals" {
+    var text: Io.Writer.Allocating = .init(gpa);
+    defer text.deinit();
+    const writer = &text.writer;
+    try writer.writeAll("v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+    const count = 20;
+    for (1..count + 1) |x| try writer.print("vn {d} 0 1\n", .{x});
+    for (0..2) |_| for (1..count + 1) |x| {
+        try writer.print("f 1//{d} 2//{d} 3//{d}\n", .{ x, x, x });
+    };
+    var scene = try readClean("a.obj", text.written());
+    defer scene.deinit();
+    const mesh = &scene.meshes[0];
+    try expectEqual(2 * count, mesh.triangles.len);
+    try expectEqual(3 * count, mesh.positions.len);
+    try expectEqual(mesh.triangles[count - 1], mesh.triangles[2 * count - 1]);
+    for (mesh.triangles[0..count], 1..) |corners, x| {
+        try expectEqual(@as(f32, @floatFromInt(x)), mesh.normals.?[corners[2]][0]);
+    }
+}
+
 test "OBJ: smoothing groups make normals, each for itself" {
     // Two squares that meet at a right angle, in one group, and then in two.
     const corners =

@@ -44,6 +44,7 @@ const Signature = struct {
 const picture = "; a picture is no scene";
 const convert = "; convert it to glTF";
 const environment = " picture; --env lights a scene with it";
+const tiles = "a 3D Tiles payload" ++ convert;
 const unpack = "; unpack it and name a file in it";
 const web_page = "a web page (HTML), perhaps what a failed download left";
 
@@ -82,6 +83,13 @@ const signatures = [_]Signature{
         .foreign = "an OLE document, as 3ds Max writes them" ++ convert,
     } },
     .{ .bytes = "LWO", .offset = 8, .is = .{ .foreign = "a LightWave object" ++ convert } },
+    .{ .bytes = "b3dm", .is = .{ .foreign = tiles } },
+    .{ .bytes = "i3dm", .is = .{ .foreign = tiles } },
+    .{ .bytes = "pnts", .is = .{ .foreign = tiles } },
+    .{ .bytes = "cmpt", .is = .{ .foreign = tiles } },
+    .{ .bytes = "xof 0", .is = .{ .foreign = "a DirectX file" ++ convert } },
+    .{ .bytes = "AC10", .is = .{ .foreign = "a DWG drawing" ++ convert } },
+    .{ .bytes = "ftyp", .offset = 4, .is = .{ .foreign = "a film or a picture, no scene" } },
     .{ .bytes = "#VRML", .is = .{ .foreign = "a VRML file" ++ convert } },
     .{ .bytes = "//Maya", .is = .{ .foreign = "a Maya scene" ++ convert } },
     .{ .bytes = "ISO-10303-21", .is = .{ .foreign = "a STEP file" ++ convert } },
@@ -190,6 +198,8 @@ fn ofText(start: []const u8) ?Recognized {
         if (word.len == 0) continue;
         if (isOneOf(word, pbrt_words)) return .{ .format = .pbrt };
         if (isOneOf(word, obj_words)) return .{ .format = .obj };
+        if (std.mem.eql(u8, word, "0") and std.mem.eql(u8, lines.next() orelse "", "SECTION"))
+            return .{ .foreign = "a DXF drawing" ++ convert };
         if (std.mem.eql(u8, word, "newmtl"))
             return .{ .foreign = "a material library of an OBJ file; name that file" };
         if (isOneOf(word, "OFF COFF NOFF"))
@@ -276,6 +286,8 @@ test "what is no scene is named" {
     try expectForeign("a COLLADA", "<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"\">");
     try expectForeign("an XML file", "<?xml version=\"1.0\"?><a/>");
     try expectForeign("a Git LFS pointer", "version https://git-lfs.github.com/spec/v1\noid");
+    try expectForeign("a 3D Tiles payload;", "b3dm\x01\x00");
+    try expectForeign("a DXF drawing;", "  0\r\nSECTION\r\n  2\r\nHEADER\r\n");
     try expectForeign("a text in UTF-16", "\xff\xfe{\x00");
     try expectForeign("a material library", "# by hand\n\nnewmtl a\nKd 1 0 0\n");
     try std.testing.expectEqualStrings(web_page, misplaced("\n<!DOCTYPE html><html>").?);
