@@ -189,7 +189,8 @@ fn writeCounts(writer: *Writer, counts: *const scene_data.File.Counts) Writer.Er
 
 fn writeDrawn(writer: *Writer, info: *const Info) Writer.Error!void {
     const drawn = &info.drawn;
-    try writer.print("drawn        {d} triangles", .{drawn.triangle_count});
+    const noun = if (drawn.triangle_count == 1) "triangle" else "triangles";
+    try writer.print("drawn        {d} {s}", .{ drawn.triangle_count, noun });
     if (drawn.triangle_count != drawn.unique_triangle_count) {
         try writer.print(" ({d} unique)", .{drawn.unique_triangle_count});
     }
