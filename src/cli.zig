@@ -1064,6 +1064,25 @@ test "viewpoints arrive as they were meant, and may not contradict each other" {
     }
 }
 
+test "an animation by name, index or all, and a time of the first without" {
+    const Which = settings.Animation.Which;
+    const Case = struct { []const [:0]const u8, Which, f32 };
+    for ([_]Case{
+        .{ &.{"s.glb"}, .default, 0 },
+        .{ &.{ "s.glb", "--animation", "run" }, .{ .name = "run" }, 0 },
+        .{ &.{ "s.glb", "--animation=3", "--animation-time", "1.5" }, .{ .index = 3 }, 1.5 },
+        .{ &.{ "s.glb", "--animation-time=2", "--animation", "all" }, .all, 2 },
+        .{ &.{ "s.glb", "--animation-time", "-0.5" }, .{ .index = 0 }, -0.5 },
+    }) |case| {
+        const animation = (try parseForTest(case[0])).render.animation;
+        try std.testing.expectEqualDeep(case[1], animation.which);
+        try std.testing.expectEqual(case[2], animation.time_s);
+    }
+    const bad = [_][:0]const u8{ "s.glb", "--animation-time", "soon" };
+    try std.testing.expectError(error.UsageInvalid, parseForTest(&bad));
+    try std.testing.expect((try parseForTest(&.{ "s.glb", "--frame-all" })).render.view.frames_all);
+}
+
 test "one number is the long side" {
     const side = (try optionsForTest(&.{ "--thesis", "-r512" })).view;
     try std.testing.expectEqual(512, side.long_side.?);

@@ -42,16 +42,6 @@ pub const Info = struct {
     /// About the most that it takes to render that.
     memory_bytes: u64,
     warnings: []const []const u8 = &.{},
-
-    /// Whether it is rendered only with `--force`.
-    pub fn needsForce(info: *const Info) bool {
-        for (info.scene.file.extensions) |used| {
-            if (!used.required) continue;
-            const known = parse.extensions.find(used.name) orelse return true;
-            if (!known.mayBeRequired()) return true;
-        }
-        return false;
-    }
 };
 
 /// An image of the scene's, by its header.
@@ -239,7 +229,9 @@ test "the text" {
         \\variant      0 'red'
         \\             1 'blue'
         \\image        image 0 'p', PNG, 2 x 1, RGB, 70 bytes
-        \\in the file  5 nodes, 2 meshes, 2 materials, 1 texture, 1 image, 2 animations, 2 cameras, 1 light
+        \\
+    ++ "in the file  5 nodes, 2 meshes, 2 materials, 1 texture, 1 image, 2 animations, " ++
+        \\2 cameras, 1 light
         \\drawn        2 triangles (1 unique)
         \\bounds       x 0.000 to 14.000, y 0.000 to 3.000, z -2.000 to 0.000 m
         \\memory       about 5.0 MiB to render 1024 x 512

@@ -96,6 +96,20 @@ pub const pictureSize = view_file.pictureSize;
 /// Bytes that textures take.
 pub const planTextures = texture.plan;
 
+/// Which meshes of a scene its instances share, unless the user says; false: none.
+pub fn chooseShared(
+    gpa: Allocator,
+    from: *const Scene,
+    chosen: []bool,
+) error{OutOfMemory}!bool {
+    return sharing_file.choose(gpa, &.{
+        .sources = &.{},
+        .materials = from.materials,
+        .meshes = from.meshes,
+        .instances = from.instances,
+    }, .{}, chosen);
+}
+
 /// What is seen of it, and in what light.
 pub const ViewSettings = struct {
     camera: choices.Camera = .default,
@@ -253,11 +267,11 @@ pub const PoseCache = struct {
     }
 };
 
-/// Places what is in a scene and builds the tree over it: a world in which nothing shines and that
-/// is seen by nobody yet. Its memory comes from `gpa` by way of arenas: its few large arrays are a
-/// block of `gpa` each, of which an arena asks for half as much again but touches only what is
-/// used. What was loaded of the scene has to live as long. Fills `prepare_ns` and `bvh_build_ns` of
-/// `times`.
+/// Places what is in a scene, as it stands, and builds the tree over it: a world in which nothing
+/// shines and that is seen by nobody yet. Its memory comes from `gpa` by way of arenas: its few
+/// large arrays are a block of `gpa` each, of which an arena asks for half as much again but
+/// touches only what is used. What was loaded of the scene has to live as long. Fills `prepare_ns`
+/// and `bvh_build_ns` of `times`.
 pub fn pose(
     gpa: Allocator,
     io: std.Io,
@@ -355,9 +369,9 @@ fn placeAll(
     const gpa = cache.gpa;
     _ = posed.pose_arena.reset(.retain_capacity);
     const arena = posed.pose_arena.allocator();
+    const place = try place_file.compose(arena, from);
     const drawn: Drawn = try .of(arena, from, &loaded.parts, &loaded.textures);
     const parts = &drawn.parts;
-    const place = try place_file.compose(arena, from);
     var soup = try cache.plan.place(
         gpa,
         arena,
@@ -621,7 +635,8 @@ fn joinClusters(
         inline else => |*tree, tag| {
             const width = comptime std.fmt.parseInt(u32, @tagName(tag)[1..], 10) catch unreachable;
             sharing_file.renumber(width, tree, geometry);
-            tree.* = try join.join(cache.gpa, arena, &input, boxes, width, tree, facts);
+            const depth_max = join.depthMax(width);
+            tree.* = try join.join(cache.gpa, arena, &input, boxes, width, tree, depth_max, facts);
         },
     }
     facts.bytes += cache.sharing.bytes;
@@ -1493,6 +1508,7 @@ test {
     _ = bvh_wide;
     _ = alpha;
     _ = check;
+    _ = join;
     _ = deform;
     _ = emitter_lights;
     _ = flatten;

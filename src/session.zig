@@ -227,9 +227,9 @@ pub const Session = struct {
     }
 
     /// Places the geometry at a moment of the scene's animations and builds the tree over it; the
-    /// first time, decodes the textures. It may be called again, also where nodes and weights of a
-    /// borrowed scene have changed since, and nothing else: arrays are written once more, and the
-    /// tree is fitted. Asserts that there is a scene.
+    /// first time, decodes the textures. It may be called again, also where nodes, weights and
+    /// materials of a borrowed scene have changed since, and nothing else: arrays are written once
+    /// more, and the tree is fitted. Asserts that there is a scene.
     pub fn pose(session: *Session, chosen: Pose) Error!void {
         errdefer session.dropWorld();
         const scene = &session.scene.?;

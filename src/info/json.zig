@@ -55,7 +55,7 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     });
     try writeExtensions(&json, file.extensions);
     try writeFields(&json, .{
-        .needs_force = info.needsForce(),
+        .needs_force = file.needs_force,
         .warnings = report.Texts{ .list = info.warnings },
     });
     try json.endObject();

@@ -42,7 +42,7 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     try report.writeBytes(writer, info.memory_bytes);
     try writer.print(" to render {d} x {d}\n", .{ info.size[0], info.size[1] });
     try writeExtensions(writer, file.extensions);
-    if (info.needsForce()) {
+    if (file.needs_force) {
         try writer.writeAll("rendering    only with --force, for what it requires\n");
     }
 }

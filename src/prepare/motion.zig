@@ -150,10 +150,12 @@ fn timesOf(
 ) error{OutOfMemory}![]const f64 {
     var times: std.ArrayList(f64) = .empty;
     defer times.deinit(gpa);
+    var known: Lists = .empty;
+    defer known.deinit(gpa);
     for (from.animations, 0..) |*animation, index| switch (running) {
         .none => {},
-        .one => |one| if (one == index) try appendTimes(gpa, animation, &times),
-        .all => try appendTimes(gpa, animation, &times),
+        .one => |one| if (one == index) try appendTimes(gpa, animation, &known, &times),
+        .all => try appendTimes(gpa, animation, &known, &times),
     };
     std.mem.sortUnstable(f64, times.items, {}, std.sort.asc(f64));
     var count: usize = 0;
@@ -181,17 +183,19 @@ fn timesOf(
     return all;
 }
 
+/// Lists of times by their address: most channels share them.
+const Lists = std.AutoHashMapUnmanaged([*]const f32, void);
+
 fn appendTimes(
     gpa: Allocator,
     animation: *const scene.Animation,
+    known: *Lists,
     times: *std.ArrayList(f64),
 ) error{OutOfMemory}!void {
-    var known: ?[]const f32 = null;
     for (animation.channels) |*channel| {
         const own = channel.sampler.times;
-        // Most share them.
-        if (known) |before| if (before.ptr == own.ptr and before.len == own.len) continue;
-        known = own;
+        const entry = try known.getOrPut(gpa, own.ptr);
+        if (entry.found_existing) continue;
         for (own) |time| try times.append(gpa, time);
     }
 }

@@ -15,8 +15,8 @@ pub const none: u32 = std.math.maxInt(u32);
 /// Levels of a tree at most; the builder keeps to it, traversal stacks are sized by it.
 pub const tree_depth_max = 64;
 
-/// Levels that a ray may have to go down: instances add those of their clusters, and some between.
-pub const walk_depth_max = tree_depth_max + 34;
+/// Levels that a ray may have to go down, those within clusters of instances counted.
+pub const walk_depth_max = tree_depth_max + 1;
 
 /// Bytes that nodes and triangle packs are aligned to: a cache line.
 pub const cache_line_bytes = 64;

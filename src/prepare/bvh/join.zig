@@ -7,6 +7,7 @@
 
 const std = @import("std");
 const math = @import("../../math.zig");
+const parallel = @import("../../parallel.zig");
 const world = @import("../../world.zig");
 const wide = @import("wide.zig");
 const bvh_input = @import("input.zig");
@@ -16,8 +17,15 @@ const Allocator = std.mem.Allocator;
 const Box3 = math.Box3;
 const Child = world.Child;
 
+/// Levels above the clusters at most, so that stacks have room for what is below them.
+pub fn depthMax(comptime width: u32) u32 {
+    return world.walk_depth_max - world.instances.clusterNodesMax(width) - 1;
+}
+
 /// Joins `tree` with one over `boxes`, at least one, which stand for the clusters of the same
-/// numbers. `input` says how to build; the tree's nodes come from `arena`. Adds to `statistics`.
+/// numbers. `input` says how to build; the tree's nodes come from `arena`. Where it would have more
+/// levels than `depth_max`, the boxes are only put together in their order, `width` at a time. Adds
+/// to `statistics`.
 pub fn join(
     gpa: Allocator,
     arena: Allocator,
@@ -25,6 +33,7 @@ pub fn join(
     boxes: []const Box3,
     comptime width: u32,
     tree: *const world.Tree(width),
+    depth_max: u32,
     statistics: *world.TreeStatistics,
 ) bvh_input.Error!world.Tree(width) {
     var scratch: std.heap.ArenaAllocator = .init(gpa);
@@ -43,8 +52,13 @@ pub fn join(
         .count = 1,
     };
     const first = if (has_triangles) writer.copy(tree.nodes) else 0;
-    const second = writer.copy(clusters.nodes);
+    const below_count = writer.count;
+    var second = writer.copy(clusters.nodes);
     for (second..writer.count) |index| try writer.open(scratch.allocator(), index);
+    if (1 + try writer.depthBelow(gpa, second) > depth_max) {
+        writer.count = below_count;
+        second = (try writer.gather(scratch.allocator(), 0, clusters.packs.len)).target;
+    }
     const both = [2]Child{
         .{ .target = first, .pack_count = 0 }, .{ .target = second, .pack_count = 0 },
     };
@@ -52,17 +66,12 @@ pub fn join(
     for (both[if (has_triangles) 0 else 1..], 0..) |child, slot| {
         writer.setChild(0, slot, child, writer.boundsOf(child.target));
     }
-    statistics.depth = try writer.depth(gpa);
-    assert(statistics.depth + instancesDepth(width) <= world.walk_depth_max);
+    statistics.depth = try writer.depthBelow(gpa, 0);
+    assert(statistics.depth <= world.walk_depth_max);
     statistics.node_count = writer.count;
     statistics.sah_cost += built.statistics.sah_cost;
     statistics.bytes = writer.count * @sizeOf(Node) + std.mem.sliceAsBytes(tree.packs).len;
     return .{ .nodes = writer.nodes[0..writer.count], .packs = tree.packs };
-}
-
-/// Levels of a cluster, and the entry of the stack that ends it.
-fn instancesDepth(comptime width: u32) u32 {
-    return world.instances.clusterNodesMax(width) + 1;
 }
 
 /// A tree over boxes in place of triangles: each is that of the triangle between its corners.
@@ -120,18 +129,28 @@ fn Writer(comptime width: u32) type {
                 const child = writer.nodes[index].child[slot];
                 if (child.pack_count == 0) continue;
                 const first, const end = child.packs();
-                var items = try scratch.alloc(Item, end - first);
-                for (items, first..end) |*item, pack| item.* = writer.nodeOf(pack);
-                while (items.len > 1) {
-                    const groups = @divCeil(items.len, width);
-                    for (0..groups) |turn| {
-                        const begin = turn * width;
-                        items[turn] = writer.group(items[begin..@min(begin + width, items.len)]);
-                    }
-                    items = items[0..groups];
-                }
-                writer.nodes[index].child[slot] = items[0].child;
+                writer.nodes[index].child[slot] = try writer.gather(scratch, first, end);
             }
+        }
+
+        /// A node over the clusters of some packs, one at least.
+        fn gather(
+            writer: *Self,
+            scratch: Allocator,
+            first: usize,
+            end: usize,
+        ) error{OutOfMemory}!Child {
+            var items = try scratch.alloc(Item, end - first);
+            for (items, first..end) |*item, pack| item.* = writer.nodeOf(pack);
+            while (items.len > 1) {
+                const groups = @divCeil(items.len, width);
+                for (0..groups) |turn| {
+                    const begin = turn * width;
+                    items[turn] = writer.group(items[begin..@min(begin + width, items.len)]);
+                }
+                items = items[0..groups];
+            }
+            return items[0].child;
         }
 
         /// A new node of the clusters of a pack.
@@ -177,12 +196,12 @@ fn Writer(comptime width: u32) type {
             node.child[slot] = child;
         }
 
-        /// Levels of nodes.
-        fn depth(writer: *const Self, gpa: Allocator) error{OutOfMemory}!u32 {
+        /// Levels of nodes from one on.
+        fn depthBelow(writer: *const Self, gpa: Allocator, node: u32) error{OutOfMemory}!u32 {
             const Visit = struct { node: u32, level: u32 };
             var stack: std.ArrayList(Visit) = .empty;
             defer stack.deinit(gpa);
-            try stack.append(gpa, .{ .node = 0, .level = 1 });
+            try stack.append(gpa, .{ .node = node, .level = 1 });
             var deepest: u32 = 0;
             while (stack.pop()) |visit| {
                 deepest = @max(deepest, visit.level);
@@ -199,5 +218,52 @@ fn Writer(comptime width: u32) type {
             for (0..width) |slot| box = box.join(writer.nodes[index].childBox(slot));
             return box;
         }
+    };
+}
+
+test "every cluster is reached once, in its box, however few levels there may be" {
+    const gpa = std.testing.allocator;
+    var arena_state: std.heap.ArenaAllocator = .init(gpa);
+    defer arena_state.deinit();
+    const arena = arena_state.allocator();
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    var random_state: std.Random.DefaultPrng = .init(7);
+    const random = random_state.random();
+    var boxes: [200]Box3 = undefined;
+    var bounds: Box3 = .empty;
+    for (&boxes, 0..) |*box, index| {
+        // Many in one place.
+        if (index % 3 == 1) {
+            box.* = boxes[0];
+            continue;
+        }
+        var at: math.Vec3 = undefined;
+        for (&at) |*coordinate| coordinate.* = random.floatNorm(f32);
+        box.* = Box3.empty.include(at).grow(0.1);
+        bounds = bounds.join(box.*);
+    }
+    const input: wide.Input = .{
+        .positions = &.{},
+        .triangles = &.{},
+        .centroid_bounds = .empty,
+        .padding = .init(@splat(0), bounds),
+        .pool = &pool,
+    };
+    inline for (.{ 4, 8, 16 }) |width| for ([_]u32{ 1, depthMax(width) }) |depth_max| {
+        var built = try wide.build(gpa, arena, &input, width);
+        const tree = built.tree();
+        const joined =
+            try join(gpa, arena, &input, &boxes, width, &tree, depth_max, &built.statistics);
+        var seen: [boxes.len]bool = @splat(false);
+        for (joined.nodes) |*node| for (node.child, 0..) |child, slot| {
+            if (!child.isCluster()) continue;
+            try std.testing.expect(!seen[child.target]);
+            seen[child.target] = true;
+            try std.testing.expect(node.childBox(slot).contains(boxes[child.target]));
+        };
+        for (seen) |is_seen| try std.testing.expect(is_seen);
+        if (depth_max == 1) try std.testing.expect(built.statistics.depth <= 6);
+        try std.testing.expectEqual(joined.nodes.len, built.statistics.node_count);
     };
 }
