@@ -210,7 +210,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--floor WHAT",
-            .help = "shadow: what is seen of a floor is the shadow on it;\nor none (default)",
+            .help = "shadow: a floor that shows it, or none (default)",
         },
         .{
             .usage = "--ambient L",
