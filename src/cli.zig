@@ -186,8 +186,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--format-in FORMAT",
-            .help = "how to read the scene where its contents do not tell:\n" ++
-                namesOf(settings.SceneFormat),
+            .help = namesOf(settings.SceneFormat) ++ ", whatever it holds",
         },
         .{
             .usage = "--env FILE",
@@ -211,7 +210,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--floor WHAT",
-            .help = "shadow: what is seen of a floor is the shadow on it;\nor none (default)",
+            .help = "shadow: a floor that shows it, or none (default)",
         },
         .{
             .usage = "--ambient L",
@@ -333,10 +332,9 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
     \\       raylane info SCENE [options]          (see raylane info --help)
     \\
-    \\SCENE is a file in glTF 2.0 (JSON or GLB), PBRT, OBJ, STL or PLY, - for standard
-    \\input, or builtin:NAME, NAME being cornell, atrium, nave or handles. The image
-    \\is written to the working directory under the scene's name, as a whole or not
-    \\at all; a report goes to standard output.
+    \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, - for standard input, or
+    \\builtin:cornell, atrium, nave or handles. The image is written to the working
+    \\directory under the scene's name, as a whole or not at all, a report to stdout.
     \\
 ++ arguments_file.helpOf(sections) ++
     \\
