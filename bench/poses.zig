@@ -52,13 +52,16 @@ fn write(
     var buffer: [1 << 16]u8 = undefined;
     var stdout: std.Io.File.Writer = .initStreaming(.stdout(), io, &buffer);
     const out = &stdout.interface;
-    for (geometry.surfaces()) |*triangle| for (triangle.corner) |vertex| {
-        for (0..3) |axis| {
-            const is_there = !triangle.isDropped();
-            const number = if (is_there) geometry.positions[vertex][axis] else std.math.nan(f32);
-            try out.writeInt(u32, @bitCast(number), .little);
+    for (0..geometry.surfaceCount()) |primitive| {
+        const triangle = geometry.triangleAt(@intCast(primitive));
+        for (triangle.corner) |vertex| {
+            const position: [3]f32 = if (triangle.isDropped())
+                @splat(std.math.nan(f32))
+            else
+                geometry.positionAt(vertex);
+            for (position) |number| try out.writeInt(u32, @bitCast(number), .little);
         }
-    };
+    }
     try out.flush();
 }
 

@@ -78,6 +78,7 @@ pub const Options = struct {
     /// Null: as many as the system has CPUs.
     thread_count: ?u32 = null,
     tree_quality: settings.TreeQuality = .default,
+    instances: settings.Instances = .auto,
     load: settings.Load = .{},
     animation: settings.Animation = .{},
     view: settings.View = .{},
@@ -289,6 +290,12 @@ const sections: []const Section = &.{
             .help = namesOf(settings.TreeQuality) ++ ": time to build the scene's tree\n" ++
                 "against time to trace; the image is always the same",
         },
+        .{
+            .usage = "--instances HOW",
+            .help = namesOf(settings.Instances) ++ ": whether a mesh is\n" ++
+                "held once for all its instances: less memory, more\n" ++
+                "time; the image is always the same",
+        },
         .{ .usage = "--variant NAME", .help = "how rays are traced; the image is always the same" },
         .{
             .usage = "--list-variants",
@@ -464,6 +471,7 @@ const Parser = struct {
             .stats => options.stats = try reader.choice(given, Stats),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
+            .instances => options.instances = try reader.choice(given, settings.Instances),
             .variant => options.render.variant = try parser.variantOf(given.value),
             .count_tests => options.count_tests = true,
             .point_size => options.view.point_size = pointSizeOf(given.value) orelse
@@ -930,6 +938,7 @@ test "numbers keep to their ranges" {
         },
         .{ .flag = "--stats", .good = &.{ "text", "json", "none" }, .bad = &.{ "JSON", "" } },
         .{ .flag = "--bvh", .good = &.{ "fast", "default", "high" }, .bad = &.{ "High", "" } },
+        .{ .flag = "--instances", .good = &.{ "auto", "share", "flatten" }, .bad = &.{"all"} },
         .{
             .flag = "--format",
             .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },

@@ -425,6 +425,7 @@ const Job = struct {
         try session.pose(.{
             .lanes = raylane.variant.compiled[options.render.variant].lanes,
             .tree_quality = options.tree_quality,
+            .sharing = .of(options.instances),
             .animation = options.animation,
             .view = options.view,
         });

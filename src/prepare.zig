@@ -27,6 +27,8 @@ const emitter_lights = @import("prepare/emitter_lights.zig");
 const extent_file = @import("prepare/extent.zig");
 const emitters = @import("prepare/emitters.zig");
 const environment = @import("prepare/environment.zig");
+const sharing_file = @import("prepare/instances.zig");
+const join = @import("prepare/bvh/join.zig");
 const light = @import("prepare/light.zig");
 const material = @import("prepare/material.zig");
 const motion_file = @import("prepare/motion.zig");
@@ -71,11 +73,16 @@ pub const PoseSettings = struct {
     lanes: u8,
     pool: *parallel.Pool,
     tree_quality: TreeQuality = .default,
+    /// When instances share their meshes.
+    sharing: SharingRule = .{},
     /// Diameter of points and width of lines, in pixels of the automatic view.
     point_size: f32 = choices.point_size.default,
     /// What decides how large these are.
     view: WantedView = .{},
 };
+
+/// See `PoseSettings`.
+pub const SharingRule = sharing_file.Rule;
 
 /// See `PoseSettings`.
 pub const WantedView = view_file.Wanted;
@@ -88,6 +95,20 @@ pub const Extent = extent_file.Extent;
 pub const pictureSize = view_file.pictureSize;
 /// Bytes that textures take.
 pub const planTextures = texture.plan;
+
+/// Which meshes of a scene its instances share, unless the user says; false: none.
+pub fn chooseShared(
+    gpa: Allocator,
+    from: *const Scene,
+    chosen: []bool,
+) error{OutOfMemory}!bool {
+    return sharing_file.choose(gpa, &.{
+        .sources = &.{},
+        .materials = from.materials,
+        .meshes = from.meshes,
+        .instances = from.instances,
+    }, .{}, chosen);
+}
 
 /// What is seen of it, and in what light.
 pub const ViewSettings = struct {
@@ -221,6 +242,8 @@ pub const Posed = struct {
 /// written again, a tree to be fitted. The memory of arrays and tree is the world's.
 pub const PoseCache = struct {
     gpa: Allocator,
+    /// Its memory is the world's.
+    sharing: sharing_file.Sharing,
     plan: flatten.Plan,
     arrays: flatten.Arrays,
     tree: ?bvh_refit.AnyRefit = null,
@@ -235,9 +258,11 @@ pub const PoseCache = struct {
         cache.* = undefined;
     }
 
-    /// Whether a pose with these settings can use it.
+    /// Whether a pose with these settings can use it. Which instances share a mesh depends on where
+    /// they stand.
     pub fn fits(cache: *const PoseCache, settings: *const PoseSettings) bool {
-        return cache.lanes == settings.lanes and cache.tree_quality == settings.tree_quality and
+        return cache.sharing.instances.len == 0 and cache.lanes == settings.lanes and
+            cache.tree_quality == settings.tree_quality and
             cache.point_size == settings.point_size;
     }
 };
@@ -262,12 +287,13 @@ pub fn pose(
     errdefer posed.world.deinit();
     const parts = &loaded.parts;
     const point_size = settings.point_size;
-    var plan: flatten.Plan =
-        try .init(gpa, parts.instances, parts.meshes, point_size, diagnostic);
-    errdefer plan.deinit(gpa);
     const attributes = attributesOf(&loaded.textures);
+    const sharing = try shareMeshes(&posed.world, gpa, from, loaded, settings);
+    var plan: flatten.Plan = try .init(gpa, sharing.flat, parts.meshes, point_size, diagnostic);
+    errdefer plan.deinit(gpa);
     posed.cache = .{
         .gpa = gpa,
+        .sharing = sharing,
         .plan = plan,
         .arrays = try plan.alloc(posed.world.arena.allocator(), attributes),
         .lanes = settings.lanes,
@@ -275,14 +301,43 @@ pub fn pose(
         .point_size = point_size,
     };
     const planned_ns = nanoseconds(start.durationTo(Clock.awake.now(io)));
-    try poseAgain(&posed.world, &posed.cache, io, from, loaded, settings, diagnostic, times);
+    try placeAll(&posed.world, &posed.cache, io, from, loaded, settings, diagnostic, times);
     times.prepare_ns += planned_ns;
     return posed;
 }
 
+/// What instances share, where they do. Not inlined, see `chooseView`.
+noinline fn shareMeshes(
+    posed: *World,
+    gpa: Allocator,
+    from: *const Scene,
+    loaded: *const Loaded,
+    settings: PoseSettings,
+) PoseError!sharing_file.Sharing {
+    const mode = simd.setFlushToZero();
+    defer simd.setFloatControl(mode);
+    const place = try place_file.compose(gpa, from);
+    defer place.deinit(gpa);
+    const arena = posed.arena.allocator();
+    const drawn: Drawn = try .of(arena, from, &loaded.parts, &loaded.textures);
+    return sharing_file.share(
+        gpa,
+        arena,
+        &drawn.parts,
+        attributesOf(&loaded.textures),
+        &place,
+        &.{
+            .rule = settings.sharing,
+            .lanes = settings.lanes,
+            .quality = settings.tree_quality,
+            .pool = settings.pool,
+        },
+    );
+}
+
 /// Makes a world that `pose` made of the scene what it would be if `pose` had been called now: but
-/// for the shape of the tree, which no picture depends on. Nodes and weights may have moved, and
-/// materials changed; meshes and instances are the same, and `cache` fits the settings. Where this
+/// for the shape of the tree, which no picture depends on. Nodes, weights and materials in motion
+/// may be others; meshes and instances are the same, and `cache` fits the settings. Where this
 /// fails, world and cache are of no use but to be freed.
 pub fn poseAgain(
     posed: *World,
@@ -295,6 +350,19 @@ pub fn poseAgain(
     times: *StageTimes,
 ) PoseError!void {
     assert(cache.fits(&settings));
+    return placeAll(posed, cache, io, from, loaded, settings, diagnostic, times);
+}
+
+fn placeAll(
+    posed: *World,
+    cache: *PoseCache,
+    io: std.Io,
+    from: *const Scene,
+    loaded: *const Loaded,
+    settings: PoseSettings,
+    diagnostic: *Diagnostic,
+    times: *StageTimes,
+) PoseError!void {
     const mode = simd.setFlushToZero();
     defer simd.setFloatControl(mode);
     const start = Clock.awake.now(io);
@@ -308,21 +376,28 @@ pub fn poseAgain(
         gpa,
         arena,
         &cache.arrays,
-        parts.instances,
+        if (cache.sharing.instances.len > 0) cache.sharing.flat else parts.instances,
         parts.meshes,
         &place,
         settings.pool,
         diagnostic,
     );
-    var geometry = geometryOf(&soup, &place);
+    var geometry = geometryOf(&soup, &place, &cache.sharing);
     if (soup.strokes.spheres.len > 0) {
         const materials = parts.materials;
         const pixel = try view_file.pixelSize(gpa, from, materials, &geometry, &settings.view);
         try strokes.draw(gpa, &soup, pixel * settings.point_size / 2, settings.pool);
-        geometry = geometryOf(&soup, &place);
+        geometry = geometryOf(&soup, &place, &cache.sharing);
     }
-    const materials =
-        try material.place(arena, parts, &drawn.textures, soup.positions, soup.triangles);
+    geometry.shared = try sharing_file.numberAll(
+        gpa,
+        arena,
+        &cache.sharing,
+        parts,
+        &soup,
+        attributesOf(&loaded.textures),
+    );
+    const materials = try material.place(arena, parts, &drawn.textures, &geometry);
     const tree_start = Clock.awake.now(io);
     const tree_facts = try fitTree(&posed.tree_arena, cache, &geometry, settings);
     const end = Clock.awake.now(io);
@@ -339,7 +414,7 @@ pub fn poseAgain(
         .textures = loaded.textures.textures,
         .facts = .{
             .tree = tree_facts,
-            .degenerate_count = soup.dropped_count,
+            .degenerate_count = soup.dropped_count + cache.sharing.dropped_count,
             .stroke_triangle_count = soup.triangles.len - soup.surface_count -
                 soup.dropped_stroke_count,
         },
@@ -348,7 +423,12 @@ pub fn poseAgain(
 }
 
 /// All but the tree.
-fn geometryOf(soup: *const flatten.TriangleSoup, place: *const place_file.Pose) world.Geometry {
+fn geometryOf(
+    soup: *const flatten.TriangleSoup,
+    place: *const place_file.Pose,
+    sharing: *const sharing_file.Sharing,
+) world.Geometry {
+    const bounds = soup.bounds.join(sharing.bounds);
     var geometry: world.Geometry = .{
         .tree = world.Geometry.empty.tree,
         .positions = soup.positions,
@@ -360,9 +440,9 @@ fn geometryOf(soup: *const flatten.TriangleSoup, place: *const place_file.Pose) 
         .surface_count = soup.surface_count,
         .spheres = soup.strokes.spheres,
         .sphere_radius = soup.sphere_radius,
-        .bounds = soup.bounds,
+        .bounds = bounds,
         .centroid_bounds = soup.centroid_bounds,
-        .padding = .init(place_file.round(place.center), soup.bounds),
+        .padding = .init(place_file.round(place.center), bounds),
         .size = @floatCast(place.size),
     };
     for (&geometry.texcoords, soup.texcoords) |*to, set| to.* = set;
@@ -542,7 +622,31 @@ noinline fn fitTree(
     _ = arena.reset(.retain_capacity);
     cache.tree = try growTree(cache.gpa, arena.allocator(), geometry, settings);
     geometry.tree = cache.tree.?.tree();
-    return cache.tree.?.statistics();
+    var facts = cache.tree.?.statistics();
+    if (cache.sharing.boxes.len > 0)
+        try joinClusters(arena.allocator(), cache, geometry, settings, &facts);
+    return facts;
+}
+
+/// Puts the clusters of instances above and beside the tree of what is flattened.
+fn joinClusters(
+    arena: Allocator,
+    cache: *const PoseCache,
+    geometry: *world.Geometry,
+    settings: PoseSettings,
+    facts: *world.TreeStatistics,
+) PoseError!void {
+    const input = inputOf(geometry, settings, null);
+    const boxes = cache.sharing.boxes;
+    switch (geometry.tree) {
+        inline else => |*tree, tag| {
+            const width = comptime std.fmt.parseInt(u32, @tagName(tag)[1..], 10) catch unreachable;
+            sharing_file.renumber(width, tree, geometry);
+            const depth_max = join.depthMax(width);
+            tree.* = try join.join(cache.gpa, arena, &input, boxes, width, tree, depth_max, facts);
+        },
+    }
+    facts.bytes += cache.sharing.bytes;
 }
 
 /// Gives a geometry that has all else a tree of `settings.lanes`, whose memory comes from `arena`.
@@ -1293,6 +1397,55 @@ test "a mesh brings only the vertices from its first to its last" {
     try std.testing.expectEqual(math.Vec3{ 1, 0, 5 }, result.geometry.positions[2]);
 }
 
+test "a tree is fitted until it costs 1.3 times what it did, and is then built anew" {
+    const gpa = std.testing.allocator;
+    const side = 20;
+    var corners: [side * side][3]math.Vec3 = undefined;
+    var moves: [3 * corners.len]math.Vec3 = undefined;
+    for (&corners, 0..) |*triangle, index| {
+        const x: f32 = @floatFromInt(index % side);
+        const y: f32 = @floatFromInt(index / side);
+        triangle.* = .{ .{ x, y, 0 }, .{ x + 1, y, 0 }, .{ x, y + 1, 0 } };
+        // Every other one goes to the other end.
+        const across: f32 = if (index % 2 == 0) 0 else side - 1 - 2 * x;
+        for (moves[3 * index ..][0..3]) |*move| move.* = .{ across, 0, 0 };
+    }
+    var from = try TestScene.soup(gpa, &corners);
+    defer from.deinit();
+    var mesh = from.meshes[0];
+    mesh.morph_targets = &.{.{ .positions = &moves }};
+    from.meshes = (&mesh)[0..1];
+    var weights: [1]f32 = .{0};
+    from.instances = &.{.{ .mesh = 0, .node = 0, .morph_weights = &weights }};
+    from.check();
+    var pool: parallel.Pool = .init(2);
+    defer pool.deinit();
+    var diagnostic: Diagnostic = .{};
+    var times: StageTimes = .{};
+    const io = std.testing.io;
+    var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
+    defer loaded.deinit();
+    const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
+    var posed = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
+    defer posed.deinit();
+    const world_posed = &posed.world;
+    const built = world_posed.facts.tree.sah_cost;
+    for ([_]f32{ 0.01, 1, 1.01, 0 }, [_]bool{ true, false, true, false }) |weight, is_fitted| {
+        weights[0] = weight;
+        const cache = &posed.cache;
+        try poseAgain(world_posed, cache, io, &from, &loaded, settings, &diagnostic, &times);
+        try check.check(gpa, world_posed);
+        try std.testing.expectEqual(is_fitted, cache.tree.?.w4.sums.len > 0);
+        var fresh = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
+        defer fresh.deinit();
+        try expectSameBytes(fresh.world.geometry.positions, world_posed.geometry.positions);
+        const cost = world_posed.facts.tree.sah_cost;
+        const new_cost = fresh.world.facts.tree.sah_cost;
+        if (!is_fitted) try std.testing.expectEqual(new_cost, cost);
+        try std.testing.expect(cost <= 1.3 * @max(built, new_cost));
+    }
+}
+
 test "memory that runs out is an error that leaks nothing" {
     const gpa = std.testing.allocator;
     // Enough of them to be cut by a grid and by all threads first.
@@ -1319,6 +1472,41 @@ test "memory that runs out is an error that leaks nothing" {
     try std.testing.checkAllAllocationFailures(gpa, one, .{&from});
 }
 
+test "memory that runs out when a scene is posed again is an error that leaks nothing" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    const nodes = try from.arena.allocator().alloc(scene.Node, 2);
+    nodes[0] = from.nodes[0];
+    from.nodes = nodes;
+    from.instances = &.{ .{ .mesh = 0, .node = 0 }, .{ .mesh = 0, .node = 1 } };
+    const one = struct {
+        fn one(failing: std.mem.Allocator, shown: *const Scene, second: *scene.Node) !void {
+            var pool: parallel.Pool = .init(1);
+            defer pool.deinit();
+            var diagnostic: Diagnostic = .{};
+            var times: StageTimes = .{};
+            const io = std.testing.io;
+            var loaded = try load(failing, io, shown, .{ .pool = &pool }, &diagnostic, &times);
+            defer loaded.deinit();
+            const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
+            second.* = .{ .parent = scene.none, .local = .scale(@splat(0)) };
+            var posed = try pose(failing, io, shown, &loaded, settings, &diagnostic, &times);
+            defer posed.deinit();
+            // Fitted; with a triangle that the tree lacks; and fitted again.
+            for ([_]f64{ 0, 1, 2 }) |scale| {
+                second.local = .scale(@splat(scale));
+                const cache = &posed.cache;
+                const again = &posed.world;
+                try poseAgain(again, cache, io, shown, &loaded, settings, &diagnostic, &times);
+                const dropped: u32 = if (scale > 0) 0 else 1;
+                try std.testing.expectEqual(dropped, again.geometry.dropped_count);
+            }
+        }
+    }.one;
+    try std.testing.checkAllAllocationFailures(gpa, one, .{ &from, &nodes[1] });
+}
+
 test {
     _ = animate;
     _ = Drawn;
@@ -1327,6 +1515,7 @@ test {
     _ = bvh_wide;
     _ = alpha;
     _ = check;
+    _ = join;
     _ = deform;
     _ = emitter_lights;
     _ = flatten;
@@ -1337,6 +1526,7 @@ test {
     _ = tangents;
     _ = texture;
     _ = extent_file;
+    _ = @import("prepare/relief.zig");
     _ = @import("prepare/layers.zig");
     _ = @import("prepare/texture_use.zig");
     _ = @import("prepare/pyramid.zig");

@@ -68,6 +68,8 @@ pub const Pose = struct {
     /// Width of the tree: the variant's that is to render.
     lanes: u8,
     tree_quality: settings.TreeQuality = .default,
+    /// When instances share their meshes.
+    sharing: prepare.SharingRule = .{},
     animation: settings.Animation = .{},
     /// What `view` will be asked for: points and lines are as large as its pixels want them, and
     /// stay so until the next pose.
@@ -244,6 +246,7 @@ pub const Session = struct {
             .lanes = chosen.lanes,
             .pool = &session.pool,
             .tree_quality = chosen.tree_quality,
+            .sharing = chosen.sharing,
             .point_size = chosen.view.point_size,
             .view = .{
                 .camera = chosen.view.camera,

@@ -97,6 +97,17 @@ pub const TreeQuality = enum {
     high,
 };
 
+/// What becomes of instances of one mesh: memory against time to trace. The picture is the same in
+/// any case.
+pub const Instances = enum {
+    /// Shared where that saves much memory.
+    auto,
+    /// Shared wherever they can be.
+    share,
+    /// Each with triangles of its own.
+    flatten,
+};
+
 /// Which camera to look through.
 pub const Camera = union(enum) {
     /// The file's own, else automatic.

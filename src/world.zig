@@ -7,6 +7,10 @@
 const std = @import("std");
 const math = @import("math.zig");
 const environment_file = @import("world/environment.zig");
+/// Where instances stand.
+pub const placement = @import("world/placement.zig");
+/// Meshes that several instances share.
+pub const instances = @import("world/instances.zig");
 const geometry_file = @import("world/geometry.zig");
 const materials_file = @import("world/materials.zig");
 const textures_file = @import("world/textures.zig");
@@ -21,6 +25,7 @@ pub const EnvironmentMap = environment_file.EnvironmentMap;
 pub const EnvironmentPart = environment_file.EnvironmentPart;
 pub const EnvironmentSource = environment_file.EnvironmentSource;
 pub const EnvironmentTexel = environment_file.EnvironmentTexel;
+pub const Face = instances.Face;
 pub const Geometry = geometry_file.Geometry;
 pub const Layers = @import("world/layers.zig").Layers;
 pub const Lookup = textures_file.Lookup;
@@ -29,6 +34,7 @@ pub const Material = materials_file.Material;
 pub const Materials = materials_file.Materials;
 pub const Node = geometry_file.Node;
 pub const Padding = @import("world/padding.zig").Padding;
+pub const Placement = placement.Placement;
 pub const Slot = textures_file.Slot;
 pub const Sphere = geometry_file.Sphere;
 pub const Texture = textures_file.Texture;
@@ -44,6 +50,7 @@ pub const Wrap = textures_file.Wrap;
 pub const cache_line_bytes = geometry_file.cache_line_bytes;
 pub const none = geometry_file.none;
 pub const tree_depth_max = geometry_file.tree_depth_max;
+pub const walk_depth_max = geometry_file.walk_depth_max;
 
 /// All that tracing a picture takes.
 pub const Frame = struct {

@@ -27,7 +27,7 @@ fn isActive(x: usize, y: usize) bool {
 }
 
 /// A tile that looks from `origin` to `target`; neighbouring rays differ by `step` of the way.
-fn aim(origin: [3]f32, target: [3]f32, step: f32, random: std.Random) Grid {
+pub fn aim(origin: [3]f32, target: [3]f32, step: f32, random: std.Random) Grid {
     const vec3 = raylane.math.vec3;
     const forward = vec3.sub(target, origin);
     const length = @sqrt(vec3.dot(forward, forward));
@@ -112,7 +112,7 @@ fn hitsOf(world: *const World, queries: *const [side][side]?Query) Hits {
 }
 
 /// One tile by one variant: primary rays, then shadow rays to both kinds of light.
-fn expectTile(
+pub fn expectTile(
     comptime Kernel: type,
     world: *const World,
     grid: *const Grid,

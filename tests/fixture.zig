@@ -144,6 +144,7 @@ pub const Options = struct {
     tile_size: u32 = 16,
     thread_count: usize = 1,
     tree_quality: raylane.settings.TreeQuality = .default,
+    sharing: raylane.prepare.SharingRule = .{},
     ambient: ?f32 = null,
     environment: raylane.settings.Environment = .{ .source = .none },
     background: ?[3]f32 = null,
@@ -172,7 +173,11 @@ pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options)
     const mode = raylane.simd.setFlushToZero();
     defer raylane.simd.setFloatControl(mode);
     session.adopt(scene.*, .borrowed);
-    try session.pose(.{ .lanes = lanes, .tree_quality = options.tree_quality });
+    try session.pose(.{
+        .lanes = lanes,
+        .tree_quality = options.tree_quality,
+        .sharing = options.sharing,
+    });
     try look(session, options);
 }
 

@@ -13,8 +13,8 @@ test {
     _ = @import("strokes.zig");
     _ = @import("decode.zig");
     _ = @import("environment.zig");
-    _ = @import("formats.zig");
     _ = @import("forgiven.zig");
+    _ = @import("formats.zig");
     _ = @import("glass.zig");
     _ = @import("gltf_animations.zig");
     _ = @import("gltf_materials.zig");
@@ -22,6 +22,7 @@ test {
     _ = @import("gltf_poses.zig");
     _ = @import("gltf_quantization.zig");
     _ = @import("gltf_textures.zig");
+    _ = @import("instances.zig");
     _ = @import("malformed.zig");
     _ = @import("meshes.zig");
     _ = @import("offset.zig");

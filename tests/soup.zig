@@ -44,14 +44,16 @@ pub const Hit = struct { t: f32, primitive: i32 };
 pub fn bruteForce(world: *const World, query: Query) Hit {
     const triangle = raylane.trace.triangle;
     var ray = query.ray();
-    for (world.geometry.triangles, 0..) |corners, number| {
-        if (corners.isDropped()) continue;
+    const geometry = &world.geometry;
+    for (0..geometry.triangleCount()) |number| {
+        const face = geometry.face(@intCast(number));
+        if (face.material == raylane.world.none) continue;
         const p: [3]Single.Vec3 = .{
-            .splat(world.geometry.positions[corners.corner[0]]),
-            .splat(world.geometry.positions[corners.corner[1]]),
-            .splat(world.geometry.positions[corners.corner[2]]),
+            .splat(face.position(geometry, 0)),
+            .splat(face.position(geometry, 1)),
+            .splat(face.position(geometry, 2)),
         };
-        const hit = triangle.intersect(Single, p, ray.line, &world.geometry.padding);
+        const hit = triangle.intersect(Single, p, ray.line, &geometry.padding);
         const primitive: Single.I32 = .splat(@intCast(number));
         const accepted = hit.mask
             .bitAnd(ray.tnear.isBefore(hit.t, primitive))
@@ -72,7 +74,7 @@ pub fn expectHit(expected: Hit, t: f32, primitive: i32) !void {
 }
 
 /// All rays by themselves and in bundles, by one variant.
-fn expectVariant(
+pub fn expectVariant(
     comptime variant: Variant,
     world: *const World,
     queries: []const Query,
@@ -108,7 +110,7 @@ fn expectMultiHit(
 ) !void {
     const lists = try gpa.create(raylane.trace.multi_hit.HitLists(Kernel));
     defer gpa.destroy(lists);
-    const occluders = try gpa.alloc(u32, world.geometry.triangles.len / 32 + 1);
+    const occluders = try gpa.alloc(u32, world.geometry.triangleCount() / 32 + 1);
     defer gpa.free(occluders);
     var materials = world.materials;
     materials.occluders = occluders;
@@ -302,7 +304,8 @@ pub fn addTriangles(soup: Soup, corners: *Corners, random: std.Random, count: us
     }
 }
 
-fn addQueries(soup: Soup, queries: []Query, corners: []const [3]f32, random: std.Random) void {
+/// Fills `queries` with rays at and about corners, along planes, near and far.
+pub fn addQueries(soup: Soup, queries: []Query, corners: []const [3]f32, random: std.Random) void {
     const center: f32 = if (soup == .far_away) 1e5 else 0;
     const shared: [3]f32 = .{ center + 0.1, center - 0.3, center + 7 };
     for (queries, 0..) |*query, index| {

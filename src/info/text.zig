@@ -33,6 +33,7 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     try writeScenes(writer, file);
     try writeCameras(writer, scene);
     try writeLights(writer, info);
+    try writeAnimations(writer, scene.animations);
     try writeVariants(writer, scene.material_variants);
     try writeImages(writer, info.images);
     try writeCounts(writer, &info.counts);
@@ -41,7 +42,7 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     try report.writeBytes(writer, info.memory_bytes);
     try writer.print(" to render {d} x {d}\n", .{ info.size[0], info.size[1] });
     try writeExtensions(writer, file.extensions);
-    if (info.needsForce()) {
+    if (file.needs_force) {
         try writer.writeAll("rendering    only with --force, for what it requires\n");
     }
 }
@@ -118,6 +119,17 @@ fn writeLights(writer: *Writer, info: *const Info) Writer.Error!void {
     if (info.scene.environment) |*map| try lists.next("an environment ({t})", .{map.projection});
     if (lists.is_empty) try writer.writeAll("none");
     try writer.writeByte('\n');
+}
+
+fn writeAnimations(writer: *Writer, animations: []const scene_data.Animation) Writer.Error!void {
+    for (animations, 0..) |*animation, index| {
+        if (!try begin(writer, "animation", index, animations.len)) return;
+        try writer.print("{d}", .{index});
+        if (animation.name.len > 0) try writer.print(" {f}", .{quote(animation.name)});
+        if (animation.span()) |span| {
+            try writer.print(", {d:.3} to {d:.3} s\n", .{ span[0], span[1] });
+        } else try writer.writeAll(", nothing that is drawn moves\n");
+    }
 }
 
 fn writeVariants(writer: *Writer, names: []const []const u8) Writer.Error!void {

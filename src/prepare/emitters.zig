@@ -107,7 +107,9 @@ const Finder = struct {
             }
             const number = triangles[first].material;
             var end = first + 1;
-            while (end < triangles.len) : (end += 1) {
+            // Triangles of instances in between end a run, as if they were here.
+            const limit = finder.geometry.shared.flatEnd(first) orelse triangles.len;
+            while (end < limit) : (end += 1) {
                 if (triangles[end].material != number and !triangles[end].isDropped()) break;
             }
             defer first = end;

@@ -20,9 +20,9 @@ const vec3 = math.vec3;
 const deform = @import("deform.zig");
 const pose_file = @import("pose.zig");
 const strokes = @import("strokes.zig");
-const Affine = math.Affine;
 const AffineD = math.AffineD;
 const Box3 = math.Box3;
+const Placement = world.Placement;
 const Vec3 = math.Vec3;
 
 pub const Error = error{ OutOfMemory, SceneTooLarge } || parallel.Error;
@@ -91,7 +91,7 @@ const Draw = struct {
 
     // By pose.
     mesh: *const scene.Mesh = undefined,
-    maps: Maps = undefined,
+    maps: Placement = undefined,
     /// Of morph targets; empty: none changes the mesh.
     weights: []const f32 = &.{},
     /// In place of `maps`; empty: the mesh has no skin.
@@ -119,18 +119,6 @@ const Draw = struct {
         draw.maps = .of(map, draw.mirrored);
         draw.weights = if (is_morphed) instance.morph_weights else &.{};
         draw.is_colored_anew = !is_placed or was_morphed or is_morphed;
-    }
-};
-
-/// Maps into the world.
-const Maps = struct {
-    point: AffineD,
-    direction: Affine,
-    normal: Affine,
-
-    fn of(map: AffineD, mirrored: bool) Maps {
-        const scaled = scaledDown(.of(map));
-        return .{ .point = map, .direction = scaled, .normal = normalMap(scaled, mirrored) };
     }
 };
 
@@ -345,11 +333,12 @@ fn countStrokes(
 
 /// The stretch of a mesh's vertices that it uses; files share one list of vertices among many
 /// meshes.
-const VertexRange = struct {
+pub const VertexRange = struct {
     first: u32,
     count: u32,
 
-    fn of(mesh: *const scene.Mesh) VertexRange {
+    /// Of a mesh; empty where it draws nothing.
+    pub fn of(mesh: *const scene.Mesh) VertexRange {
         if (mesh.isEmpty()) return .{ .first = 0, .count = 0 };
         var lowest: u32 = std.math.maxInt(u32);
         var highest: u32 = 0;
@@ -365,46 +354,6 @@ const VertexRange = struct {
         return .{ .first = lowest, .count = highest - lowest + 1 };
     }
 };
-
-/// The linear part over its largest entry, so that neither tiny nor huge maps leave the range of an
-/// f32 when its entries are multiplied.
-fn scaledDown(map: Affine) Affine {
-    var largest: f32 = 0;
-    for ([_]Vec3{ map.x, map.y, map.z }) |axis| {
-        for (axis) |entry| largest = if (@abs(entry) > largest) @abs(entry) else largest;
-    }
-    if (!(largest > std.math.floatMin(f32)) or largest == std.math.inf(f32)) largest = 1;
-    return .{
-        .x = divide(map.x, largest),
-        .y = divide(map.y, largest),
-        .z = divide(map.z, largest),
-        .translation = .{ 0, 0, 0 },
-    };
-}
-
-/// The map for normals: cofactors, which turn with a mirroring map's winding, so turned back for
-/// those.
-fn normalMap(scaled: Affine, mirrored: bool) Affine {
-    const sign: f32 = if (mirrored) -1 else 1;
-    return .{
-        .x = vec3.scale(vec3.cross(scaled.y, scaled.z), sign),
-        .y = vec3.scale(vec3.cross(scaled.z, scaled.x), sign),
-        .z = vec3.scale(vec3.cross(scaled.x, scaled.y), sign),
-        .translation = .{ 0, 0, 0 },
-    };
-}
-
-fn divide(a: Vec3, divisor: f32) Vec3 {
-    return .{ a[0] / divisor, a[1] / divisor, a[2] / divisor };
-}
-
-/// Normals are interpolated without being made unit vectors first, which wants them in a range
-/// where sums and squares keep their digits; beyond it the length is given up.
-fn tameNormal(normal: Vec3) Vec3 {
-    const largest = vec3.maxComponent(.{ @abs(normal[0]), @abs(normal[1]), @abs(normal[2]) });
-    if (largest > 1e-12 and largest < 1e12) return normal;
-    return vec3.normalize(normal) orelse .{ 0, 0, 0 };
-}
 
 /// Shared by the threads.
 const Work = struct {
@@ -451,11 +400,11 @@ const Work = struct {
             return work.placeDeformed(draw, from, to, source);
         }
         for (work.positions[from..to], draw.mesh.positions[source..][0..count]) |*to_p, p| {
-            to_p.* = pose_file.round(draw.maps.point.point(pose_file.widen(p)));
+            to_p.* = draw.maps.placePoint(p);
         }
         if (draw.mesh.normals) |normals| {
             for (work.normals[from..to], normals[source..][0..count]) |*to_n, n| {
-                to_n.* = tameNormal(draw.maps.normal.direction(n));
+                to_n.* = draw.maps.placeNormal(n);
             }
         } else {
             @memset(work.normals[from..to], .{ 0, 0, 0 });
@@ -502,11 +451,11 @@ const Work = struct {
         if (mesh.tangents != null) deform.morph(mesh, draw.weights, .tangents, 0, source, tangents);
         const sign: f32 = if (draw.mirrored) -1 else 1;
         for (positions, normals, 0..) |*position, *normal, index| {
-            const maps: Maps = if (draw.joint_maps.len > 0)
+            const maps: Placement = if (draw.joint_maps.len > 0)
                 .of(deform.blend(mesh.joint_sets, draw.joint_maps, source + index), draw.mirrored)
             else
                 draw.maps;
-            position.* = pose_file.round(maps.point.point(pose_file.widen(position.*)));
+            position.* = maps.placePoint(position.*);
             normal.* = vec3.normalize(maps.normal.direction(normal.*)) orelse .{ 0, 0, 0 };
             if (!has_tangents or mesh.tangents == null) continue;
             const tangent = &tangents[index];
@@ -658,16 +607,9 @@ fn copy(to: anytype, from: anytype, source: usize, missing: std.meta.Elem(@TypeO
     if (from) |all| @memcpy(to, all[source..][0..to.len]) else @memset(to, missing);
 }
 
-/// Tangents lie in the surface and go where directions go. The bitangent, which goes there too, is
-/// cross(normal, tangent) times the sign: mirroring maps turn the cross product, so the sign turns
-/// with it.
 fn placeTangents(draw: *const Draw, to: [][4]f32, source: usize) void {
     const tangents = draw.mesh.tangents orelse return @memset(to, .{ 0, 0, 0, 1 });
-    const sign: f32 = if (draw.mirrored) -1 else 1;
-    for (to, tangents[source..][0..to.len]) |*to_t, t| {
-        const mapped = tameNormal(draw.maps.direction.direction(t[0..3].*));
-        to_t.* = .{ mapped[0], mapped[1], mapped[2], t[3] * sign };
-    }
+    for (to, tangents[source..][0..to.len]) |*to_t, t| to_t.* = draw.maps.placeTangent(t);
 }
 
 /// Index of the last draw whose `field` is at most `position`, so that what follows holds it.

@@ -180,7 +180,7 @@ pub const Subject = struct {
     ) error{OutOfMemory}!Subject {
         var subject: Subject = .{
             .shown = .{ .geometry = geometry, .materials = materials },
-            .used = try .initEmpty(gpa, geometry.positions.len),
+            .used = try .initEmpty(gpa, geometry.vertexCount()),
             .center = .{ 0, 0, 0 },
             .size = 1,
             .basis = .ofDirection(directions[0]),
@@ -205,9 +205,10 @@ pub const Subject = struct {
     fn markShown(subject: *Subject) void {
         const shown = &subject.shown;
         shown.surface_count = 0;
-        for (shown.geometry.surfaces()) |*triangle| {
+        for (0..shown.geometry.surfaceCount()) |number| {
+            const triangle = shown.geometry.triangleAt(@intCast(number));
             shown.surface_count += @intFromBool(!triangle.isDropped());
-            if (shown.holds(triangle)) mark(&subject.used, triangle);
+            if (shown.holds(&triangle)) mark(&subject.used, &triangle);
         }
         subject.markSpheres(&subject.used);
     }
@@ -223,7 +224,7 @@ pub const Subject = struct {
         var bounds: math.Box3 = .empty;
         var vertices = subject.used.iterator(.{});
         while (vertices.next()) |vertex| {
-            bounds = bounds.include(subject.shown.geometry.positions[vertex]);
+            bounds = bounds.include(subject.shown.geometry.positionAt(@intCast(vertex)));
         }
         subject.size = 0;
         for (&subject.center, bounds.lower, bounds.upper) |*middle, lower, upper| {
@@ -288,16 +289,17 @@ pub const Subject = struct {
         const before = facing.count();
         const shown = &subject.shown;
         subject.markSpheres(facing);
-        for (shown.geometry.surfaces()) |*triangle| {
-            if (!shown.holds(triangle)) continue;
+        for (0..shown.geometry.surfaceCount()) |number| {
+            const triangle = shown.geometry.triangleAt(@intCast(number));
+            if (!shown.holds(&triangle)) continue;
             if (!shown.materials[triangle.material].double_sided) {
-                const normal = areaNormal(shown.geometry, triangle);
-                const corner = shown.geometry.positions[triangle.corner[0]];
+                const normal = areaNormal(shown.geometry, &triangle);
+                const corner = shown.geometry.positionAt(triangle.corner[0]);
                 const toward = vec3d.neg(relativeTo(eye, corner));
                 const lengths = vec3d.length(normal) * vec3d.length(toward);
                 if (vec3d.dot(normal, toward) < facing_sine_min * lengths) continue;
             }
-            mark(facing, triangle);
+            mark(facing, &triangle);
         }
         return facing.count() > before;
     }
@@ -371,7 +373,7 @@ pub const Subject = struct {
         radius *= subject.size;
         var vertices = subject.used.iterator(.{});
         while (vertices.next()) |vertex| {
-            const p = relativeTo(target, subject.shown.geometry.positions[vertex]);
+            const p = relativeTo(target, subject.shown.geometry.positionAt(@intCast(vertex)));
             const r = @sqrt(p[0] * p[0] + p[2] * p[2]);
             const nearer = toward * p[1] * sin;
             const over = p[1] * cos / slope[1];
@@ -388,7 +390,7 @@ pub const Subject = struct {
         var distance: f64 = 0;
         var vertices = subject.used.iterator(.{});
         while (vertices.next()) |vertex| {
-            const p = relativeTo(target, subject.shown.geometry.positions[vertex]);
+            const p = relativeTo(target, subject.shown.geometry.positionAt(@intCast(vertex)));
             distance = larger(distance, vec3d.length(p));
         }
         return (distance + subject.shown.geometry.sphere_radius) * (1 + margin);
@@ -407,7 +409,7 @@ pub const Subject = struct {
         points[0] = .{ 0, 0, 0 };
         var vertices = chosen.iterator(.{});
         for (points[0..count]) |*point| {
-            const position = subject.shown.geometry.positions[vertices.next().?];
+            const position = subject.shown.geometry.positionAt(@intCast(vertices.next().?));
             var relative = relativeTo(subject.center, position);
             for (&relative) |*component| component.* /= subject.size;
             point.* = .{
@@ -461,8 +463,8 @@ const Shown = struct {
         const material = &shown.materials[material_index];
         if (shown.all or material.alpha_mode == .@"opaque") return true;
         var alpha: f32 = 0;
-        if (shown.geometry.colors.len == 0) alpha = 1 else for (vertices) |vertex| {
-            const color = shown.geometry.colors[vertex];
+        if (!shown.geometry.hasColors()) alpha = 1 else for (vertices) |vertex| {
+            const color = shown.geometry.colorAt(vertex);
             alpha = if (color[3] > alpha) color[3] else alpha;
         }
         alpha *= material.base_color[3];
@@ -472,9 +474,9 @@ const Shown = struct {
 
 /// Twice the area of a triangle along its normal, towards its front.
 fn areaNormal(geometry: *const world.Geometry, triangle: *const world.Triangle) Vec3d {
-    const a = geometry.positions[triangle.corner[0]];
-    const b = geometry.positions[triangle.corner[1]];
-    const c = geometry.positions[triangle.corner[2]];
+    const a = geometry.positionAt(triangle.corner[0]);
+    const b = geometry.positionAt(triangle.corner[1]);
+    const c = geometry.positionAt(triangle.corner[2]);
     const middle: Vec3d = .{ a[0], a[1], a[2] };
     return vec3d.cross(relativeTo(middle, b), relativeTo(middle, c));
 }
@@ -517,7 +519,7 @@ fn flatFront(shown: *const Shown, bounds: math.Box3) ?Vec3d {
     var all: f64 = 0;
     var samples: Samples = .{ .shown = shown };
     while (samples.next()) |triangle| {
-        const normal = areaNormal(shown.geometry, triangle);
+        const normal = areaNormal(shown.geometry, &triangle);
         const sign: f64 = if (vec3d.dot(normal, sum) < 0) -1 else 1;
         sum = vec3d.add(sum, vec3d.scale(normal, sign));
         all += vec3d.length(normal);
@@ -541,7 +543,7 @@ fn depthAlong(axis: Vec3d, shown: *const Shown, bounds: math.Box3) f64 {
     var most: f64 = -std.math.inf(f64);
     var samples: Samples = .{ .shown = shown };
     while (samples.next()) |triangle| for (triangle.corner) |vertex| {
-        const position = shown.geometry.positions[vertex];
+        const position = shown.geometry.positionAt(vertex);
         const at = vec3d.dot(axis, .{ position[0], position[1], position[2] });
         least = if (at < least) at else least;
         most = larger(most, at);
@@ -558,11 +560,12 @@ const Samples = struct {
     /// Triangles to pass by that are not dropped.
     ahead: usize = 0,
 
-    fn next(samples: *Samples) ?*const world.Triangle {
-        const triangles = samples.shown.geometry.surfaces();
+    fn next(samples: *Samples) ?world.Triangle {
+        const geometry = samples.shown.geometry;
+        const count = geometry.surfaceCount();
         const stride = samples.shown.surface_count / sample_count_max + 1;
-        while (samples.index < triangles.len) {
-            const triangle = &triangles[samples.index];
+        while (samples.index < count) {
+            const triangle = geometry.triangleAt(@intCast(samples.index));
             samples.index += 1;
             if (triangle.isDropped()) continue;
             if (samples.ahead > 0) {
@@ -570,7 +573,7 @@ const Samples = struct {
                 continue;
             }
             samples.ahead = stride - 1;
-            if (samples.shown.holds(triangle)) return triangle;
+            if (samples.shown.holds(&triangle)) return triangle;
         }
         return null;
     }
@@ -585,9 +588,9 @@ fn boardAxis(shown: *const Shown, bounds: math.Box3) ?usize {
     var squares: Vec3d = .{ 0, 0, 0 };
     var samples: Samples = .{ .shown = shown };
     while (samples.next()) |triangle| {
-        const area = vec3d.length(areaNormal(shown.geometry, triangle)) / 3;
+        const area = vec3d.length(areaNormal(shown.geometry, &triangle)) / 3;
         for (triangle.corner) |vertex| {
-            const at = relativeTo(middle, shown.geometry.positions[vertex]);
+            const at = relativeTo(middle, shown.geometry.positionAt(vertex));
             sum = vec3d.add(sum, vec3d.scale(at, area));
             squares = vec3d.add(squares, vec3d.scale(vec3d.mul(at, at), area));
             all += area;
@@ -615,7 +618,7 @@ fn chooseDirection(shown: *const Shown, choices: []const Direction) Direction {
     var visible: [directions.len]f64 = @splat(0);
     var samples: Samples = .{ .shown = shown };
     while (samples.next()) |triangle| {
-        const normal = areaNormal(shown.geometry, triangle);
+        const normal = areaNormal(shown.geometry, &triangle);
         const back: f64 = if (shown.materials[triangle.material].double_sided) -1 else 0;
         for (toward[0..choices.len], visible[0..choices.len]) |to, *sum| {
             const projected = vec3d.dot(normal, to);

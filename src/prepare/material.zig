@@ -16,13 +16,12 @@ const Parts = @import("alpha.zig").Parts;
 const TextureSet = @import("texture.zig").TextureSet;
 const volumes_file = @import("volumes.zig");
 
-/// The world's materials in the order of the parts'; positions and triangles are the world's.
+/// The world's materials in the order of the parts'. Of the geometry no tree is needed.
 pub fn place(
     arena: Allocator,
     parts: *const Parts,
     textures: *const TextureSet,
-    positions: []const [3]f32,
-    triangles: []const world.Triangle,
+    geometry: *const world.Geometry,
 ) error{OutOfMemory}!world.Materials {
     const converted = try arena.alloc(world.Material, parts.materials.len);
     for (parts.materials, textures.materials, converted) |*material, *use, *to| {
@@ -44,7 +43,9 @@ pub fn place(
         has_transmission = has_transmission or used.transmits();
         has_holes = has_holes or used.alpha_cutoff >= 0;
     }
-    const volumes = try volumes_file.rank(arena, converted, layers, positions, triangles);
+    // What bounds volumes is flattened.
+    const volumes = try volumes_file
+        .rank(arena, converted, layers, geometry.positions, geometry.triangles);
     var has_scattering = false;
     for (volumes) |*volume| has_scattering = has_scattering or volume.scatters();
     const stops_all = !has_transparency and !has_holes;
@@ -61,7 +62,7 @@ pub fn place(
         .occluders = if (stops_all)
             &.{}
         else
-            try occluders(arena, converted, textures.lookups, triangles),
+            try occluders(arena, converted, textures.lookups, geometry),
     };
 }
 
@@ -121,19 +122,18 @@ fn occluders(
     arena: Allocator,
     materials: []const world.Material,
     lookups: []const world.Lookup,
-    triangles: []const world.Triangle,
+    geometry: *const world.Geometry,
 ) error{OutOfMemory}![]const u32 {
-    const words = try arena.alloc(u32, @divCeil(triangles.len, 32));
-    for (words, 0..) |*word, index| {
-        word.* = 0;
-        const first = 32 * index;
-        for (triangles[first..@min(first + 32, triangles.len)], 0..) |*triangle, bit| {
-            if (triangle.isDropped()) continue;
-            const material = &materials[triangle.material];
-            const own = lookups[material.first_lookup..][0..material.lookup_count];
-            const stops = material.stopsLight(own);
-            word.* |= @as(u32, @intFromBool(stops)) << @intCast(bit);
-        }
+    const count = geometry.triangleCount();
+    const words = try arena.alloc(u32, @divCeil(count, 32));
+    @memset(words, 0);
+    for (0..count) |number| {
+        const face = geometry.face(@intCast(number));
+        if (face.material == world.none) continue;
+        const material = &materials[face.material];
+        const own = lookups[material.first_lookup..][0..material.lookup_count];
+        const stops = material.stopsLight(own);
+        words[number / 32] |= @as(u32, @intFromBool(stops)) << @intCast(number % 32);
     }
     return words;
 }

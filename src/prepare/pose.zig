@@ -10,6 +10,7 @@ const std = @import("std");
 const math = @import("../math.zig");
 const scene = @import("../scene.zig");
 const deform = @import("deform.zig");
+const placement = @import("../world.zig").placement;
 const assert = std.debug.assert;
 const vec3d = math.vec3d;
 const AffineD = math.AffineD;
@@ -118,14 +119,9 @@ fn findCenter(from: *const scene.Scene, pose: *Pose) void {
 }
 
 /// A point in double precision.
-pub inline fn widen(point: math.Vec3) Vec3d {
-    return .{ point[0], point[1], point[2] };
-}
-
+pub const widen = placement.widen;
 /// A point in single precision: the one rounding of all that is placed in the world.
-pub inline fn round(point: Vec3d) math.Vec3 {
-    return .{ @floatCast(point[0]), @floatCast(point[1]), @floatCast(point[2]) };
-}
+pub const round = placement.round;
 
 fn testPose(nodes: []const scene.Node, positions: []const math.Vec3, node: u32) !Pose {
     const gpa = std.testing.allocator;

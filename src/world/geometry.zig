@@ -3,6 +3,8 @@
 const std = @import("std");
 const math = @import("../math.zig");
 const assert = std.debug.assert;
+const instances = @import("instances.zig");
+const Face = instances.Face;
 const Padding = @import("padding.zig").Padding;
 const Vec3 = math.Vec3;
 const Box3 = math.Box3;
@@ -13,19 +15,38 @@ pub const none: u32 = std.math.maxInt(u32);
 /// Levels of a tree at most; the builder keeps to it, traversal stacks are sized by it.
 pub const tree_depth_max = 64;
 
+/// Levels that a ray may have to go down, those within clusters of instances counted.
+pub const walk_depth_max = tree_depth_max + 1;
+
 /// Bytes that nodes and triangle packs are aligned to: a cache line.
 pub const cache_line_bytes = 64;
 
 /// A child of a node. One word, since stacks write and read it as a whole: two stores that one load
 /// reads back make processors wait.
 pub const Child = packed struct(u64) {
-    /// Number of a node, or of the first triangle pack; `none` if there is no child.
+    /// Number of a node, of the first triangle pack, or of an instance's cluster; `none` if there
+    /// is no child.
     target: u32,
-    /// 0: a node; else that many packs.
+    /// 0: a node; `cluster_mark`: a cluster; else that many packs.
     pack_count: u32,
+
+    /// Packs of a leaf are fewer.
+    pub const cluster_mark = std.math.maxInt(u32) - 1;
+    /// What stands on a stack below a cluster's children: here the tree is the scene's again.
+    pub const cluster_end: Child = .{ .target = none, .pack_count = std.math.maxInt(u32) };
 
     pub const missing: Child = .{ .target = none, .pack_count = 0 };
     pub const root: Child = .{ .target = 0, .pack_count = 0 };
+
+    /// A cluster of an instance: `target` is its number.
+    pub inline fn isCluster(child: Child) bool {
+        return child.pack_count == cluster_mark;
+    }
+
+    /// Whether it is a leaf with packs of its own.
+    pub inline fn hasPacks(child: Child) bool {
+        return child.pack_count > 0 and child.pack_count < cluster_mark;
+    }
 
     /// The numbers of its packs, from the first to before the last; equal for a node.
     pub inline fn packs(child: Child) [2]usize {
@@ -83,7 +104,7 @@ pub fn TrianglePack(comptime width: comptime_int) type {
     return extern struct {
         /// [corner][axis][lane].
         corner: [3][3][width]f32 align(16),
-        /// Index into `Geometry.triangles`.
+        /// Numbers of triangles, see `Geometry.face`.
         primitive: [width]u32,
 
         /// A pack without triangles.
@@ -108,6 +129,8 @@ pub fn Tree(comptime width: comptime_int) type {
         pub inline fn prefetch(tree: *const @This(), child: Child) void {
             const start: [*]const u8 = if (child.pack_count == 0)
                 @ptrCast(&tree.nodes[child.target])
+            else if (child.isCluster())
+                return
             else
                 @ptrCast(&tree.packs[child.target]);
             const bytes = @max(@sizeOf(Node(width)), @sizeOf(TrianglePack(width)));
@@ -134,8 +157,9 @@ pub const AnyTree = union(enum) {
     }
 };
 
-/// Three corners and a material; its index in `Geometry.triangles` is the primitive number. One
-/// that has no area or no finite place is dropped: it keeps its number, but the tree lacks it.
+/// Three corners and a material; its index in `Geometry.triangles` is the primitive number, unless
+/// instances share meshes. One that has no area or no finite place is dropped: it keeps its number,
+/// but the tree lacks it.
 pub const Triangle = extern struct {
     /// Indices into `Geometry.positions` and the other arrays by vertex, counter-clockwise in
     /// front.
@@ -198,6 +222,10 @@ pub const Geometry = struct {
     /// Of points and lines, all with the same radius in metres.
     spheres: []const Sphere = &.{},
     sphere_radius: f32 = 0,
+    /// Instances that are not flattened, whose triangles and vertices are not in the arrays above.
+    shared: instances.Shared = .{},
+    /// A thread's own, `ClusterCache` in the width of the tree; a must where there are such.
+    cluster_cache: ?*const anyopaque = null,
     /// Box of the corners of triangles that are not dropped, empty without any.
     bounds: Box3,
     /// Box of twice the centroids of the triangles' boxes, empty without any.
@@ -208,9 +236,56 @@ pub const Geometry = struct {
     /// most of the scene is.
     size: f32,
 
-    /// The triangles that are not of points and lines.
-    pub fn surfaces(geometry: *const Geometry) []const Triangle {
-        return geometry.triangles[0..@min(geometry.triangles.len, geometry.surface_count)];
+    /// How many triangles are not of points and lines, those of instances counted.
+    pub fn surfaceCount(geometry: *const Geometry) u32 {
+        if (geometry.shared.runs.len > 0) return geometry.shared.primitive_count;
+        return @intCast(@min(geometry.triangles.len, geometry.surface_count));
+    }
+
+    /// How many triangles there are, those of instances counted.
+    pub fn triangleCount(geometry: *const Geometry) usize {
+        if (geometry.shared.runs.len > 0) return geometry.shared.primitive_count;
+        return geometry.triangles.len;
+    }
+
+    /// How many vertices there are, those of instances counted.
+    pub fn vertexCount(geometry: *const Geometry) usize {
+        if (geometry.shared.runs.len > 0) return geometry.shared.vertex_count;
+        return geometry.positions.len;
+    }
+
+    /// Whether any vertex has a colour.
+    pub inline fn hasColors(geometry: *const Geometry) bool {
+        return geometry.colors.len > 0 or geometry.shared.has_colors;
+    }
+
+    /// Whether textures want tangents.
+    pub inline fn hasTangents(geometry: *const Geometry) bool {
+        return geometry.tangents.len > 0 or geometry.shared.has_tangents;
+    }
+
+    /// A triangle by its number.
+    pub inline fn face(geometry: *const Geometry, primitive: u32) Face {
+        if (geometry.shared.runs.len == 0) return .of(&geometry.triangles[primitive]);
+        return geometry.shared.face(geometry, primitive);
+    }
+
+    /// A triangle by its number, with corners for `positionAt` and `colorAt`.
+    pub fn triangleAt(geometry: *const Geometry, primitive: u32) Triangle {
+        if (geometry.shared.runs.len == 0) return geometry.triangles[primitive];
+        return geometry.shared.triangleAt(geometry, primitive);
+    }
+
+    /// A vertex by its number.
+    pub fn positionAt(geometry: *const Geometry, vertex: u32) Vec3 {
+        if (geometry.shared.runs.len == 0) return geometry.positions[vertex];
+        return geometry.shared.positionAt(geometry, vertex);
+    }
+
+    /// The colour of a vertex by its number; asserts that some have one.
+    pub fn colorAt(geometry: *const Geometry, vertex: u32) [4]f32 {
+        if (geometry.shared.runs.len == 0) return geometry.colors[vertex];
+        return geometry.shared.colorAt(geometry, vertex);
     }
 
     /// Without anything to hit, and without a tree.

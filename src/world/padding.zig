@@ -85,6 +85,25 @@ pub const Padding = struct {
         return if (above > below) above else below;
     }
 
+    /// `ofBox` of as many boxes as vectors hold, bit for bit.
+    pub inline fn ofVectors(
+        padding: *const Padding,
+        comptime count: comptime_int,
+        lower: [3]@Vector(count, f32),
+        upper: [3]@Vector(count, f32),
+    ) @Vector(count, f32) {
+        const Vector = @Vector(count, f32);
+        var reach: Vector = @splat(0);
+        for (lower, upper, padding.center) |low, high, center| {
+            const middle: Vector = @splat(center);
+            for ([_]Vector{ @abs(low - middle), @abs(high - middle) }) |distant| {
+                reach = @select(f32, distant > reach, distant, reach);
+            }
+        }
+        const relative: Vector = @splat(pad_relative);
+        return reach * relative + @as(Vector, @splat(padding.pad_center));
+    }
+
     /// `ofBox` in lanes, bit for bit; `lower` and `upper` may be turned, as `center` is.
     pub inline fn ofBoxes(
         padding: *const Padding,
@@ -206,5 +225,32 @@ test "a multiply-add against a node's box accepts what the exact test accepts" {
                 try std.testing.expect(if (side == 0) other <= t else other >= t);
             }
         }
+    }
+}
+
+test "pads in vectors are those of boxes one by one" {
+    var random_state: std.Random.DefaultPrng = .init(9);
+    const random = random_state.random();
+    for (0..200) |_| {
+        var boxes: [4]Box3 = @splat(.empty);
+        var lower: [3]@Vector(4, f32) = undefined;
+        var upper: [3]@Vector(4, f32) = undefined;
+        for (&boxes, 0..) |*box, lane| {
+            for (0..2) |_| {
+                var point: Vec3 = undefined;
+                for (&point) |*coordinate| {
+                    const size = std.math.ldexp(@as(f32, 1), random.intRangeAtMost(i32, -9, 9));
+                    coordinate.* = random.floatNorm(f32) * size;
+                }
+                box.* = box.include(point);
+            }
+            inline for (0..4) |index| if (index == lane) for (0..3) |axis| {
+                lower[axis][index] = box.lower[axis];
+                upper[axis][index] = box.upper[axis];
+            };
+        }
+        const padding: Padding = .init(.{ random.floatNorm(f32), 3, -0.1 }, boxes[0]);
+        const pads: [4]f32 = padding.ofVectors(4, lower, upper);
+        for (boxes, pads) |box, pad| try std.testing.expectEqual(padding.ofBox(box), pad);
     }
 }

@@ -18,6 +18,7 @@ const World = world.World;
 pub fn check(gpa: Allocator, checked: *const World) error{OutOfMemory}!void {
     const vertex_count = checked.geometry.positions.len;
     assert(checked.geometry.normals.len == vertex_count);
+    checkNumbers(&checked.geometry);
     assert(checked.geometry.colors.len == 0 or checked.geometry.colors.len == vertex_count);
     assert(checked.view.width > 0 and checked.view.height > 0);
     var dropped_count: usize = 0;
@@ -32,9 +33,38 @@ pub fn check(gpa: Allocator, checked: *const World) error{OutOfMemory}!void {
     }
 }
 
+/// Runs follow each other without gaps.
+fn checkNumbers(geometry: *const world.Geometry) void {
+    var primitive_next: u32 = 0;
+    var vertex_next: u32 = 0;
+    for (geometry.shared.runs, 0..) |run, index| {
+        assert(run.primitive_first == primitive_next and run.vertex_first == vertex_next);
+        if (run.instance == world.none) {
+            const is_last = index + 1 == geometry.shared.runs.len;
+            const shared = &geometry.shared;
+            primitive_next = if (is_last)
+                shared.primitive_count
+            else
+                shared.runs[index + 1].primitive_first;
+            vertex_next = if (is_last) shared.vertex_count else shared.runs[index + 1].vertex_first;
+            continue;
+        }
+        const instance = &geometry.shared.instances[run.instance];
+        const mesh = &geometry.shared.meshes[instance.mesh];
+        assert(instance.primitive_first == primitive_next);
+        primitive_next += @intCast(mesh.triangles.len);
+        vertex_next += @intCast(mesh.positions.len);
+    }
+    assert(primitive_next == geometry.shared.primitive_count);
+    assert(vertex_next == geometry.shared.vertex_count);
+}
+
 fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMemory}!void {
     const Visit = struct { node: u32, depth: u32, box: ?Box3 };
-    const seen = try gpa.alloc(bool, checked.geometry.triangles.len);
+    const width = @typeInfo(@TypeOf(tree.nodes[0].child)).array.len;
+    const mapped = try gpa.create(world.instances.MappedCluster(width));
+    defer gpa.destroy(mapped);
+    const seen = try gpa.alloc(bool, checked.geometry.triangleCount());
     defer gpa.free(seen);
     @memset(seen, false);
     var stack: std.ArrayList(Visit) = .empty;
@@ -45,7 +75,8 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
     var depth: u32 = 0;
     while (stack.pop()) |visit| {
         node_count += 1;
-        if (tree.packs.len > 0) depth = @max(depth, visit.depth);
+        if (tree.packs.len > 0 or checked.geometry.shared.runs.len > 0)
+            depth = @max(depth, visit.depth);
         const node = &tree.nodes[visit.node];
         var joined: Box3 = .empty;
         for (node.child, 0..) |child, index| {
@@ -56,6 +87,9 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
             } else if (child.pack_count == 0) {
                 const below = visit.depth + 1;
                 try stack.append(gpa, .{ .node = child.target, .depth = below, .box = box });
+            } else if (child.isCluster()) {
+                mapped.fill(&checked.geometry, child.target);
+                checkCluster(checked, mapped, box, seen);
             } else {
                 pack_count += child.pack_count;
                 const first, const end = child.packs();
@@ -63,19 +97,20 @@ fn checkTree(gpa: Allocator, checked: *const World, tree: anytype) error{OutOfMe
             }
         }
         // Boxes are unions, grown once: by no more than their own margin.
-        if (visit.box) |box| {
+        const is_joined = checked.geometry.shared.runs.len > 0;
+        if (visit.box) |box| if (is_joined) assert(box.contains(joined)) else {
             assert(box.isEmpty() == joined.isEmpty());
             if (box.isEmpty()) continue;
             const margin = checked.geometry.padding.marginOfBox(box);
             assert(box.contains(joined) and joined.grow(margin).contains(box));
-        }
+        };
     }
-    for (seen, checked.geometry.triangles) |is_seen, triangle| {
-        assert(is_seen != triangle.isDropped());
+    for (seen, 0..) |is_seen, number| {
+        assert(is_seen != (checked.geometry.face(@intCast(number)).material == world.none));
     }
     assert(node_count == tree.nodes.len and node_count == checked.facts.tree.node_count);
     assert(pack_count == tree.packs.len);
-    assert(depth == checked.facts.tree.depth and depth <= world.tree_depth_max);
+    assert(depth == checked.facts.tree.depth and depth <= world.walk_depth_max);
     assert(checked.facts.tree.bytes >= std.mem.sliceAsBytes(tree.packs).len);
 }
 
@@ -90,8 +125,9 @@ fn checkLeaf(checked: *const World, packs: anytype, box: Box3, seen: []bool) voi
                     for (position) |coordinate| assert(coordinate == 0);
                     continue;
                 }
-                const vertex = checked.geometry.triangles[primitive].corner[corner_index];
-                for (position, checked.geometry.positions[vertex]) |a, b| assert(a == b);
+                const face = checked.geometry.face(primitive);
+                const placed = face.position(&checked.geometry, corner_index);
+                for (position, placed) |a, b| assert(a == b);
                 corners = corners.include(position);
             }
             if (primitive == world.none) continue;
@@ -105,4 +141,30 @@ fn checkLeaf(checked: *const World, packs: anytype, box: Box3, seen: []bool) voi
     if (box.isEmpty()) return;
     const grown = joined.grow(checked.geometry.padding.marginOfBox(joined));
     assert(box.contains(grown) and grown.contains(box));
+}
+
+/// The tree of a mapped cluster, all of which lies within the box above.
+fn checkCluster(checked: *const World, mapped: anytype, box: Box3, seen: []bool) void {
+    const tree = mapped.tree();
+    var waiting: [mapped.nodes.len]u32 = undefined;
+    waiting[0] = 0;
+    var count: usize = 1;
+    var pack_count: usize = 0;
+    while (count > 0) {
+        count -= 1;
+        const node = &tree.nodes[waiting[count]];
+        for (node.child, 0..) |child, index| {
+            if (child == world.Child.missing) continue;
+            assert(box.contains(node.childBox(index)));
+            if (child.pack_count == 0) {
+                waiting[count] = child.target;
+                count += 1;
+            } else {
+                pack_count += child.pack_count;
+                const first, const end = child.packs();
+                checkLeaf(checked, tree.packs[first..end], node.childBox(index), seen);
+            }
+        }
+    }
+    assert(pack_count == mapped.pack_count);
 }

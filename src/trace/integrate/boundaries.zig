@@ -21,8 +21,7 @@ const Volume = world_file.Volume;
 /// What a ray in some direction goes through at a triangle; null if that bounds nothing that nests.
 pub fn crossingAt(frame: *const Frame, primitive: u32, direction: [3]f32) ?Crossing {
     const geometry = frame.geometry;
-    const triangle = &geometry.triangles[primitive];
-    const rank = frame.materials.all[triangle.material].volume_rank;
+    const rank = frame.materials.all[geometry.face(primitive).material].volume_rank;
     const volumes = frame.materials.volumes;
     if (rank >= volumes.len or !volumes[rank].nests) return null;
     const plane = planeOf(geometry, primitive);
@@ -31,11 +30,11 @@ pub fn crossingAt(frame: *const Frame, primitive: u32, direction: [3]f32) ?Cross
 
 /// The normal of a triangle, twice its area long.
 pub fn planeOf(geometry: *const world_file.Geometry, primitive: u32) [3]f32 {
-    const corner = geometry.triangles[primitive].corner;
-    const first = geometry.positions[corner[0]];
+    const face = geometry.face(primitive);
+    const first = face.position(geometry, 0);
     return vec3.cross(
-        vec3.sub(geometry.positions[corner[1]], first),
-        vec3.sub(geometry.positions[corner[2]], first),
+        vec3.sub(face.position(geometry, 1), first),
+        vec3.sub(face.position(geometry, 2), first),
     );
 }
 
@@ -196,8 +195,8 @@ pub fn Boundaries(comptime Kernel: type) type {
             direction: [3]f32,
         ) void {
             const volumes = frame.materials.volumes;
-            const triangle = &frame.geometry.triangles[primitive];
-            const rank = frame.materials.all[triangle.material].volume_rank;
+            const material = frame.geometry.face(primitive).material;
+            const rank = frame.materials.all[material].volume_rank;
             if (rank >= volumes.len or volumes[rank].nests) return;
             const ior = volumes[rank].ior;
             const is_leaving = vec3.dot(planeOf(frame.geometry, primitive), direction) > 0;

@@ -122,8 +122,7 @@ pub fn Passage(comptime Kernel: type) type {
             var is_first = true;
             for (hits, first..) |hit, index| {
                 const number: u32 = @intCast(hit.primitive);
-                const triangle = &passage.frame.geometry.triangles[number];
-                const material = &materials.all[triangle.material];
+                const material = &materials.all[passage.frame.geometry.face(number).material];
                 if (!material.transmits()) continue;
                 var f0 = material.dielectric_f0;
                 if (boundaries_file.crossingAt(passage.frame, number, way)) |crossing| {

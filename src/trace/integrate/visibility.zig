@@ -250,7 +250,7 @@ pub fn Visibility(comptime Kernel: type) type {
             const geometry = frame.geometry;
             const all = frame.materials.all;
             // Without vertex colours and textures it is the material's alone.
-            if (geometry.colors.len == 0 and !frame.hasTextures()) {
+            if (!geometry.hasColors() and !frame.hasTextures()) {
                 const numbers = Corners.materialsOf(geometry, hit.primitive, ray.active);
                 return .of(&.of(all, numbers, ray.active), .white, passing);
             }

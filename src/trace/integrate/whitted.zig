@@ -20,6 +20,7 @@ const sample_file = @import("sample.zig");
 const tiles = @import("tiles.zig");
 const visibility_file = @import("visibility.zig");
 const Film = @import("../../film.zig").Film;
+const OwnFrame = @import("../traverse/own_frame.zig").OwnFrame;
 const EnvironmentLights = @import("environment_lights.zig").EnvironmentLights;
 const Grid = @import("../traverse/beam/grid.zig").Grid;
 const Rectangle = @import("../../film.zig").Rectangle;
@@ -46,6 +47,7 @@ pub fn Whitted(comptime Kernel: type) type {
         pub const counts_tests = Kernel.counts_tests;
 
         frame: *const Frame,
+        own_frame: OwnFrame(Kernel),
         settings: *const tiles.Settings,
         rays: statistics.RayCounts,
         visibility: visibility_file.Visibility(Kernel),
@@ -67,12 +69,14 @@ pub fn Whitted(comptime Kernel: type) type {
         /// To be freed by `deinit`.
         pub fn init(
             gpa: std.mem.Allocator,
-            frame: *const Frame,
+            shared_frame: *const Frame,
             settings: *const tiles.Settings,
         ) error{OutOfMemory}!*Self {
             assert(settings.depth_max <= path_file.depth_limit);
             const whitted = try gpa.create(Self);
             errdefer gpa.destroy(whitted);
+            const frame = try whitted.own_frame.init(gpa, shared_frame);
+            errdefer whitted.own_frame.deinit(gpa);
             whitted.stack = try .init(gpa, settings.depth_max, frame.hasLayers());
             whitted.frame = frame;
             whitted.settings = settings;
@@ -87,6 +91,7 @@ pub fn Whitted(comptime Kernel: type) type {
         /// Frees everything.
         pub fn deinit(whitted: *Self, gpa: std.mem.Allocator) void {
             whitted.stack.deinit(gpa);
+            whitted.own_frame.deinit(gpa);
             gpa.destroy(whitted);
         }
 

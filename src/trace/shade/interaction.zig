@@ -113,7 +113,7 @@ pub fn Corners(comptime Lanes: type) type {
             var rest = asked.bits();
             while (rest != 0) : (rest &= rest - 1) {
                 const number = &numbers[@ctz(rest)];
-                number.* = @intCast(geometry.triangles[@intCast(number.*)].material);
+                number.* = @intCast(geometry.face(@intCast(number.*)).material);
             }
             return .fromArray(numbers);
         }
@@ -124,7 +124,7 @@ pub fn Corners(comptime Lanes: type) type {
             geometry: *const Geometry,
             barycentrics: [3]Lanes.F32,
         ) material_file.Color(Lanes) {
-            if (geometry.colors.len == 0) return .white;
+            if (!geometry.hasColors()) return .white;
             var channels: [4]Lanes.F32 = undefined;
             inline for (&channels, 0..) |*channel, index| {
                 const a = corners.color[0][index].mul(barycentrics[0]);
@@ -144,22 +144,21 @@ pub fn Corners(comptime Lanes: type) type {
             number: u32,
             lanes: Lanes.Mask,
         ) void {
-            const triangle = &geometry.triangles[number];
+            const face = geometry.face(number);
             inline for (0..3) |corner| {
-                const vertex = triangle.corner[corner];
+                const position = face.position(geometry, corner);
                 corners.position[corner] =
-                    .select(lanes, .splat(geometry.positions[vertex]), corners.position[corner]);
-                corners.normal[corner] =
-                    .select(lanes, .splat(geometry.normals[vertex]), corners.normal[corner]);
-                if (geometry.colors.len > 0) {
-                    const channels = &corners.color[corner];
-                    inline for (channels, 0..) |*channel, index| {
-                        const value = geometry.colors[vertex][index];
+                    .select(lanes, .splat(position), corners.position[corner]);
+                const normal = face.normal(geometry, corner);
+                corners.normal[corner] = .select(lanes, .splat(normal), corners.normal[corner]);
+                if (geometry.hasColors()) {
+                    const color = face.color(geometry, corner);
+                    inline for (&corners.color[corner], color) |*channel, value| {
                         channel.* = .select(lanes, .splat(value), channel.*);
                     }
                 }
             }
-            const material: Lanes.I32 = .splat(@intCast(triangle.material));
+            const material: Lanes.I32 = .splat(@intCast(face.material));
             corners.material = .select(lanes, material, corners.material);
         }
     };

@@ -71,7 +71,7 @@ pub fn find(
         .bitangent_sign = .splat(1),
         .along = all.pair("anisotropy_rotation"),
     };
-    if (frame.hasTextures() or frame.geometry.tangents.len > 0)
+    if (frame.hasTextures() or frame.geometry.hasTangents())
         texture(Lanes, frame, place, &all, point, layers, &bent);
     layers.tangent = bent.turned(point.normal);
 }

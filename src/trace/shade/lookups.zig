@@ -112,11 +112,11 @@ pub fn has(lookups: []const Lookup, slot: Slot) bool {
 
 /// The tangent at a point, and the sign of its bitangent; 0 where vertices have none.
 pub fn tangentAt(geometry: *const world_file.Geometry, point: *const Point) [4]f32 {
-    if (geometry.tangents.len == 0) return @splat(0);
-    const corners = geometry.triangles[point.primitive].corner;
-    const first = geometry.tangents[corners[0]];
-    const second = geometry.tangents[corners[1]];
-    const third = geometry.tangents[corners[2]];
+    if (!geometry.hasTangents()) return @splat(0);
+    const face = geometry.face(point.primitive);
+    const first = face.tangent(geometry, 0);
+    const second = face.tangent(geometry, 1);
+    const third = face.tangent(geometry, 2);
     var tangent: [4]f32 = undefined;
     inline for (tangent[0..3], first[0..3], second[0..3], third[0..3]) |*to, a, b, c| {
         to.* = (a + (b - a) * point.weights[0]) + (c - a) * point.weights[1];
@@ -131,18 +131,18 @@ fn footprintOf(
     lookup: *const Lookup,
     point: *const Point,
 ) texture_file.Footprint {
-    const texcoords = geometry.texcoords[lookup.texcoord_set];
+    const set = lookup.texcoord_set;
     const rows = &lookup.transform;
     // A set that no mesh has counts as 0 everywhere.
-    if (texcoords.len == 0) return .{
+    if (geometry.texcoords[set].len == 0 and geometry.shared.runs.len == 0) return .{
         .place = .{ rows[0][2], rows[1][2] },
         .axes = @splat(.{ 0, 0 }),
     };
-    const corners = geometry.triangles[point.primitive].corner;
-    const first = texcoords[corners[0]];
+    const face = geometry.face(point.primitive);
+    const first = face.texcoord(geometry, set, 0);
     const edges = [2][2]f32{
-        difference(texcoords[corners[1]], first),
-        difference(texcoords[corners[2]], first),
+        difference(face.texcoord(geometry, set, 1), first),
+        difference(face.texcoord(geometry, set, 2), first),
     };
     const along = combined(edges, point.weights);
     const place = [2]f32{ first[0] + along[0], first[1] + along[1] };

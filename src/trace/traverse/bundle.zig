@@ -90,7 +90,7 @@ pub fn trace(
         .view = viewOf(Kernel.Rays, &geometry.padding, group),
         .padding = &geometry.padding,
     };
-    _ = walk.walk(Kernel, geometry.tree.get(Kernel.width), &search, counts);
+    _ = walk.walk(Kernel, geometry, &search, counts);
 }
 
 fn Search(comptime Kernel: type, comptime query: Query) type {

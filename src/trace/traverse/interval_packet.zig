@@ -220,14 +220,13 @@ fn tracePacket(
     @setEvalBranchQuota(4000); // For what is inlined here.
     const geometry = stream.geometry;
     const groups = stream.bundle.groups[first_group..][0..Kernel.subtile_groups];
-    const tree = geometry.tree.get(Kernel.width);
     for (groups, views) |*group, *view| {
         if (group.active.andNot(view.fusable).any()) return false;
     }
     const ends: intervals.Ends = .of(Kernel, &geometry.padding, groups, views);
     var search: Search(Kernel, query) =
         .init(geometry, groups, views, octant, &ends, budget.*, first_group, stream.lists);
-    _ = walk.walk(Kernel, tree, &search, counts);
+    _ = walk.walk(Kernel, geometry, &search, counts);
     budget.balance = @min(search.budget.balance, PacketBudget.balance_max);
     if (budget.lasts()) return true;
     for (groups) |*group| {

@@ -31,7 +31,7 @@ pub fn Kernel(comptime chosen: Variant, comptime counting: bool) type {
         /// Children of a node, triangles of a pack: the lanes of a test of one ray.
         pub const width: comptime_int = chosen.lanes;
         /// Entries of a stack that holds the siblings on the way down.
-        pub const stack_max = world.tree_depth_max * (width - 1) + 1;
+        pub const stack_max = world.walk_depth_max * (width - 1) + 1;
         /// Lane values over boxes and triangles.
         pub const Boxes = simd.Lanes(chosen.backend, width);
         /// Rays in a group.

@@ -133,15 +133,9 @@ pub fn HitLists(comptime Kernel: type) type {
             while (bits != 0) : (bits &= bits - 1) {
                 const lane = @ctz(bits);
                 var ray: TraversalRay = .of(Rays, false, rays, view, lane);
-                var search: Search = .{
-                    .lists = lists,
-                    .place = .{ .group = @intCast(group), .lane = lane },
-                    .ray = &ray,
-                    .slabs = ray.slabsOf(),
-                    .limit = ray.limit,
-                };
-                const tree = lists.geometry.tree.get(Kernel.width);
-                _ = walk.walk(Kernel, tree, &search, tests);
+                var search: Search(false) =
+                    .of(lists, .{ .group = @intCast(group), .lane = lane }, &ray);
+                _ = walk.walk(Kernel, lists.geometry, &search, tests);
             }
         }
 
@@ -210,43 +204,56 @@ pub fn HitLists(comptime Kernel: type) type {
                 return .{ .t = -std.math.inf(f32), .primitive = hit.primitive };
             }
             // Its material is asked for next.
-            @prefetch(&lists.geometry.triangles[number], .{});
+            if (lists.geometry.shared.runs.len == 0)
+                @prefetch(&lists.geometry.triangles[number], .{});
             const list = &lists.hits[place.group][place.lane];
             const count = &lists.counts[place.group][place.lane];
             count.* = insert(list, count.*, hit);
             return if (count.* == hits_max) list[hits_max - 1] else null;
         }
 
-        /// A ray on its way through a tree, for `walk.walk`.
-        const Search = struct {
-            lists: *Self,
-            place: Place,
-            ray: *TraversalRay,
-            slabs: TraversalRay.Slabs,
-            limit: f32,
+        /// A ray on its way through a tree, for `walk.walk`. `fused` as in `TraversalRay.of`.
+        pub fn Search(comptime fused: bool) type {
+            return struct {
+                lists: *Self,
+                place: Place,
+                ray: *TraversalRay,
+                slabs: TraversalRay.Slabs,
+                limit: f32,
 
-            pub inline fn meet(
-                search: *const Search,
-                node: *const world_file.Node(Kernel.width),
-                tests: *TestCounts,
-            ) box.Range(Kernel.Boxes) {
-                return search.slabs.meet(false, node, search.limit, tests);
-            }
+                pub inline fn of(lists: *Self, place: Place, ray: *TraversalRay) @This() {
+                    return .{
+                        .lists = lists,
+                        .place = place,
+                        .ray = ray,
+                        .slabs = ray.slabsOf(),
+                        .limit = ray.limit,
+                    };
+                }
 
-            pub inline fn intersect(
-                search: *Search,
-                pack: *const world_file.TrianglePack(Kernel.width),
-                tests: *TestCounts,
-            ) bool {
-                const stopped = search.lists.take(search.place, search.ray, pack, tests);
-                search.limit = search.ray.limit;
-                return stopped;
-            }
+                pub inline fn meet(
+                    search: *const @This(),
+                    node: *const world_file.Node(Kernel.width),
+                    tests: *TestCounts,
+                ) box.Range(Kernel.Boxes) {
+                    return search.slabs.meet(fused, node, search.limit, tests);
+                }
 
-            pub inline fn isDone(_: *const Search, stopped: bool) bool {
-                return stopped;
-            }
-        };
+                pub inline fn intersect(
+                    search: *@This(),
+                    pack: *const world_file.TrianglePack(Kernel.width),
+                    tests: *TestCounts,
+                ) bool {
+                    const stopped = search.lists.take(search.place, search.ray, pack, tests);
+                    search.limit = search.ray.limit;
+                    return stopped;
+                }
+
+                pub inline fn isDone(_: *const @This(), stopped: bool) bool {
+                    return stopped;
+                }
+            };
+        }
     };
 }
 

@@ -59,6 +59,21 @@ pub fn Searches(comptime Kernel: type) type {
 
         const Self = @This();
 
+        /// Room for the clusters of instances: for two of them, so that each is mapped often.
+        const Room = struct {
+            geometry: Geometry,
+            cache: world_file.instances.ClusterCache(Kernel.width),
+            slots: [2]world_file.instances.MappedCluster(Kernel.width),
+
+            fn of(room: *Room, geometry: *const Geometry) *const Geometry {
+                if (geometry.shared.runs.len == 0) return geometry;
+                room.cache = .init(&room.slots);
+                room.geometry = geometry.*;
+                room.geometry.cluster_cache = &room.cache;
+                return &room.geometry;
+            }
+        };
+
         pub const of: Self = .{
             .one_closest = One(.closest_hit).trace,
             .one_any = One(.any_hit).trace,
@@ -76,12 +91,17 @@ pub fn Searches(comptime Kernel: type) type {
                     ray: *Ray,
                     counts: *TestCounts,
                 ) callconv(.c) bool {
-                    return single.trace(Kernel, query, geometry, ray, counts);
+                    var room: Room = undefined;
+                    return single.trace(Kernel, query, room.of(geometry), ray, counts);
                 }
             };
         }
 
         fn hitLists(lists: *HitLists, bundle: *Bundle, counts: *TestCounts) callconv(.c) void {
+            var room: Room = undefined;
+            const geometry = lists.geometry;
+            defer lists.geometry = geometry;
+            lists.geometry = room.of(geometry);
             lists.trace(bundle, counts);
         }
 
@@ -91,7 +111,8 @@ pub fn Searches(comptime Kernel: type) type {
             grid: ?*const Grid,
             counts: *TestCounts,
         ) callconv(.c) bool {
-            return dispatch.closestHit(Kernel, geometry, bundle, grid, counts) == .all;
+            var room: Room = undefined;
+            return dispatch.closestHit(Kernel, room.of(geometry), bundle, grid, counts) == .all;
         }
 
         fn anyHit(
@@ -101,7 +122,8 @@ pub fn Searches(comptime Kernel: type) type {
             coherence: *const Coherence,
             counts: *TestCounts,
         ) callconv(.c) void {
-            dispatch.anyHit(Kernel, geometry, bundle, light, coherence.*, counts);
+            var room: Room = undefined;
+            dispatch.anyHit(Kernel, room.of(geometry), bundle, light, coherence.*, counts);
         }
 
         fn packetsAny(
@@ -110,7 +132,8 @@ pub fn Searches(comptime Kernel: type) type {
             budget: *PacketBudget,
             counts: *TestCounts,
         ) callconv(.c) void {
-            interval_packet.trace(Kernel, .any_hit, geometry, bundle, budget, counts);
+            var room: Room = undefined;
+            interval_packet.trace(Kernel, .any_hit, room.of(geometry), bundle, budget, counts);
         }
 
         fn beamClosest(
@@ -119,7 +142,8 @@ pub fn Searches(comptime Kernel: type) type {
             bundle: *Bundle,
             counts: *TestCounts,
         ) callconv(.c) bool {
-            return eye_rays.trace(Kernel, geometry, grid, bundle, counts);
+            var room: Room = undefined;
+            return eye_rays.trace(Kernel, room.of(geometry), grid, bundle, counts);
         }
     };
 }

@@ -82,7 +82,7 @@ inline fn travel(
     counts: *TestCounts,
 ) ?Found {
     var search: Search(Kernel, query, fused) = .of(ray, &geometry.padding);
-    if (!walk.walk(Kernel, geometry.tree.get(Kernel.width), &search, counts)) return null;
+    if (!walk.walk(Kernel, geometry, &search, counts)) return null;
     return .{ .t = ray.limit, .primitive = ray.closest_primitive };
 }
 

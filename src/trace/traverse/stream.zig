@@ -18,8 +18,9 @@ const bundle_file = @import("bundle.zig");
 const multi_hit = @import("multi_hit.zig");
 const single = @import("single.zig");
 const stack_file = @import("stack.zig");
+const walk = @import("walk.zig");
 const assert = std.debug.assert;
-const Query = @import("walk.zig").Query;
+const Query = walk.Query;
 const Geometry = world_file.Geometry;
 const Place = bundle_file.Place;
 
@@ -135,6 +136,12 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
                 const next = stream.pop(&entries, &entry_count);
                 const set = stream.looking(entry.set);
                 if (entry.child.pack_count > 0) {
+                    if (entry.child.isCluster()) {
+                        @branchHint(.unlikely);
+                        stream.enterCluster(set, entry.child.target, counts);
+                        entry = next orelse stream.pop(&entries, &entry_count) orelse return;
+                        continue;
+                    }
                     const first, const end = entry.child.packs();
                     stream.intersect(set, tree.packs[first..end], counts);
                 } else if (set != 0) {
@@ -162,6 +169,34 @@ pub fn Stream(comptime Kernel: type, comptime query: Query) type {
         inline fn looking(stream: *const Self, set: Set) Set {
             return if (query == .closest_hit) set else set & ~stream.found;
         }
+
+        /// One active ray after the other through the tree of an instance's cluster.
+        noinline fn enterCluster(
+            stream: *Self,
+            set: Set,
+            reference: u32,
+            counts: *TestCounts,
+        ) void {
+            const geometry = stream.geometry;
+            const tree = walk.clusterOf(Kernel, geometry, reference).tree();
+            var rest = set;
+            while (rest != 0) : (rest &= rest - 1) {
+                const number = @ctz(rest);
+                const ray = &stream.rays[number];
+                var search: Search = if (query == .multi_hit)
+                    .of(stream.lists, stream.places[number], ray)
+                else
+                    .of(ray, &geometry.padding);
+                if (walk.walkTree(Kernel, geometry, tree, &search, counts))
+                    stream.found |= @as(Set, 1) << @intCast(number);
+            }
+        }
+
+        /// Of a ray by itself.
+        const Search = if (query == .multi_hit)
+            multi_hit.HitLists(Kernel).Search(true)
+        else
+            single.Search(Kernel, query, true);
 
         /// One active ray after the other against the triangles of a leaf.
         inline fn intersect(

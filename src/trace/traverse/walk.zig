@@ -1,5 +1,8 @@
 //! Depth-first, front-to-back traversal of the wide BVH, generic over what is searched for.
 //!
+//! Where it comes to a cluster of an instance, the same loop goes on in the small tree that the
+//! cluster is mapped to (world/instances.zig), until nothing of that is left on the stack.
+//!
 //! In: a search, which knows what it looks for (a ray: single.zig; rays in lanes: bundle.zig; a
 //! packet: interval_packet.zig; a beam: beam/traverse.zig). Out: whether it found anything. The
 //! hits are the search's own.
@@ -31,7 +34,18 @@ pub const Query = enum {
 ///                               if there is one, asked before every leaf; the end where it says no
 pub inline fn walk(
     comptime Kernel: type,
-    tree: *const world_file.Tree(Kernel.width),
+    geometry: *const world_file.Geometry,
+    search: anytype,
+    counts: *TestCounts,
+) bool {
+    return walkTree(Kernel, geometry, geometry.tree.get(Kernel.width).*, search, counts);
+}
+
+/// The same in a tree of its own, such as that of a cluster.
+pub inline fn walkTree(
+    comptime Kernel: type,
+    geometry: *const world_file.Geometry,
+    whole: world_file.Tree(Kernel.width),
     search: anytype,
     counts: *TestCounts,
 ) bool {
@@ -39,6 +53,7 @@ pub inline fn walk(
     var stack_count: usize = 0;
     var found = false;
     var entry: Entry = .whole;
+    var tree = whole;
     while (true) {
         if (entry.child.pack_count == 0) {
             assert(stack_count + Kernel.width <= Kernel.stack_max);
@@ -49,6 +64,16 @@ pub inline fn walk(
                 entry = stack_file.descend(Kernel.Boxes, node, range, met, &stack, &stack_count);
                 continue;
             }
+        } else if (!entry.child.hasPacks()) {
+            @branchHint(.unlikely);
+            if (entry.child.isCluster()) {
+                stack[stack_count] = .{ .child = .cluster_end, .near = -std.math.inf(f32) };
+                stack_count += 1;
+                tree = clusterOf(Kernel, geometry, entry.child.target).tree();
+                entry = .whole;
+                continue;
+            }
+            tree = whole;
         } else {
             if (@hasDecl(@TypeOf(search.*), "allows") and
                 !search.allows(entry.child.pack_count, stack_count)) break;
@@ -65,6 +90,17 @@ pub inline fn walk(
         } else break;
     }
     return found;
+}
+
+/// A cluster of an instance, mapped; valid until the next is asked for.
+pub noinline fn clusterOf(
+    comptime Kernel: type,
+    geometry: *const world_file.Geometry,
+    reference: u32,
+) *const world_file.instances.MappedCluster(Kernel.width) {
+    const Cache = world_file.instances.ClusterCache(Kernel.width);
+    const cache: *const Cache = @ptrCast(@alignCast(geometry.cluster_cache.?));
+    return cache.get(geometry, reference);
 }
 
 /// Counts the test of a ray against the children of a node.

@@ -9,10 +9,50 @@ const ray_file = @import("../ray.zig");
 const triangle = @import("../triangle.zig");
 const assert = std.debug.assert;
 
-/// Where a triangle stands in the tree: pack times width plus lane. Of a ray without a hit: -1.
+/// Where a triangle stands in the tree: pack times width plus lane. Behind all of these, those of
+/// instances by their number. Of a ray without a hit: -1.
 pub const Slot = i32;
 /// See `Slot`.
 pub const no_slot: Slot = -1;
+
+/// Stands for the slots of a pack that is not the tree's own.
+const mapped: Slot = -2;
+
+/// The first slot of a pack.
+pub inline fn firstSlot(
+    comptime width: u32,
+    tree: *const world_file.Tree(width),
+    pack: *const world_file.TrianglePack(width),
+) Slot {
+    const Pack = world_file.TrianglePack(width);
+    const offset = @intFromPtr(pack) -% @intFromPtr(tree.packs.ptr);
+    if (offset >= tree.packs.len * @sizeOf(Pack)) return mapped;
+    return @intCast(@divExact(offset, @sizeOf(Pack)) * width);
+}
+
+/// The slot of a triangle, by the first one of its pack.
+pub inline fn slotOf(
+    geometry: *const world_file.Geometry,
+    comptime width: u32,
+    first: Slot,
+    lane: usize,
+    primitive: i32,
+) Slot {
+    if (first == mapped) return ownCount(geometry, width) + primitive;
+    return first + @as(Slot, @intCast(lane));
+}
+
+/// Slots of the tree's own packs.
+inline fn ownCount(geometry: *const world_file.Geometry, comptime width: u32) Slot {
+    return @intCast(geometry.tree.get(width).packs.len * width);
+}
+
+/// The number of a triangle of an instance; null: it is the tree's own.
+inline fn sharedAt(geometry: *const world_file.Geometry, comptime width: u32, slot: Slot) ?u32 {
+    if (geometry.shared.runs.len == 0) return null;
+    const own_count = ownCount(geometry, width);
+    return if (slot < own_count) null else @intCast(slot - own_count);
+}
 
 /// The pack and lane of a slot.
 inline fn place(comptime width: u32, slot: Slot) struct { pack: u32, lane: u32 } {
@@ -23,34 +63,37 @@ inline fn place(comptime width: u32, slot: Slot) struct { pack: u32, lane: u32 }
 /// Number of the triangle in a slot.
 pub inline fn primitiveAt(
     comptime width: u32,
-    tree: *const world_file.Tree(width),
+    geometry: *const world_file.Geometry,
     slot: Slot,
 ) i32 {
+    if (sharedAt(geometry, width, slot)) |number| return @intCast(number);
     const at = place(width, slot);
-    return @bitCast(tree.packs[at.pack].primitive[at.lane]);
+    return @bitCast(geometry.tree.get(width).packs[at.pack].primitive[at.lane]);
 }
 
 /// A corner of the triangle in a slot.
 inline fn cornerAt(
     comptime width: u32,
-    tree: *const world_file.Tree(width),
+    geometry: *const world_file.Geometry,
     slot: Slot,
     corner: usize,
 ) [3]f32 {
+    if (sharedAt(geometry, width, slot)) |number|
+        return geometry.face(number).position(geometry, corner);
     const at = place(width, slot);
-    const components = &tree.packs[at.pack].corner[corner];
+    const components = &geometry.tree.get(width).packs[at.pack].corner[corner];
     return .{ components[0][at.lane], components[1][at.lane], components[2][at.lane] };
 }
 
 /// The corners of the triangle in a slot, the same in all lanes.
 pub inline fn splat(
     comptime Kernel: type,
-    tree: *const world_file.Tree(Kernel.width),
+    geometry: *const world_file.Geometry,
     slot: Slot,
 ) [3]Kernel.Rays.Vec3 {
     var corners: [3]Kernel.Rays.Vec3 = undefined;
     inline for (&corners, 0..) |*corner, index| {
-        corner.* = .splat(cornerAt(Kernel.width, tree, slot, index));
+        corner.* = .splat(cornerAt(Kernel.width, geometry, slot, index));
     }
     return corners;
 }
@@ -63,7 +106,7 @@ pub fn meet(
     slot: Slot,
 ) triangle.WeightedIntersection(Kernel.Rays) {
     @branchHint(.cold);
-    const corners = splat(Kernel, geometry.tree.get(Kernel.width), slot);
+    const corners = splat(Kernel, geometry, slot);
     return triangle.intersect(Kernel.Rays, corners, group.line, &geometry.padding);
 }
 
@@ -82,11 +125,10 @@ pub fn comeFirst(
     const Rays = Kernel.Rays;
     const met = rays.bitAnd(Rays.I32.load(others).gt(.splat(no_slot)));
     if (met.none()) return rays;
-    const tree = geometry.tree.get(Kernel.width);
-    const gathered = gather(Kernel, tree, others);
+    const gathered = gather(Kernel, geometry, others);
     const other = triangle.intersect(Rays, gathered.corners, group.line, &geometry.padding);
     assert(met.andNot(other.mask).none());
-    const number: Rays.I32 = .splat(primitiveAt(Kernel.width, tree, slot));
+    const number: Rays.I32 = .splat(primitiveAt(Kernel.width, geometry, slot));
     const first = t.lt(other.t).bitOr(t.eq(other.t).bitAnd(gathered.primitive.gt(number)));
     return rays.andNot(met.andNot(first));
 }
@@ -99,7 +141,7 @@ pub fn Gathered(comptime Lanes: type) type {
 /// The triangles in slots; of slot 0 in lanes where there is none.
 pub inline fn gather(
     comptime Kernel: type,
-    tree: *const world_file.Tree(Kernel.width),
+    geometry: *const world_file.Geometry,
     slots: *const [Kernel.ray_count]Slot,
 ) Gathered(Kernel.Rays) {
     var components: [3][3][Kernel.ray_count]f32 = undefined;
@@ -107,10 +149,10 @@ pub inline fn gather(
     for (slots, 0..) |slot, lane| {
         const there = if (slot == no_slot) 0 else slot;
         inline for (&components, 0..) |*corner, index| {
-            const position = cornerAt(Kernel.width, tree, there, index);
+            const position = cornerAt(Kernel.width, geometry, there, index);
             inline for (corner, position) |*component, value| component[lane] = value;
         }
-        numbers[lane] = primitiveAt(Kernel.width, tree, there);
+        numbers[lane] = primitiveAt(Kernel.width, geometry, there);
     }
     var gathered: Gathered(Kernel.Rays) = .{
         .corners = undefined,

@@ -29,9 +29,7 @@ pub fn resolve(
     const course = Course.of(grid);
     switch (course.axis orelse 3) {
         inline 0...2 => |axis| {
-            const tree = geometry.tree.get(Kernel.width);
-            const Octant = UniformOctant(Kernel, axis);
-            Octant.run(geometry, tree, &course, grid, buffer, bundle);
+            UniformOctant(Kernel, axis).run(geometry, &course, grid, buffer, bundle);
         },
         else => apart(Kernel, geometry, buffer, bundle),
     }
@@ -86,8 +84,7 @@ fn apart(
         const own = buffer.of("slot", index);
         const there = Rays.I32.loadAligned(own).gt(.splat(exact.no_slot));
         if (there.none()) continue;
-        const tree = geometry.tree.get(Kernel.width);
-        const gathered = exact.gather(Kernel, tree, own);
+        const gathered = exact.gather(Kernel, geometry, own);
         const hit = triangle.intersect(Rays, gathered.corners, group.line, &geometry.padding);
         assert(there.andNot(hit.mask).none());
         group.closest = .{
@@ -134,7 +131,6 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
 
         fn run(
             geometry: *const world_file.Geometry,
-            tree: *const world_file.Tree(Kernel.width),
             course: *const Course,
             grid: *const Grid,
             buffer: *TileDepthBuffer(Kernel),
@@ -159,15 +155,20 @@ fn UniformOctant(comptime Kernel: type, comptime axis: u2) type {
                         if (slot == exact.no_slot) continue;
                         if (slot != last.slot) last = .{
                             .slot = slot,
-                            .placed = .of(padding, exact.splat(Kernel, tree, slot), origin, shift),
-                            .primitive = .splat(exact.primitiveAt(Kernel.width, tree, slot)),
+                            .placed = .of(
+                                padding,
+                                exact.splat(Kernel, geometry, slot),
+                                origin,
+                                shift,
+                            ),
+                            .primitive = .splat(exact.primitiveAt(Kernel.width, geometry, slot)),
                         };
                         const hit = intersect(group, &last.placed, down, .splat(true));
                         group.closest = .{ .t = hit.t, .primitive = last.primitive };
                         continue;
                     }
                     const there = lanes.gt(.splat(exact.no_slot));
-                    const gathered = exact.gather(Kernel, tree, own);
+                    const gathered = exact.gather(Kernel, geometry, own);
                     const each: Placed = .of(padding, gathered.corners, origin, shift);
                     const hit = intersect(group, &each, down, there);
                     assert(there.andNot(hit.mask).none());

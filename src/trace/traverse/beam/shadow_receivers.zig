@@ -281,8 +281,8 @@ pub fn ShadowReceivers(comptime Kernel: type) type {
         ) void {
             F32.select(rays, .splat(inf), set.lower(group))
                 .storeAligned(@alignCast(set.nearness[group * lanes ..][0..lanes]));
-            const tree = set.geometry.tree.get(Kernel.width);
-            const primitive: Rays.I32 = .splat(exact.primitiveAt(Kernel.width, tree, slot));
+            const primitive: Rays.I32 =
+                .splat(exact.primitiveAt(Kernel.width, set.geometry, slot));
             const closest = &set.bundle.groups[group].closest.primitive;
             closest.* = .select(rays, primitive, closest.*);
         }

@@ -22,14 +22,13 @@ const Linear = @import("projected_triangle.zig").Linear;
 
 /// Traces a set of rays through the whole tree. Returns false where the budget is spent before.
 pub fn trace(comptime Kernel: type, set: anytype, budget: Budget, counts: *TestCounts) bool {
-    const tree = set.geometry.tree.get(Kernel.width);
     var search: Search(Kernel, @TypeOf(set.*)) = .{
         .set = set,
-        .tree = tree,
+        .tree = set.geometry.tree.get(Kernel.width),
         .budget = budget,
         .limit = set.depthMax(),
     };
-    _ = walk.walk(Kernel, tree, &search, counts);
+    _ = walk.walk(Kernel, set.geometry, &search, counts);
     return search.is_within_budget;
 }
 
@@ -63,8 +62,7 @@ fn Search(comptime Kernel: type, comptime Set: type) type {
 
         pub inline fn intersect(search: *const Self, pack: *const Pack, counts: *TestCounts) bool {
             walk.countPack(Kernel, pack, counts);
-            const offset = @intFromPtr(pack) - @intFromPtr(search.tree.packs.ptr);
-            draw(Kernel, search.set, pack, @intCast(@divExact(offset, @sizeOf(Pack))));
+            draw(Kernel, search.set, pack, exact.firstSlot(Kernel.width, search.tree, pack));
             return false;
         }
 
@@ -80,7 +78,7 @@ inline fn draw(
     comptime Kernel: type,
     set: anytype,
     pack: *const world_file.TrianglePack(Kernel.width),
-    pack_index: u32,
+    first: exact.Slot,
 ) void {
     @setEvalBranchQuota(4000); // For what is inlined here.
     const Boxes = Kernel.Boxes;
@@ -133,12 +131,12 @@ inline fn draw(
         .window = window,
         .primitive = primitive,
     });
-    const first: exact.Slot = @intCast(pack_index * Kernel.width);
     while (decided != 0) : (decided &= decided - 1) {
         const lane = @ctz(decided);
         var coverage: Coverage(Set, f32, i32) = undefined;
         takeEach(&coverage, &table, lane);
-        rasterise.cover(Kernel, true, set, &coverage, first + @as(exact.Slot, lane));
+        const slot = exact.slotOf(set.geometry, Kernel.width, first, lane, coverage.primitive);
+        rasterise.cover(Kernel, true, set, &coverage, slot);
     }
     if (undecided != 0) coverUndecided(Kernel, set, &table, undecided, first);
 }
@@ -157,7 +155,8 @@ noinline fn coverUndecided(
         const lane = @ctz(rest);
         var coverage: Coverage(@TypeOf(set.*), f32, i32) = undefined;
         takeEach(&coverage, table, lane);
-        rasterise.cover(Kernel, false, set, &coverage, first + @as(exact.Slot, lane));
+        const slot = exact.slotOf(set.geometry, Kernel.width, first, lane, coverage.primitive);
+        rasterise.cover(Kernel, false, set, &coverage, slot);
     }
 }
 
