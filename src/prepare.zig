@@ -449,22 +449,29 @@ fn geometryOf(
     return geometry;
 }
 
-/// All that the animations of a scene show which run at the moment that is posed; null where there
-/// are none. Free with its `deinit`.
+/// Brings `motion` up to all that the animations show which run at the moment that is posed, where
+/// it is not that already; null where there are none. `from` is the scene at rest.
 pub fn gatherMotion(
     gpa: Allocator,
     from: *const Scene,
     loaded: *const Loaded,
     posed: *const AnimatedScene,
     pool: *parallel.Pool,
-) PoseError!?Motion {
+    motion: *?Motion,
+) PoseError!void {
     const mode = simd.setFlushToZero();
     defer simd.setFloatControl(mode);
     const place = try place_file.compose(gpa, &posed.scene);
     defer place.deinit(gpa);
+    if (motion.*) |*known| {
+        if (std.meta.eql(known.shift, place.shift)) return;
+        known.deinit();
+        motion.* = null;
+    }
     const running = posed.moment.running;
     const parts = &loaded.parts;
-    return Motion.gather(gpa, from, parts, &loaded.textures, running, place.shift, pool);
+    motion.* =
+        try .gather(gpa, from, parts, &loaded.textures, running, place.shift, pool);
 }
 
 fn nanoseconds(duration: std.Io.Duration) u64 {

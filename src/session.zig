@@ -315,14 +315,14 @@ pub const Session = struct {
             backdrop = try session.chooseFor(&session.backdrop, &studio);
             backdrop.?.is_seen = true;
         }
-        if (choices.frames_all and session.motion == null) session.motion =
-            try prepare.gatherMotion(
-                session.gpa,
-                &session.scene.?,
-                &session.loaded.?,
-                &session.posed.?,
-                &session.pool,
-            );
+        if (choices.frames_all) try prepare.gatherMotion(
+            session.gpa,
+            &session.scene.?,
+            &session.loaded.?,
+            &session.posed.?,
+            &session.pool,
+            &session.motion,
+        );
         session.times.prepare_ns += session.since(start);
         try prepare.view(&session.world.?, session.io, &session.posed.?.scene, .{
             .camera = choices.camera,

@@ -23,6 +23,8 @@ const Motion = @This();
 
 arena: std.heap.ArenaAllocator,
 geometry: world.Geometry,
+/// What has been subtracted from all places.
+shift: Vec3d,
 
 /// Moments at most.
 pub const moment_count_max = 256;
@@ -58,7 +60,7 @@ pub fn gather(
         vertex_count += parts.meshes[instance.mesh].positions.len;
     }
     const most: usize = @intCast(std.math.clamp(vertex_count_max / vertex_count, 2, all.len));
-    var motion: Motion = .{ .arena = .init(gpa), .geometry = .empty };
+    var motion: Motion = .{ .arena = .init(gpa), .geometry = .empty, .shift = shift };
     errdefer motion.deinit();
     var scratch_state: std.heap.ArenaAllocator = .init(gpa);
     defer scratch_state.deinit();
