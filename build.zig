@@ -38,6 +38,7 @@ pub fn build(b: *std.Build) void {
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
         .bench_rays = b.step("bench:rays", "Time rays: zig build bench:rays -- SCENE [options]"),
         .bench_parse = b.step("bench:parse", "Time parsing: zig build bench:parse -- SCENE.pbrt"),
+        .bench_poses = b.step("bench:poses", "Posed triangles: -- SCENE ANIMATION SECONDS"),
         .bench_frames = b.step("bench:frames", "Time frames in motion: -- SCENE [FRAMES [SIZE]]"),
         .bench_structures = b.step("bench:structures", "Trees beside each other: -- SCENE"),
         .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
@@ -59,13 +60,12 @@ pub fn build(b: *std.Build) void {
 
     const program = package.program();
     steps.install.dependOn(&b.addInstallArtifact(program, .{}).step);
-    const run = runOn(b, program);
-    run.addPassthruArgs();
-    steps.run.dependOn(&run.step);
+    addRun(steps.run, program);
     steps.@"asm".dependOn(&b.addInstallFile(package.assembly(), "raylane.s").step);
 
     addBenchmark(steps.check, steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
     addBenchmark(steps.check, steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
+    addBenchmark(steps.check, steps.bench_poses, package.benchmark("poses", "bench/poses.zig"));
     addBenchmark(steps.check, steps.bench_frames, package.renderer("frames", "bench/frames.zig"));
     const structures = package.benchmark("structures", "bench/structures.zig");
     addBenchmark(steps.check, steps.bench_structures, structures);
@@ -254,12 +254,16 @@ const TestPackages = struct {
 /// Makes `step` install a benchmark and run it with the arguments that follow `--`, and `check`
 /// compile it.
 fn addBenchmark(check: *std.Build.Step, step: *std.Build.Step, benchmark: *Compile) void {
-    const b = step.owner;
-    const run = runOn(b, benchmark);
-    run.addPassthruArgs();
-    step.dependOn(&b.addInstallArtifact(benchmark, .{}).step);
-    step.dependOn(&run.step);
+    step.dependOn(&step.owner.addInstallArtifact(benchmark, .{}).step);
+    addRun(step, benchmark);
     check.dependOn(&benchmark.step);
+}
+
+/// Runs a program with the arguments that follow `--`.
+fn addRun(step: *std.Build.Step, program: *Compile) void {
+    const run = runOn(step.owner, program);
+    run.addPassthruArgs();
+    step.dependOn(&run.step);
 }
 
 /// Runs a program where it is, or under qemu-user when it is built for another machine.

@@ -2,8 +2,8 @@
 //!
 //! In: SCENE [FRAMES [SIZE]]. Out: the middle times of the stages of a frame whose pose comes after
 //! the one before it, and of a frame that is posed from nothing; both must be the same pictures
-//! (exit code 4 if not). Every node with a mesh, and every joint, swings by itself about an axis.
-//! Not a goal: times to compare between machines.
+//! (exit code 4 if not). The first animation runs; in a scene without any, every node with a mesh
+//! swings about an axis. Not a goal: times to compare between machines.
 
 const std = @import("std");
 const raylane = @import("raylane");
@@ -20,7 +20,7 @@ const size_default = 256;
 /// Half the angle that a node swings by.
 const swing_rad = 0.15;
 
-/// Of a scene of a second's period at so many frames.
+/// Nodes swing once in a second.
 const frames_a_second = 30;
 
 const Stage = enum { pose, tree, view, trace };
@@ -77,14 +77,11 @@ fn numberAt(arguments: []const [:0]const u8, index: usize, default: u32) u32 {
     return std.fmt.parseInt(u32, arguments[index], 10) catch 0;
 }
 
-/// Nodes that something hangs on.
+/// Nodes that meshes hang on.
 fn movingNodes(arena: Allocator, scene: *const scene_file.Scene) ![]bool {
     const moving = try arena.alloc(bool, scene.nodes.len);
     @memset(moving, false);
     for (scene.instances) |instance| moving[instance.node] = true;
-    for (scene.skins) |skin| for (skin.joints) |joint| {
-        moving[joint] = true;
-    };
     return moving;
 }
 
@@ -95,13 +92,22 @@ const Frames = struct {
     nodes: []scene_file.Node,
     moving: []const bool,
     size: u32,
+    animation: raylane.settings.Animation = .{},
 
     /// Makes a frame. Returns the hash of its picture.
     fn run(frames: *Frames, frame: usize, times: *Times) !u64 {
-        frames.swing(@as(f64, @floatFromInt(frame)) / frames_a_second);
+        const time_s = @as(f64, @floatFromInt(frame)) / frames_a_second;
+        if (frames.scene.animations.len > 0)
+            frames.animation = .{ .which = .{ .index = 0 }, .time_s = @floatCast(time_s) }
+        else
+            frames.swing(time_s);
         const session = &frames.session;
         const view: raylane.settings.View = .{ .long_side = frames.size };
-        try session.pose(.{ .lanes = raylane.variant.compiled[0].lanes, .view = view });
+        try session.pose(.{
+            .lanes = raylane.variant.compiled[0].lanes,
+            .view = view,
+            .animation = frames.animation,
+        });
         times.get(.pose)[frame] = session.times.prepare_ns;
         times.get(.tree)[frame] = session.times.bvh_build_ns;
         const begin = Io.Clock.awake.now(session.io);

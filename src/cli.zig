@@ -186,8 +186,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--format-in FORMAT",
-            .help = "how to read the scene where its contents do not tell:\n" ++
-                namesOf(settings.SceneFormat),
+            .help = namesOf(settings.SceneFormat) ++ ", whatever it holds",
         },
         .{
             .usage = "--env FILE",
@@ -211,7 +210,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--floor WHAT",
-            .help = "shadow: what is seen of a floor is the shadow on it;\nor none (default)",
+            .help = "shadow: a floor that shows it, or none (default)",
         },
         .{
             .usage = "--ambient L",
@@ -333,10 +332,9 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
     \\       raylane info SCENE [options]          (see raylane info --help)
     \\
-    \\SCENE is a file in glTF 2.0 (JSON or GLB), PBRT, OBJ, STL or PLY, - for standard
-    \\input, or builtin:NAME, NAME being cornell, atrium, nave or handles. The image
-    \\is written to the working directory under the scene's name, as a whole or not
-    \\at all; a report goes to standard output.
+    \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, - for standard input, or
+    \\builtin:cornell, atrium, nave or handles. The image is written to the working
+    \\directory under the scene's name, as a whole or not at all, a report to stdout.
     \\
 ++ arguments_file.helpOf(sections) ++
     \\
@@ -1064,6 +1062,25 @@ test "viewpoints arrive as they were meant, and may not contradict each other" {
     }) |option| {
         try expectUsage("'--camera' contradicts", &.{ option, "--camera=name", "s" });
     }
+}
+
+test "an animation by name, index or all, and a time of the first without" {
+    const Which = settings.Animation.Which;
+    const Case = struct { []const [:0]const u8, Which, f32 };
+    for ([_]Case{
+        .{ &.{"s.glb"}, .default, 0 },
+        .{ &.{ "s.glb", "--animation", "run" }, .{ .name = "run" }, 0 },
+        .{ &.{ "s.glb", "--animation=3", "--animation-time", "1.5" }, .{ .index = 3 }, 1.5 },
+        .{ &.{ "s.glb", "--animation-time=2", "--animation", "all" }, .all, 2 },
+        .{ &.{ "s.glb", "--animation-time", "-0.5" }, .{ .index = 0 }, -0.5 },
+    }) |case| {
+        const animation = (try parseForTest(case[0])).render.animation;
+        try std.testing.expectEqualDeep(case[1], animation.which);
+        try std.testing.expectEqual(case[2], animation.time_s);
+    }
+    const bad = [_][:0]const u8{ "s.glb", "--animation-time", "soon" };
+    try std.testing.expectError(error.UsageInvalid, parseForTest(&bad));
+    try std.testing.expect((try parseForTest(&.{ "s.glb", "--frame-all" })).render.view.frames_all);
 }
 
 test "one number is the long side" {

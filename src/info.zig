@@ -22,7 +22,7 @@ pub const writeText = @import("info/text.zig").write;
 pub const writeJson = @import("info/json.zig").write;
 
 /// `SceneTooLarge`: it could not be rendered, for its textures; the diagnostic says more.
-pub const Error = prepare.LoadError;
+pub const Error = prepare.LoadError || prepare.AnimateError;
 
 /// What is known of a scene.
 pub const Info = struct {
@@ -35,23 +35,13 @@ pub const Info = struct {
     images: []const Image,
     drawn: Drawn,
     lights: Lights,
-    /// Null: nothing is drawn.
+    /// As it stands where nobody chooses an animation; null: nothing is drawn.
     extent: ?prepare.Extent,
     /// Width and height of the picture, unless the user says more.
     size: [2]u32,
     /// About the most that it takes to render that.
     memory_bytes: u64,
     warnings: []const []const u8 = &.{},
-
-    /// Whether it is rendered only with `--force`.
-    pub fn needsForce(info: *const Info) bool {
-        for (info.scene.file.extensions) |used| {
-            if (!used.required) continue;
-            const known = parse.extensions.find(used.name) orelse return true;
-            if (!known.mayBeRequired()) return true;
-        }
-        return false;
-    }
 };
 
 /// An image of the scene's, by its header.
@@ -108,13 +98,15 @@ pub fn collect(
         }
     }
     const size = prepare.pictureSize(scene, &.{});
+    var posed = try prepare.animateScene(gpa, scene, .{}, diagnostic);
+    defer posed.deinit();
     return .{
         .scene = scene,
         .counts = scene.file.counts orelse countsOf(scene),
         .images = images,
         .drawn = drawnOf(scene),
         .lights = try lightsOf(gpa, scene),
-        .extent = try prepare.extentOf(gpa, scene),
+        .extent = try prepare.extentOf(gpa, &posed.scene),
         .size = size,
         .memory_bytes = try memory.estimate(gpa, scene, size, diagnostic),
     };
@@ -128,7 +120,7 @@ fn countsOf(scene: *const Scene) scene_data.File.Counts {
         .textures = scene.textures.len,
         .images = scene.images.len,
         .skins = scene.skins.len,
-        .animations = 0,
+        .animations = scene.animations.len,
         .cameras = scene.cameras.len,
         .lights = scene.lights.len,
     };
@@ -172,7 +164,7 @@ const testing = std.testing;
 const document_for_test =
     \\{"asset":{"version":"2.0","generator":"by \"hand\"\u0007"},
     \\"extensionsUsed":["KHR_lights_punctual","KHR_xmp","KHR_materials_variants","A_b"],
-    \\"extensionsRequired":["KHR_lights_punctual","EXT_lights_ies"],
+    \\"extensionsRequired":["KHR_lights_punctual","C_d"],
     \\"extensions":{"KHR_lights_punctual":{"lights":[{"type":"spot","spot":{}}]},
     \\"KHR_materials_variants":{"variants":[{"name":"red"},{"name":"blue"}]}},
     \\"scene":1,"scenes":[{"name":"points","nodes":[4]},{"nodes":[0,1,2,3]}],
@@ -186,7 +178,10 @@ const document_for_test =
     \\"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]},
     \\{"primitives":[{"attributes":{"POSITION":0},"mode":0}]}],
     \\"accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":3,
-    \\"min":[0,0,-1],"max":[2,1.5,0]}],
+    \\"min":[0,0,-1],"max":[2,1.5,0]},{"bufferView":0,"byteOffset":4,"componentType":5126,
+    \\"type":"SCALAR","count":3,"min":[0],"max":[2]}],
+    \\"animations":[{"name":"drift","channels":[{"sampler":0,"target":{"node":1,
+    \\"path":"translation"}}],"samplers":[{"input":1,"output":0}]},{"channels":[],"samplers":[]}],
     \\"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,
     \\"uri":"data:;base64,AAAAAAAAAAAAAAAAAAAAQAAAAAAAAAAAAAAAAAAAwD8AAIC/"}],
     \\"images":[{"name":"p","uri":"data:image/png;base64,
@@ -219,7 +214,7 @@ fn writeForTest(
 test "the text" {
     var text: std.Io.Writer.Allocating = .init(testing.allocator);
     defer text.deinit();
-    try writeForTest(.{}, null, writeText, &text.writer);
+    try writeForTest(.{ .force = true }, null, writeText, &text.writer);
     try testing.expectEqualStrings(
         \\file         a?.gltf
         \\format       glTF 2.0
@@ -229,18 +224,23 @@ test "the text" {
         \\camera       0 'at the?door', perspective, 28.6 degrees, aspect 2.000, default
         \\             1 'plan', orthographic, 8.000 x 6.000 m
         \\lights       1 spot, 1 material that emits on 2 triangles
+        \\animation    0 'drift', 0.000 to 2.000 s
+        \\             1, nothing that is drawn moves
         \\variant      0 'red'
         \\             1 'blue'
         \\image        image 0 'p', PNG, 2 x 1, RGB, 70 bytes
-        \\in the file  5 nodes, 2 meshes, 2 materials, 1 texture, 1 image, 2 cameras, 1 light
+        \\
+    ++ "in the file  5 nodes, 2 meshes, 2 materials, 1 texture, 1 image, 2 animations, " ++
+        \\2 cameras, 1 light
         \\drawn        2 triangles (1 unique)
         \\bounds       x 0.000 to 14.000, y 0.000 to 3.000, z -2.000 to 0.000 m
         \\memory       about 5.0 MiB to render 1024 x 512
         \\extension    KHR_lights_punctual: rendered, see docs/lights.md (required)
-        \\             EXT_lights_ies: ignored, such lights are left out (required)
+        \\             C_d: unknown (required)
         \\             KHR_xmp: ignored, data
         \\             KHR_materials_variants: rendered, by --material-variant
         \\             A_b: unknown
+        \\rendering    only with --force, for what it requires
         \\
     , text.written());
 }
@@ -262,6 +262,12 @@ test "the JSON has every key, and what another scene draws" {
             emissive_materials: u64,
             emissive_triangles: u64,
             environment: ?[]const u8,
+        },
+        animations: []const struct {
+            name: ?[]const u8,
+            start: ?f32,
+            end: ?f32,
+            channels: u64,
         },
         material_variants: []const []const u8,
         images: []const struct {
@@ -300,7 +306,8 @@ test "the JSON has every key, and what another scene draws" {
         .{ .name = "KHR_accessor_float64", .required = true },
         .{ .name = "A_b", .required = false },
     };
-    try writeForTest(.{ .scene = .{ .index = 0 } }, &extensions, writeJson, &text.writer);
+    const choices: settings.Load = .{ .force = true, .scene = .{ .index = 0 } };
+    try writeForTest(choices, &extensions, writeJson, &text.writer);
     const line = text.written();
     try testing.expectEqual(line.len - 1, std.mem.findScalar(u8, line, '\n'));
     const parsed = try std.json.parseFromSlice(Parsed, gpa, line, .{});
@@ -315,6 +322,8 @@ test "the JSON has every key, and what another scene draws" {
     try testing.expectEqual([3]f64{ 2, 1.5, 0 }, value.bounds.?.upper);
     try testing.expectEqual(0, value.cameras.len + value.images.len);
     try testing.expectEqual(2, value.counts.cameras);
+    try testing.expectEqual(2, value.animations.len);
+    try testing.expectEqual(null, value.animations[1].end);
     try testing.expectEqualStrings("ignored", value.extensions[0].treatment);
     try testing.expect(value.extensions[0].required and value.needs_force);
     try testing.expectEqualStrings("unknown", value.extensions[1].treatment);

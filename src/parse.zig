@@ -178,6 +178,7 @@ test {
     _ = pbrt;
     _ = @import("parse/named_images.zig");
     _ = @import("parse/number.zig");
+    _ = @import("parse/orientation.zig");
     _ = @import("parse/plain.zig");
     _ = @import("parse/ply.zig");
     _ = obj;

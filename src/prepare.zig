@@ -96,6 +96,20 @@ pub const pictureSize = view_file.pictureSize;
 /// Bytes that textures take.
 pub const planTextures = texture.plan;
 
+/// Which meshes of a scene its instances share, unless the user says; false: none.
+pub fn chooseShared(
+    gpa: Allocator,
+    from: *const Scene,
+    chosen: []bool,
+) error{OutOfMemory}!bool {
+    return sharing_file.choose(gpa, &.{
+        .sources = &.{},
+        .materials = from.materials,
+        .meshes = from.meshes,
+        .instances = from.instances,
+    }, .{}, chosen);
+}
+
 /// What is seen of it, and in what light.
 pub const ViewSettings = struct {
     camera: choices.Camera = .default,
@@ -322,8 +336,8 @@ noinline fn shareMeshes(
 }
 
 /// Makes a world that `pose` made of the scene what it would be if `pose` had been called now: but
-/// for the shape of the tree, which no picture depends on. Nodes and weights may have moved, and
-/// materials changed; meshes and instances are the same, and `cache` fits the settings. Where this
+/// for the shape of the tree, which no picture depends on. Nodes, weights and materials in motion
+/// may be others; meshes and instances are the same, and `cache` fits the settings. Where this
 /// fails, world and cache are of no use but to be freed.
 pub fn poseAgain(
     posed: *World,
@@ -435,22 +449,29 @@ fn geometryOf(
     return geometry;
 }
 
-/// All that the animations of a scene show which run at the moment that is posed; null where there
-/// are none. Free with its `deinit`.
+/// Brings `motion` up to all that the animations show which run at the moment that is posed, where
+/// it is not that already; null where there are none. `from` is the scene at rest.
 pub fn gatherMotion(
     gpa: Allocator,
     from: *const Scene,
     loaded: *const Loaded,
     posed: *const AnimatedScene,
     pool: *parallel.Pool,
-) PoseError!?Motion {
+    motion: *?Motion,
+) PoseError!void {
     const mode = simd.setFlushToZero();
     defer simd.setFloatControl(mode);
     const place = try place_file.compose(gpa, &posed.scene);
     defer place.deinit(gpa);
+    if (motion.*) |*known| {
+        if (std.meta.eql(known.shift, place.shift)) return;
+        known.deinit();
+        motion.* = null;
+    }
     const running = posed.moment.running;
     const parts = &loaded.parts;
-    return Motion.gather(gpa, from, parts, &loaded.textures, running, place.shift, pool);
+    motion.* =
+        try .gather(gpa, from, parts, &loaded.textures, running, place.shift, pool);
 }
 
 fn nanoseconds(duration: std.Io.Duration) u64 {
@@ -1376,6 +1397,55 @@ test "a mesh brings only the vertices from its first to its last" {
     try std.testing.expectEqual(math.Vec3{ 1, 0, 5 }, result.geometry.positions[2]);
 }
 
+test "a tree is fitted until it costs 1.3 times what it did, and is then built anew" {
+    const gpa = std.testing.allocator;
+    const side = 20;
+    var corners: [side * side][3]math.Vec3 = undefined;
+    var moves: [3 * corners.len]math.Vec3 = undefined;
+    for (&corners, 0..) |*triangle, index| {
+        const x: f32 = @floatFromInt(index % side);
+        const y: f32 = @floatFromInt(index / side);
+        triangle.* = .{ .{ x, y, 0 }, .{ x + 1, y, 0 }, .{ x, y + 1, 0 } };
+        // Every other one goes to the other end.
+        const across: f32 = if (index % 2 == 0) 0 else side - 1 - 2 * x;
+        for (moves[3 * index ..][0..3]) |*move| move.* = .{ across, 0, 0 };
+    }
+    var from = try TestScene.soup(gpa, &corners);
+    defer from.deinit();
+    var mesh = from.meshes[0];
+    mesh.morph_targets = &.{.{ .positions = &moves }};
+    from.meshes = (&mesh)[0..1];
+    var weights: [1]f32 = .{0};
+    from.instances = &.{.{ .mesh = 0, .node = 0, .morph_weights = &weights }};
+    from.check();
+    var pool: parallel.Pool = .init(2);
+    defer pool.deinit();
+    var diagnostic: Diagnostic = .{};
+    var times: StageTimes = .{};
+    const io = std.testing.io;
+    var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
+    defer loaded.deinit();
+    const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
+    var posed = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
+    defer posed.deinit();
+    const world_posed = &posed.world;
+    const built = world_posed.facts.tree.sah_cost;
+    for ([_]f32{ 0.01, 1, 1.01, 0 }, [_]bool{ true, false, true, false }) |weight, is_fitted| {
+        weights[0] = weight;
+        const cache = &posed.cache;
+        try poseAgain(world_posed, cache, io, &from, &loaded, settings, &diagnostic, &times);
+        try check.check(gpa, world_posed);
+        try std.testing.expectEqual(is_fitted, cache.tree.?.w4.sums.len > 0);
+        var fresh = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
+        defer fresh.deinit();
+        try expectSameBytes(fresh.world.geometry.positions, world_posed.geometry.positions);
+        const cost = world_posed.facts.tree.sah_cost;
+        const new_cost = fresh.world.facts.tree.sah_cost;
+        if (!is_fitted) try std.testing.expectEqual(new_cost, cost);
+        try std.testing.expect(cost <= 1.3 * @max(built, new_cost));
+    }
+}
+
 test "memory that runs out is an error that leaks nothing" {
     const gpa = std.testing.allocator;
     // Enough of them to be cut by a grid and by all threads first.
@@ -1438,6 +1508,41 @@ test "memory that runs out while meshes are shared leaks nothing" {
     try std.testing.checkAllAllocationFailures(gpa, one, .{&from});
 }
 
+test "memory that runs out when a scene is posed again is an error that leaks nothing" {
+    const gpa = std.testing.allocator;
+    var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});
+    defer from.deinit();
+    const nodes = try from.arena.allocator().alloc(scene.Node, 2);
+    nodes[0] = from.nodes[0];
+    from.nodes = nodes;
+    from.instances = &.{ .{ .mesh = 0, .node = 0 }, .{ .mesh = 0, .node = 1 } };
+    const one = struct {
+        fn one(failing: std.mem.Allocator, shown: *const Scene, second: *scene.Node) !void {
+            var pool: parallel.Pool = .init(1);
+            defer pool.deinit();
+            var diagnostic: Diagnostic = .{};
+            var times: StageTimes = .{};
+            const io = std.testing.io;
+            var loaded = try load(failing, io, shown, .{ .pool = &pool }, &diagnostic, &times);
+            defer loaded.deinit();
+            const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
+            second.* = .{ .parent = scene.none, .local = .scale(@splat(0)) };
+            var posed = try pose(failing, io, shown, &loaded, settings, &diagnostic, &times);
+            defer posed.deinit();
+            // Fitted; with a triangle that the tree lacks; and fitted again.
+            for ([_]f64{ 0, 1, 2 }) |scale| {
+                second.local = .scale(@splat(scale));
+                const cache = &posed.cache;
+                const again = &posed.world;
+                try poseAgain(again, cache, io, shown, &loaded, settings, &diagnostic, &times);
+                const dropped: u32 = if (scale > 0) 0 else 1;
+                try std.testing.expectEqual(dropped, again.geometry.dropped_count);
+            }
+        }
+    }.one;
+    try std.testing.checkAllAllocationFailures(gpa, one, .{ &from, &nodes[1] });
+}
+
 test {
     _ = animate;
     _ = Drawn;
@@ -1457,6 +1562,7 @@ test {
     _ = tangents;
     _ = texture;
     _ = extent_file;
+    _ = @import("prepare/relief.zig");
     _ = @import("prepare/layers.zig");
     _ = @import("prepare/texture_use.zig");
     _ = @import("prepare/pyramid.zig");

@@ -56,6 +56,8 @@ pub const Image = struct {
     /// What messages call it, printable, in quotes where it is a name of the file's.
     name: []const u8,
     bytes: []const u8,
+    /// Where it is gray it holds heights, of which normals are to be made.
+    is_relief: bool = false,
 };
 
 /// What a texture has beyond its image.

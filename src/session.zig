@@ -241,15 +241,7 @@ pub const Session = struct {
             try session.diagnostic.settle();
         }
         const loaded = &session.loaded.?;
-        const diagnostic = session.diagnostic;
-        const moment = try prepare.animateScene(session.gpa, scene, chosen.animation, diagnostic);
-        if (session.posed) |*before| {
-            const is_same = std.meta.eql(before.moment.running, moment.moment.running);
-            if (!is_same) session.dropMotion();
-        }
-        session.dropPosed();
-        session.posed = moment;
-        const shown = &session.posed.?.scene;
+        const shown = try session.animate(chosen.animation);
         const pose_settings: prepare.PoseSettings = .{
             .lanes = chosen.lanes,
             .pool = &session.pool,
@@ -271,7 +263,7 @@ pub const Session = struct {
                 shown,
                 loaded,
                 pose_settings,
-                diagnostic,
+                session.diagnostic,
                 &session.times,
             );
         };
@@ -282,11 +274,24 @@ pub const Session = struct {
             shown,
             loaded,
             pose_settings,
-            diagnostic,
+            session.diagnostic,
             &session.times,
         );
         session.world = posed.world;
         session.pose_cache = posed.cache;
+    }
+
+    /// The scene at a moment, until the next one.
+    fn animate(session: *Session, chosen: settings.Animation) Error!*const Scene {
+        const scene = &session.scene.?;
+        const posed = try prepare.animateScene(session.gpa, scene, chosen, session.diagnostic);
+        if (session.posed) |*before| {
+            const is_same = std.meta.eql(before.moment.running, posed.moment.running);
+            if (!is_same) session.dropMotion();
+        }
+        session.dropPosed();
+        session.posed = posed;
+        return &session.posed.?.scene;
     }
 
     /// Chooses what is seen, from where and by what light; the tree stays. Asserts that there is a
@@ -310,14 +315,14 @@ pub const Session = struct {
             backdrop = try session.chooseFor(&session.backdrop, &studio);
             backdrop.?.is_seen = true;
         }
-        if (choices.frames_all and session.motion == null) session.motion =
-            try prepare.gatherMotion(
-                session.gpa,
-                &session.scene.?,
-                &session.loaded.?,
-                &session.posed.?,
-                &session.pool,
-            );
+        if (choices.frames_all) try prepare.gatherMotion(
+            session.gpa,
+            &session.scene.?,
+            &session.loaded.?,
+            &session.posed.?,
+            &session.pool,
+            &session.motion,
+        );
         session.times.prepare_ns += session.since(start);
         try prepare.view(&session.world.?, session.io, &session.posed.?.scene, .{
             .camera = choices.camera,

@@ -880,11 +880,32 @@ test "a scene that cannot be read is an error that leaves the old image" {
         try expectOneErrorLine(ending);
         try testing.expectStringStartsWith(ending.stderr["raylane: ".len..], case[0]);
     }
-    const folder = try sandbox.run(&.{ "folder", "-o", "a.png" });
-    try testing.expect(folder.exit_code == 1 or folder.exit_code == 3);
-    try expectOneErrorLine(folder);
+    const folder = try sandbox.expectExit(3, &.{ "folder", "-o", "a.png" });
+    try testing.expectEqualStrings("raylane: folder: is a folder\n", folder.stderr);
     try sandbox.expectFiles(&.{ "a.png", "broken.gltf", "empty.glb", "folder", "picture.glb" });
     try testing.expectEqualStrings("old", try sandbox.read("a.png"));
+}
+
+test "a scene comes from standard input or through a pipe by its name" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("s.glb", try triangleScene(sandbox.arena_state.allocator()));
+    for ([_][]const u8{
+        "cat s.glb | \"$@\" - -o a.png",
+        "\"$@\" - -o a.png <s.glb",
+        "mkfifo p && { cat s.glb >p & } && \"$@\" p -o a.png && wait && rm p",
+    }) |script| {
+        const arguments = [_][]const u8{ "-r4x4", "--spp=1", "-q", "-t1" };
+        const ending = try sandbox.runShell(script, &arguments);
+        try testing.expectEqualStrings("", ending.stderr);
+        try testing.expectEqual(0, ending.exit_code);
+        try sandbox.expectFiles(&.{ "a.png", "s.glb" });
+        try sandbox.folder.dir.deleteFile(io, "a.png");
+    }
+    const empty = try sandbox.runShell("\"$@\" - -o a.png </dev/null", &.{});
+    try testing.expectEqual(3, empty.exit_code);
+    try testing.expectEqualStrings("raylane: standard input: is empty\n", empty.stderr);
+    try sandbox.expectFiles(&.{"s.glb"});
 }
 
 test "a file name cannot break the line of a message" {

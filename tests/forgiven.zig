@@ -428,6 +428,34 @@ test "numbers that are not finite" {
     }, normals[0..4].*);
 }
 
+test "weights and colours that are not finite" {
+    const nan = "\x00\x00\xc0\x7f";
+    const changes = [_]Change{
+        .{ ",\"inverseBindMatrices\":8", "" },
+        .{ "{\"componentType\":5126,\"count\":4,\"type\":\"VEC4\"}", "{\"bufferView\":8," ++
+            "\"componentType\":5126,\"count\":4,\"type\":\"VEC4\"}" },
+        .{ "\"COLOR_0\":2", "\"COLOR_0\":6" },
+    };
+    var buffer = malformed.makeBuffer();
+    @memcpy(buffer[208..212], nan); // The second vertex; the matrices' diagonals are 1.
+    var text = try malformed.makeText(&buffer);
+    defer gpa.free(text);
+    for (changes) |one| {
+        const changed = try malformed.replace(text, one[0], one[1]);
+        gpa.free(text);
+        text = changed;
+    }
+    var said: Diagnostic = .{};
+    var scene = try read(text, .{}, &said);
+    defer scene.deinit();
+    const mesh = &scene.meshes[0];
+    try testing.expectEqual([4]f32{ 1, 0, 0, 0 }, mesh.colors.?[0]);
+    try testing.expectEqual([4]f32{ 1, 1, 1, 1 }, mesh.colors.?[1]);
+    // What has no weight hangs on its first joint.
+    try testing.expectEqual([4]f32{ 1, 0, 0, 0 }, mesh.joint_sets[0].weights[1]);
+    try expectWarning(&said, "accessor 6: 1 of 4 colours are not finite, left out (and 1 more)");
+}
+
 test "positions that are not finite where nothing has a corner" {
     const nan = "\x00\x00\xc0\x7f";
     const buffer = buffer: {

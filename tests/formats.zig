@@ -111,6 +111,27 @@ test "OBJ: corners that share what they have are one vertex, polygons of all kin
     try expectEqual(0, scene.materials[0].metallic);
 }
 
+test "OBJ: a position may have any number of normals" {
+    var text: Io.Writer.Allocating = .init(gpa);
+    defer text.deinit();
+    const writer = &text.writer;
+    try writer.writeAll("v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+    const count = 20;
+    for (1..count + 1) |x| try writer.print("vn {d} 0 1\n", .{x});
+    for (0..2) |_| for (1..count + 1) |x| {
+        try writer.print("f 1//{d} 2//{d} 3//{d}\n", .{ x, x, x });
+    };
+    var scene = try readClean("a.obj", text.written());
+    defer scene.deinit();
+    const mesh = &scene.meshes[0];
+    try expectEqual(2 * count, mesh.triangles.len);
+    try expectEqual(3 * count, mesh.positions.len);
+    try expectEqual(mesh.triangles[count - 1], mesh.triangles[2 * count - 1]);
+    for (mesh.triangles[0..count], 1..) |corners, x| {
+        try expectEqual(@as(f32, @floatFromInt(x)), mesh.normals.?[corners[2]][0]);
+    }
+}
+
 test "OBJ: smoothing groups make normals, each for itself" {
     // Two squares that meet at a right angle, in one group, and then in two.
     const corners =
@@ -234,6 +255,8 @@ const library =
     \\map_d sub folder\a b.png
     \\map_Pr r.png
     \\norm -bm 2 C:\textures\n.png
+    \\newmtl bumpy
+    \\map_Bump -bm .5 r.png
     \\newmtl lamp
     \\Ke 3 2 1
     \\newmtl matt
@@ -244,7 +267,8 @@ const with_library =
     "mtllib my materials.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 .25\nvt 1 0\nvt 0 1\n" ++
     "usemtl matt\nf 1 2 3\nusemtl shiny one\nf 1 2 3\nusemtl window\nf 1 2 3\n" ++
     "usemtl mirror\nf 1 2 3\nusemtl glass\nf 1 2 3\nusemtl metal\nf 1 2 3\n" ++
-    "usemtl textured\nf 1/1 2/2 3/3\nusemtl lamp\nf 1 2 3\nusemtl matt\nf 3 2 1\n";
+    "usemtl textured\nf 1/1 2/2 3/3\n" ++
+    "usemtl bumpy\nf 1/1 2/2 3/3\nusemtl lamp\nf 1 2 3\nusemtl matt\nf 3 2 1\n";
 
 test "MTL: every kind of material becomes ours" {
     var folder = std.testing.tmpDir(.{});
@@ -258,7 +282,7 @@ test "MTL: every kind of material becomes ours" {
     var scene = try readIn(folder.dir, "a.obj", with_library, &said);
     defer scene.deinit();
     try expectEqual(0, said.warning_count);
-    try expectEqual(8, scene.meshes.len);
+    try expectEqual(9, scene.meshes.len);
     try expectEqual(2, scene.meshes[0].triangles.len);
     const all = scene.materials;
     const code: f32 = @floatCast(srgb.linear(0.5));
@@ -276,7 +300,11 @@ test "MTL: every kind of material becomes ours" {
     try expect(all[5].metallic == 1 and all[5].roughness == 0.5 and all[5].anisotropy == 0.5);
     try expect(all[5].clearcoat == 0.75 and all[5].clearcoat_roughness == 0.25);
     try expectEqual(Vec3{ 0.5, 0.5, 0.5 }, all[5].sheen_color);
-    try expectEqual(Vec3{ 3, 2, 1 }, all[7].emissive);
+    try expectEqual(Vec3{ 3, 2, 1 }, all[8].emissive);
+    try expectEqual(0.5, all[7].normal_scale);
+    const relief = scene.images[scene.textures[all[7].normal_texture.?.texture].image];
+    try expect(relief.is_relief);
+    try std.testing.expectEqualStrings("r.png", relief.bytes);
     const textured = &all[6];
     try expectEqual([4]f32{ 1, 1, 1, 1 }, textured.base_color);
     try expectEqual(.mask, textured.alpha_mode);
@@ -287,7 +315,7 @@ test "MTL: every kind of material becomes ours" {
     try expectEqual(.clamp_to_edge, texture.wrap[0]);
     try std.testing.expectEqualStrings("sub folder/a b.png", scene.images[texture.image].bytes);
     try expectEqual(2, textured.normal_scale);
-    try expectEqual(3, scene.images.len);
+    try expectEqual(4, scene.images.len);
     try expectEqual([2]f32{ 0, 0.75 }, scene.meshes[6].texcoords[0].?[0]);
 }
 
@@ -305,6 +333,15 @@ test "MTL: what is missing is grey, with a warning" {
     try expectEqual(0.5, scene.materials[0].base_color[0]);
     // Under the name of the scene it is found all the same.
     try folder.dir.writeFile(io, .{ .sub_path = "a.mtl", .data = "newmtl matt\nmap_Kd x.png\nhm" });
+    try folder.dir.writeFile(io, .{ .sub_path = "c.mtl", .data = "newmtl a\nrefl r.png\nKa 1" });
+    var unread: Diagnostic = .{};
+    var third = try readIn(folder.dir, "c.obj", "mtllib c.mtl\nv 0 0 0\np 1", &unread);
+    third.deinit();
+    try expectEqual(1, unread.warning_count);
+    try std.testing.expectEqualStrings(
+        "'c.mtl': refl is not rendered",
+        unread.warnings[0].text(),
+    );
     var other: Diagnostic = .{};
     var named = try readIn(folder.dir, "b/a.obj", with_library, &other);
     defer named.deinit();
@@ -477,6 +514,29 @@ test "PLY: colours of vertices, of faces, and coordinates of corners" {
     try expectEqual([2]f32{ 0, 1 }, mesh.texcoords[0].?[0]);
     try expectEqual([4]f32{ 0, 1, 0, 1 }, mesh.colors.?[4]);
     try std.testing.expectEqualStrings("image", own.images[0].bytes);
+}
+
+test "PLY: nothing at all is a warning" {
+    var said: Diagnostic = .{};
+    var scene = try read("a", "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n" ++
+        "element face 0\nproperty list uchar int vertex_indices\nend_header\n", &said);
+    defer scene.deinit();
+    try std.testing.expectEqualStrings(
+        "nothing to render: no triangles",
+        said.warnings[0].text(),
+    );
+}
+
+test "PLY: lines that end in returns alone, faces that look as their normals say" {
+    var scene = try readClean("a", "ply\rformat binary_little_endian 1.0\rcomment x\r" ++
+        "element vertex 3\rproperty char x\rproperty char y\rproperty char z\r" ++
+        "property char nx\rproperty char ny\rproperty char nz\r" ++
+        "element face 1\rproperty list uchar uchar vertex_index\rend_header\r" ++
+        "\x0a\x00\x00\x00\x00\x01\x01\x00\x00\x00\x00\x01\x00\x01\x00\x00\x00\x01" ++
+        "\x03\x00\x01\x02");
+    defer scene.deinit();
+    try expectEqual(Vec3{ 10, 0, 0 }, scene.meshes[0].positions[0]);
+    try expectEqual([3]u32{ 0, 2, 1 }, scene.meshes[0].triangles[0]);
 }
 
 test "PLY: points, edges and strips" {

@@ -251,7 +251,7 @@ test "what cannot be read of an animation is left out with a warning, and the re
     const cases = comptime [_]Case{
         .{
             animation(node("1", "translation"), falling_times, vectors, "LINEAR"),
-            start ++ "sampler 0: its times do not ascend, left out",
+            start ++ "sampler 0: its times fall, left out",
         },
         .{
             animation(node("1", "translation"), broken_times, vectors, "LINEAR"),
@@ -338,6 +338,25 @@ test "all that an animation shows is framed, whatever moment is seen" {
     try testing.expectEqual(cameras[0], cameras[1]);
     try session.view(.{ .resolution = .{ 8, 8 }, .camera = .auto });
     try testing.expect(!std.meta.eql(cameras[0], session.world.?.view.camera));
+    // Far away, where another moment has its origin elsewhere.
+    const far: Vec3 = .{ 1 << 20, 0, 0 };
+    var scene = try read(gpa, line, &said);
+    const nodes = try scene.arena.allocator().dupe(raylane.scene.Node, scene.nodes);
+    for (&nodes[0].local.translation, far) |*to, offset| to.* += offset;
+    scene.nodes = nodes;
+    session.adopt(scene, .owned);
+    for (&cameras, [2]f32{ 1, 3 }) |*camera, time_s| {
+        const chosen: settings.Animation = .{ .which = .all, .time_s = time_s };
+        try session.pose(.{ .lanes = raylane.variant.compiled[0].lanes, .animation = chosen });
+        try session.view(wide);
+        // Relative to a vertex that goes from y = 1 and z = 1 to 2 and 4, and x to 0.
+        const at = session.world.?.geometry.positions[0];
+        camera.* = session.world.?.view.camera;
+        camera.origin = raylane.math.vec3.sub(camera.origin, at);
+    }
+    const moved_by: Vec3 = .{ -0.5, 1, 3 };
+    const same = raylane.math.vec3.add(cameras[1].origin, moved_by);
+    for (cameras[0].origin, same) |a, b| try testing.expectApproxEqAbs(a, b, 1e-3);
     // At rest nothing moves.
     try session.pose(.{ .lanes = raylane.variant.compiled[0].lanes });
     try session.view(wide);

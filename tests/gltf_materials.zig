@@ -328,26 +328,28 @@ test "what is out of range is clamped, what makes no sense is left out, each wit
         },
         .{
             "volume_scatter\":{\"multiscatterColorTexture\":{\"index\":20}}",
-            "multiscatterColorTexture: there is no texture 20, left out",
+            "multiscatterColorTexture: there is no texture 20",
             .{},
         },
         .{
             "volume_scatter\":{\"multiscatterColorTexture\":{\"index\":0,\"texCoord\":4294967295}}",
-            "multiscatterColorTexture: only TEXCOORD_0 to TEXCOORD_3 are read, left out",
+            "multiscatterColorTexture: there is no TEXCOORD of its texCoord",
             .{},
         },
         .{
             "volume_scatter\":{\"multiscatterColorTexture\":{\"index\":4294967296}}",
-            "KHR_materials_volume_scatter is not as it should be, left out",
+            "names nothing, lists have 4194304 elements at most",
             .{},
         },
     }) |case| {
-        // Such an index is too large for a list, and for a processor of 32 bits.
         var said: Diagnostic = .{};
         errdefer std.debug.print("{s} {s}\n", .{ case[0], said.message.text() });
         var scene = readExtension(arena.allocator(), case[0], &said) catch |err| {
             try testing.expectEqual(error.InvalidInput, err);
-            try testing.expect(std.mem.find(u8, case[0], "4294967") != null);
+            const is_reference = std.mem.find(u8, case[0], "\"index\"") != null;
+            try testing.expect(is_reference);
+            if (@sizeOf(usize) == 8) // Else such a number is too large for the processor.
+                try testing.expectStringEndsWith(said.message.text(), case[1]);
             continue;
         };
         defer scene.deinit();

@@ -13,8 +13,8 @@ test {
     _ = @import("strokes.zig");
     _ = @import("decode.zig");
     _ = @import("environment.zig");
-    _ = @import("formats.zig");
     _ = @import("forgiven.zig");
+    _ = @import("formats.zig");
     _ = @import("glass.zig");
     _ = @import("gltf_animations.zig");
     _ = @import("gltf_materials.zig");

@@ -752,7 +752,7 @@ test "buffers beside the scene, inside its folder and outside" {
             "buffer 0: 'link.bin' is a link that leads outside the scene's folder " ++
                 "(see --allow-outside)",
         },
-        .{ "a%00.bin", true, "buffer 0: 'a%00.bin' is not a valid path" },
+        .{ "a%00.bin", true, "buffer 0: 'a?.bin' is not a valid path" },
         .{ ".", false, "buffer 0: '.' is a folder" },
         .{
             "http://localhost/a.bin",

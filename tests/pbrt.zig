@@ -1260,7 +1260,7 @@ const everything =
     \\Sampler "halton" "integer pixelsamples" 2 Integrator "path" "integer maxdepth" 3
     \\MakeNamedMaterial "m" "string type" "uber" "rgb Kt" [.1 .2 .3]
     \\Texture "t" "color" "scale" "rgb tex1" [.5 .5 .5] "float tex2" 2
-    \\WorldBegin
+    \\WorldBegin Attribute "shape" "float alpha" 1 "string note" "x" ColorSpace "rec2020"
     \\LightSource "spot" "point from" [0 5 0] "point to" [0 0 0] "blackbody I" [3000 1]
     \\LightSource "infinite" "spectrum L" [400 1 500 .5 700 1]
     \\AttributeBegin
@@ -1270,6 +1270,7 @@ const everything =
     \\Material "plastic" "texture Kd" "t" "float roughness" .1
     \\ObjectBegin "o" Shape "cone" Shape "cylinder" "float phimax" 90 ObjectEnd
     \\TransformBegin Transform [1 0 0 0 0 1 0 0 0 0 1 0 1 2 3 1] ObjectInstance "o" TransformEnd
+    \\NamedMaterial "later" Shape "disk" MakeNamedMaterial "later" "string type" "matte"
     \\NamedMaterial "m"
     \\Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point P" [0 0 0 1 0 0 1 1 0 0 1 0]
     \\Shape "loopsubdiv" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 1 1 0] "integer levels" 1

@@ -509,3 +509,28 @@ test "every allocation may fail" {
     }
     try testing.expect(fail_index > 10);
 }
+
+test "the power of a lamp with a picture is what the picture lets out" {
+    var folder: Folder = try .make();
+    defer folder.free();
+    // Two by one pixels of RGB: red, then (0, 128, 255).
+    try folder.temporary.dir.writeFile(io, .{ .sub_path = "real.png", .data = "\x89PNG\r\n\x1a\n" ++
+        "\x00\x00\x00\x0dIHDR\x00\x00\x00\x02\x00\x00\x00\x01\x08\x02\x00\x00\x00" ++
+        "\x7b\x40\xe8\xdd" ++
+        "\x00\x00\x00\x12IDAT\x78\x01\x01\x07\x00\xf8\xff" ++
+        "\x00\xff\x00\x00\x00\x80\xff\x08\x00\x02\x7f\xd5\x70\x6e\xaa" ++
+        "\x00\x00\x00\x00IEND\xae\x42\x60\x82" });
+    const luminance = (0.212671 + 0.215861 * 0.715160 + 0.072169) / 2.0;
+    // Half a square metre, to one side; and a picture that is none, which counts as white.
+    for ([_][]const u8{ "real.png", "a.png" }, [_]f32{ luminance, 1 }) |name, mean| {
+        var buffer: [400]u8 = undefined;
+        const text = try std.mem.print(&buffer, "Camera \"perspective\" WorldBegin " ++
+            "AreaLightSource \"diffuse\" \"string filename\" \"{s}\" \"float power\" 3 " ++
+            with_uv ++ " WorldEnd", .{name});
+        var scene = try folder.readClean(text);
+        defer scene.deinit();
+        const emitted = scene.materials[scene.meshes[0].material].emissive;
+        for (emitted) |channel|
+            try testing.expectApproxEqRel(3 / (std.math.pi * 0.5 * mean), channel, 1e-4);
+    }
+}

@@ -82,6 +82,7 @@ const roots = [_][]const u8{
     "bench/lowering.zig",
     "bench/frames.zig",
     "bench/parse.zig",
+    "bench/poses.zig",
     "bench/rays.zig",
     "bench/structures.zig",
     "src/kernel.zig",

@@ -27,6 +27,7 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     });
     try writeScenes(&json, file);
     try writeCameras(&json, scene);
+    try writeAnimations(&json, scene.animations);
     try writeFields(&json, .{
         .lights = .{
             .point = info.lights.by_kind.get(.point),
@@ -54,7 +55,7 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     });
     try writeExtensions(&json, file.extensions);
     try writeFields(&json, .{
-        .needs_force = info.needsForce(),
+        .needs_force = file.needs_force,
         .warnings = report.Texts{ .list = info.warnings },
     });
     try json.endObject();
@@ -104,6 +105,24 @@ fn writeCameras(json: *Stringify, scene: *const scene_data.Scene) Writer.Error!v
             }),
         }
         try json.endObject();
+    }
+    try json.endArray();
+}
+
+fn writeAnimations(
+    json: *Stringify,
+    animations: []const scene_data.Animation,
+) Writer.Error!void {
+    try json.objectField("animations");
+    try json.beginArray();
+    for (animations) |*animation| {
+        const span = animation.span();
+        try json.write(.{
+            .name = optional(animation.name),
+            .start = if (span) |ends| ends[0] else null,
+            .end = if (span) |ends| ends[1] else null,
+            .channels = animation.channels.len,
+        });
     }
     try json.endArray();
 }

@@ -20,6 +20,10 @@ const base_bytes = 4 << 20;
 const tree_triangle_bytes = 50;
 /// While it is built, besides: boxes, and what is touched of binary nodes and their costs.
 const build_triangle_bytes = 48;
+/// Triangles of a cluster, which an instance of a shared mesh has in place of its own, and bytes of
+/// each: a box, and its part of the tree over all clusters.
+const cluster_triangles = 80;
+const cluster_bytes = 240;
 /// A map of the surroundings: what is decoded, radiance, its levels; by texel of the image.
 const environment_texel_bytes = 56;
 /// What else is made of it.
@@ -39,7 +43,7 @@ pub fn estimate(
     const side_max = settings.texture_side.default;
     const textures = try prepare.planTextures(gpa, scene, side_max, diagnostic);
     const read = try sceneBytes(gpa, scene);
-    const soup = soupOf(scene);
+    const soup = try soupOf(gpa, scene);
     const pixels = @as(u64, size[0]) * size[1];
     const layers: u64 = if (hasUnlit(scene)) 2 else 1;
     const tree = soup.triangle_count * tree_triangle_bytes;
@@ -103,10 +107,16 @@ const Arrays = struct {
     }
 };
 
-/// What `prepare` places in the world.
+/// What `prepare` places in the world, or shares.
 const Soup = struct { triangle_count: u64 = 0, byte_count: u64 = 0 };
 
-fn soupOf(scene: *const Scene) Soup {
+fn soupOf(gpa: Allocator, scene: *const Scene) error{OutOfMemory}!Soup {
+    const is_shared = try gpa.alloc(bool, scene.meshes.len);
+    defer gpa.free(is_shared);
+    if (!try prepare.chooseShared(gpa, scene, is_shared)) @memset(is_shared, false);
+    const is_placed = try gpa.alloc(bool, scene.meshes.len);
+    defer gpa.free(is_placed);
+    @memset(is_placed, false);
     var vertex_count: u64 = 0;
     var soup: Soup = .{};
     var vertex_bytes: u64 = 2 * @sizeOf([3]f32);
@@ -116,6 +126,12 @@ fn soupOf(scene: *const Scene) Soup {
     for (scene.instances) |instance| {
         const mesh = &scene.meshes[instance.mesh];
         const material = &scene.materials[mesh.material];
+        if (is_shared[instance.mesh]) {
+            const cluster_count = mesh.triangles.len / cluster_triangles + 1;
+            soup.byte_count += @sizeOf(world.instances.Instance) + cluster_count * cluster_bytes;
+            if (is_placed[instance.mesh]) continue;
+            is_placed[instance.mesh] = true;
+        }
         soup.triangle_count += mesh.triangles.len;
         // Files share one list of vertices among many meshes, of which each draws some.
         vertex_count += @min(mesh.positions.len, 3 * mesh.triangles.len);
@@ -131,7 +147,7 @@ fn soupOf(scene: *const Scene) Soup {
     for (has_texcoords) |is_used| {
         if (is_used) vertex_bytes += @sizeOf([2]f32);
     }
-    soup.byte_count = vertex_count * vertex_bytes + soup.triangle_count * @sizeOf(world.Triangle);
+    soup.byte_count += vertex_count * vertex_bytes + soup.triangle_count * @sizeOf(world.Triangle);
     return soup;
 }
 
@@ -161,14 +177,15 @@ test "what is drawn, its textures and the picture count" {
     errdefer builder.deinit();
     const material = try builder.addMaterial(.{});
     const unlit = try builder.addMaterial(.{ .unlit = true });
-    const triangles: [1000][3]u32 = @splat(.{ 0, 1, 2 });
+    // Fewer triangles than meshes have that are shared.
+    const triangles: [50][3]u32 = @splat(.{ 0, 1, 2 });
     const mesh = try builder.addMesh(.{
         .positions = &.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } },
         .triangles = &triangles,
         .material = material,
     });
     const node = try builder.addNode(scene_data.none, .identity);
-    for (0..1000) |_| try builder.addInstance(mesh, node);
+    for (0..20_000) |_| try builder.addInstance(mesh, node);
     var scene = try builder.finish();
     defer scene.deinit();
     const instances = scene.instances;

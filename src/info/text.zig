@@ -33,6 +33,7 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     try writeScenes(writer, file);
     try writeCameras(writer, scene);
     try writeLights(writer, info);
+    try writeAnimations(writer, scene.animations);
     try writeVariants(writer, scene.material_variants);
     try writeImages(writer, info.images);
     try writeCounts(writer, &info.counts);
@@ -41,7 +42,7 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     try report.writeBytes(writer, info.memory_bytes);
     try writer.print(" to render {d} x {d}\n", .{ info.size[0], info.size[1] });
     try writeExtensions(writer, file.extensions);
-    if (info.needsForce()) {
+    if (file.needs_force) {
         try writer.writeAll("rendering    only with --force, for what it requires\n");
     }
 }
@@ -120,6 +121,17 @@ fn writeLights(writer: *Writer, info: *const Info) Writer.Error!void {
     try writer.writeByte('\n');
 }
 
+fn writeAnimations(writer: *Writer, animations: []const scene_data.Animation) Writer.Error!void {
+    for (animations, 0..) |*animation, index| {
+        if (!try begin(writer, "animation", index, animations.len)) return;
+        try writer.print("{d}", .{index});
+        if (animation.name.len > 0) try writer.print(" {f}", .{quote(animation.name)});
+        if (animation.span()) |span| {
+            try writer.print(", {d:.3} to {d:.3} s\n", .{ span[0], span[1] });
+        } else try writer.writeAll(", nothing that is drawn moves\n");
+    }
+}
+
 fn writeVariants(writer: *Writer, names: []const []const u8) Writer.Error!void {
     for (names, 0..) |name, index| {
         if (!try begin(writer, "variant", index, names.len)) return;
@@ -177,7 +189,8 @@ fn writeCounts(writer: *Writer, counts: *const scene_data.File.Counts) Writer.Er
 
 fn writeDrawn(writer: *Writer, info: *const Info) Writer.Error!void {
     const drawn = &info.drawn;
-    try writer.print("drawn        {d} triangles", .{drawn.triangle_count});
+    const noun = if (drawn.triangle_count == 1) "triangle" else "triangles";
+    try writer.print("drawn        {d} {s}", .{ drawn.triangle_count, noun });
     if (drawn.triangle_count != drawn.unique_triangle_count) {
         try writer.print(" ({d} unique)", .{drawn.unique_triangle_count});
     }

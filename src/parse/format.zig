@@ -19,6 +19,21 @@ pub const Recognized = union(enum) {
     unknown,
 };
 
+/// What stands in the place of a file that Git LFS has not fetched.
+const pointer_start = "version https://git-lfs.";
+const pointer = "a Git LFS pointer, not the file itself; git lfs pull fetches that";
+
+/// What stands where a file of any other kind should be; null: nothing of that sort.
+pub fn misplaced(bytes: []const u8) ?[]const u8 {
+    if (std.mem.startsWith(u8, bytes, pointer_start)) return pointer;
+    const start = std.mem.trimStart(u8, bytes[0..@min(bytes.len, 64)], " \t\r\n");
+    for (tags) |one| {
+        const is_page = std.mem.eql(u8, one.is, web_page);
+        if (is_page and std.ascii.startsWithIgnoreCase(start, one.tag)) return web_page;
+    }
+    return null;
+}
+
 const Signature = struct {
     bytes: []const u8,
     /// Where it stands.
@@ -29,6 +44,7 @@ const Signature = struct {
 const picture = "; a picture is no scene";
 const convert = "; convert it to glTF";
 const environment = " picture; --env lights a scene with it";
+const tiles = "a 3D Tiles payload" ++ convert;
 const unpack = "; unpack it and name a file in it";
 const web_page = "a web page (HTML), perhaps what a failed download left";
 
@@ -67,12 +83,17 @@ const signatures = [_]Signature{
         .foreign = "an OLE document, as 3ds Max writes them" ++ convert,
     } },
     .{ .bytes = "LWO", .offset = 8, .is = .{ .foreign = "a LightWave object" ++ convert } },
+    .{ .bytes = "b3dm", .is = .{ .foreign = tiles } },
+    .{ .bytes = "i3dm", .is = .{ .foreign = tiles } },
+    .{ .bytes = "pnts", .is = .{ .foreign = tiles } },
+    .{ .bytes = "cmpt", .is = .{ .foreign = tiles } },
+    .{ .bytes = "xof 0", .is = .{ .foreign = "a DirectX file" ++ convert } },
+    .{ .bytes = "AC10", .is = .{ .foreign = "a DWG drawing" ++ convert } },
+    .{ .bytes = "ftyp", .offset = 4, .is = .{ .foreign = "a film or a picture, no scene" } },
     .{ .bytes = "#VRML", .is = .{ .foreign = "a VRML file" ++ convert } },
     .{ .bytes = "//Maya", .is = .{ .foreign = "a Maya scene" ++ convert } },
     .{ .bytes = "ISO-10303-21", .is = .{ .foreign = "a STEP file" ++ convert } },
-    .{ .bytes = "version https://git-lfs.", .is = .{
-        .foreign = "a Git LFS pointer, not the file itself; git lfs pull fetches that",
-    } },
+    .{ .bytes = pointer_start, .is = .{ .foreign = pointer } },
     .{ .bytes = "%PDF", .is = .{ .foreign = "a PDF document, no scene" } },
     .{ .bytes = "\x7fELF", .is = .{ .foreign = "a program, no scene" } },
     .{ .bytes = "SQLite format 3", .is = .{ .foreign = "a database, no scene" } },
@@ -177,6 +198,8 @@ fn ofText(start: []const u8) ?Recognized {
         if (word.len == 0) continue;
         if (isOneOf(word, pbrt_words)) return .{ .format = .pbrt };
         if (isOneOf(word, obj_words)) return .{ .format = .obj };
+        if (std.mem.eql(u8, word, "0") and std.mem.eql(u8, lines.next() orelse "", "SECTION"))
+            return .{ .foreign = "a DXF drawing" ++ convert };
         if (std.mem.eql(u8, word, "newmtl"))
             return .{ .foreign = "a material library of an OBJ file; name that file" };
         if (isOneOf(word, "OFF COFF NOFF"))
@@ -263,8 +286,12 @@ test "what is no scene is named" {
     try expectForeign("a COLLADA", "<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"\">");
     try expectForeign("an XML file", "<?xml version=\"1.0\"?><a/>");
     try expectForeign("a Git LFS pointer", "version https://git-lfs.github.com/spec/v1\noid");
+    try expectForeign("a 3D Tiles payload;", "b3dm\x01\x00");
+    try expectForeign("a DXF drawing;", "  0\r\nSECTION\r\n  2\r\nHEADER\r\n");
     try expectForeign("a text in UTF-16", "\xff\xfe{\x00");
     try expectForeign("a material library", "# by hand\n\nnewmtl a\nKd 1 0 0\n");
+    try std.testing.expectEqualStrings(web_page, misplaced("\n<!DOCTYPE html><html>").?);
+    try std.testing.expectEqual(null, misplaced("<htm"));
     try std.testing.expectEqual(.gzip, recognize("\x1f\x8b\x08", ""));
 }
 

@@ -87,7 +87,7 @@ fn fill(source: *Source, resources: *Resources, animations: *Animations) Error!v
     const settings = &resources.settings;
     const shown = try nodes.choose(source, settings.scene);
     if (shown) |one| try source.need(.scenes, Source.indexOf(source.data.scenes, one));
-    builder.scene.file = try description.read(source, builder.scene.file.format, shown);
+    try description.read(source, shown);
     const variant = try variants.choose(source, settings.material_variant);
     const origins = try nodes.collect(source, shown);
     defer source.gpa.free(origins);

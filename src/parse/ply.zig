@@ -204,10 +204,13 @@ const Reader = struct {
         return error.InvalidPly;
     }
 
-    /// The next line of the header, without its end.
+    /// The next line of the header, without its end, which is the same for all: old systems have
+    /// returns alone, behind the last of which binary data may look like another end.
     fn line(reader: *Reader) Error![]const u8 {
         const rest = reader.bytes[reader.cursor..];
-        const end = std.mem.findScalar(u8, rest, '\n') orelse
+        const has_returns = std.mem.startsWith(u8, reader.bytes, "ply\r") and
+            reader.bytes[4] != '\n';
+        const end = std.mem.findScalar(u8, rest, if (has_returns) '\r' else '\n') orelse
             return reader.fail("the PLY header does not end", .{});
         reader.cursor += end + 1;
         return std.mem.trimEnd(u8, rest[0..end], "\r \t");
@@ -443,6 +446,7 @@ const Reader = struct {
     }
 
     fn readFaces(reader: *Reader, element: *const Element) Error!void {
+        if (element.count == 0) return;
         if (reader.mesh.positions.len == 0) return reader.fail("has faces before vertices", .{});
         try reader.checkCount(element);
         const extras = reader.wants.extras;
@@ -497,11 +501,15 @@ const Reader = struct {
             return;
         };
         face.cut.clearRetainingCapacity();
-        face.positions.clearRetainingCapacity();
-        for (corners) |corner| {
-            try face.positions.append(reader.gpa, reader.mesh.positions[corner]);
+        if (corners.len == 3) {
+            try face.cut.append(reader.gpa, .{ 0, 1, 2 });
+        } else {
+            face.positions.clearRetainingCapacity();
+            for (corners) |corner| {
+                try face.positions.append(reader.gpa, reader.mesh.positions[corner]);
+            }
+            try reader.cutter.cut(face.positions.items, &face.cut);
         }
-        try reader.cutter.cut(face.positions.items, &face.cut);
         // Where one face has coordinates of its own, all have, or (0, 0).
         const texcoords = face.texcoords.items;
         const has_texcoords = texcoords.len > 0 and texcoords.len == 2 * corners.len;
@@ -527,6 +535,7 @@ const Reader = struct {
     /// Lists of vertices of which each makes a triangle with the two before it, turned every second
     /// time; -1 begins anew.
     fn readStrips(reader: *Reader, element: *const Element) Error!void {
+        if (element.count == 0) return;
         if (reader.mesh.positions.len == 0) return reader.fail("has faces before vertices", .{});
         try reader.checkCount(element);
         const index_max: u32 = @intCast(reader.mesh.positions.len - 1);

@@ -5,6 +5,7 @@
 //! multiplied with them where there are coordinates.
 
 const std = @import("std");
+const orientation = @import("orientation.zig");
 const plain = @import("plain.zig");
 const ply = @import("ply.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
@@ -40,6 +41,7 @@ pub fn read(
     if (mesh.texcoords) |texcoords| for (texcoords) |*texcoord| {
         texcoord[1] = 1 - texcoord[1];
     };
+    if (mesh.normals) |normals| orientation.orient(mesh.positions, normals, mesh.triangles);
     const texture = if (mesh.texcoords != null and mesh.texture_file != null)
         try textureOf(resources, &builder, mesh.texture_file.?, diagnostic)
     else

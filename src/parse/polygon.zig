@@ -12,9 +12,9 @@ const Vec3 = math.Vec3;
 
 const Cutter = @This();
 
-/// Triangles that are compared with a corner, at most, for a file of `input_bytes`.
+/// Corners that are looked at, at most, for a file of `input_bytes`.
 pub fn stepsMax(input_bytes: u64) u64 {
-    return (1 << 24) + 64 * input_bytes;
+    return (1 << 24) + 8 * input_bytes;
 }
 
 gpa: Allocator,
@@ -107,7 +107,8 @@ fn clip(cutter: *Cutter, out: *std.ArrayList([3]u32)) Allocator.Error!void {
     var left = count;
     var corner: u32 = 0;
     var missed: u32 = 0;
-    while (left > 3 and missed < left) {
+    while (left > 3 and missed < left and cutter.steps_left > 0) {
+        cutter.steps_left -= 1;
         const before, const behind = .{ cutter.last.items[corner], cutter.next.items[corner] };
         if (!cutter.isEar(before, corner, behind)) {
             missed += 1;

@@ -22,6 +22,7 @@ const Identity = @import("../identity.zig").Identity;
 const Io = std.Io;
 const Reason = diagnostic_data.Message;
 const Settings = @import("../settings.zig").Load;
+const format = @import("format.zig");
 const standard_input = @import("../settings.zig").standard_input;
 const stream = @import("stream.zig");
 const assert = std.debug.assert;
@@ -130,7 +131,11 @@ fn readNamed(
         error.InvalidInput,
         "is outside the scene's folder (see --allow-outside)",
     );
-    return resources.load(allocator, path, reason);
+    const file = try resources.load(allocator, path, reason);
+    const what = format.misplaced(file.bytes) orelse return file;
+    allocator.free(file.bytes);
+    reason.set("is {s}", .{what});
+    return error.InvalidInput;
 }
 
 /// The scene itself.
@@ -317,6 +322,10 @@ test "regular files of the scene's folder only, and the reason in words" {
     defer gpa.free(file.bytes);
     try std.testing.expectEqualStrings("hello", file.bytes);
     try std.testing.expectEqual(5, resources.bytes_read);
+
+    try temporary.dir.writeFile(io, .{ .sub_path = "p", .data = "version https://git-lfs.x" });
+    try std.testing.expectError(error.InvalidInput, resources.read("p", &reason));
+    try std.testing.expect(std.mem.startsWith(u8, reason.text(), "is a Git LFS pointer"));
 
     const cases = [_]struct { []const u8, Error, []const u8 }{
         .{ "", error.InvalidInput, "is not a valid path" },

@@ -25,8 +25,10 @@ pub fn readAll(
     const guess = @min(expected_bytes, bytes_max) + 1;
     try bytes.ensureTotalCapacityPrecise(allocator, @intCast(@max(guess, first_bytes)));
     while (true) {
+        // One byte more than the limit tells that there is more.
+        const room_max: usize = @intCast(@max(bytes_max + 1, first_bytes));
         if (bytes.items.len == bytes.capacity)
-            try bytes.ensureTotalCapacityPrecise(allocator, 2 * bytes.capacity);
+            try bytes.ensureTotalCapacityPrecise(allocator, @min(2 * bytes.capacity, room_max));
         const count = try readSome(descriptor, bytes.unusedCapacitySlice());
         if (count == 0) break;
         bytes.items.len += count;

@@ -21,6 +21,9 @@ const Sampler = scene.Sampler;
 const Scene = scene.Scene;
 const Vec3d = math.Vec3d;
 
+/// Animations that are tried, at most, where the scene at rest is not meant to be seen.
+const forced_count_max = 16;
+
 /// `AnimationUnknown`: none has that name or index; the diagnostic says more.
 pub const Error = error{ OutOfMemory, AnimationUnknown };
 
@@ -80,7 +83,8 @@ fn whereHidden(gpa: Allocator, from: *const Scene) error{OutOfMemory}!Moment {
     if (from.animations.len == 0) return .{};
     const count = try hiddenCount(gpa, from);
     if (count == 0) return .{};
-    for (from.animations, 0..) |*animation, index| {
+    const tried = @min(from.animations.len, forced_count_max);
+    for (from.animations[0..tried], 0..) |*animation, index| {
         const span = animation.span() orelse continue;
         var arena_state: std.heap.ArenaAllocator = .init(gpa);
         defer arena_state.deinit();
@@ -100,12 +104,15 @@ fn hiddenCount(gpa: Allocator, from: *const Scene) error{OutOfMemory}!usize {
     const maps = try gpa.alloc(AffineD, from.nodes.len);
     defer gpa.free(maps);
     pose_file.composeNodes(from.nodes, maps);
+    const collapsed = try gpa.alloc(bool, from.skins.len);
+    defer gpa.free(collapsed);
+    for (collapsed, from.skins) |*to, *skin| to.* = isCollapsed(skin, maps);
     var count: usize = 0;
     for (from.instances) |*instance| {
         const is_hidden = if (instance.skin == scene.none)
             isPoint(maps[instance.node])
         else
-            isCollapsed(&from.skins[instance.skin], maps);
+            collapsed[instance.skin];
         if (is_hidden) count += 1;
     }
     return count;

@@ -113,7 +113,7 @@ pub fn share(
 }
 
 /// Chooses meshes by counts and materials; false: none is shared.
-fn choose(
+pub fn choose(
     gpa: Allocator,
     parts: *const Parts,
     rule: Rule,

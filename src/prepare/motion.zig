@@ -23,6 +23,8 @@ const Motion = @This();
 
 arena: std.heap.ArenaAllocator,
 geometry: world.Geometry,
+/// What has been subtracted from all places.
+shift: Vec3d,
 
 /// Moments at most.
 pub const moment_count_max = 256;
@@ -58,9 +60,18 @@ pub fn gather(
         vertex_count += parts.meshes[instance.mesh].positions.len;
     }
     const most: usize = @intCast(std.math.clamp(vertex_count_max / vertex_count, 2, all.len));
-    var motion: Motion = .{ .arena = .init(gpa), .geometry = .empty };
+    var motion: Motion = .{ .arena = .init(gpa), .geometry = .empty, .shift = shift };
     errdefer motion.deinit();
-    var gathered: Gathered = .{ .arena = motion.arena.allocator() };
+    var scratch_state: std.heap.ArenaAllocator = .init(gpa);
+    defer scratch_state.deinit();
+    const scratch = scratch_state.allocator();
+    var unheard: Diagnostic = .{}; // The pose that is shown says what there is to say.
+    const plan: flatten.Plan = try .init(scratch, parts.instances, parts.meshes, 1, &unheard);
+    var gathered: Gathered = .{
+        .arena = motion.arena.allocator(),
+        .arrays = try plan.alloc(scratch, .{}),
+        .plan = plan,
+    };
     const count = @min(most, all.len);
     for (0..count) |index| {
         const place = if (count == 1) 0 else index * (all.len - 1) / (count - 1);
@@ -79,6 +90,9 @@ pub fn gather(
 
 const Gathered = struct {
     arena: Allocator,
+    plan: flatten.Plan,
+    /// Of one moment after the other.
+    arrays: flatten.Arrays,
     positions: std.ArrayList([3]f32) = .empty,
     colors: std.ArrayList([4]f32) = .empty,
     triangles: std.ArrayList(world.Triangle) = .empty,
@@ -100,13 +114,17 @@ const Gathered = struct {
         const shown = try animate.at(scratch, from, moment);
         const drawn: Drawn = try .of(scratch, &shown, parts, textures);
         const place = try pose_file.composeShifted(scratch, &shown, shift);
-        var unheard: Diagnostic = .{}; // The pose that is shown says what there is to say.
-        const instances = drawn.parts.instances;
-        const meshes = drawn.parts.meshes;
-        var plan: flatten.Plan = try .init(scratch, instances, meshes, 1, &unheard);
-        const arrays = try plan.alloc(scratch, .{});
-        const soup =
-            try plan.place(gpa, scratch, &arrays, instances, meshes, &place, pool, &unheard);
+        var unheard: Diagnostic = .{};
+        const soup = try gathered.plan.place(
+            gpa,
+            scratch,
+            &gathered.arrays,
+            drawn.parts.instances,
+            drawn.parts.meshes,
+            &place,
+            pool,
+            &unheard,
+        );
         const first: u32 = @intCast(gathered.positions.items.len);
         const own = soup.positions[0..soup.room.vertex_first];
         if (first + own.len > flatten.element_count_max) return error.SceneTooLarge;
@@ -134,10 +152,12 @@ fn timesOf(
 ) error{OutOfMemory}![]const f64 {
     var times: std.ArrayList(f64) = .empty;
     defer times.deinit(gpa);
+    var known: Lists = .empty;
+    defer known.deinit(gpa);
     for (from.animations, 0..) |*animation, index| switch (running) {
         .none => {},
-        .one => |one| if (one == index) try appendTimes(gpa, animation, &times),
-        .all => try appendTimes(gpa, animation, &times),
+        .one => |one| if (one == index) try appendTimes(gpa, animation, &known, &times),
+        .all => try appendTimes(gpa, animation, &known, &times),
     };
     std.mem.sortUnstable(f64, times.items, {}, std.sort.asc(f64));
     var count: usize = 0;
@@ -165,17 +185,19 @@ fn timesOf(
     return all;
 }
 
+/// Lists of times by their address: most channels share them.
+const Lists = std.AutoHashMapUnmanaged([*]const f32, void);
+
 fn appendTimes(
     gpa: Allocator,
     animation: *const scene.Animation,
+    known: *Lists,
     times: *std.ArrayList(f64),
 ) error{OutOfMemory}!void {
-    var known: ?[]const f32 = null;
     for (animation.channels) |*channel| {
         const own = channel.sampler.times;
-        // Most share them.
-        if (known) |before| if (before.ptr == own.ptr and before.len == own.len) continue;
-        known = own;
+        const entry = try known.getOrPut(gpa, own.ptr);
+        if (entry.found_existing) continue;
         for (own) |time| try times.append(gpa, time);
     }
 }

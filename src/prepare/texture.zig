@@ -13,6 +13,7 @@ const huge_pages = @import("../huge_pages.zig");
 const math = @import("../math.zig");
 const parallel = @import("../parallel.zig");
 const pyramid_file = @import("pyramid.zig");
+const relief = @import("relief.zig");
 const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
@@ -300,10 +301,11 @@ const Work = struct {
         for (work.request_of, 0..) |requests, image| {
             if (requests[0] == scene.none and requests[1] == scene.none) continue;
             var reason: decode.Reason = .{};
-            const info = decode.info(work.from.images[image].bytes, &reason) catch {
+            var info = decode.info(work.from.images[image].bytes, &reason) catch {
                 work.reasons[image] = reason;
                 continue;
             };
+            if (work.from.images[image].is_relief) info.channel_count = relief.channel_count;
             total += work.pyramidBytes(&info, requests);
             try work.tasks.append(work.gpa, .{
                 .image = @intCast(image),
@@ -360,6 +362,7 @@ const Work = struct {
         var texels: ?Texels =
             try decode.decode(work.gpa, work.from.images[task.image].bytes, reason);
         defer if (texels) |*left| left.deinit(work.gpa);
+        if (work.from.images[task.image].is_relief) try relief.toNormals(work.gpa, &texels.?);
         const both = task.requests[0] != scene.none and task.requests[1] != scene.none;
         for (task.requests, 0..) |index, use| {
             if (index == scene.none) continue;

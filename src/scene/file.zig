@@ -19,6 +19,8 @@ pub const File = struct {
     scene_shown: u32 = none,
     /// In the order of the file, each once.
     extensions: []const Extension = &.{},
+    /// It requires extensions that are not known, and is drawn all the same.
+    needs_force: bool = false,
     /// Null: all that is in the file is in the scene.
     counts: ?Counts = null,
 

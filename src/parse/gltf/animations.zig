@@ -67,7 +67,13 @@ const Text = struct {
 const Channel = struct { animation: u32, sampler: scene.Sampler, property: Property };
 
 /// Numbers of an accessor, or why there are none.
-const Decoded = struct { numbers: []const f32 = &.{}, width: u32 = 1, wrong: []const u8 = "" };
+const Decoded = struct {
+    numbers: []const f32 = &.{},
+    width: u32 = 1,
+    wrong: []const u8 = "",
+    /// Each of the numbers and the next one.
+    order: enum { rises, repeats, falls } = .rises,
+};
 
 /// Of a channel, for messages.
 const Place = struct {
@@ -166,13 +172,14 @@ fn readChannel(animations: *Animations, place: Place, unknown: *Unknown) Error!v
 
 /// Notes which of the weights from `first` on are not always 0.
 fn note(
-    source: *const Source,
+    source: *Source,
     map: *std.AutoHashMapUnmanaged(u32, []bool),
     owner: u32,
     count: u32,
     first: u32,
     sampler: *const scene.Sampler,
-) error{OutOfMemory}!void {
+) Error!void {
+    try source.charge(sampler.values.len * @sizeOf(f32)); // Channels may share them.
     const entry = try map.getOrPut(source.gpa, owner);
     if (!entry.found_existing) {
         errdefer _ = map.remove(owner);
@@ -279,19 +286,13 @@ fn readSampler(animations: *Animations, place: Place, index: u32, width: u32) Er
         "{f}: sampler {d}: the interpolation {f} is not known, taken as LINEAR",
         .{ place, index, quote(text.interpolation) },
     );
-    const times = keys.numbers;
-    var repeats = false;
-    for (times[1..], times[0 .. times.len - 1]) |next, time| {
-        if (next < time) {
-            source.forgive(
-                "{f}: sampler {d}: its times do not ascend, left out",
-                .{ place, index },
-            );
-            return null;
-        }
-        if (next == time) repeats = true;
+    if (keys.order == .falls) {
+        source.forgive("{f}: sampler {d}: its times fall, left out", .{ place, index });
+        return null;
     }
-    if (repeats) source.forgive("{f}: sampler {d}: has two keys at one time", .{ place, index });
+    if (keys.order == .repeats)
+        source.forgive("{f}: sampler {d}: has two keys at one time", .{ place, index });
+    const times = keys.numbers;
     const parts: u64 = if (interpolation == .cubic_spline) 3 else 1;
     // Weights are single numbers in a row.
     const fits = values.width == width or values.width == 1;
@@ -340,7 +341,13 @@ fn decodeNew(animations: *Animations, index: u32) Error!Decoded {
             const bad = accessors.decodeFloats(known, accessor, rows);
             if (bad != null) return .{ .wrong = "has numbers that are not finite" };
             const numbers: [*]const f32 = @ptrCast(rows);
-            return .{ .numbers = numbers[0 .. rows.len * known], .width = known };
+            var decoded: Decoded = .{ .numbers = numbers[0 .. rows.len * known], .width = known };
+            if (known > 1) return decoded;
+            for (decoded.numbers[1..], numbers[0 .. rows.len - 1]) |next, number| {
+                if (next < number) decoded.order = .falls;
+                if (next == number and decoded.order == .rises) decoded.order = .repeats;
+            }
+            return decoded;
         },
         else => return .{ .wrong = "has matrices" },
     }
@@ -386,7 +393,12 @@ pub fn finish(
         @memset(known, scene.none);
         for (origins, 0..) |origin, place| known[origin] = @intCast(place);
     }
-    var expansion: Expansion = .{ .animations = animations, .places = known, .origins = origins };
+    var expansion: Expansion = .{
+        .animations = animations,
+        .places = known,
+        .origins = origins,
+        .form_count = materials.added.items.len,
+    };
     defer expansion.deinit();
     const made = try source.arena.alloc(scene.Animation, animations.list.len);
     var rest: []const Channel = animations.channels.items;
@@ -422,6 +434,7 @@ const Expansion = struct {
     /// By node of the file: its number among the moving ones.
     moving_of: std.AutoHashMapUnmanaged(u32, u32) = .empty,
     forms: std.ArrayList(Materials.Form) = .empty,
+    form_count: u64,
 
     fn deinit(expansion: *Expansion) void {
         const gpa = expansion.animations.source.gpa;
@@ -444,6 +457,7 @@ const Expansion = struct {
     ) Error!void {
         const animations = expansion.animations;
         const builder = animations.source.builder;
+        try animations.source.charge(expansion.choiceCount(channel.property));
         switch (channel.property) {
             inline .translation, .rotation, .scale => |node, tag| {
                 const moving = try expansion.movingNode(node) orelse return;
@@ -486,6 +500,17 @@ const Expansion = struct {
             },
             .unseen => unreachable, // Left out before.
         }
+    }
+
+    /// How many are looked at to find those that a property stands for.
+    fn choiceCount(expansion: *const Expansion, property: Property) u64 {
+        return switch (property) {
+            .light => expansion.animations.lights.items.len,
+            .camera => expansion.animations.cameras.items.len,
+            .mesh_weights, .mesh_weight => expansion.origins.len,
+            .material, .texture => expansion.form_count,
+            else => 0,
+        };
     }
 
     /// Of a node, or of all that draw a mesh and have none of their own.

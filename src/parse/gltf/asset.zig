@@ -15,8 +15,9 @@ const Error = Source.Error;
 /// Names of extensions in one warning.
 const named_count_max = 6;
 
-/// Checks the version and the required extensions.
-pub fn check(source: *const Source) Error!void {
+/// Checks the version and the required extensions. What can be drawn without force is: then it has
+/// no effect.
+pub fn check(source: *Source) Error!void {
     const data = source.data;
     const version = try parseVersion(source, "version", data.asset.version);
     const wanted = if (data.asset.min_version == null)
@@ -32,50 +33,57 @@ pub fn check(source: *const Source) Error!void {
     for (Source.slice(data.extensions_required, data.extensions_required_count)) |raw| {
         const name = std.mem.span(@as([*:0]const u8, raw));
         const is_accepted = if (extensions.find(name)) |known| known.mayBeRequired() else false;
+        const lacks_draco = !draco.is_held and std.mem.eql(u8, name, "KHR_draco_mesh_compression");
+        if (is_accepted and !lacks_draco) continue;
+        source.builder.scene.file.needs_force = true;
         if (source.force) continue;
-        if (!is_accepted) return source.fail(
+        return if (lacks_draco) source.fail(
+            "the required extension {f} needs a build with Draco (-Ddraco)",
+            .{diagnostic.quote(name)},
+        ) else source.fail(
             "the required extension {f} is not supported (see --force)",
             .{diagnostic.quote(name)},
         );
-        if (!draco.is_held and std.mem.eql(u8, name, "KHR_draco_mesh_compression"))
-            return source.fail(
-                "the required extension {f} needs a build with Draco (-Ddraco)",
-                .{diagnostic.quote(name)},
-            );
     }
+    if (!source.builder.scene.file.needs_force) source.force = false;
     const required = Source.slice(data.extensions_required, data.extensions_required_count);
     const used = Source.slice(data.extensions_used, data.extensions_used_count);
-    warnOf(source, &.{required}, isUnknown, "not supported, and yet required: the extensions ");
+    warnOf(source, &.{required}, isForced, "not supported, and yet required: the extensions ");
     warnOf(source, &.{required}, isIdle, "without a part in the picture: the required extensions ");
     warnOf(source, &.{ required, used }, isMissed, "not rendered: the extensions ");
 }
 
-/// Rendered by force alone.
-fn isUnknown(known: ?*const extensions.Extension) bool {
-    return if (known) |extension| !extension.mayBeRequired() else true;
+/// Required, and drawn all the same.
+fn isForced(source: *const Source, name: []const u8) bool {
+    if (!source.force) return false;
+    if (extensions.find(name)) |known| if (known.mayBeRequired()) return false;
+    const data = source.data;
+    return isListed(data.extensions_required, data.extensions_required_count, name);
 }
 
-fn isIdle(known: ?*const extensions.Extension) bool {
-    const extension = known orelse return false;
+fn isIdle(source: *const Source, name: []const u8) bool {
+    _ = source;
+    const extension = extensions.find(name) orelse return false;
     return extension.treatment == .ignored and extension.lack == .nothing;
 }
 
-fn isMissed(known: ?*const extensions.Extension) bool {
-    return if (known) |extension| extension.isMissed() else true;
+fn isMissed(source: *const Source, name: []const u8) bool {
+    if (isForced(source, name)) return false; // It has been said.
+    return if (extensions.find(name)) |known| known.isMissed() else true;
 }
 
 /// Names the extensions of the lists that are like that in one warning.
 fn warnOf(
     source: *const Source,
     lists: []const []const [*c]u8,
-    isOne: *const fn (?*const extensions.Extension) bool,
+    isOne: *const fn (*const Source, []const u8) bool,
     comptime what: []const u8,
 ) void {
     var names: [named_count_max][]const u8 = undefined;
     var count: usize = 0;
     for (lists) |list| for (list) |raw| {
         const name = std.mem.span(@as([*:0]const u8, raw));
-        if (!isOne(extensions.find(name))) continue;
+        if (!isOne(source, name)) continue;
         if (contains(names[0..@min(count, names.len)], name)) continue;
         if (count < names.len) names[count] = name;
         count += 1;
@@ -95,8 +103,12 @@ fn warnOf(
 /// Whether the file says that it uses the extension.
 pub fn uses(source: *const Source, extension: []const u8) bool {
     const data = source.data;
-    for (Source.slice(data.extensions_used, data.extensions_used_count)) |raw| {
-        if (std.mem.eql(u8, extension, std.mem.span(@as([*:0]const u8, raw)))) return true;
+    return isListed(data.extensions_used, data.extensions_used_count, extension);
+}
+
+fn isListed(list: [*c]const [*c]u8, count: usize, name: []const u8) bool {
+    for (Source.slice(list, count)) |raw| {
+        if (std.mem.eql(u8, name, std.mem.span(@as([*:0]const u8, raw)))) return true;
     }
     return false;
 }

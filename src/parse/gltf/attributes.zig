@@ -30,9 +30,9 @@ pub const Used = struct {
     weights: [scene.joint_set_count]?u32 = @splat(null),
     /// Whether there are more joints than there are sets for.
     has_more_joints: bool = false,
-    vertex_count: u32 = 0,
     /// Whether its triangles come one by one from Draco, whatever the mode.
     is_draco: bool = false,
+    vertex_count: u32 = 0,
 };
 
 /// Finds the attributes of a primitive and checks those that are always drawn; for the others there

@@ -10,7 +10,6 @@ const c = @import("../cgltf.zig");
 const decode = @import("../../decode.zig");
 const diagnostic = @import("../../diagnostic.zig");
 const Allocator = std.mem.Allocator;
-const assert = std.debug.assert;
 const Error = Source.Error;
 const Source = @import("source.zig");
 const meshopt = decode.meshopt;
@@ -28,21 +27,23 @@ pub fn checkRest(source: *const Source) Error!void {
     }
 }
 
+/// Compares a view with its buffer, and its compressed data with theirs.
 fn check(source: *const Source, view: *const c.cgltf_buffer_view, index: usize) Error!void {
     try source.need(.buffer_views, index);
     const extent: Extent = .of(source, view);
+    if (view.has_meshopt_compression == 0) try source.need(.buffers, extent.buffer);
     if (extent.excess() > 0) return source.fail(
         "buffer view {d}: {d} bytes past its buffer {d}",
         .{ index, extent.excess(), extent.buffer },
     );
     if (view.size == 0) return source.fail("buffer view {d}: byteLength is 0", .{index});
-    if (view.has_meshopt_compression != 0) {
-        const compressed: Extent = .of(source, &view.meshopt_compression);
-        if (compressed.excess() > 0) return source.fail(
-            "buffer view {d}: its compressed data is {d} bytes past buffer {d}",
-            .{ index, compressed.excess(), compressed.buffer },
-        );
-    }
+    if (view.has_meshopt_compression == 0) return;
+    const compressed: Extent = .of(source, &view.meshopt_compression);
+    try source.need(.buffers, compressed.buffer);
+    if (compressed.excess() > 0) return source.fail(
+        "buffer view {d}: its compressed data is {d} bytes past buffer {d}",
+        .{ index, compressed.excess(), compressed.buffer },
+    );
 }
 
 /// A run of bytes in a buffer.
@@ -67,11 +68,9 @@ const Extent = struct {
         return (extent.offset +| extent.size) -| extent.buffer_bytes;
     }
 
-    /// Null where the buffer has no data. Asserts that `check` has passed it.
+    /// Null where the buffer has no data; fails where it has less than it says.
     fn bytes(extent: Extent, source: *const Source) Error!?[]const u8 {
-        try source.need(.buffers, extent.buffer);
         const buffer = source.buffers[extent.buffer] orelse return null;
-        assert(extent.excess() == 0);
         if (extent.offset + extent.size > buffer.len) return source.fail(
             "buffer {d}: has {d} bytes, its byteLength is {d}",
             .{ extent.buffer, buffer.len, extent.buffer_bytes },

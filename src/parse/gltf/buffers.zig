@@ -125,7 +125,7 @@ const Reader = struct {
             .bytes => |bytes| return reader.own(bytes),
             .path => |path| {
                 defer gpa.free(path);
-                return reader.fromFile(text, path);
+                return reader.fromFile(path);
             },
         }
     }
@@ -137,13 +137,11 @@ const Reader = struct {
         return bytes;
     }
 
-    fn fromFile(reader: Reader, encoded: []const u8, path: []const u8) Error![]const u8 {
+    fn fromFile(reader: Reader, path: []const u8) Error![]const u8 {
         var reason: diagnostic_data.Message = .{};
         const file = reader.resources.read(path, &reason) catch |err| {
             if (err == error.OutOfMemory) return err;
-            const text = try escapes.decodeString(reader.buffers.gpa, encoded);
-            defer reader.buffers.gpa.free(text);
-            const parts = .{ reader.index, quote(text), reason.text() };
+            const parts = .{ reader.index, quote(path), reason.text() };
             return reader.diagnostic.fail(err, "buffer {d}: {f} {s}", parts);
         };
         return reader.own(file.bytes);

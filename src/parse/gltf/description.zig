@@ -10,19 +10,17 @@ const scene = @import("../../scene.zig");
 const Source = @import("source.zig");
 const Error = error{OutOfMemory};
 
-/// The description of the file whose scene `shown` is read; null: all of its nodes are.
-pub fn read(
-    source: *const Source,
-    format: scene.File.Format,
-    shown: ?*const c.cgltf_scene,
-) Error!scene.File {
+/// Completes the description of the file whose scene `shown` is read; null: all of its nodes are.
+pub fn read(source: *const Source, shown: ?*const c.cgltf_scene) Error!void {
     const data = source.data;
     const scenes = try source.arena.alloc([]const u8, data.scenes_count);
     for (scenes, Source.slice(data.scenes, data.scenes_count)) |*name, *one| {
         name.* = try choice.nameOf(source.arena, one) orelse "";
     }
-    return .{
-        .format = format,
+    const before = source.builder.scene.file;
+    source.builder.scene.file = .{
+        .format = before.format,
+        .needs_force = before.needs_force,
         .version = try textOf(source, data.asset.version),
         .generator = try textOf(source, data.asset.generator),
         .scenes = scenes,

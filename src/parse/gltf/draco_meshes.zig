@@ -22,9 +22,11 @@ pub const Decoded = struct {
     accessor: accessors.Accessor,
 };
 
-/// Memory that decoding may take, by what is decoded: bytes for each vertex and each index.
+/// Memory that decoding may take, in bytes: so much, and for each vertex and each index. What the
+/// file says of these is charged before, so that a short one cannot claim to have many.
 const decoder_bytes_min: u64 = 16 << 20;
-const decoder_bytes_of_each: u64 = 512;
+const decoder_bytes_of_each: u64 = 256;
+const charged_bytes_of_each: u64 = 32;
 
 /// Decodes the accessors of a primitive; false where they have plain data.
 pub fn decode(source: *Source, primitive: *const c.cgltf_primitive, place: Place) Error!bool {
@@ -41,20 +43,23 @@ pub fn decode(source: *Source, primitive: *const c.cgltf_primitive, place: Place
     if (source.draco.get(position_index)) |known| if (known.view == view) return true;
     const indices = primitive.indices orelse
         return source.fail("{f}: compressed by Draco, but without indices", .{place});
+    const indices_index = Source.indexOf(source.data.accessors, indices);
+    try source.need(.accessors, position_index);
+    try source.need(.accessors, indices_index);
     const stream = try buffer_views.contents(source, compressed.buffer_view) orelse
         return source.fail("buffer view {d}: its buffer has no data", .{view});
-    const vertex_count: u64 = Source.item(position, 0).count;
-    const index_count: u64 = Source.item(indices, 0).count;
+    const count = @as(u64, Source.item(position, 0).count) +| Source.item(indices, 0).count;
+    try source.charge(charged_bytes_of_each *| count);
     var mesh: draco.Mesh = undefined;
     var reason: diagnostic.Message = .{};
-    const bytes_max = decoder_bytes_min +| decoder_bytes_of_each *| (vertex_count +| index_count);
+    const bytes_max = decoder_bytes_min +| decoder_bytes_of_each *| count;
     mesh.init(source.gpa, stream, bytes_max, &reason) catch |err| return switch (err) {
         error.OutOfMemory => error.OutOfMemory,
         error.InvalidStream => source.fail("buffer view {d}: {s}", .{ view, reason.text() }),
     };
     defer mesh.deinit();
     const decoder: Decoder = .{ .source = source, .mesh = &mesh, .view = view };
-    try decoder.indices(Source.indexOf(source.data.accessors, indices));
+    try decoder.indices(indices_index);
     const attributes = Source.slice(compressed.attributes, compressed.attributes_count);
     for (attributes) |*attribute| {
         const name = std.mem.span(@as([*:0]const u8, attribute.name));
@@ -97,6 +102,7 @@ const Decoder = struct {
 
     fn attribute(decoder: Decoder, index: u32, id: u32) Error!void {
         const source = decoder.source;
+        try source.need(.accessors, index);
         var accessor = try gltf_accessors.describe(source, index);
         accessor.count = try decoder.checkCount(index, decoder.mesh.vertexCount(), "vertices");
         const bytes = try decoder.keep(index, accessor) orelse return;

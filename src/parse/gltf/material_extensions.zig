@@ -248,8 +248,8 @@ pub fn readScatter(
     const info = scatter.multiscatterColorTexture orelse return;
     const name = "multiscatterColorTexture";
     const all = textures orelse return;
-    if (info.index >= source.data.textures_count) return source.forgive(
-        "material {d}: {s}: there is no texture {d}, left out",
+    if (info.index >= source.data.textures_count) return source.fail(
+        "material {d}: {s}: there is no texture {d}",
         .{ factors.index, name, info.index },
     );
     const view = viewOf(source, &info);

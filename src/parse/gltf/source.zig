@@ -45,8 +45,6 @@ pub const Error = @import("../resource.zig").Error;
 
 /// Frees what the reader has noted.
 pub fn deinit(source: *Source) void {
-    source.resolved.deinit(source.gpa);
-    source.hidden.deinit(source.gpa);
     var contents = source.decompressed.valueIterator();
     while (contents.next()) |bytes| source.gpa.free(bytes.*);
     source.decompressed.deinit(source.gpa);
@@ -56,6 +54,8 @@ pub fn deinit(source: *Source) void {
         source.gpa.free(bytes);
     }
     source.draco.deinit(source.gpa);
+    source.resolved.deinit(source.gpa);
+    source.hidden.deinit(source.gpa);
     source.* = undefined;
 }
 

@@ -4,8 +4,9 @@
 //! or nothing where there was nothing to mend. In strings: bytes that are no UTF-8 (a name in
 //! Latin-1, GBK or Shift-JIS) are shown as `\xE9`, in a URI as `%E9`; a backslash that escapes
 //! nothing stands for itself; controls become spaces. Elsewhere: comments, commas before a closing
-//! bracket, byte order marks, and zero bytes behind the document are left out. What is still wrong
-//! then is refused by json.zig as before.
+//! bracket, byte order marks, and zero bytes behind the document are left out; what C and Python
+//! write for infinity and NaN becomes null. What is still wrong then is refused by json.zig as
+//! before.
 
 const std = @import("std");
 const escapes = @import("escapes.zig");
@@ -78,7 +79,12 @@ const Mender = struct {
                     mender.note("the JSON text ends in zero bytes, ignored");
                     return;
                 },
-                else => {},
+                else => if (notANumber(rest)) |length| {
+                    mender.note("the JSON text has words for what is not a number, read as null");
+                    try out.writeAll("null");
+                    mender.offset += length;
+                    continue;
+                },
             }
             try out.writeByte(rest[0]);
             mender.offset += 1;
@@ -188,6 +194,18 @@ fn endsString(text: []const u8) bool {
     return next.len == 0 or std.mem.findScalar(u8, ",:}]", next[0]) != null;
 }
 
+/// Bytes of a word for infinity or NaN at the start; null: there is none.
+fn notANumber(text: []const u8) ?usize {
+    const sign = @intFromBool(text[0] == '-' or text[0] == '+');
+    for ([_][]const u8{ "NaN", "nan(ind)", "nan", "Infinity", "inf" }) |word| {
+        if (!std.mem.startsWith(u8, text[sign..], word)) continue;
+        const rest = text[sign + word.len ..];
+        if (rest.len == 0 or std.mem.findScalar(u8, " \t\r\n,]}", rest[0]) != null)
+            return sign + word.len;
+    }
+    return null;
+}
+
 /// Bytes of a comment or a byte order mark at the start; null: there is neither.
 fn gapLength(text: []const u8) ?usize {
     if (std.mem.startsWith(u8, text, mark)) return mark.len;
@@ -224,6 +242,8 @@ test repair {
         .{ "[]\x00\x00\n\x00", "[]" },
         .{ "[] \xef\xbb\xbf[\xef\xbb\xbf]", "[] []" },
         .{ "[\"\\u12\"]", "[\"\\\\u12\"]" },
+        .{ "[NaN,-Infinity , nan]", "[null,null , null]" },
+        .{ "{\"a\":-nan(ind)}", "{\"a\":null}" },
     }) |pair| {
         var diagnostic: Diagnostic = .{};
         const copy = (try repair(gpa, pair[0], &diagnostic)).?;
@@ -233,7 +253,7 @@ test repair {
     }
     // What there is no doubt about stays as it is.
     const kept = [_][]const u8{
-        "{\"a\":[\"\\\"\\u0041\"]}", "", "[", "\"", "\"\\\"", "nan", "[1\x00]",
+        "{\"a\":[\"\\\"\\u0041\"]}", "", "[", "\"", "\"\\\"", "nano", "[1\x00]",
     };
     for (kept) |text| {
         var diagnostic: Diagnostic = .{};

@@ -4,10 +4,11 @@
 //! whose vertices are the combinations, each once. Faces without normals are smooth where a
 //! smoothing group is on: their normals are the sums of the faces around, by area, of the same
 //! position and group (Gouraud 1971); others are flat. Time is linear: the elements are sorted by
-//! counting, the combinations are looked up by hash.
+//! counting, the combinations are looked up by position, or by hash where one has many.
 
 const std = @import("std");
 const math = @import("../../math.zig");
+const orientation = @import("../orientation.zig");
 const scene = @import("../../scene.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
@@ -18,6 +19,9 @@ const Resources = @import("../resource.zig");
 const Vec3 = math.Vec3;
 const none = scene.none;
 const Assembly = @This();
+
+/// Vertices of a position that are looked through.
+const chain_max = 8;
 
 /// What can be one mesh.
 const Class = enum { smooth, flat, lines, points };
@@ -30,8 +34,12 @@ materials: *Materials,
 diagnostic: *Diagnostic,
 cutter: Polygon,
 /// Vertices of the mesh that is made, by what meets in them.
-known: std.AutoHashMapUnmanaged(Reader.Corner, u32) = .empty,
 vertices: std.ArrayList(Reader.Corner) = .empty,
+/// For each position its first vertex, and for each vertex the next one there, or `none`: at most
+/// `chain_max`. What there are more is in `known`.
+heads: []u32 = &.{},
+nexts: std.ArrayList(u32) = .empty,
+known: std.AutoHashMapUnmanaged(Reader.Corner, u32) = .empty,
 triangles: std.ArrayList([3]u32) = .empty,
 segments: std.ArrayList([2]u32) = .empty,
 points: std.ArrayList(u32) = .empty,
@@ -46,8 +54,9 @@ bare_count: u64 = 0,
 /// Frees what it has worked with.
 pub fn deinit(assembly: *Assembly) void {
     inline for (.{
-        "known", "vertices", "triangles", "segments", "points", "face", "cut",
+        "known", "vertices", "nexts", "triangles", "segments", "points", "face", "cut",
     }) |name| @field(assembly, name).deinit(assembly.gpa);
+    assembly.gpa.free(assembly.heads);
     assembly.cutter.deinit();
     assembly.* = undefined;
 }
@@ -55,6 +64,8 @@ pub fn deinit(assembly: *Assembly) void {
 /// Adds all meshes to the scene.
 pub fn run(assembly: *Assembly) Resources.Error!void {
     try assembly.smoothFaces();
+    assembly.heads = try assembly.gpa.alloc(u32, assembly.reader.positions.items.len);
+    @memset(assembly.heads, none);
     const elements = assembly.reader.elements.items;
     const bucket_count = class_count * (assembly.reader.material_names.items.len + 1);
     const ends = try assembly.gpa.alloc(u32, bucket_count);
@@ -163,7 +174,8 @@ fn addMesh(
     material_index: u32,
     class: Class,
 ) Resources.Error!void {
-    inline for (.{ "vertices", "triangles", "segments", "points", "known" }) |name| {
+    for (assembly.vertices.items) |vertex| assembly.heads[vertex.position] = none;
+    inline for (.{ "vertices", "nexts", "triangles", "segments", "points", "known" }) |name| {
         @field(assembly, name).clearRetainingCapacity();
     }
     var material = try assembly.materials.get(material_index);
@@ -219,13 +231,24 @@ fn vertexOf(
         .texcoord = if (is_textured) corner.texcoord else none,
         .normal = if (has_normals) corner.normal else none,
     };
-    const entry = try assembly.known.getOrPut(assembly.gpa, key);
-    if (!entry.found_existing) {
-        entry.value_ptr.* = @intCast(assembly.vertices.items.len);
-        try assembly.vertices.append(assembly.gpa, key);
-        if (is_textured and key.texcoord == none) assembly.bare_count += 1;
+    const vertex: u32 = @intCast(assembly.vertices.items.len);
+    var link = &assembly.heads[key.position];
+    for (0..chain_max) |_| {
+        if (link.* == none) {
+            link.* = vertex;
+            break;
+        }
+        if (std.meta.eql(assembly.vertices.items[link.*], key)) return link.*;
+        link = &assembly.nexts.items[link.*];
+    } else {
+        const entry = try assembly.known.getOrPut(assembly.gpa, key);
+        if (entry.found_existing) return entry.value_ptr.*;
+        entry.value_ptr.* = vertex;
     }
-    return entry.value_ptr.*;
+    try assembly.vertices.append(assembly.gpa, key);
+    try assembly.nexts.append(assembly.gpa, none);
+    if (is_textured and key.texcoord == none) assembly.bare_count += 1;
+    return vertex;
 }
 
 fn addFace(
@@ -288,12 +311,14 @@ fn finishMesh(
             downwards(reader.texcoords.items[vertex.texcoord]);
         if (colors) |all| all[index] = linearColor(reader.colors.items, vertex.position);
     }
+    const triangles = try arena.dupe([3]u32, assembly.triangles.items);
+    if (normals) |all| orientation.orient(positions, all, triangles);
     try assembly.builder.addWorldMesh(.{
         .positions = positions,
         .normals = normals,
         .texcoords = .{ texcoords, null, null, null },
         .colors = colors,
-        .triangles = try arena.dupe([3]u32, assembly.triangles.items),
+        .triangles = triangles,
         .segments = try arena.dupe([2]u32, assembly.segments.items),
         .points = try arena.dupe(u32, assembly.points.items),
         .material = material,

@@ -104,8 +104,12 @@ const maps: std.StaticStringMap([]const u8) = .initComptime(.{
 
 /// What is passed over in silence: it changes little, or nothing that is seen here.
 const silent_words = [_][]const u8{
-    "Ka",      "map_Ka",  "map_Ns", "map_aat", "sharpness", "Km",  "map_aniso", "map_anisor",
-    "map_RMA", "map_ORM", "Ni_",    "Kt",      "map_Kt",    "pcr",
+    "Ka", "map_Ka", "map_Ns", "map_aat", "sharpness", "map_aniso", "map_anisor",
+};
+
+/// What is known and changes the picture, but is not rendered.
+const unread_words = [_][]const u8{
+    "refl", "map_refl", "disp", "map_disp", "decal", "map_ORM", "map_RMA",
 };
 
 /// Lives as long as the scene is read; names and maps are parts of the texts.
@@ -134,7 +138,11 @@ pub fn read(
             if (!entry.found_existing) material.* = .{ .folder = folder };
             continue;
         }
-        if (set(material, &words, word)) continue;
+        if (set(material, &words, word) or isOneOf(word, &silent_words)) continue;
+        if (isOneOf(word, &unread_words)) {
+            library.diagnostic.warn("{f}: {s} is not rendered", .{ quote(title), word });
+            continue;
+        }
         library.diagnostic.forgive("{f}: line {d}: {f} is not understood, ignored", .{
             quote(title), words.lineOf(start), quote(word),
         });
@@ -150,10 +158,14 @@ fn set(material: *Material, words: *Words, word: []const u8) bool {
     } else if (numbers.get(word)) |name| {
         _ = isOption(words, "-halo");
         setField(f32, material, name, finite(words.float()) orelse return false);
-    } else return for (silent_words) |silent| {
-        if (std.mem.eql(u8, word, silent)) break true;
-    } else false;
+    } else return false;
     return true;
+}
+
+fn isOneOf(word: []const u8, words: []const []const u8) bool {
+    return for (words) |other| {
+        if (std.mem.eql(u8, word, other)) break true;
+    } else false;
 }
 
 /// Sets the field of that name, which has this type.

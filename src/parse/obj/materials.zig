@@ -33,6 +33,8 @@ library: Library,
 known: std.AutoHashMapUnmanaged(u32, u32) = .empty,
 bare: std.AutoHashMapUnmanaged(u32, u32) = .empty,
 unlit_of: std.AutoHashMapUnmanaged(u32, u32) = .empty,
+/// The scene's image as a map of heights.
+reliefs: std.AutoHashMapUnmanaged(u32, u32) = .empty,
 
 /// `mtllib` statements at most: each names at least one file that is looked for.
 const library_count_max = 1000;
@@ -335,7 +337,7 @@ fn addDissolve(
     material.alpha_texture = try materials.view(raw.folder, map);
 }
 
-/// Exporters name maps of normals as if they were heights.
+/// Heights, or normals, which exporters name so as well: prepare looks at the image.
 fn addBump(
     materials: *Materials,
     raw: *const Library.Material,
@@ -343,15 +345,14 @@ fn addBump(
 ) Resources.Error!void {
     const map = raw.bump_map orelse return;
     if (material.normal_texture != null) return;
-    const name = std.fs.path.basename(map.name);
-    const is_normal = for ([_][]const u8{ "norm", "nrm", "ddn", "_n.", "_nm." }) |part| {
-        if (std.ascii.findIgnoreCase(name, part) != null) break true;
-    } else false;
-    if (!is_normal) {
-        materials.diagnostic.warn("map_Bump {f} holds heights, left out", .{quote(map.name)});
-        return;
+    const image = try materials.images.get(raw.folder, map.name) orelse return;
+    const entry = try materials.reliefs.getOrPut(materials.arena, image);
+    if (!entry.found_existing) {
+        var copy = materials.builder.images.items[image];
+        copy.is_relief = true;
+        entry.value_ptr.* = try materials.builder.addImage(copy);
     }
-    material.normal_texture = try materials.view(raw.folder, map);
+    material.normal_texture = try materials.viewOf(entry.value_ptr.*, map);
     material.normal_scale = map.multiplier;
 }
 
@@ -362,6 +363,10 @@ fn view(
     map: Map,
 ) Resources.Error!?scene.TextureView {
     const image = try materials.images.get(folder, map.name) orelse return null;
+    return try materials.viewOf(image, map);
+}
+
+fn viewOf(materials: *Materials, image: u32, map: Map) Resources.Error!scene.TextureView {
     const wrap: scene.Wrap = if (map.is_clamped) .clamp_to_edge else .repeat;
     // From (u, 1 - v) to (s, 1 - t), where s = su u + ou and t = sv v + ov.
     const su, const sv = map.scale;

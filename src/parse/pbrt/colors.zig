@@ -134,14 +134,7 @@ fn spectrumFile(colors: *Colors, position: u64, name: []const u8) Error!?Vec3 {
     var value: ?Vec3 = null;
     if (input.readFile(position, name)) |file| {
         defer input.gpa.free(file.bytes);
-        const has_mark = std.mem.startsWith(u8, file.bytes, Input.byte_order_mark);
-        if (has_mark) try input.forgive(
-            position,
-            "mark",
-            "{f}: a byte order mark (BOM) is passed over",
-            .{quote(name)},
-        );
-        value = try colors.parsePairs(file.bytes[if (has_mark) 3 else 0.. :0]);
+        value = try colors.parsePairs(try input.withoutMark(position, name, file.bytes));
         if (value == null) try input.warn(
             position,
             "spectrum file",

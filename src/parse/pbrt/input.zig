@@ -379,6 +379,23 @@ pub fn readFile(input: *Input, position: u64, path: []const u8) Error!Resources.
     return .{ .bytes = plain, .identity = file.identity };
 }
 
+/// The bytes of a file that the scene names at `position`, without the mark that may stand before.
+pub fn withoutMark(
+    input: *Input,
+    position: u64,
+    name: []const u8,
+    bytes: [:0]const u8,
+) Error![:0]const u8 {
+    if (!std.mem.startsWith(u8, bytes, byte_order_mark)) return bytes;
+    try input.forgive(
+        position,
+        "mark",
+        "{f}: a byte order mark (BOM) is passed over",
+        .{quote(name)},
+    );
+    return bytes[byte_order_mark.len..];
+}
+
 /// What a gzip file holds; it counts as text that is read. The caller frees it.
 pub fn inflate(
     input: *Input,
@@ -393,7 +410,7 @@ pub fn inflate(
 }
 
 /// What some editors put before a text: RFC 3629, section 6.
-pub const byte_order_mark = "\xef\xbb\xbf";
+const byte_order_mark = "\xef\xbb\xbf";
 
 test placeOf {
     const text = "a\nbc\n\nd";

@@ -124,8 +124,10 @@ pub fn scaled(color: Vec3, factor: f64) Vec3 {
 pub fn add(source: *const Source, name: []const u8) Error!void {
     const Kind = enum { point, spot, distant, goniometric, projection, infinite, exinfinite };
     const builder = source.builder;
-    const kind = std.meta.stringToEnum(Kind, name) orelse
+    const kind = std.meta.stringToEnum(Kind, name) orelse {
+        source.parameters.pass();
         return source.note(name, "is not supported and left out");
+    };
     switch (kind) {
         .point, .goniometric => {
             if (kind == .goniometric) {
@@ -177,6 +179,7 @@ fn addInfinite(source: *const Source, name: []const u8) Error!void {
     if (parameters.find("portal") != null)
         try source.note(name, "shines from all around, its portal is not read");
     const image = try source.colors.textures.imageOf(path) orelse {
+        parameters.pass();
         try source.note(name, "without its map a grey sky stands for it");
         builder.has_unknown_sky = true;
         return;

@@ -62,8 +62,10 @@ const Kind = enum {
 
 /// The material `name` with its parameters.
 pub fn convert(colors: *Colors, name: []const u8, parameters: *const Parameters) Error!Material {
-    if (name.len == 0 or std.mem.eql(u8, name, "none") or std.mem.eql(u8, name, "interface"))
+    if (name.len == 0 or std.mem.eql(u8, name, "none") or std.mem.eql(u8, name, "interface")) {
+        parameters.pass();
         return .{ .surface = matte_default, .is_boundary = true };
+    }
     const has_bumps = parameters.find("bumpmap") != null or
         parameters.find("displacement") != null;
     if (has_bumps) try colors.input.warnHere(
@@ -72,8 +74,10 @@ pub fn convert(colors: *Colors, name: []const u8, parameters: *const Parameters)
         .{quote(name)},
     );
     var reader: Reader = .{ .colors = colors, .parameters = parameters };
-    const kind = std.meta.stringToEnum(Kind, name) orelse
+    const kind = std.meta.stringToEnum(Kind, name) orelse {
+        parameters.pass();
         return .{ .surface = try reader.unknown(name) };
+    };
     var surface = bounded(try reader.read(kind));
     surface.base_color_texture = reader.base_texture;
     surface.normal_texture = try reader.normalTexture();
@@ -379,13 +383,23 @@ const Reader = struct {
     /// The diffuse reflectance that light makes of much scattering, the dipole's of Jensen et al.,
     /// "A practical model for subsurface light transport" (2001), section 2.4.
     fn subsurface(reader: *Reader) Error!scene.Material {
+        for ([_][]const u8{ "scale", "g", "mfp" }) |key| _ = reader.has(key); // Distances.
         if (reader.has("Kd") or reader.has("reflectance")) return reader.polished(
             try reader.baseColor(if (reader.has("Kd")) "Kd" else "reflectance", 0.5),
             1.33,
         );
         const scattered_name = if (reader.has("sigma_prime_s")) "sigma_prime_s" else "sigma_s";
-        const absorbed = try reader.spectrum("sigma_a", .{ 0.0011, 0.0024, 0.014 });
-        const scattered = try reader.spectrum(scattered_name, .{ 2.55, 3.21, 3.77 });
+        const name = reader.parameters.string("name") orelse "Wholemilk";
+        const known = spectra.mediumNamed(name) orelse default: {
+            try reader.colors.input.warnHere(
+                "medium",
+                "Material 'subsurface': medium {f} is not known, milk stands for it",
+                .{quote(name)},
+            );
+            break :default spectra.mediumNamed("Wholemilk").?;
+        };
+        const absorbed = try reader.spectrum("sigma_a", known.absorbed);
+        const scattered = try reader.spectrum(scattered_name, known.scattered);
         const ior = @max(try reader.index(1.3), 1);
         const inside = -1.440 / (ior * ior) + 0.710 / ior + 0.668 + 0.0636 * ior;
         const boundary = (1 + inside) / (1 - inside);

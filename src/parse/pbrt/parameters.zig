@@ -62,6 +62,8 @@ pub const Parameter = struct {
     is_text: bool,
     first: usize,
     count: usize,
+    /// Somebody has asked for it, or none need to.
+    is_read: bool = false,
 };
 
 items: std.ArrayList(Parameter) = .empty,
@@ -161,20 +163,21 @@ fn readNumbers(
     var cursor = text.cursor;
     while (true) {
         if (bytes[cursor] <= ' ' or bytes[cursor] == '#') cursor = Input.skip(bytes, cursor);
-        if (bytes[cursor] == 0 or bytes[cursor] == 'I') {
-            // The end of an included text, or another one.
-            text.cursor = cursor;
-            _ = try input.peekInList();
-            text = input.top();
-            bytes = text.bytes;
-            cursor = text.cursor;
-        }
         if (bytes[cursor] == ']' and bracketed) break;
         const value = (if (Number == f32)
             number.float(bytes, &cursor)
         else
             number.integer(bytes, &cursor)) catch |err| {
             text.cursor = cursor;
+            const position = input.offset();
+            _ = try input.peekInList();
+            if (input.offset() != position) {
+                // The end of an included text, or another one.
+                text = input.top();
+                bytes = text.bytes;
+                cursor = text.cursor;
+                continue;
+            }
             return failNumber(input, err, if (Number == f32) "number" else "whole number");
         };
         if (list.items.len == list.capacity) try list.ensureUnusedCapacity(input.gpa, 1);
@@ -258,6 +261,7 @@ pub fn addMissing(
         if (parameters.find(item.name) != null) continue;
         var added = item;
         added.offset = position;
+        added.is_read = true;
         if (item.is_text) {
             added.first = parameters.strings.items.len;
             try parameters.strings.appendSlice(gpa, others.stringsOf(&item));
@@ -272,15 +276,51 @@ pub fn addMissing(
     }
 }
 
+/// Nobody needs to ask for any: all of it is left out, or replaced.
+pub fn pass(parameters: *const Parameters) void {
+    for (parameters.items.items) |*item| item.is_read = true;
+}
+
+/// Says which ones nobody has asked for, but for those that change nothing of what is seen.
+pub fn warnOfUnread(
+    parameters: *const Parameters,
+    input: *Input,
+    directive: []const u8,
+) Error!void {
+    for (parameters.items.items) |*item| {
+        if (item.is_read or unseen.has(item.name)) continue;
+        var kind: [256]u8 = undefined;
+        try input.warn(
+            item.offset,
+            std.mem.print(&kind, "{s} {s}", .{ directive, item.name }) catch item.name,
+            "{s}: {f} is not read",
+            .{ directive, quote(item.name) },
+        );
+    }
+}
+
+/// Parameters of how PBRT makes its picture, and those that only some values of others ask for.
+const unseen: std.StaticStringMap(void) = .initComptime(names: {
+    const list = "S diagonal difftrans display edgelength faceIndices filename filter " ++
+        "focaldistance mapname maxanisotropy maxcomponentvalue maxdepth maxsampleluminance " ++
+        "meanfreepath mfp nsamples pixelbounds remaproughness samples savefp16 scheme " ++
+        "shutterclose shutteropen splitdepth st trilinear uv";
+    @setEvalBranchQuota(10_000);
+    var rows: []const struct { []const u8 } = &.{};
+    var words = std.mem.tokenizeScalar(u8, list, ' ');
+    while (words.next()) |word| rows = rows ++ .{.{word}};
+    break :names rows;
+});
+
 /// The parameter of that name, the last one where it stands twice.
 pub fn find(parameters: *const Parameters, name: []const u8) ?*const Parameter {
-    var index = parameters.items.items.len;
-    while (index > 0) {
-        index -= 1;
-        const parameter = &parameters.items.items[index];
-        if (std.mem.eql(u8, parameter.name, name)) return parameter;
+    var found: ?*const Parameter = null;
+    for (parameters.items.items) |*parameter| {
+        if (!std.mem.eql(u8, parameter.name, name)) continue;
+        parameter.is_read = true;
+        found = parameter;
     }
-    return null;
+    return found;
 }
 
 /// Its numbers, none where it is made of others or of strings.

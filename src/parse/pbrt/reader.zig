@@ -51,6 +51,8 @@ const AreaLight = struct {
     two_sided: bool,
     /// What each shape emits in all; 0: as its emission says.
     power: f32 = 0,
+    /// Mean luminance of the picture.
+    luminance: f64 = 1,
     picture: ?scene_data.TextureView = null,
 };
 
@@ -169,6 +171,15 @@ const Directive = enum {
     TransformBegin,
     TransformEnd,
     Translate,
+
+    /// Whether its parameters have to do with what is seen, beside how.
+    fn isSeen(directive: Directive) bool {
+        return switch (directive) {
+            .Camera, .Film, .Shape => true,
+            .AreaLightSource, .LightSource, .MakeNamedMaterial, .Material => true,
+            else => false,
+        };
+    }
 
     /// Whose defaults its parameters have.
     fn target(directive: Directive) ?Defaults.Target {
@@ -305,19 +316,13 @@ fn perform(reader: *Reader, directive: Directive) Error!void {
         },
         .NamedMaterial => try reader.namedMaterial(),
         .Option => try reader.option(),
-        .Texture => {
-            const name = try reader.text();
-            _ = try reader.text(); // Its type: all of them are colours here.
-            const class = try reader.text();
-            try reader.readParameters(directive);
-            const textures = &reader.colors.textures;
-            const made = try textures.make(&reader.colors, class, &reader.parameters);
-            try reader.keep(Textures.Texture, &textures.named, name, made);
-        },
+        .Texture => try reader.texture(),
         else => {
             const name = try reader.text();
             try reader.readParameters(directive);
             try reader.performNamed(directive, name);
+            if (directive.isSeen())
+                try reader.parameters.warnOfUnread(reader.input, @tagName(directive));
         },
     }
 }
@@ -338,6 +343,20 @@ fn forgive(
     arguments: anytype,
 ) Error!void {
     return reader.input.forgive(reader.input.directive, kind, format, arguments);
+}
+
+/// `Texture "name" "type" "class" parameters`.
+fn texture(reader: *Reader) Error!void {
+    const name = try reader.text();
+    // All of them are colours here.
+    const is_color = !std.mem.eql(u8, try reader.text(), "float");
+    const class = try reader.text();
+    const parameters = &reader.parameters;
+    try reader.readParameters(.Texture);
+    const textures = &reader.colors.textures;
+    const made = try textures.make(&reader.colors, class, is_color, parameters);
+    try parameters.warnOfUnread(reader.input, "Texture");
+    try reader.keep(Textures.Texture, &textures.named, name, made);
 }
 
 /// Directives of the form `Directive "name" parameters`.
@@ -563,17 +582,29 @@ fn sampler(reader: *Reader) Error!void {
     reader.sample_count = @intCast(count);
 }
 
-/// `Option "type name" value`: none of them has to do with what is seen, but for one.
+/// `Option "name" value`, the name with a type before it or without: none of them has to do with
+/// what is seen, but for one.
 fn option(reader: *Reader) Error!void {
-    try reader.parameters.read(reader.input);
-    const known: std.StaticStringMap(void) = .initComptime(.{
-        .{"disablepixeljitter"},    .{"disabletexturefiltering"}, .{"disablewavelengthjitter"},
-        .{"displacementedgescale"}, .{"msereferenceimage"},       .{"msereferenceout"},
-        .{"rendercoordsys"},        .{"seed"},                    .{"pixelstats"},
-        .{"wavefront"},
-    });
-    for (reader.parameters.items.items) |*item| if (!known.has(item.name))
-        try reader.input.warnHere(item.name, "Option {f} is not read", .{quote(item.name)});
+    const input = reader.input;
+    const declaration = try reader.text();
+    const bracketed = input.peek() == '[';
+    if (bracketed) input.top().cursor += 1;
+    const value = if (input.peek() == '"') try input.string() else input.word();
+    if (value.len == 0) return input.fail(input.offset(), "a value is expected", .{});
+    if (bracketed) {
+        if (input.peek() != ']') return input.fail(input.offset(), "']' is expected", .{});
+        input.top().cursor += 1;
+    }
+    const start = if (std.mem.findScalarLast(u8, declaration, ' ')) |space| space + 1 else 0;
+    const name = declaration[start..];
+    const known = [_][]const u8{
+        "disablepixeljitter",    "disabletexturefiltering", "disablewavelengthjitter",
+        "displacementedgescale", "msereferenceimage",       "msereferenceout",
+        "rendercoordsys",        "seed",                    "pixelstats",
+        "wavefront",
+    };
+    for (known) |other| if (std.ascii.eqlIgnoreCase(name, other)) return;
+    try input.warnHere(name, "Option {f} is not read", .{quote(name)});
 }
 
 /// All integrators are Whitted's here; "maxdepth" counts rays in his and in direct lighting,
@@ -689,6 +720,11 @@ fn areaLightSource(reader: *Reader) Error!void {
     if (parameters.string("filename")) |path| {
         const shown = try reader.colors.textures.show(&.{ .path = path });
         area_light.picture = if (shown) |picture| picture.view else null;
+        if (shown != null and area_light.power > 0) {
+            const textures = &reader.colors.textures;
+            const image = (try textures.imageOf(path)).?;
+            area_light.luminance = try textures.luminanceOf(image) orelse 1;
+        }
     }
     reader.graphics.area_light = area_light;
 }
@@ -705,11 +741,10 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
     const input = reader.input;
     reader.tessellator.parameters = &reader.parameters;
     reader.tessellator.name = name;
-    const kind = shapes.kinds.get(name) orelse return input.warnHere(
-        name,
-        "Shape {f} is not supported and left out",
-        .{quote(name)},
-    );
+    const kind = shapes.kinds.get(name) orelse {
+        reader.parameters.pass();
+        return input.warnHere(name, "Shape {f} is not supported and left out", .{quote(name)});
+    };
     const is_boundary = if (graphics.material) |material| material.is_boundary else false;
     const seen = if (is_boundary) null else try reader.shapeMaterial();
     const has_picture = if (graphics.area_light) |light| light.picture != null else false;
@@ -729,7 +764,7 @@ fn shape(reader: *Reader, name: []const u8) Error!void {
             return reader.addAreaLight(kind, black, area_light);
         } else try input.warnHere("boundary", "Shape: what bounds a medium does not shine", .{});
     }
-    const material = seen orelse return;
+    const material = seen orelse return reader.parameters.pass();
     const mesh = try reader.meshOf(kind, material);
     if (reader.object == null)
         try reader.builder.instantiate(mesh, &graphics.transform)
@@ -783,7 +818,10 @@ fn meshOf(reader: *Reader, kind: shapes.Kind, material: u32) Error!u32 {
     }
     const key = shapes.hash(&reader.tessellator, reader.graphics.reverse) ^
         (@as(u64, material) *% 0x9e3779b97f4a7c15);
-    if (reader.known_meshes.get(key)) |mesh| return mesh;
+    if (reader.known_meshes.get(key)) |mesh| {
+        reader.parameters.pass();
+        return mesh;
+    }
     const geometry = try shapes.make(&reader.tessellator, kind, reader.graphics.reverse);
     const mesh = try reader.builder.addMesh(geometry, material);
     try reader.known_meshes.put(reader.arena, key, mesh);
@@ -805,7 +843,8 @@ fn addAreaLight(
     else
         materials.hidden_lamp;
     const sides: f64 = if (area_light.two_sided) 2 else 1;
-    const of_unit = sides * std.math.pi * lights.areaOf(&geometry, place);
+    const area = lights.areaOf(&geometry, place);
+    const of_unit = sides * std.math.pi * area * area_light.luminance;
     bright.emissive = area_light.emission.by(area_light.power, of_unit);
     bright.emissive_texture = area_light.picture;
     bright.double_sided = area_light.two_sided;

@@ -164,10 +164,33 @@ fn planck(temperature: f64, wavelength: f64) f64 {
 }
 
 /// Spectra that PBRT knows by name: index of refraction (eta) and absorption (k) of metals,
-/// refraction of glasses at the sodium line.
+/// refraction of glasses at the sodium line, and standard illuminants, of luminance 1.
 pub fn fromName(name: []const u8) ?Vec3 {
-    return named.get(name);
+    if (named.get(name)) |known| return known;
+    const x, const y = illuminants.get(name) orelse return null;
+    return fromXyz(.{ x / y, 1, (1 - x - y) / y });
 }
+
+/// Their chromaticities for the observer of 2 degrees: CIE 15:2004, tables T.3 and T.6.1; D60 as
+/// in ACES.
+const illuminants: std.StaticStringMap([2]f64) = .initComptime(.{
+    .{ "illum-acesD60", .{ 0.32168, 0.33767 } },
+    .{ "stdillum-A", .{ 0.44758, 0.40745 } },
+    .{ "stdillum-D50", .{ 0.34567, 0.35851 } },
+    .{ "stdillum-D65", .{ 0.31272, 0.32903 } },
+    .{ "stdillum-F1", .{ 0.3131, 0.3371 } },
+    .{ "stdillum-F2", .{ 0.3721, 0.3751 } },
+    .{ "stdillum-F3", .{ 0.4091, 0.3941 } },
+    .{ "stdillum-F4", .{ 0.4402, 0.4031 } },
+    .{ "stdillum-F5", .{ 0.3138, 0.3452 } },
+    .{ "stdillum-F6", .{ 0.3779, 0.3882 } },
+    .{ "stdillum-F7", .{ 0.3129, 0.3292 } },
+    .{ "stdillum-F8", .{ 0.3458, 0.3586 } },
+    .{ "stdillum-F9", .{ 0.3741, 0.3727 } },
+    .{ "stdillum-F10", .{ 0.3458, 0.3588 } },
+    .{ "stdillum-F11", .{ 0.3805, 0.3769 } },
+    .{ "stdillum-F12", .{ 0.4370, 0.4042 } },
+});
 
 const named: std.StaticStringMap(Vec3) = .initComptime(.{
     .{ "metal-Ag-eta", Vec3{ 0.1552, 0.1166, 0.1383 } },
@@ -191,8 +214,31 @@ const named: std.StaticStringMap(Vec3) = .initComptime(.{
     .{ "glass-F5", Vec3{ 1.6034, 1.6034, 1.6034 } },
     .{ "glass-F10", Vec3{ 1.6237, 1.6237, 1.6237 } },
     .{ "glass-F11", Vec3{ 1.6206, 1.6206, 1.6206 } },
-    .{ "stdillum-A", Vec3{ 2.22, 0.82, 0.20 } },
-    .{ "stdillum-D65", Vec3{ 1, 1, 1 } },
+});
+
+/// What a medium does to light on a way of a millimetre: scattering is the reduced one.
+pub const Medium = struct { scattered: Vec3, absorbed: Vec3 };
+
+/// Media that PBRT knows by name (Jensen et al. 2001, "A practical model for subsurface light
+/// transport", figure 5); null for those of other sources.
+pub fn mediumNamed(name: []const u8) ?Medium {
+    const row = media.get(name) orelse return null;
+    return .{ .scattered = row[0..3].*, .absorbed = row[3..6].* };
+}
+
+const media: std.StaticStringMap([6]f32) = .initComptime(.{
+    .{ "Apple", .{ 2.29, 2.39, 1.97, 0.0030, 0.0034, 0.046 } },
+    .{ "Chicken1", .{ 0.15, 0.21, 0.38, 0.015, 0.077, 0.19 } },
+    .{ "Chicken2", .{ 0.19, 0.25, 0.32, 0.018, 0.088, 0.20 } },
+    .{ "Cream", .{ 7.38, 5.47, 3.15, 0.0002, 0.0028, 0.0163 } },
+    .{ "Ketchup", .{ 0.18, 0.07, 0.03, 0.061, 0.97, 1.45 } },
+    .{ "Marble", .{ 2.19, 2.62, 3.00, 0.0021, 0.0041, 0.0071 } },
+    .{ "Potato", .{ 0.68, 0.70, 0.55, 0.0024, 0.0090, 0.12 } },
+    .{ "Skimmilk", .{ 0.70, 1.22, 1.90, 0.0014, 0.0025, 0.0142 } },
+    .{ "Skin1", .{ 0.74, 0.88, 1.01, 0.032, 0.17, 0.48 } },
+    .{ "Skin2", .{ 1.09, 1.59, 1.79, 0.013, 0.070, 0.145 } },
+    .{ "Spectralon", .{ 11.6, 20.4, 14.9, 0, 0, 0 } },
+    .{ "Wholemilk", .{ 2.55, 3.21, 3.77, 0.0011, 0.0024, 0.014 } },
 });
 
 /// Luminance of linear RGB (Rec. 709).
@@ -210,6 +256,15 @@ test "a spectrum of ones has luminance one and the tint of the equal-energy whit
     for ([_][]const f32{ &.{}, &.{1}, &.{ 500, 1, 400, 1 }, &.{ 500, 1, 500, 2 } }) |bad| {
         try std.testing.expectEqual(null, fromPairs(bad));
     }
+}
+
+test "illuminants have luminance 1, and the daylight of 6500 K is white" {
+    for (illuminants.keys()) |name|
+        try std.testing.expectApproxEqAbs(1, luminance(fromName(name).?), 1e-3);
+    for (fromName("stdillum-D65").?) |channel| try std.testing.expectApproxEqAbs(1, channel, 2e-3);
+    const warm = fromName("stdillum-A").?;
+    try std.testing.expect(warm[0] > 1.5 and warm[2] < 0.4);
+    try std.testing.expectEqual(null, fromName("stdillum-Q"));
 }
 
 test "white is white in every space, and their primaries are beyond ours" {

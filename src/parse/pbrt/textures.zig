@@ -6,14 +6,17 @@
 //! warning, once a kind. docs/pbrt.md has the table.
 
 const std = @import("std");
+const decode = @import("../../decode.zig");
 const diagnostic = @import("../../diagnostic.zig");
+const math = @import("../../math.zig");
 const scene = @import("../../scene.zig");
+const spectra = @import("spectra.zig");
 const Colors = @import("colors.zig");
 const ImageFiles = @import("../image_files.zig");
 const Input = @import("input.zig");
 const Parameters = @import("parameters.zig");
 const Error = Input.Error;
-const Vec3 = @import("../../math.zig").Vec3;
+const Vec3 = math.Vec3;
 const quote = diagnostic.quote;
 const Textures = @This();
 
@@ -94,6 +97,32 @@ pub fn imageOf(textures: *Textures, path: []const u8) Error!?u32 {
     return image;
 }
 
+/// The mean luminance of one of the scene's images, which is decoded for that; null where it is
+/// none.
+pub fn luminanceOf(textures: *Textures, image: u32) error{OutOfMemory}!?f64 {
+    const gpa = textures.input.gpa;
+    const file = textures.files.builder.images.items[image].bytes;
+    var reason: decode.Reason = .{};
+    var texels = decode.decode(gpa, file, &reason) catch |err| switch (err) {
+        error.OutOfMemory => |failure| return failure,
+        error.InvalidImage => return null,
+    };
+    defer texels.deinit(gpa);
+    const count = @as(usize, texels.width) * texels.height;
+    var sum: f64 = 0;
+    for (0..count) |texel| {
+        const first = texel * texels.channel_count;
+        const step: usize = @intFromBool(texels.channel_count >= 3);
+        var rgb: Vec3 = undefined;
+        for (&rgb, 0..) |*to, channel| to.* = switch (texels.data) {
+            .bytes => |bytes| math.srgb.decoded[bytes[first + step * channel]],
+            .floats => |floats| floats[first + step * channel],
+        };
+        sum += spectra.luminance(rgb);
+    }
+    return sum / @as(f64, @floatFromInt(count));
+}
+
 const Class = enum {
     constant,
     scale,
@@ -110,10 +139,17 @@ pub fn make(
     textures: *Textures,
     colors: *Colors,
     class: []const u8,
+    is_color: bool,
     parameters: *const Parameters,
 ) Error!Texture {
-    const maker: Maker = .{ .textures = textures, .colors = colors, .parameters = parameters };
+    const maker: Maker = .{
+        .textures = textures,
+        .colors = colors,
+        .parameters = parameters,
+        .is_color = is_color,
+    };
     const known = std.meta.stringToEnum(Class, class) orelse {
+        parameters.pass();
         try textures.input.warnHere(
             class,
             "Texture {f} is not supported: its mean is taken as {d}",
@@ -123,11 +159,14 @@ pub fn make(
     };
     switch (known) {
         .constant, .scale, .mix, .imagemap => {},
-        .directionmix, .checkerboard, .dots, .bilerp => try textures.input.warnHere(
-            class,
-            "Texture {f} is shown as its mean",
-            .{quote(class)},
-        ),
+        .directionmix, .checkerboard, .dots, .bilerp => {
+            parameters.pass();
+            try textures.input.warnHere(
+                class,
+                "Texture {f} is shown as its mean",
+                .{quote(class)},
+            );
+        },
     }
     return maker.make(known);
 }
@@ -137,6 +176,7 @@ const Maker = struct {
     textures: *Textures,
     colors: *Colors,
     parameters: *const Parameters,
+    is_color: bool,
 
     const white: Texture = .{ .mean = .{ 1, 1, 1 } };
     const black: Texture = .{ .mean = .{ 0, 0, 0 } };
@@ -240,12 +280,21 @@ const Maker = struct {
         const from = maker.parameters;
         const scale = from.float("scale", 1);
         const result: Texture = .{ .mean = @splat(picture_mean * scale) };
+        const default = if (from.boolean("gamma", true)) "sRGB" else "linear";
+        const encoding = from.string("encoding") orelse default;
+        if (maker.is_color and !std.mem.eql(u8, encoding, "sRGB")) try input.warnHere(
+            "encoding",
+            "Texture 'imagemap': colours of 8 bits are sRGB, not {f}",
+            .{quote(encoding)},
+        );
         const path = from.string("filename") orelse {
+            from.pass();
             try input.warnHere("no file", "Texture 'imagemap' has no filename, left out", .{});
             return result;
         };
         const mapping = from.string("mapping") orelse "uv";
         if (from.boolean("invert", false) or !std.mem.eql(u8, mapping, "uv")) {
+            from.pass();
             try input.warnHere(
                 "imagemap",
                 "Texture 'imagemap': inverted pictures, and those that are mapped otherwise " ++

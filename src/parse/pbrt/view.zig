@@ -96,6 +96,7 @@ pub fn setCamera(
     if (std.mem.eql(u8, name, "orthographic")) {
         result.kind = .orthographic;
     } else if (!std.mem.eql(u8, name, "perspective")) {
+        parameters.pass();
         try input.warnHere(
             name,
             "Camera {f} is not supported: a perspective one with fov 90 stands for it",

@@ -23,7 +23,8 @@ pub fn read(tessellator: *Tessellator, name: []const u8, bytes: [:0]const u8) Er
     };
     if (from.not_finite_count > 0)
         return tessellator.fail("{f}: a number is not finite", .{quote(name)});
-    if (from.dropped_count > 0) try tessellator.input.warnHere(
+    if (from.dropped_count > 0) try tessellator.input.forgive(
+        tessellator.input.directive,
         name,
         "{f}: {d} normals or coordinates that are not finite are dropped",
         .{ quote(name), from.dropped_count },
@@ -50,7 +51,8 @@ pub fn mesh(tessellator: *Tessellator) Error!Geometry {
         return tessellator.fail("has no filename", .{});
     const name = tessellator.parameters.string("filename") orelse
         return tessellator.fail("has no filename", .{});
-    const file = try tessellator.input.readFile(parameter.offset, name);
-    defer tessellator.input.gpa.free(file.bytes);
-    return read(tessellator, name, file.bytes);
+    const input = tessellator.input;
+    const file = try input.readFile(parameter.offset, name);
+    defer input.gpa.free(file.bytes);
+    return read(tessellator, name, try input.withoutMark(parameter.offset, name, file.bytes));
 }

@@ -7,6 +7,7 @@
 const std = @import("std");
 const limits = @import("../limits.zig");
 const math = @import("../../../math.zig");
+const orientation = @import("../../orientation.zig");
 const Input = @import("../input.zig");
 const Parameters = @import("../parameters.zig");
 const Error = Input.Error;
@@ -201,22 +202,10 @@ pub fn unshare(
 /// Coordinates of the corners of a triangle without any.
 pub const triangle_corners: []const [3][2]f32 = &.{.{ .{ 0, 0 }, .{ 1, 0 }, .{ 1, 1 } }};
 
-/// The normal of a face, as long as twice its area.
-fn faceNormal(geometry: *const Geometry, corners: [3]u32) Vec3 {
-    const a = geometry.positions[corners[0]];
-    const ab = math.vec3.sub(geometry.positions[corners[1]], a);
-    return math.vec3.cross(ab, math.vec3.sub(geometry.positions[corners[2]], a));
-}
-
 /// Turns the faces around that look against their vertices' normals.
 pub fn orient(geometry: *const Geometry) void {
     const normals = geometry.normals orelse return;
-    for (geometry.triangles) |*corners| {
-        const face = faceNormal(geometry, corners.*);
-        var agreement: f32 = 0;
-        for (corners) |corner| agreement += math.vec3.dot(face, normals[corner]);
-        if (agreement < 0) std.mem.swap(u32, &corners[1], &corners[2]);
-    }
+    orientation.orient(geometry.positions, normals, geometry.triangles);
 }
 
 /// Normals of a smooth surface: the sum of the faces around each vertex, by area.
@@ -224,7 +213,7 @@ pub fn smooth(tessellator: *Tessellator, geometry: *Geometry) Error!void {
     const normals = try tessellator.alloc(Vec3, geometry.positions.len);
     @memset(normals, .{ 0, 0, 0 });
     for (geometry.triangles) |corners| {
-        const face = faceNormal(geometry, corners);
+        const face = orientation.faceNormal(geometry.positions, corners);
         for (corners) |corner| normals[corner] = math.vec3.add(normals[corner], face);
     }
     for (normals) |*normal| normal.* = math.vec3.normalize(normal.*) orelse .{ 0, 0, 0 };
