@@ -326,15 +326,13 @@ pub fn packBox(
 /// the same flattened triangles would have.
 pub fn MappedCluster(comptime width: comptime_int) type {
     return struct {
-        /// Index into `Shared.clusters`; `none`: nothing is mapped.
-        reference: u32,
         pack_count: u32,
         nodes: [clusterNodesMax(width)]Node(width),
         packs: [clusterPacksMax(width)]TrianglePack(width) align(geometry_file.cache_line_bytes),
 
         const Self = @This();
 
-        /// Maps a cluster.
+        /// Maps a cluster, by its index in `Shared.clusters`.
         pub fn fill(mapped: *Self, geometry: *const Geometry, reference: u32) void {
             const shared = &geometry.shared;
             const at = shared.clusters[reference];
@@ -342,7 +340,6 @@ pub fn MappedCluster(comptime width: comptime_int) type {
             const mesh = &shared.meshes[instance.mesh];
             const cluster = &mesh.clusters[at.cluster];
             const from = mesh.tree.get(width);
-            mapped.reference = reference;
             mapped.pack_count = cluster.pack_count;
             const packs = from.packs[cluster.pack_first..][0..cluster.pack_count];
             for (packs, mapped.packs[0..packs.len]) |*pack, *to| {
@@ -412,14 +409,16 @@ pub fn MappedCluster(comptime width: comptime_int) type {
 /// Clusters that a thread has mapped, so that the next of its rays find them so.
 pub fn ClusterCache(comptime width: comptime_int) type {
     return struct {
+        /// Which cluster each slot holds, or `none`.
+        tags: []u32,
         /// As many as a power of two.
         slots: []MappedCluster(width),
 
         /// Of slots that hold nothing yet.
-        pub fn init(slots: []MappedCluster(width)) @This() {
-            assert(std.math.isPowerOfTwo(slots.len));
-            for (slots) |*slot| slot.reference = none;
-            return .{ .slots = slots };
+        pub fn init(tags: []u32, slots: []MappedCluster(width)) @This() {
+            assert(tags.len == slots.len and std.math.isPowerOfTwo(slots.len));
+            @memset(tags, none);
+            return .{ .tags = tags, .slots = slots };
         }
 
         /// A cluster, valid until the next is asked for.
@@ -430,8 +429,12 @@ pub fn ClusterCache(comptime width: comptime_int) type {
         ) *const MappedCluster(width) {
             // Fibonacci hashing (Knuth, The Art of Computer Programming, volume 3, section 6.4).
             const hash = (reference *% 0x9e3779b1) >> 16;
-            const slot = &cache.slots[hash & (cache.slots.len - 1)];
-            if (slot.reference != reference) slot.fill(geometry, reference);
+            const index = hash & (cache.slots.len - 1);
+            const slot = &cache.slots[index];
+            if (cache.tags[index] != reference) {
+                slot.fill(geometry, reference);
+                cache.tags[index] = reference;
+            }
             return slot;
         }
     };

@@ -4,6 +4,7 @@
 //! share meshes. What is found in it does not depend on what has been mapped before.
 
 const std = @import("std");
+const huge_pages = @import("../../huge_pages.zig");
 const world_file = @import("../../world.zig");
 const Allocator = std.mem.Allocator;
 const Frame = world_file.Frame;
@@ -35,11 +36,14 @@ pub fn OwnFrame(comptime Kernel: type) type {
             frame: *const Frame,
             thread_count: usize,
         ) error{OutOfMemory}!*const Frame {
-            own.cache.slots = &.{};
+            own.cache = .{ .tags = &.{}, .slots = &.{} };
             if (frame.geometry.shared.runs.len == 0) return frame;
             const share = bytes_max / thread_count / @sizeOf(Slot);
             const slot_count = std.math.clamp(share, slot_count_min, slot_count_max);
-            own.cache = .init(try gpa.alloc(Slot, std.math.floorPowerOfTwo(usize, slot_count)));
+            const count = std.math.floorPowerOfTwo(usize, slot_count);
+            const tags = try gpa.alloc(u32, count);
+            errdefer gpa.free(tags);
+            own.cache = .init(tags, try huge_pages.alloc(gpa, Slot, count));
             own.geometry = frame.geometry.*;
             own.geometry.cluster_cache = &own.cache;
             own.frame = frame.*;
@@ -49,7 +53,9 @@ pub fn OwnFrame(comptime Kernel: type) type {
 
         /// Frees the room.
         pub fn deinit(own: *Self, gpa: Allocator) void {
-            gpa.free(own.cache.slots);
+            if (own.cache.slots.len == 0) return;
+            huge_pages.free(gpa, own.cache.slots);
+            gpa.free(own.cache.tags);
         }
     };
 }
