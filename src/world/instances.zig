@@ -406,19 +406,22 @@ pub fn MappedCluster(comptime width: comptime_int) type {
     };
 }
 
-/// Clusters that a thread has mapped, so that the next of its rays find them so.
+/// Clusters that a thread has mapped, so that the next of its rays find them so: a cache of two
+/// ways, the one of which that was asked for last stays.
 pub fn ClusterCache(comptime width: comptime_int) type {
     return struct {
-        /// Which cluster each slot holds, or `none`.
-        tags: []u32,
-        /// As many as a power of two.
+        sets: []Set,
+        /// Two for each set, which are as many as a power of two.
         slots: []MappedCluster(width),
 
+        /// Which clusters two slots hold, or `none`, and which of the slots was asked for last.
+        pub const Set = struct { tags: [2]u32, last: u32 };
+
         /// Of slots that hold nothing yet.
-        pub fn init(tags: []u32, slots: []MappedCluster(width)) @This() {
-            assert(tags.len == slots.len and std.math.isPowerOfTwo(slots.len));
-            @memset(tags, none);
-            return .{ .tags = tags, .slots = slots };
+        pub fn init(sets: []Set, slots: []MappedCluster(width)) @This() {
+            assert(2 * sets.len == slots.len and std.math.isPowerOfTwo(sets.len));
+            @memset(sets, .{ .tags = @splat(none), .last = 0 });
+            return .{ .sets = sets, .slots = slots };
         }
 
         /// A cluster, valid until the next is asked for.
@@ -429,11 +432,16 @@ pub fn ClusterCache(comptime width: comptime_int) type {
         ) *const MappedCluster(width) {
             // Fibonacci hashing (Knuth, The Art of Computer Programming, volume 3, section 6.4).
             const hash = (reference *% 0x9e3779b1) >> 16;
-            const index = hash & (cache.slots.len - 1);
-            const slot = &cache.slots[index];
-            if (cache.tags[index] != reference) {
+            const index = hash & (cache.sets.len - 1);
+            const set = &cache.sets[index];
+            const way: u32 = if (set.tags[0] == reference)
+                0
+            else if (set.tags[1] == reference) 1 else 1 - set.last;
+            set.last = way;
+            const slot = &cache.slots[2 * index + way];
+            if (set.tags[way] != reference) {
                 slot.fill(geometry, reference);
-                cache.tags[index] = reference;
+                set.tags[way] = reference;
             }
             return slot;
         }

@@ -12,10 +12,10 @@ const Geometry = world_file.Geometry;
 
 /// Bytes that all threads have for mapped clusters, each an equal part. With 6 MB a thread mapping
 /// was half of a forest's time: neighbouring tiles see much the same clusters.
-const bytes_max = 128 << 20;
+const bytes_max = 256 << 20;
 /// Clusters that a thread keeps at least and at most.
 const slot_count_min = 256;
-const slot_count_max = 4096;
+const slot_count_max = 8192;
 
 /// Must stay where it is.
 pub fn OwnFrame(comptime Kernel: type) type {
@@ -36,14 +36,14 @@ pub fn OwnFrame(comptime Kernel: type) type {
             frame: *const Frame,
             thread_count: usize,
         ) error{OutOfMemory}!*const Frame {
-            own.cache = .{ .tags = &.{}, .slots = &.{} };
+            own.cache = .{ .sets = &.{}, .slots = &.{} };
             if (frame.geometry.shared.runs.len == 0) return frame;
             const share = bytes_max / thread_count / @sizeOf(Slot);
             const slot_count = std.math.clamp(share, slot_count_min, slot_count_max);
             const count = std.math.floorPowerOfTwo(usize, slot_count);
-            const tags = try gpa.alloc(u32, count);
-            errdefer gpa.free(tags);
-            own.cache = .init(tags, try huge_pages.alloc(gpa, Slot, count));
+            const sets = try gpa.alloc(Cache.Set, count / 2);
+            errdefer gpa.free(sets);
+            own.cache = .init(sets, try huge_pages.alloc(gpa, Slot, count));
             own.geometry = frame.geometry.*;
             own.geometry.cluster_cache = &own.cache;
             own.frame = frame.*;
@@ -55,7 +55,7 @@ pub fn OwnFrame(comptime Kernel: type) type {
         pub fn deinit(own: *Self, gpa: Allocator) void {
             if (own.cache.slots.len == 0) return;
             huge_pages.free(gpa, own.cache.slots);
-            gpa.free(own.cache.tags);
+            gpa.free(own.cache.sets);
         }
     };
 }

@@ -63,12 +63,12 @@ pub fn Searches(comptime Kernel: type) type {
         const Room = struct {
             geometry: Geometry,
             cache: world_file.instances.ClusterCache(Kernel.width),
-            tags: [2]u32,
+            sets: [1]world_file.instances.ClusterCache(Kernel.width).Set,
             slots: [2]world_file.instances.MappedCluster(Kernel.width),
 
             fn of(room: *Room, geometry: *const Geometry) *const Geometry {
                 if (geometry.shared.runs.len == 0) return geometry;
-                room.cache = .init(&room.tags, &room.slots);
+                room.cache = .init(&room.sets, &room.slots);
                 room.geometry = geometry.*;
                 room.geometry.cluster_cache = &room.cache;
                 return &room.geometry;
