@@ -1472,6 +1472,42 @@ test "memory that runs out is an error that leaks nothing" {
     try std.testing.checkAllAllocationFailures(gpa, one, .{&from});
 }
 
+test "memory that runs out while meshes are shared leaks nothing" {
+    const gpa = std.testing.allocator;
+    var corners: [40][3]math.Vec3 = undefined;
+    for (&corners, 0..) |*triangle, index| {
+        const at: f32 = @floatFromInt(index);
+        triangle.* = .{ .{ at, 0, 0 }, .{ at + 1, 0, 0 }, .{ at, 1, 0 } };
+    }
+    var from = try TestScene.soup(gpa, &corners);
+    defer from.deinit();
+    from.nodes = &.{
+        .{ .parent = scene.none, .local = .identity },
+        .{ .parent = scene.none, .local = .translate(.{ 0, 0, 3 }) },
+        // Leaves all triangles out.
+        .{ .parent = scene.none, .local = .scale(.{ 0, 1, 1 }) },
+    };
+    from.instances = &.{
+        .{ .mesh = 0, .node = 0 }, .{ .mesh = 0, .node = 1 }, .{ .mesh = 0, .node = 2 },
+    };
+    const one = struct {
+        fn one(failing: std.mem.Allocator, scene_from: *const Scene) !void {
+            var pool: parallel.Pool = .init(1);
+            defer pool.deinit();
+            var result = try prepareForTest(failing, scene_from, .{
+                .lanes = 4,
+                .pool = &pool,
+                .sharing = .{ .saved_min = 0, .triangle_min = 1 },
+            });
+            defer result.deinit();
+            try std.testing.expectEqual(2, result.geometry.shared.instances.len);
+            try std.testing.expectEqual(40, result.geometry.triangles.len);
+            try std.testing.expectEqual(120, result.geometry.triangleCount());
+        }
+    }.one;
+    try std.testing.checkAllAllocationFailures(gpa, one, .{&from});
+}
+
 test "memory that runs out when a scene is posed again is an error that leaks nothing" {
     const gpa = std.testing.allocator;
     var from = try TestScene.soup(gpa, &.{.{ .{ 0, 0, 0 }, .{ 1, 0, 0 }, .{ 0, 1, 0 } }});

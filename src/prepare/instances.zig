@@ -51,6 +51,9 @@ pub const Rule = struct {
     pub const never: Rule = .{ .saved_min = std.math.maxInt(u64) };
 };
 
+/// Triangles, or vertices, that may be drawn of what is shared: beams number twice as many.
+const drawn_max = flatten.element_count_max / 2;
+
 /// How, and by whom.
 pub const Settings = struct {
     rule: Rule,
@@ -120,9 +123,12 @@ pub fn choose(
     const counts = try gpa.alloc(u32, meshes.len);
     defer gpa.free(counts);
     @memset(counts, 0);
+    var drawn: u64 = 0;
     for (parts.instances) |*instance| {
         const mesh = &meshes[instance.mesh];
         if (mesh.points.len > 0 or mesh.segments.len > 0) return false;
+        drawn += @max(mesh.triangles.len, mesh.positions.len);
+        if (drawn > drawn_max) return false; // `flatten` says that these are too many.
         counts[instance.mesh] += @intFromBool(isRigid(instance));
     }
     var saved: u64 = 0;

@@ -75,7 +75,8 @@ pub fn Whitted(comptime Kernel: type) type {
             assert(settings.depth_max <= path_file.depth_limit);
             const whitted = try gpa.create(Self);
             errdefer gpa.destroy(whitted);
-            const frame = try whitted.own_frame.init(gpa, shared_frame);
+            const frame = try whitted.own_frame
+                .init(gpa, shared_frame, settings.pool.thread_count);
             errdefer whitted.own_frame.deinit(gpa);
             whitted.stack = try .init(gpa, settings.depth_max, frame.hasLayers());
             whitted.frame = frame;

@@ -9,8 +9,12 @@ const Allocator = std.mem.Allocator;
 const Frame = world_file.Frame;
 const Geometry = world_file.Geometry;
 
-/// Clusters that a thread keeps: some 6 MB.
-const slot_count = 512;
+/// Bytes that all threads have for mapped clusters, each in equal part. Mapping was half of the time
+/// of a forest with 6 MB a thread: neighbouring tiles see much the same clusters.
+const bytes_max = 128 << 20;
+/// Clusters that a thread keeps at least and at most.
+const slot_count_min = 256;
+const slot_count_max = 4096;
 
 /// Must stay where it is.
 pub fn OwnFrame(comptime Kernel: type) type {
@@ -23,15 +27,19 @@ pub fn OwnFrame(comptime Kernel: type) type {
 
         const Self = @This();
 
-        /// The frame to trace, which lives as long as both. In place; `deinit` frees what it takes.
+        /// The frame to trace, one of so many threads', which lives as long as both. In place;
+        /// `deinit` frees what it takes.
         pub fn init(
             own: *Self,
             gpa: Allocator,
             frame: *const Frame,
+            thread_count: usize,
         ) error{OutOfMemory}!*const Frame {
             own.cache.slots = &.{};
             if (frame.geometry.shared.runs.len == 0) return frame;
-            own.cache = .init(try gpa.alloc(Slot, slot_count));
+            const share = bytes_max / thread_count / @sizeOf(Slot);
+            const slot_count = std.math.clamp(share, slot_count_min, slot_count_max);
+            own.cache = .init(try gpa.alloc(Slot, std.math.floorPowerOfTwo(usize, slot_count)));
             own.geometry = frame.geometry.*;
             own.geometry.cluster_cache = &own.cache;
             own.frame = frame.*;
