@@ -9,8 +9,8 @@ const Allocator = std.mem.Allocator;
 const Frame = world_file.Frame;
 const Geometry = world_file.Geometry;
 
-/// Bytes that all threads have for mapped clusters, each in equal part. Mapping was half of the time
-/// of a forest with 6 MB a thread: neighbouring tiles see much the same clusters.
+/// Bytes that all threads have for mapped clusters, each an equal part. With 6 MB a thread mapping
+/// was half of a forest's time: neighbouring tiles see much the same clusters.
 const bytes_max = 128 << 20;
 /// Clusters that a thread keeps at least and at most.
 const slot_count_min = 256;
