@@ -172,13 +172,11 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--animation WHICH",
-            .help = "name or index of an animation, or all at once\n" ++
-                "(default: none, the scene as it stands)",
+            .help = "name or index of an animation, or all (default: none)",
         },
         .{
             .usage = "--animation-time S",
-            .help = "seconds since its start (default: 0); by itself of\n" ++
-                "the first animation",
+            .help = "seconds since its start (default: 0)",
         },
         .{
             .usage = "--up-axis AXIS",

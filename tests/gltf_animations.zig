@@ -229,6 +229,42 @@ test "pointers move nodes, materials, lights and cameras" {
     try testing.expectEqual(1, rest.lights[0].intensity[0]);
 }
 
+test "what is hidden appears, with all below it, and its light" {
+    const show = comptime animation(
+        pointer("/nodes/0/extensions/KHR_node_visibility/visible"),
+        times,
+        two_numbers,
+        "STEP",
+    );
+    var said: Diagnostic = .{};
+    var session: Session = .init(gpa, testing.io, 1, &said);
+    defer session.deinit();
+    const text = try makeText(show);
+    defer gpa.free(text);
+    const hidden = try texts.replace(text, "\"nodes\":[{",
+        \\"nodes":[{"extensions":{"KHR_node_visibility":{"visible":false}},
+    );
+    defer gpa.free(hidden);
+    const io = testing.io;
+    session.adopt(try raylane.parse.parseBytes(gpa, io, hidden, .cwd(), .{}, &said), .owned);
+    for ([_]settings.Animation{
+        .{},
+        .{ .which = .all, .time_s = 1 },
+        .{},
+    }, [_]bool{ false, true, false }) |chosen, is_seen| {
+        try session.pose(.{
+            .lanes = raylane.variant.compiled[0].lanes,
+            .animation = chosen,
+        });
+        try session.view(.{ .resolution = .{ 4, 4 } });
+        const world = &session.world.?;
+        try testing.expectEqual(!is_seen, world.geometry.triangles[0].isDropped());
+        try testing.expectEqual(is_seen, world.facts.own_light_count > 0);
+    }
+    // Nothing but that there is nothing else.
+    try testing.expectEqual(1, said.warning_count);
+}
+
 test "a node that moves has its matrix taken apart" {
     var said: Diagnostic = .{};
     const turn = comptime animation(node("3", "scale"), times, vectors, "LINEAR");

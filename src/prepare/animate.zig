@@ -176,11 +176,15 @@ pub fn pose(
 /// The scene at a moment. What moves comes from `arena`, all else is still `from`'s.
 pub fn at(arena: Allocator, from: *const Scene, moment: Moment) error{OutOfMemory}!Scene {
     var shown = from.*;
-    if (moment.running == .none) return shown;
+    if (moment.running == .none) {
+        try hide(arena, &shown);
+        return shown;
+    }
     var stage: Stage = .{
         .nodes = try arena.dupe(scene.Node, from.nodes),
         .moving = try arena.dupe(scene.MovingNode, from.moving.nodes),
         .is_moved = try arena.alloc(bool, from.moving.nodes.len),
+        .shows = try arena.dupe(bool, from.moving.shows),
         .weights = try arena.alloc([]f32, from.moving.weights.len),
         .materials = try arena.dupe(scene.Material, from.materials),
         .lights = try arena.dupe(scene.Light, from.lights),
@@ -200,11 +204,45 @@ pub fn at(arena: Allocator, from: *const Scene, moment: Moment) error{OutOfMemor
     }
     shown.nodes = stage.nodes;
     shown.instances = instances;
-    shown.moving = .{ .nodes = stage.moving, .weights = stage.weights };
+    shown.moving = .{
+        .nodes = stage.moving,
+        .weights = stage.weights,
+        .shows = stage.shows,
+        .nowhere = from.moving.nowhere,
+    };
     shown.materials = stage.materials;
     shown.lights = stage.lights;
     shown.cameras = stage.cameras;
+    try hide(arena, &shown);
     return shown;
+}
+
+/// What is hidden has no size, and does not shine.
+fn hide(arena: Allocator, shown: *Scene) error{OutOfMemory}!void {
+    if (shown.moving.shows.len == 0) return;
+    const visible = try shown.moving.visibility(arena, shown.nodes);
+    shown.instances = try hidden(arena, shown.instances, visible, shown.moving.nowhere);
+    var lights: std.ArrayList(scene.Light) = try .initCapacity(arena, shown.lights.len);
+    for (shown.lights) |light| {
+        if (visible[light.node]) lights.appendAssumeCapacity(light);
+    }
+    shown.lights = lights.items;
+}
+
+/// The instances, of which those that are not visible are put nowhere. From `arena`.
+pub fn hidden(
+    arena: Allocator,
+    instances: []const scene.Instance,
+    visible: []const bool,
+    nowhere: u32,
+) error{OutOfMemory}![]const scene.Instance {
+    const placed = try arena.dupe(scene.Instance, instances);
+    for (placed) |*instance| {
+        if (visible[instance.node]) continue;
+        instance.node = nowhere;
+        instance.skin = scene.none;
+    }
+    return placed;
 }
 
 /// What moves, while it does.
@@ -213,6 +251,7 @@ const Stage = struct {
     moving: []scene.MovingNode,
     /// By moving node.
     is_moved: []bool,
+    shows: []bool,
     weights: [][]f32,
     materials: []scene.Material,
     lights: []scene.Light,
@@ -224,6 +263,7 @@ const Stage = struct {
             .translation => |index| stage.movingNode(index).translation = frame.vector(),
             .rotation => |index| stage.movingNode(index).rotation = frame.rotation(),
             .scale => |index| stage.movingNode(index).scale = frame.vector(),
+            .visible => |node| stage.shows[node] = frame.number(0) != 0,
             .weights => |list| for (stage.weights[list], 0..) |*weight, index| {
                 weight.* = frame.single(index);
             },

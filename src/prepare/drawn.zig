@@ -1,5 +1,5 @@
 //! What is drawn of a scene at a moment, in place of what was loaded once: morph weights, and
-//! materials with how they look textures up.
+//! materials with how they look textures up, what is hidden.
 //!
 //! In: the scene at that moment, and what was loaded of it, where nothing that a moving material
 //! may want has been left out. Out: the same but for instances and materials that move. What a
@@ -7,6 +7,7 @@
 //! the transforms of textures at rest.
 
 const std = @import("std");
+const animate = @import("animate.zig");
 const scene = @import("../scene.zig");
 const texture_use = @import("texture_use.zig");
 const world = @import("../world.zig");
@@ -34,6 +35,12 @@ pub fn of(
             instance.morph_weights = from.moving.weights[instance.moving_weights];
         }
         drawn.parts.instances = instances;
+    }
+    if (from.moving.shows.len > 0) {
+        const visible = try from.moving.visibility(arena, from.nodes);
+        const instances = drawn.parts.instances;
+        const nowhere = from.moving.nowhere;
+        drawn.parts.instances = try animate.hidden(arena, instances, visible, nowhere);
     }
     for (from.materials) |*material| {
         if (material.in_motion) break;

@@ -43,6 +43,8 @@ pub const Target = union(enum) {
     /// A quaternion.
     rotation: u32,
     scale: u32,
+    /// Index into `Moving.shows`; 0 hides.
+    visible: u32,
     /// All of a list of `Moving.weights`.
     weights: u32,
     /// One of them.
@@ -58,7 +60,7 @@ pub const Target = union(enum) {
             .translation, .scale => 3,
             .rotation => 4,
             .weights => null,
-            .weight, .camera => 1,
+            .weight, .camera, .visible => 1,
             .material => |of| of.property.width(),
             .texture => |of| if (of.part == .rotation_rad) 1 else 2,
             .light => |of| if (of.property == .color) 3 else 1,
@@ -179,11 +181,30 @@ pub const Moving = struct {
     nodes: []const MovingNode = &.{},
     /// Lists of morph weights that instances share.
     weights: []const []const f32 = &.{},
+    /// By node: whether it does not hide itself and all below it; empty: nothing hides.
+    shows: []const bool = &.{},
+    /// Where there are some: a node without a size, for what is hidden.
+    nowhere: u32 = scene.none,
+
+    /// By node, whose parents stand before it: whether nothing hides it. From `arena`.
+    pub fn visibility(
+        moving: *const Moving,
+        arena: std.mem.Allocator,
+        nodes: []const scene.Node,
+    ) error{OutOfMemory}![]const bool {
+        const visible = try arena.dupe(bool, moving.shows);
+        for (nodes, visible) |node, *is_visible| {
+            if (node.parent != scene.none and !visible[node.parent]) is_visible.* = false;
+        }
+        return visible;
+    }
 };
 
 /// Asserts what the stages after `parse` rely on.
 pub fn check(from: *const scene.Scene) void {
     for (from.moving.nodes) |*moving| assert(moving.node < from.nodes.len);
+    const shows = from.moving.shows;
+    if (shows.len > 0) assert(shows.len == from.nodes.len and from.moving.nowhere < shows.len);
     for (from.instances) |*instance| {
         if (instance.moving_weights == scene.none) continue;
         const count = from.moving.weights[instance.moving_weights].len;
@@ -206,6 +227,7 @@ fn checkTarget(from: *const scene.Scene, target: Target, width: u32) void {
     if (target.width()) |wanted| assert(width == wanted);
     switch (target) {
         .translation, .rotation, .scale => |index| assert(index < from.moving.nodes.len),
+        .visible => |node| assert(node < from.moving.shows.len),
         .weights => |list| assert(from.moving.weights[list].len == width),
         .weight => |one| assert(one.index < from.moving.weights[one.list].len),
         inline .material, .texture => |of| assert(from.materials[of.material].in_motion),

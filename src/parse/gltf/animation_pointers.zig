@@ -18,6 +18,7 @@ pub const Property = union(enum) {
     translation: u32,
     rotation: u32,
     scale: u32,
+    visible: u32,
     weights: u32,
     weight: Element,
     /// Of meshes, for nodes that have none of their own.
@@ -82,6 +83,8 @@ fn ofNode(index: u32, text: []const u8) ?Property {
     inline for (names) |name| {
         if (std.mem.eql(u8, text, name)) return @unionInit(Property, name, index);
     }
+    if (std.mem.eql(u8, text, "extensions/KHR_node_visibility/visible"))
+        return .{ .visible = index };
     const element = elementOf(text) orelse return null;
     return .{ .weight = .{ .index = index, .element = element } };
 }
@@ -207,6 +210,7 @@ test "pointers to what is rendered" {
     for ([_]Case{
         .{ "/nodes/12/rotation", .{ .rotation = 12 } },
         .{ "/nodes/0/weights", .{ .weights = 0 } },
+        .{ "/nodes/7/extensions/KHR_node_visibility/visible", .{ .visible = 7 } },
         .{ "/nodes/3/weights/10", .{ .weight = .{ .index = 3, .element = 10 } } },
         .{ "/meshes/1/weights", .{ .mesh_weights = 1 } },
         .{ "/meshes/1/weights/0", .{ .mesh_weight = .{ .index = 1, .element = 0 } } },

@@ -166,6 +166,7 @@ fn readChannel(animations: *Animations, place: Place, unknown: *Unknown) Error!v
             try note(source, &animations.mesh_targets, one.index, count, one.element, &sampler);
         },
         inline .material, .texture => |of| animations.moves_material[of.index] = true,
+        .visible => source.keeps_hidden = true,
         else => {},
     }
 }
@@ -223,6 +224,7 @@ fn widthOf(source: *const Source, property: Property) ?u32 {
     return switch (property) {
         .translation, .scale => |node| if (node < data.nodes_count) 3 else null,
         .rotation => |node| if (node < data.nodes_count) 4 else null,
+        .visible => |node| if (node < data.nodes_count) 1 else null,
         .weights => |node| notZero(targetCount(source, meshOf(source, node) orelse return null)),
         .mesh_weights => |mesh| notZero(targetCount(source, mesh)),
         .weight => |one| {
@@ -421,6 +423,19 @@ pub fn finish(
         .nodes = try source.arena.dupe(scene.MovingNode, expansion.moving.items),
         .weights = try source.arena.dupe([]const f32, animations.lists.items),
     };
+    if (source.keeps_hidden) try addVisibility(source);
+}
+
+/// Which nodes show themselves at rest.
+fn addVisibility(source: *Source) Error!void {
+    const builder = source.builder;
+    const moving = &builder.scene.moving;
+    moving.nowhere = try builder.addNode(scene.none, .scale(.{ 0, 0, 0 }));
+    const shows = try source.arena.alloc(bool, builder.nodes.items.len);
+    for (shows, 0..) |*is_shown, index| {
+        is_shown.* = index >= source.hidden.bit_length or !source.hidden.isSet(index);
+    }
+    moving.shows = shows;
 }
 
 /// Properties of the file become those of the scene, where one may stand for several.
@@ -462,6 +477,9 @@ const Expansion = struct {
             inline .translation, .rotation, .scale => |node, tag| {
                 const moving = try expansion.movingNode(node) orelse return;
                 try expansion.add(channel, @unionInit(scene.Target, @tagName(tag), moving));
+            },
+            .visible => |node| if (expansion.places[node] != scene.none) {
+                try expansion.add(channel, .{ .visible = expansion.places[node] });
             },
             .weights, .weight => try expansion.addWeights(channel),
             .mesh_weights, .mesh_weight => try expansion.addWeights(channel),

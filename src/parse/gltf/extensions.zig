@@ -114,7 +114,7 @@ pub const all: []const Extension = &.{
     rendered("KHR_meshopt_compression", "all modes and filters"),
     ignored("KHR_node_hoverability", .nothing, "behaviour"),
     ignored("KHR_node_selectability", .nothing, "behaviour"),
-    rendered("KHR_node_visibility", "as it stands, not as animations have it"),
+    rendered("KHR_node_visibility", "of meshes and lights"),
     ignored("KHR_physics_rigid_bodies", .nothing, "behaviour"),
     ignored("KHR_techniques_webgl", .looks, "shaders: such materials are white"),
     rendered("KHR_texture_basisu", "preferred to the image that stands beside it"),

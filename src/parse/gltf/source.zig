@@ -39,6 +39,9 @@ decoded_bytes_left: u64 = 0,
 resolved: std.DynamicBitSetUnmanaged = .{},
 /// Nodes of the scene that are not shown (KHR_node_visibility), if there are any.
 hidden: std.DynamicBitSetUnmanaged = .{},
+/// These are there all the same, for animations may show them; of what is below them they say
+/// nothing.
+keeps_hidden: bool = false,
 
 /// See parse.zig.
 pub const Error = @import("../resource.zig").Error;
@@ -122,8 +125,9 @@ pub fn isResolved(source: *const Source, index: usize) bool {
     return index < source.resolved.bit_length and source.resolved.isSet(index);
 }
 
-/// Whether a node of the scene is not shown.
+/// Whether a node of the scene is not shown at any time.
 pub fn isHidden(source: *const Source, node: u32) bool {
+    if (source.keeps_hidden) return false;
     return node < source.hidden.bit_length and source.hidden.isSet(node);
 }
 
