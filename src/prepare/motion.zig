@@ -32,8 +32,8 @@ pub const moment_count_max = 256;
 /// Below so many, there is one more between any two.
 const moment_count_few = 64;
 
-/// Vertices of all moments at most, unless there are two.
-const vertex_count_max = 4 << 20;
+/// Vertices, nodes and pairs of triangles of all moments at most, unless there are two moments.
+const element_count_max = 4 << 20;
 
 /// Frees everything.
 pub fn deinit(motion: *Motion) void {
@@ -55,11 +55,11 @@ pub fn gather(
     const all = try timesOf(gpa, from, running);
     defer gpa.free(all);
     if (all.len == 0) return null;
-    var vertex_count: u64 = 1;
+    var element_count: u64 = from.nodes.len;
     for (parts.instances) |*instance| {
-        vertex_count += parts.meshes[instance.mesh].positions.len;
+        const mesh = &parts.meshes[instance.mesh];
+        element_count += @max(mesh.positions.len, mesh.triangles.len / 2);
     }
-    const most: usize = @intCast(std.math.clamp(vertex_count_max / vertex_count, 2, all.len));
     var motion: Motion = .{ .arena = .init(gpa), .geometry = .empty, .shift = shift };
     errdefer motion.deinit();
     var scratch_state: std.heap.ArenaAllocator = .init(gpa);
@@ -72,7 +72,7 @@ pub fn gather(
         .arrays = try plan.alloc(scratch, .{}),
         .plan = plan,
     };
-    const count = @min(most, all.len);
+    const count = momentCount(all.len, element_count);
     for (0..count) |index| {
         const place = if (count == 1) 0 else index * (all.len - 1) / (count - 1);
         try gathered.add(gpa, from, parts, textures, .{
@@ -86,6 +86,12 @@ pub fn gather(
     motion.geometry.surface_count = @intCast(gathered.triangles.items.len);
     motion.geometry.spheres = gathered.spheres.items;
     return motion;
+}
+
+/// How many of the moments are posed, each of so many elements.
+fn momentCount(all: usize, element_count: u64) usize {
+    const most = @max(2, element_count_max / @max(element_count, 1));
+    return @min(all, most);
 }
 
 const Gathered = struct {
@@ -211,6 +217,13 @@ fn testChannel(times: []const f32, values: []const f32) scene.Channel {
         .width = 3,
         .interpolation = .linear,
     } };
+}
+
+test "one moment is enough, and large scenes have two" {
+    try testing.expectEqual(1, momentCount(1, 8));
+    try testing.expectEqual(65, momentCount(65, 0));
+    try testing.expectEqual(4, momentCount(65, element_count_max / 4));
+    try testing.expectEqual(2, momentCount(65, std.math.maxInt(u64)));
 }
 
 test "moments are the keys of what runs, and the middles between few" {
