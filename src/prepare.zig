@@ -291,6 +291,7 @@ pub fn pose(
     const sharing = try shareMeshes(&posed.world, gpa, from, loaded, settings);
     var plan: flatten.Plan = try .init(gpa, sharing.flat, parts.meshes, point_size, diagnostic);
     errdefer plan.deinit(gpa);
+    try expectRoom(gpa, plan.with_room.triangle_count);
     posed.cache = .{
         .gpa = gpa,
         .sharing = sharing,
@@ -304,6 +305,21 @@ pub fn pose(
     try placeAll(&posed.world, &posed.cache, io, from, loaded, settings, diagnostic, times);
     times.prepare_ns += planned_ns;
     return posed;
+}
+
+/// Below, it is soon known without being asked.
+const expected_bytes_min = 1 << 30;
+
+/// Fails where there is no room for the tree over so many triangles and these themselves: before
+/// they are placed, which takes long where they are too many.
+fn expectRoom(gpa: Allocator, triangle_count: u32) error{OutOfMemory}!void {
+    const each = @sizeOf(world.Triangle) + bvh_wide.build_triangle_bytes;
+    const bytes = std.math.cast(usize, @as(u64, triangle_count) * each) orelse
+        return error.OutOfMemory;
+    if (bytes < expected_bytes_min) return;
+    // Not touched.
+    const room = gpa.rawAlloc(bytes, .@"64", @returnAddress()) orelse return error.OutOfMemory;
+    gpa.rawFree(room[0..bytes], .@"64", @returnAddress());
 }
 
 /// What instances share, where they do. Not inlined, see `chooseView`.
@@ -819,6 +835,15 @@ fn testThreads(from: *const Scene, lanes: u8, quality: TreeQuality) !usize {
 fn expectSameBytes(a: anytype, b: @TypeOf(a)) !void {
     try std.testing.expectEqual(a.len, b.len);
     try std.testing.expect(std.mem.eql(u8, std.mem.sliceAsBytes(a), std.mem.sliceAsBytes(b)));
+}
+
+test "room for a tree that takes long is asked for before, that for others is not" {
+    try expectRoom(std.testing.failing_allocator, 1 << 20);
+    const many = std.math.maxInt(u32);
+    try std.testing.expectError(
+        error.OutOfMemory,
+        expectRoom(std.testing.failing_allocator, many),
+    );
 }
 
 test "an empty scene has one node, a camera and the default lights" {

@@ -28,6 +28,9 @@ pub const Input = bvh_input.Input;
 pub const node_cost: f32 = 1;
 pub const pack_cost: f32 = 1;
 
+/// Bytes that a build asks for by triangle, before there is a tree.
+pub const build_triangle_bytes = @sizeOf(bvh_split.Box) + 2 * @sizeOf(bvh_build.Node);
+
 /// How many references ahead corners are fetched, and their triangles once more as many.
 const prefetch_distance = 16;
 
