@@ -382,6 +382,13 @@ test "primitives and attributes without elements" {
             .warning = "mesh 0, primitive 1: its vertices or indices are empty, not drawn",
         },
         .{
+            .changes = &.{ more, .{
+                "\"targets\":[{\"POSITION\":4}]}",
+                "\"targets\":[{\"POSITION\":4}]},{\"targets\":[{}]}",
+            } },
+            .warning = "mesh 0, primitive 1: without POSITION, not drawn",
+        },
+        .{
             .changes = &.{ more, .{ "\"NORMAL\":1", "\"NORMAL\":9" } },
             .warning = "mesh 0, primitive 0: 'NORMAL' is empty, left out",
         },
