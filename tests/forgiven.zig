@@ -269,8 +269,8 @@ test "what nothing drawn needs" {
         },
         .{
             .behind = "\"targets\":[{\"POSITION\":4}]}]}",
-            .added = ",{\"primitives\":[{\"attributes\":{\"POSITION\":4294967296}}]}",
-            .fault = "meshes[1].primitives[0].attributes.POSITION: 4294967296 names nothing, " ++
+            .added = ",{\"primitives\":[{\"attributes\":{\"POSITION\":2147483648}}]}",
+            .fault = "meshes[1].primitives[0].attributes.POSITION: 2147483648 names nothing, " ++
                 "lists have 4194304 elements at most",
         },
     }) |addition| {
