@@ -60,7 +60,9 @@ pub const exposure_ev_max = 64;
 pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4 };
 /// And where a floor catches their shadows, unless the user says.
 pub const floor_shadow_count = 16;
-/// Largest that automatic exposure chooses.
+/// What automatic exposure chooses lies between these: far enough down for surfaces in the sun, of
+/// 100,000 lx, and for lamps close by, but not so far up that what is all but black is enlarged.
+pub const exposure_auto_ev_min = -24;
 pub const exposure_auto_ev_max = 10;
 /// Measures of how far two pictures are from each other.
 pub const Metric = enum { max, rmse, psnr, ssim, flip };
@@ -247,7 +249,7 @@ pub const Exposure = union(enum) {
     default,
     /// Stops: radiance 2^-ev is white before tone mapping. |ev| <= `exposure_ev_max`.
     ev: f32,
-    /// By what the view shows, within `exposure_auto_ev_max`.
+    /// By what the view shows, between `exposure_auto_ev_min` and `exposure_auto_ev_max`.
     auto,
 };
 

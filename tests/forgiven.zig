@@ -269,8 +269,8 @@ test "what nothing drawn needs" {
         },
         .{
             .behind = "\"targets\":[{\"POSITION\":4}]}]}",
-            .added = ",{\"primitives\":[{\"attributes\":{\"POSITION\":4294967296}}]}",
-            .fault = "meshes[1].primitives[0].attributes.POSITION: 4294967296 names nothing, " ++
+            .added = ",{\"primitives\":[{\"attributes\":{\"POSITION\":2147483648}}]}",
+            .fault = "meshes[1].primitives[0].attributes.POSITION: 2147483648 names nothing, " ++
                 "lists have 4194304 elements at most",
         },
     }) |addition| {
@@ -380,6 +380,13 @@ test "primitives and attributes without elements" {
                     "\"targets\":[{}]}",
             } },
             .warning = "mesh 0, primitive 1: its vertices or indices are empty, not drawn",
+        },
+        .{
+            .changes = &.{ more, .{
+                "\"targets\":[{\"POSITION\":4}]}",
+                "\"targets\":[{\"POSITION\":4}]},{\"targets\":[{}]}",
+            } },
+            .warning = "mesh 0, primitive 1: without POSITION, not drawn",
         },
         .{
             .changes = &.{ more, .{ "\"NORMAL\":1", "\"NORMAL\":9" } },

@@ -130,3 +130,17 @@ test "what has no length, and what is nowhere, is harmless" {
     defer image.deinit(gpa);
     try expect(sum(&image, 0) > 1 and sum(&image, 0) < 12);
 }
+
+test "a scale of 0 hides points and lines" {
+    for ([_]f64{ 0, 1e-9 }) |size| {
+        var image = try render(.{
+            .positions = &.{ .{ 0, 0, 0 }, .{ 1, 0, 0 } },
+            .triangles = &.{},
+            .points = &.{1},
+            .segments = &.{.{ 0, 1 }},
+            .material = 0,
+        }, .{ size, size, size }, .{});
+        defer image.deinit(gpa);
+        try std.testing.expectEqual(size == 0, sum(&image, 0) == 0);
+    }
+}

@@ -100,6 +100,14 @@ pub fn Affine(comptime V: type) type {
                 vec.isFinite(map.translation);
         }
 
+        /// Whether all is put at one place.
+        pub fn isPoint(map: Self) bool {
+            for ([_]V{ map.x, map.y, map.z }) |axis| {
+                for (axis) |number| if (number != 0) return false;
+            }
+            return true;
+        }
+
         /// Moves by `offset`.
         pub fn translate(offset: V) Self {
             var map: Self = .identity;

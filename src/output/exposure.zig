@@ -23,8 +23,8 @@ const steps_per_stop = 100;
 
 /// What a picture shows by radiance.
 pub const Metered = struct {
-    /// The exposure for it in stops, within `settings.exposure_auto_ev_max`; 0 where it shows
-    /// nothing, or nothing that is not black.
+    /// The exposure for it in stops, within `settings.exposure_auto_ev_min` and its `max`; 0 where
+    /// it shows nothing, or nothing that is not black.
     ev: f32 = 0,
     /// Next to all of what is seen is black.
     is_black: bool = true,
@@ -71,8 +71,8 @@ fn ofBrightest(brightest: f32) f32 {
 /// The exposure of a factor above 0, rounded and within bounds.
 fn round(factor: f64) f32 {
     const ev = math.elementary.log(factor) / std.math.ln2;
-    const bound = settings.exposure_auto_ev_max;
-    const steps = @floor(std.math.clamp(ev, -bound, bound) * steps_per_stop + 0.5);
+    const within = std.math.clamp(ev, settings.exposure_auto_ev_min, settings.exposure_auto_ev_max);
+    const steps = @floor(within * steps_per_stop + 0.5);
     return @floatCast(steps / steps_per_stop);
 }
 
@@ -119,7 +119,9 @@ test "highlights are not given for shadows, nor one of many pixels for all other
 }
 
 test "bounds, black, and nothing at all" {
-    try std.testing.expectEqual(-10, try meterGrays(&.{1e30}));
+    try std.testing.expectEqual(-24, try meterGrays(&.{1e30}));
+    // The sun at noon on white: 100,000 lx.
+    try std.testing.expectApproxEqAbs(-17.4, try meterGrays(&.{31831}), 0.1);
     try std.testing.expectEqual(10, try meterGrays(&.{1e-30}));
     try std.testing.expectEqual(0, try meterGrays(&.{ 0, -1, -0.0 }));
     var values: [100]f32 = @splat(0);

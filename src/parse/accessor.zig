@@ -40,7 +40,7 @@ pub const Strided = struct {
 pub const Sparse = struct {
     /// Elements replaced, >= 1.
     count: u32,
-    /// Their indices: u8, u16 or u32, strictly increasing.
+    /// Their indices: u8, u16 or u32; where one stands twice, the last counts.
     indices: []const u8,
     index_component: Component,
     /// Their values, tightly packed.

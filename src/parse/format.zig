@@ -197,7 +197,11 @@ fn ofText(start: []const u8) ?Recognized {
         const word = trimmed[0..end];
         if (word.len == 0) continue;
         if (isOneOf(word, pbrt_words)) return .{ .format = .pbrt };
-        if (isOneOf(word, obj_words)) return .{ .format = .obj };
+        if (isOneOf(word, obj_words)) {
+            // A letter by itself may be anything; the default group is followed by more.
+            if (end == trimmed.len) continue;
+            return .{ .format = .obj };
+        }
         if (std.mem.eql(u8, word, "0") and std.mem.eql(u8, lines.next() orelse "", "SECTION"))
             return .{ .foreign = "a DXF drawing" ++ convert };
         if (std.mem.eql(u8, word, "newmtl"))
@@ -308,6 +312,7 @@ test "what is a scene is told by its contents, and by its name where these do no
         .{ .stl, two_triangles[0..150], "a.STL" },
         .{ .obj, "# v\n\n  mtllib a.mtl\r\nv 0 0 0", "a.pbrt" },
         .{ .obj, "v\t0 0 0", "" },
+        .{ .obj, "g\nv 0 0 0", "" },
         .{ .pbrt, "#!\n\tLookAt 0 0 5", "a" },
         .{ .pbrt, "WorldBegin", "" },
         .{ .pbrt, "Bang", "b.PBRT" },
@@ -316,7 +321,7 @@ test "what is a scene is told by its contents, and by its name where these do no
         errdefer std.debug.print("{s}\n", .{case[1]});
         try std.testing.expectEqual(case[0], recognize(case[1], case[2]).format);
     }
-    for ([_][]const u8{ "hello", "\x00\x01", "solid state", "vertex 0 0 0", "#", " " }) |bytes| {
+    for ([_][]const u8{ "hello", "\x00\x01", "solid state", "vertex 0 0 0", "#", "g" }) |bytes| {
         try std.testing.expectEqual(.unknown, recognize(bytes, "a.dat"));
     }
 }

@@ -110,19 +110,12 @@ fn hiddenCount(gpa: Allocator, from: *const Scene) error{OutOfMemory}!usize {
     var count: usize = 0;
     for (from.instances) |*instance| {
         const is_hidden = if (instance.skin == scene.none)
-            isPoint(maps[instance.node])
+            maps[instance.node].isPoint()
         else
             collapsed[instance.skin];
         if (is_hidden) count += 1;
     }
     return count;
-}
-
-fn isPoint(map: AffineD) bool {
-    for ([_]Vec3d{ map.x, map.y, map.z }) |axis| {
-        for (axis) |number| if (number != 0) return false;
-    }
-    return true;
 }
 
 /// Whether the joints, which were bound at several places, are all at one, or all without a size.
@@ -131,7 +124,7 @@ fn isCollapsed(skin: *const scene.Skin, maps: []const AffineD) bool {
     var bound: math.Box3 = .empty;
     var placed: math.Box3 = .empty;
     for (skin.joints, skin.inverse_bind_maps) |node, inverse_bind_map| {
-        if (!isPoint(maps[node])) has_size = true;
+        if (!maps[node].isPoint()) has_size = true;
         placed = placed.include(pose_file.round(maps[node].translation));
         const bind_map = inverse_bind_map.inverse() orelse continue;
         bound = bound.include(pose_file.round(bind_map.translation));

@@ -98,6 +98,8 @@ const Draw = struct {
     joint_maps: []const AffineD = &.{},
     /// The maps turn fronts into backs.
     mirrored: bool = false,
+    /// The maps leave nothing: points and lines, which are as wide as ever, are not drawn either.
+    is_hidden: bool = false,
     /// Colours and texture coordinates are not there from an earlier pose.
     is_colored_anew: bool = true,
 
@@ -115,6 +117,10 @@ const Draw = struct {
         draw.joint_maps = if (has_skin) pose.joint_maps[instance.skin] else &.{};
         draw.mirrored =
             if (has_skin) deform.isMirrored(draw.joint_maps) else map.determinant() < 0;
+        const placements: []const AffineD = if (has_skin) draw.joint_maps else (&map)[0..1];
+        draw.is_hidden = for (placements) |placement| {
+            if (!placement.isPoint()) break false;
+        } else true;
         draw.mesh = mesh;
         draw.maps = .of(map, draw.mirrored);
         draw.weights = if (is_morphed) instance.morph_weights else &.{};
@@ -577,14 +583,14 @@ const Work = struct {
                 const center = draw.vertex_target + @as(u32, @intCast(vertex));
                 const is_placed = work.isPlaced(center);
                 outside_count += @intFromBool(!is_placed);
-                const material = if (is_placed) mesh.material else world.none;
+                const material = if (is_placed and !draw.is_hidden) mesh.material else world.none;
                 spheres.appendAssumeCapacity(.{ .center = center, .material = material });
             }
             const shift = draw.vertex_target -% draw.vertex_source;
             for (mesh.segments) |pair| {
                 const ends: [2]u32 = .{ pair[0] +% shift, pair[1] +% shift };
                 const are_placed = work.isPlaced(ends[0]) and work.isPlaced(ends[1]);
-                const material = if (are_placed) mesh.material else world.none;
+                const material = if (are_placed and !draw.is_hidden) mesh.material else world.none;
                 segments.appendAssumeCapacity(.{ .ends = ends, .material = material });
             }
         }

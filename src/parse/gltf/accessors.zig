@@ -61,7 +61,10 @@ fn resolveAs(source: *Source, index: usize, purpose: Purpose) Error!?Accessor {
         "accessor {d}: {d} elements without data are over the limit of {d}",
         .{ index, raw.count, limits.zero_count_max },
     );
-    if (raw.is_sparse != 0) {
+    if (raw.is_sparse != 0 and raw.sparse.count == 0) {
+        if (!source.isResolved(index))
+            source.forgive("accessor {d}: no sparse values", .{index});
+    } else if (raw.is_sparse != 0) {
         accessor.sparse = (try resolveSparse(source, index, accessor, element_bytes)) orelse
             return null;
     }
@@ -92,17 +95,12 @@ fn strideOf(
         if (!fits or !is_aligned or view.stride < element_bytes) return element_bytes;
         return view.stride;
     }
-    if (view.stride < 4 or view.stride > 252) return source.fail(
-        "buffer view {d}: byteStride {d} is not in 4..252",
-        .{ view_index, view.stride },
-    );
+    const range_line = "buffer view {d}: byteStride {d} is not in 4..252";
+    if (view.stride > 252) return source.fail(range_line, .{ view_index, view.stride });
+    if (view.stride < 4) source.forgive(range_line, .{ view_index, view.stride });
     if (view.stride < element_bytes) return source.fail(
         "accessor {d}: elements of {d} bytes do not fit the byteStride {d} of buffer view {d}",
         .{ index, element_bytes, view.stride, view_index },
-    );
-    if (view.stride % accessor.component.bytes() != 0) return source.fail(
-        "accessor {d}: the byteStride {d} of buffer view {d} is no multiple of {d}",
-        .{ index, view.stride, view_index, accessor.component.bytes() },
     );
     return view.stride;
 }
@@ -151,7 +149,7 @@ fn resolveSparse(
     element_bytes: u32,
 ) Error!?accessors.Sparse {
     const raw = &Source.item(source.data.accessors, index).sparse;
-    if (raw.count == 0 or raw.count > accessor.count) return source.fail(
+    if (raw.count > accessor.count) return source.fail(
         "accessor {d}: {d} sparse values for {d} elements",
         .{ index, raw.count, accessor.count },
     );
@@ -193,18 +191,20 @@ fn resolveSparse(
 fn checkSparse(source: *Source, index: usize, count: u32, sparse: accessors.Sparse) Error!void {
     try source.charge(sparse.indices.len);
     var next: u64 = 0;
+    var increases = true;
     for (0..sparse.count) |position| {
         const target = sparse.index(position);
-        if (target < next) return source.fail(
-            "accessor {d}: sparse indices do not increase at {d}",
-            .{ index, position },
-        );
+        if (target < next) increases = false;
         if (target >= count) return source.fail(
             "accessor {d}: sparse index {d} of {d} elements",
             .{ index, target, count },
         );
         next = @as(u64, target) + 1;
     }
+    if (!increases) source.forgive(
+        "accessor {d}: sparse indices do not increase; of those for one element the last counts",
+        .{index},
+    );
 }
 
 /// `length` bytes of a view from `offset`; null where its buffer has no data.
@@ -225,7 +225,8 @@ fn range(
         .{ index, part, excess, viewIndex(source, view) },
     );
     const start = @as(u64, view.offset) +| offset;
-    if (start % alignment != 0) return source.fail(
+    // Bytes are read one by one.
+    if (start % alignment != 0 and !source.isResolved(index)) source.forgive(
         "accessor {d}: {s}byte {d} of buffer {d} is not aligned to {d} bytes",
         .{ index, part, start, bufferIndex(source, view), alignment },
     );

@@ -122,6 +122,10 @@ const Version = struct { major: u32, minor: u32 };
 
 fn parseVersion(source: *const Source, key: []const u8, raw: [*c]const u8) Error!Version {
     const text = std.mem.span(@as([*:0]const u8, raw));
+    if (parseDigits(text)) |major| if (text.len > 0) {
+        source.forgive("asset.{s}: {f} is taken as {d}.0", .{ key, diagnostic.quote(text), major });
+        return .{ .major = major, .minor = 0 };
+    };
     return splitVersion(text) orelse source.fail("asset.{s}: {f} is not a version", .{
         key, diagnostic.quote(text),
     });

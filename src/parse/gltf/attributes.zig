@@ -45,9 +45,6 @@ pub fn find(source: *Source, primitive: *const c.cgltf_primitive, place: Place) 
     } else return .{};
     var used: Used = .{ .is_draco = try draco_meshes.decode(source, primitive, place) };
     const positions = try required(source, position);
-    if (positions.base == null and positions.sparse == null)
-        return source.fail("accessor {d}: positions without data", .{position});
-
     used.vertex_count = positions.count;
     for (list) |*attribute| {
         const index = accessorIndex(source, attribute);
@@ -195,6 +192,15 @@ pub fn directions(source: *Source, index: u32) Error!Accessor {
     return accessor;
 }
 
+/// An accessor of colours, whose whole numbers are normalised: some writers do not say so.
+pub fn colors(source: *Source, index: u32) Error!Accessor {
+    var accessor = try required(source, index);
+    if (accessor.component == .f32 or accessor.normalized) return accessor;
+    source.forgive("accessor {d}: colours in whole numbers, taken as normalised", .{index});
+    accessor.normalized = true;
+    return accessor;
+}
+
 fn accessorIndex(source: *const Source, attribute: *const c.cgltf_attribute) u32 {
     return Source.indexOf(source.data.accessors, attribute.data);
 }
@@ -302,7 +308,9 @@ fn kindOf(accessor: Accessor, attribute: c.cgltf_attribute_type) Kind {
             .quantized
         else
             .wrong,
-        // Colours and weights.
+        // Whether it says so or not: see `colors`.
+        .color => if (small_unsigned) .core else .wrong,
+        // Weights.
         else => if (small_unsigned and accessor.normalized) .core else .wrong,
     };
 }

@@ -24,6 +24,12 @@ pub fn checkRest(source: *const Source) Error!void {
             "buffer view {d}: byteStride {d} is no multiple of 4",
             .{ index, view.stride },
         );
+        const extent: Extent = .of(source, view);
+        const byte_length = view.buffer[0].size;
+        if (extent.excess() == 0 and extent.end() > byte_length) source.forgive(
+            "buffer view {d}: {d} bytes past the byteLength of its buffer {d}, where more is",
+            .{ index, extent.end() - byte_length, extent.buffer },
+        );
     }
 }
 
@@ -49,29 +55,36 @@ fn check(source: *const Source, view: *const c.cgltf_buffer_view, index: usize) 
 /// A run of bytes in a buffer.
 const Extent = struct {
     buffer: u32,
+    /// As its byteLength says, or more where there is more.
     buffer_bytes: u64,
     offset: u64,
     size: u64,
 
     /// Of a buffer view, or of the compressed data of one.
     fn of(source: *const Source, part: anytype) Extent {
+        const buffer = Source.indexOf(source.data.buffers, part.buffer);
+        const there = if (source.buffers[buffer]) |known| known.len else 0;
         return .{
-            .buffer = Source.indexOf(source.data.buffers, part.buffer),
-            .buffer_bytes = part.buffer[0].size,
+            .buffer = buffer,
+            .buffer_bytes = @max(part.buffer[0].size, there),
             .offset = part.offset,
             .size = part.size,
         };
     }
 
+    fn end(extent: Extent) u64 {
+        return extent.offset +| extent.size;
+    }
+
     /// How many of its bytes are past the buffer's end.
     fn excess(extent: Extent) u64 {
-        return (extent.offset +| extent.size) -| extent.buffer_bytes;
+        return extent.end() -| extent.buffer_bytes;
     }
 
     /// Null where the buffer has no data; fails where it has less than it says.
     fn bytes(extent: Extent, source: *const Source) Error!?[]const u8 {
         const buffer = source.buffers[extent.buffer] orelse return null;
-        if (extent.offset + extent.size > buffer.len) return source.fail(
+        if (extent.end() > buffer.len) return source.fail(
             "buffer {d}: has {d} bytes, its byteLength is {d}",
             .{ extent.buffer, buffer.len, extent.buffer_bytes },
         );

@@ -1,8 +1,9 @@
 //! The bytes of glTF's buffers: from the GLB, from data URIs, from files beside the scene.
 //!
-//! In: the document, the GLB's binary chunk, the files of the scene. Out: for each buffer as many
-//! bytes as its byteLength says (glTF 2.0, section 3.6.1), or those that there are. One that cannot
-//! be had is left out of the document: who needs it fails. Images: textures.zig.
+//! In: the document, the GLB's binary chunk, the files of the scene. Out: for each buffer the bytes
+//! that there are, which may be more or fewer than its byteLength says (glTF 2.0, section 3.6.1:
+//! padding; files that are slightly wrong). One that cannot be had is left out of the document: who
+//! needs it fails. Images: textures.zig.
 
 const std = @import("std");
 const buffer_views = @import("buffer_views.zig");
@@ -23,7 +24,7 @@ const quote = diagnostic_data.quote;
 const Buffers = @This();
 
 gpa: Allocator,
-/// As many bytes as byteLength says, or all there are; null where the file gives none.
+/// All bytes that there are, also beyond byteLength; null where the file gives none.
 list: []?[]const u8,
 /// What `list` points into, other than the GLB.
 owned: std.ArrayList([:0]const u8) = .empty,
@@ -89,10 +90,9 @@ const Reader = struct {
 
     fn read(reader: Reader, binary: ?[]const u8) Error!?[]const u8 {
         if (reader.raw.size == 0) return reader.fail("byteLength is 0", .{});
-        if (reader.raw.uri != null) return reader.whole(try reader.fromUri());
+        if (reader.raw.uri != null) return try reader.fromUri();
         // A buffer without URI is the GLB's if it is the first, else an extension's.
-        if (reader.index == 0) if (binary) |bytes| return reader.whole(bytes);
-        return null;
+        return if (reader.index == 0) binary else null;
     }
 
     /// Whether the error is one that counts whoever needs the file.
@@ -145,10 +145,5 @@ const Reader = struct {
             return reader.diagnostic.fail(err, "buffer {d}: {f} {s}", parts);
         };
         return reader.own(file.bytes);
-    }
-
-    /// As many of the bytes as byteLength says, or as there are.
-    fn whole(reader: Reader, bytes: []const u8) []const u8 {
-        return bytes[0..@intCast(@min(bytes.len, reader.raw.size))];
     }
 };

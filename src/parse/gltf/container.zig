@@ -43,15 +43,27 @@ fn openBinary(bytes: []const u8, diagnostic: *Diagnostic) error{InvalidInput}!Co
     if (version != 2)
         return diagnostic.invalid("GLB version {d} is not supported, only 2", .{version});
     const length = readU32(bytes, 8);
-    if (length > bytes.len)
-        return diagnostic.invalid("GLB is cut short: {d} bytes of {d}", .{ bytes.len, length });
-    const chunks = try readChunks(bytes, length, diagnostic);
-    const end = @max(length, chunks.end);
+    const is_cut = length > bytes.len;
+    // Streams are written before their length is known: some have 0 there, or all bits.
+    const is_wrong = is_cut or length < header_bytes + chunk_header_bytes;
+    const declared = if (is_wrong) bytes.len else length;
+    const chunks = readChunks(bytes, declared, !is_cut, diagnostic) catch |err|
+        return if (is_cut) cutShort(bytes, length, diagnostic) else err;
+    if (is_cut and chunks.container.binary == null) return cutShort(bytes, length, diagnostic);
+    if (is_wrong or chunks.end > declared) diagnostic.forgive(
+        "the GLB's chunks end at {d} bytes, its header says {d}",
+        .{ chunks.end, length },
+    );
+    const end = @max(declared, chunks.end);
     if (end < bytes.len) diagnostic.forgive(
         "{d} bytes behind the end of the GLB are ignored",
         .{bytes.len - end},
     );
     return chunks.container;
+}
+
+fn cutShort(bytes: []const u8, length: u32, diagnostic: *Diagnostic) error{InvalidInput} {
+    return diagnostic.invalid("GLB is cut short: {d} bytes of {d}", .{ bytes.len, length });
 }
 
 const Chunks = struct {
@@ -60,10 +72,12 @@ const Chunks = struct {
     end: usize,
 };
 
-/// Reads the chunks that begin before `declared`, the length that the header gives.
+/// Reads the chunks that begin before `declared`, the length that the header gives. Where all bytes
+/// are there (`is_whole_file`), a binary chunk that says that it is longer ends with them.
 fn readChunks(
     bytes: []const u8,
     declared: usize,
+    is_whole_file: bool,
     diagnostic: *Diagnostic,
 ) error{InvalidInput}!Chunks {
     var json: ?[]const u8 = null;
@@ -73,10 +87,17 @@ fn readChunks(
     var index: usize = 0;
     while (offset < declared) : (index += 1) {
         const left = bytes.len - offset;
-        const length = if (left < chunk_header_bytes) left else readU32(bytes, offset);
+        var length: usize = if (left < chunk_header_bytes) left else readU32(bytes, offset);
         const kind = if (left < chunk_header_bytes) 0 else readU32(bytes, offset + 4);
         const is_known = kind == json_type or kind == binary_type;
-        const is_whole = left >= chunk_header_bytes and length <= left - chunk_header_bytes;
+        var is_whole = left >= chunk_header_bytes and length <= left - chunk_header_bytes;
+        if (!is_whole and index > 0 and kind == binary_type and is_whole_file) {
+            diagnostic.forgive("GLB chunk {d}: {d} bytes past the end", .{
+                index, length - (left - chunk_header_bytes),
+            });
+            length = left - chunk_header_bytes;
+            is_whole = true;
+        }
         if (!is_whole and index > 0 and !is_known) {
             diagnostic.forgive("{d} bytes behind the last chunk of the GLB are ignored", .{
                 declared - offset,
@@ -96,10 +117,6 @@ fn readChunks(
         // Further chunks of a kind that is not known have to be passed over.
         if (kind == binary_type and binary == null) binary = content;
     }
-    if (end > declared) diagnostic.forgive(
-        "the GLB's chunks end at {d} bytes, its header says {d}",
-        .{ end, declared },
-    );
     return .{ .end = end, .container = .{
         .json = json orelse return diagnostic.invalid("GLB does not begin with a JSON chunk", .{}),
         .binary = binary,
@@ -179,11 +196,11 @@ test "lengths and kinds of chunks" {
     const bad = [_][]const u8{
         "",
         "glTF",
-        header ++ "\x00\x00\x00\x00" ++ chunk,
+        header ++ "\x1c\x00\x00\x00" ++ chunk,
         header ++ "\x18\x00\x00\x00" ++ "\x04\x00\x00\x00BIN\x00{}  ",
         header ++ "\x18\x00\x00\x00" ++ "\x08\x00\x00\x00JSON{}  ",
         header ++ "\x1f\x00\x00\x00" ++ "\x03\x00\x00\x00JSON{}  1234567",
-        header ++ "\x20\x00\x00\x00" ++ chunk ++ "\x01\x00\x00\x00BIN\x00",
+        header ++ "\x21\x00\x00\x00" ++ chunk ++ "\x01\x00\x00\x00BIN\x00",
     };
     for (bad) |bytes| {
         var diagnostic: Diagnostic = .{};
@@ -238,7 +255,20 @@ test "padding that is missing or not counted, and bytes behind the last chunk" {
             .binary = null,
         },
         .{ .length = 25, .chunks = "\x04\x00\x00\x00JSON{}   ", .binary = null },
-        // Its header says less than there is.
+        // Its header says nothing.
+        .{ .length = 0, .chunks = "\x04\x00\x00\x00JSON{}  ", .binary = null },
+        // It says more than there is, or its last chunk does.
+        .{
+            .length = 255,
+            .chunks = "\x04\x00\x00\x00JSON{}  \x04\x00\x00\x00BIN\x001234",
+            .binary = "1234",
+        },
+        .{
+            .length = 36,
+            .chunks = "\x04\x00\x00\x00JSON{}  \x08\x00\x00\x00BIN\x001234",
+            .binary = "1234",
+        },
+        // It says less than there is.
         .{ .length = 19, .chunks = "\x04\x00\x00\x00JSON{}  ", .binary = null },
         .{
             .length = 35,

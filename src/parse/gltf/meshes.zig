@@ -163,6 +163,8 @@ pub fn get(meshes: *Meshes, mesh_index: u32, deformation: Deformation) Error!Ran
     const builder = meshes.source.builder;
     const first: u32 = @intCast(builder.meshes.items.len);
     var range: Range = .{ .first = first, .count = 0, .joint_max = 0 };
+    if (mesh.primitives_count == 0)
+        meshes.source.forgive("mesh {d}: has no primitives", .{mesh_index});
     for (Source.slice(mesh.primitives, mesh.primitives_count), 0..) |*primitive, index| {
         const place: Place = .{ .mesh = mesh_index, .primitive = @intCast(index) };
         const decoded = meshes.decode(primitive, place) catch |err| {
@@ -458,7 +460,7 @@ fn decodeRgba(
     other: [4]f32,
 ) Error![][4]f32 {
     const source = meshes.source;
-    const accessor = try attributes.required(source, index);
+    const accessor = try attributes.colors(source, index);
     try source.charge(@as(u64, accessor.count) * @sizeOf([4]f32));
     const colors = try source.arena.alloc([4]f32, accessor.count);
     const not_finite = if (accessor.component_count == 4)

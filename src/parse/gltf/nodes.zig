@@ -192,12 +192,14 @@ fn localTransform(source: *const Source, index: u32) Error!AffineD {
             .{index},
         );
         const m = numbers.matrix;
+        var is_affine = true;
         for ([4]f64{ m[3], m[7], m[11], m[15] }, [4]f64{ 0, 0, 0, 1 }) |value, wanted| {
-            if (!(@abs(value - wanted) <= 1e-5)) return source.fail(
-                "node {d}: matrix is not affine, its last row is {d} {d} {d} {d}",
-                .{ index, m[3], m[7], m[11], m[15] },
-            );
+            if (!(@abs(value - wanted) <= 1e-5)) is_affine = false;
         }
+        if (!is_affine) source.forgive(
+            "node {d}: matrix is not affine, its last row is {d} {d} {d} {d}, ignored",
+            .{ index, m[3], m[7], m[11], m[15] },
+        );
         local = .{
             .x = m[0..3].*,
             .y = m[4..7].*,

@@ -55,7 +55,7 @@ pub const document: Rule = object(&.{
     optional("meshes", list(.meshes, &mesh)),
     optional("nodes", list(.nodes, &node)),
     optional("samplers", list(.samplers, &sampler)),
-    optional("scene", reference(.scenes)),
+    spare("scene", reference(.scenes)),
     optional("scenes", list(.scenes, &scene)),
     optional("skins", list(.skins, &skin)),
     optional("textures", list(.textures, &texture)),
@@ -175,7 +175,7 @@ const image_based_light: Rule = named(&.{
 });
 
 const light: Rule = named(&.{
-    required("type", .string),
+    optional("type", .string),
     optional("color", .{ .vector = 3 }),
     optional("intensity", .number),
     optional("range", .positive),
@@ -186,12 +186,12 @@ const light: Rule = named(&.{
 });
 
 const mesh: Rule = named(&.{
-    required("primitives", many(&primitive)),
+    optional("primitives", many(&primitive)),
     optional("weights", many(&.number)),
 });
 
 const primitive: Rule = namedWith(&.{
-    required("attributes", attributes),
+    optional("attributes", attributes),
     optional("indices", reference(.accessors)),
     optional("material", reference(.materials)),
     optional("mode", .whole),

@@ -88,7 +88,7 @@ fn checkNode(skins: *Skins, node: *const c.cgltf_node) Error!void {
     const data = skins.source.data;
     const facts = try skins.get(Source.indexOf(data.meshes, mesh));
     const index = Source.indexOf(data.nodes, node);
-    try checkWeights(skins.source, "node", index, node.weights_count, facts.target_count);
+    checkWeights(skins.source, "node", index, node.weights_count, facts.target_count);
 }
 
 /// Notes what the drawn nodes ask of their meshes, at rest or when they move. `origins` are the
@@ -108,7 +108,7 @@ pub fn collect(
         const facts = try skins.get(Source.indexOf(data.meshes, mesh));
         const deformation = &facts.deformation;
         if (node.skin != null) deformation.has_skin = true;
-        for (weightsOf(node), 0..) |weight, target| {
+        for (weightsOf(node, facts.target_count), 0..) |weight, target| {
             if (math.flushDenormal(weight) != 0) try skins.want(facts, target);
         }
         for (animations.targetsOf(origin)) |list| if (list) |moves| {
@@ -145,9 +145,8 @@ pub fn instanceWeights(skins: *Skins, node: *const c.cgltf_node) Error![]const f
     if (!is_own) if (facts.weights) |weights| return weights;
     const weights = try source.arena.alloc(f32, facts.target_count);
     @memset(weights, 0);
-    for (weights[0..weightsOf(node).len], weightsOf(node)) |*to, weight| {
-        to.* = math.flushDenormal(weight);
-    }
+    const given = weightsOf(node, weights.len);
+    for (weights[0..given.len], given) |*to, weight| to.* = math.flushDenormal(weight);
     if (!is_own) facts.weights = weights;
     return weights;
 }
@@ -216,10 +215,13 @@ fn decodeMatrices(skins: *Skins, index: u32, accessor_index: u32, maps: []Affine
     );
 }
 
-/// A node's weights, or those of its mesh where it has none.
-fn weightsOf(node: *const c.cgltf_node) []const f32 {
-    if (node.weights_count > 0) return Source.slice(node.weights, node.weights_count);
-    return Source.slice(node.mesh[0].weights, node.mesh[0].weights_count);
+/// A node's weights, or those of its mesh where it has none; not more than there are targets.
+fn weightsOf(node: *const c.cgltf_node, target_count: usize) []const f32 {
+    const list = if (node.weights_count > 0)
+        Source.slice(node.weights, node.weights_count)
+    else
+        Source.slice(node.mesh[0].weights, node.mesh[0].weights_count);
+    return list[0..@min(list.len, target_count)];
 }
 
 /// Valid until the next mesh is met.
@@ -236,7 +238,7 @@ fn get(skins: *Skins, mesh_index: u32) Error!*Facts {
             .{ mesh_index, facts.target_count, primitive.targets_count },
         );
     }
-    try checkWeights(source, "mesh", mesh_index, mesh.weights_count, facts.target_count);
+    checkWeights(source, "mesh", mesh_index, mesh.weights_count, facts.target_count);
     try skins.known.put(source.gpa, mesh_index, facts);
     return skins.known.getPtr(mesh_index).?;
 }
@@ -247,9 +249,9 @@ fn checkWeights(
     index: usize,
     weight_count: usize,
     target_count: usize,
-) Error!void {
-    if (weight_count != 0 and weight_count != target_count) return source.fail(
-        "{s} {d}: {d} weights for {d} morph targets",
+) void {
+    if (weight_count != 0 and weight_count != target_count) source.forgive(
+        "{s} {d}: {d} weights for {d} morph targets, others count as 0",
         .{ owner, index, weight_count, target_count },
     );
 }

@@ -12,6 +12,7 @@ const scene = @import("../../scene.zig");
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
 const Allocator = std.mem.Allocator;
 const Lenience = @import("../json/lenience.zig");
+const Message = @import("../../diagnostic.zig").Message;
 const assert = std.debug.assert;
 const Source = @This();
 
@@ -20,7 +21,7 @@ gpa: Allocator,
 builder: *scene.Builder,
 arena: Allocator,
 data: *const c.cgltf_data,
-/// Bytes of each buffer, as many as its byteLength says; null where the file gives none.
+/// All bytes of each buffer that there are; null where the file gives none.
 buffers: []const ?[]const u8 = &.{},
 /// Contents of the buffer views that have been decompressed.
 decompressed: std.AutoHashMapUnmanaged(u32, []align(4) const u8) = .empty,
@@ -35,7 +36,7 @@ lenience: *const Lenience,
 force: bool = false,
 /// Bytes that decoded vertices and triangles may still take, and undrawn ones that are looked at.
 decoded_bytes_left: u64 = 0,
-/// Accessors that have been resolved, their sparse indices in order and in range.
+/// Accessors that have been resolved, their sparse indices in range.
 resolved: std.DynamicBitSetUnmanaged = .{},
 /// Nodes of the scene that are not shown (KHR_node_visibility), if there are any.
 hidden: std.DynamicBitSetUnmanaged = .{},
@@ -101,11 +102,27 @@ pub fn findBroken(source: *const Source, list: schema.List, index: usize) ?Lenie
 
 /// Makes an error of what is not drawn, or must not stop the rest, a warning.
 pub fn excuse(source: *const Source, err: Error) Error!void {
+    const said = try source.takeMessage(err);
+    source.forgiveUnneeded(said.text());
+}
+
+/// Makes an error of what can be done without a warning.
+pub fn leaveOut(source: *const Source, err: Error) Error!void {
+    const said = try source.takeMessage(err);
+    source.forgiveLeftOut(said.text());
+}
+
+/// Says why something is left out.
+pub fn forgiveLeftOut(source: *const Source, reason: []const u8) void {
+    source.forgive("{s}; left out", .{reason});
+}
+
+fn takeMessage(source: *const Source, err: Error) Error!Message {
     if (err == error.OutOfMemory) return err;
     const diagnostic = source.diagnostic;
     const said = diagnostic.message;
     if (!diagnostic.refused) diagnostic.message.set("", .{});
-    source.forgiveUnneeded(said.text());
+    return said;
 }
 
 /// Says what is wrong with what is not drawn.

@@ -25,7 +25,6 @@ pub fn readCamera(
     node: u32,
 ) Error!scene.Camera {
     const index = Source.indexOf(source.data.cameras, raw);
-    try source.need(.cameras, index);
     const projection: scene.Camera.Projection = switch (raw.type) {
         .perspective => projection: {
             const perspective = &raw.data.perspective;
@@ -35,10 +34,11 @@ pub fn readCamera(
                 "camera {d}: yfov {d} is not between 0 and pi",
                 .{ index, y_fov_rad },
             );
-            const has_aspect = perspective.has_aspect_ratio != 0;
             const aspect = perspective.aspect_ratio;
-            if (has_aspect and !(aspect >= std.math.floatMin(f32))) return source.fail(
-                "camera {d}: aspectRatio {d} is not above 0",
+            const is_aspect = aspect >= std.math.floatMin(f32);
+            const has_aspect = perspective.has_aspect_ratio != 0 and is_aspect;
+            if (perspective.has_aspect_ratio != 0 and !is_aspect) source.forgive(
+                "camera {d}: aspectRatio {d} is not above 0, ignored",
                 .{ index, aspect },
             );
             const far_ok = perspective.has_zfar == 0 or perspective.zfar > perspective.znear;

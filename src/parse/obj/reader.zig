@@ -114,7 +114,24 @@ pub fn run(reader: *Reader) Resources.Error!void {
             .g, .o, .mg => {},
         }
     }
+    if (reader.elements.items.len == 0) try reader.showVertices();
     reader.sayFaults();
+}
+
+/// Vertices that nothing connects are a cloud of points, which scanners write without "p".
+fn showVertices(reader: *Reader) Allocator.Error!void {
+    for (reader.positions.items, 0..) |position, vertex| {
+        if (!math.vec3.isFinite(position)) continue;
+        try reader.corners.append(reader.gpa, .{ .position = @intCast(vertex) });
+    }
+    const count = reader.corners.items.len;
+    if (count > 0) try reader.elements.append(reader.gpa, .{
+        .kind = .points,
+        .first = 0,
+        .count = @intCast(count),
+        .material = reader.material,
+        .smoothing = 0,
+    });
 }
 
 fn passOver(reader: *Reader, word: []const u8, start: usize) void {
@@ -290,4 +307,20 @@ inline fn index(reader: *Reader, start: usize) Resources.Error!?i64 {
 inline fn resolve(value: i64, count: usize) ?u32 {
     const from_zero = if (value < 0) value + @as(i64, @intCast(count)) else value - 1;
     return if (from_zero >= 0 and from_zero < count) @intCast(from_zero) else null;
+}
+
+test "vertices alone are points, those with faces are not" {
+    const gpa = std.testing.allocator;
+    for ([_][:0]const u8{
+        "v 0 0 0 1 0 0\nv nan 0 0\nv 1 2 3\n",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    }, [_]Element.Kind{ .points, .face }, [_]u32{ 2, 3 }) |text, kind, count| {
+        var said: Diagnostic = .{};
+        var reader: Reader = .{ .gpa = gpa, .words = .{ .text = text }, .diagnostic = &said };
+        defer reader.deinit();
+        try reader.run();
+        try std.testing.expectEqual(1, reader.elements.items.len);
+        try std.testing.expectEqual(kind, reader.elements.items[0].kind);
+        try std.testing.expectEqual(count, reader.elements.items[0].count);
+    }
 }
