@@ -19,6 +19,9 @@ pub const Account = struct {
     /// Bytes of the last refused request, and how many were out by then.
     refused: std.atomic.Value(usize) = .init(0),
     refused_at: std.atomic.Value(usize) = .init(0),
+    /// Bytes of the last request that the child did not have, and how many were out by then.
+    missing: std.atomic.Value(usize) = .init(0),
+    missing_at: std.atomic.Value(usize) = .init(0),
 
     /// Null: as much as the child has.
     pub fn init(child: Allocator, limit: ?u64) Account {
@@ -40,11 +43,21 @@ pub const Account = struct {
     /// Says why there was no memory: this account's limit, or the system.
     pub fn explain(account: *const Account, message: *Message) void {
         const refused = account.refused.load(.acquire);
-        if (refused == 0) return message.set("out of memory", .{});
+        if (refused == 0) return account.explainMissing(message);
         const used = account.refused_at.load(.monotonic);
         message.set(
             "needs more than the {f} of --max-memory ({f} in use, {f} more asked for)",
             .{ inUnits(account.limit), inUnits(used), inUnits(refused) },
+        );
+    }
+
+    fn explainMissing(account: *const Account, message: *Message) void {
+        const missing = account.missing.load(.acquire);
+        if (missing == 0) return message.set("out of memory", .{});
+        const used = account.missing_at.load(.monotonic);
+        message.set(
+            "out of memory ({f} in use, {f} more asked for)",
+            .{ inUnits(used), inUnits(missing) },
         );
     }
 
@@ -70,7 +83,11 @@ pub const Account = struct {
         const account: *Account = @ptrCast(@alignCast(context));
         if (!account.take(len)) return null;
         const memory = account.child.rawAlloc(len, alignment, address);
-        if (memory == null) account.giveBack(len);
+        if (memory == null) {
+            account.giveBack(len);
+            account.missing_at.store(account.used.load(.monotonic), .monotonic);
+            account.missing.store(len, .release);
+        }
         return memory;
     }
 
@@ -225,7 +242,10 @@ test "an account counts, refuses and forgets nothing" {
     var unlimited: Account = .init(failing.allocator(), null);
     try std.testing.expectError(error.OutOfMemory, unlimited.allocator().alloc(u8, 1));
     unlimited.explain(&message);
-    try std.testing.expectEqualStrings("out of memory", message.text());
+    try std.testing.expectEqualStrings(
+        "out of memory (0 bytes in use, 1 bytes more asked for)",
+        message.text(),
+    );
     try std.testing.expectEqual(0, unlimited.used.load(.monotonic));
 }
 
