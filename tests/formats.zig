@@ -170,6 +170,46 @@ test "OBJ: colours of vertices, lines and points, lines that end as on any syste
     try expectEqual([4]f32{ 1, 1, 1, 1 }, scene.materials[0].base_color);
 }
 
+test "OBJ: vertices alone are a cloud of points" {
+    var scene = try expectForgiven(
+        "1 faces, lines or points with places that are not finite are left out",
+        "a.obj",
+        "v 0 0 0 1 0 0\nv 1.#QNAN -1.#IND 0 1 0 0\nv 1 0 0 0 1 0\n",
+    );
+    defer scene.deinit();
+    try std.testing.expectEqualSlices(u32, &.{ 0, 1 }, scene.meshes[0].points);
+    try expectEqual([4]f32{ 0, 1, 0, 1 }, scene.meshes[0].colors.?[1]);
+}
+
+test "MTL: a byte order mark, quotes and comments about names, statements in any case" {
+    var folder = std.testing.tmpDir(.{});
+    defer folder.cleanup();
+    try folder.dir.writeFile(io, .{
+        .sub_path = "a b.mtl",
+        .data = "\xef\xbb\xbfnewmtl m\r\nkd 1 0 0\r\nmap_kd \"c d.png\"\r\n",
+    });
+    try folder.dir.writeFile(io, .{ .sub_path = "c d.png", .data = "image" });
+    const text = "mtllib \"a b.mtl\"\nusemtl m # red\nv 0 0 0\nv 1 0 0\n" ++
+        "v 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";
+    var said: Diagnostic = .{};
+    var scene = try readIn(folder.dir, "a.obj", text, &said);
+    defer scene.deinit();
+    try expectEqual(0, said.warning_count);
+    try expectEqual([4]f32{ 1, 0, 0, 1 }, scene.materials[0].base_color);
+    try std.testing.expectEqualStrings("image", scene.images[0].bytes);
+}
+
+test "STL: lines that end in returns alone; PLY: a byte order mark" {
+    var text = try readClean("a.stl", "solid a\rfacet normal 1.#IND 0 0\router loop\r" ++
+        "vertex 0 0 0\rvertex 1 0 0\rvertex 0 1 0\rendloop\rendfacet\rendsolid a\r");
+    defer text.deinit();
+    try expectEqual(1, text.triangleCount());
+    var points = try readClean("a", "\xef\xbb\xbf" ++ ply_vertices ++
+        "end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n");
+    defer points.deinit();
+    try expectEqual(4, points.meshes[0].points.len);
+}
+
 test "OBJ: what is wrong is an error with its line" {
     const corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
     try expectError("line 4: vertex 4 of 3", "a.obj", corners ++ "f 1 2 4");
@@ -205,7 +245,7 @@ test "OBJ: what can be left out is" {
             "vn 0 nan 0",
             1,
         },
-        .{ "line 6: 'quux' is no statement of OBJ, ignored, as 0 others are", "quux 1", 1 },
+        .{ "line 6: 'quux' is no statement of OBJ, ignored: 1 of them", "quux 1", 1 },
     }) |case| {
         var buffer: [200]u8 = undefined;
         const text = try std.mem.print(&buffer, "{s}f 1 2 3\n{s}", .{ corners, case[1] });
@@ -439,11 +479,22 @@ test "STL: what is wrong" {
     longer.deinit();
     std.mem.writeInt(u32, bytes[80..84], 0, .little);
     var uncounted =
-        try expectForgiven("STL claims no triangles, all 2 are read", "a.stl", &bytes);
+        try expectForgiven("STL claims 0 triangles, all 2 are read", "a.stl", &bytes);
     defer uncounted.deinit();
     try expectEqual(2, uncounted.triangleCount());
     std.mem.writeInt(u32, bytes[80..84], std.math.maxInt(u32), .little);
-    try expectError("STL claims 4294967295 triangles, its 184 bytes hold 2", "a.stl", &bytes);
+    var unknown = try expectForgiven(
+        "STL claims 4294967295 triangles, all 2 are read",
+        "a.stl",
+        &bytes,
+    );
+    defer unknown.deinit();
+    try expectEqual(2, unknown.triangleCount());
+    try expectError(
+        "STL claims 4294967295 triangles, its 183 bytes hold 1",
+        "a.stl",
+        bytes[0..183],
+    );
     std.mem.writeInt(u32, bytes[80..84], 2, .little);
     std.mem.writeInt(u32, bytes[100..104], 0x7fc00000, .little);
     var broken = try expectForgiven(

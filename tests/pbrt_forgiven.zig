@@ -368,6 +368,114 @@ test "a material may be named before it is defined" {
     for (0..2) |index| try expectEqual(Vec3{ 0, 1, 0 }, colorOf(&scene, index));
 }
 
+test "an object may be instanced before it is defined, and is left out where it never is" {
+    var folder: Folder = .make();
+    defer folder.free();
+    const early = start ++ "Translate 1 0 0 ObjectInstance \"o\" Identity " ++
+        "ObjectBegin \"o\" Shape \"disk\" ObjectEnd ";
+    var scene = try folder.readClean(early);
+    defer scene.deinit();
+    try expectEqual(1, scene.instances.len);
+    try expectEqual(1, scene.nodes[scene.instances[0].node].local.translation[0]);
+    var without = try folder.readForgiven(
+        early ++ "\nObjectInstance \"x\" ObjectInstance \"x\" ObjectInstance \"y\"",
+        "",
+        "line 2: no object 'x': it is left out",
+    );
+    defer without.deinit();
+    try expectEqual(1, without.instances.len);
+}
+
+test "backslashes in names of files are slashes, but lead nowhere else" {
+    var folder: Folder = .make();
+    defer folder.free();
+    try folder.temporary.dir.createDir(io, "in", .default_dir);
+    try folder.write("in/a.pbrt", mesh ++ indices);
+    try folder.write("in/a.spd", "400 1 700 1");
+    for ([_][]const u8{ "Include \"in\\a.pbrt\"", "Import \".\\in\\a.pbrt\"" }) |text| {
+        var buffers: [2][200]u8 = undefined;
+        const whole = try std.mem.print(&buffers[0], "{s}{s}", .{ start, text });
+        const said = try std.mem.print(&buffers[1], "'{s}': backslashes are taken as slashes", .{
+            text[std.mem.findScalar(u8, text, '"').? + 1 .. text.len - 1],
+        });
+        var scene = try folder.readForgiven(whole, "line 1: ", said);
+        defer scene.deinit();
+        try expectEqual(2, scene.triangleCount());
+    }
+    const outside = folder.read(start ++ "Include \"..\\a.pbrt\"", false);
+    try std.testing.expectError(error.InvalidInput, outside);
+    var image = try folder.read(start ++ "LightSource \"infinite\" \"string filename\" " ++
+        "\"in\\a.spd\" Shape \"disk\"", false);
+    defer image.deinit();
+    try expectEqual(1, image.images.len);
+}
+
+test "lists of a mesh that do not fit are left out, spectra come in any order" {
+    var folder: Folder = .make();
+    defer folder.free();
+    const cases = [_]struct { []const u8, []const u8 }{
+        .{ "\"normal N\" [0 0 1]", "trianglemesh: has 1 normals N for 4 points" },
+        .{
+            "\"integer indices\" [0 1 2 0 2 3 1]",
+            "trianglemesh: 7 indices make no whole triangles",
+        },
+    };
+    for (cases) |case| {
+        var buffer: [300]u8 = undefined;
+        const text = try std.mem.print(&buffer, "{s}{s}{s}{s}", .{ start, mesh, indices, case[0] });
+        var scene = try folder.readForgiven(text, "line 1: ", case[1]);
+        defer scene.deinit();
+        try expectEqual(2, scene.triangleCount());
+        try expectEqual(null, scene.meshes[0].normals);
+    }
+    var empty = try folder.readClean(start ++ "Shape \"trianglemesh\" \"point3 P\" [] " ++
+        "\"integer indices\" [] Shape \"disk\"");
+    defer empty.deinit();
+    try expectEqual(32, empty.triangleCount());
+    try folder.write("a.spd", "400,0\r\n500,.8 # c\r\n600,0");
+    try folder.write("b.spd", "600 0 500 .8 400 0 400 1 700");
+    const shape = " Shape \"disk\"";
+    const named = start ++ "Material \"matte\" \"spectrum Kd\" ";
+    var sorted = try folder.readClean(named ++ "\"a.spd\"" ++ shape);
+    defer sorted.deinit();
+    for ([_][]const u8{ "\"b.spd\"", "[600 0 500 .8 400 0 400 1]" }) |values| {
+        var buffer: [300]u8 = undefined;
+        const text = try std.mem.print(&buffer, "{s}{s}{s}", .{ named, values, shape });
+        const said = "a spectrum is pairs of rising wavelengths and values";
+        var scene = try folder.readForgiven(text, "line 1: ", said);
+        defer scene.deinit();
+        try expectEqual(colorOf(&sorted, 0), colorOf(&scene, 0));
+    }
+}
+
+test "a named material of the type of no name is a boundary" {
+    var folder: Folder = .make();
+    defer folder.free();
+    var scene = try folder.readClean(start ++ "MakeNamedMaterial \"a\" \"string type\" \"\" " ++
+        "NamedMaterial \"a\" Shape \"disk\" Material \"matte\" Shape \"sphere\"");
+    defer scene.deinit();
+    try expectEqual(1, scene.meshes.len);
+}
+
+test "a mixture with a boundary is as dense as the other's share" {
+    var folder: Folder = .make();
+    defer folder.free();
+    const named = start ++ "MakeNamedMaterial \"a\" \"string type\" \"interface\" " ++
+        "MakeNamedMaterial \"b\" \"string type\" \"matte\" \"rgb Kd\" [1 0 0] " ++
+        "Material \"mix\" \"string materials\" [\"a\" \"b\"] \"float amount\" ";
+    for ([_][]const u8{ "0", ".25", "1" }, [_]?f32{ null, 0.25, 1 }) |amount, opacity| {
+        var buffer: [400]u8 = undefined;
+        const text = try std.mem.print(&buffer, "{s}{s} Shape \"disk\"", .{ named, amount });
+        var scene = try folder.read(text, true);
+        defer scene.deinit();
+        try expectEqual(@as(usize, if (opacity == null) 0 else 1), scene.meshes.len);
+        if (opacity == null) continue;
+        const material = &scene.materials[scene.meshes[0].material];
+        try expectEqual([4]f32{ 1, 0, 0, opacity.? }, material.base_color);
+        try expectEqual(opacity.? < 1, material.alpha_mode == .blend);
+    }
+}
+
 test "what Attribute says counts where a directive does not, within its block" {
     var folder: Folder = .make();
     defer folder.free();

@@ -58,14 +58,16 @@ pub fn get(images: *NamedImages, folder: []const u8, name: []const u8) Resources
     return image;
 }
 
-/// Paths, relative to the scene's folder, under which a file of that name may be.
+/// Paths, relative to the scene's folder, under which a file of that name, in quotes or not, may
+/// be.
 pub fn candidates(
     arena: Allocator,
     folder: []const u8,
     name: []const u8,
     buffer: *[3][]const u8,
 ) error{OutOfMemory}![]const []const u8 {
-    const slashed = try arena.dupe(u8, name);
+    const is_quoted = name.len > 2 and name[0] == '"' and name[name.len - 1] == '"';
+    const slashed = try arena.dupe(u8, if (is_quoted) name[1 .. name.len - 1] else name);
     std.mem.replaceScalar(u8, slashed, '\\', '/');
     const has_drive = slashed.len >= 2 and std.ascii.isAlphabetic(slashed[0]) and slashed[1] == ':';
     const last = std.fs.path.basename(if (has_drive) slashed[2..] else slashed);
@@ -97,6 +99,7 @@ test candidates {
         .{ "m", "..\\t\\a.png", &.{ "m/../t/a.png", "m/a.png", "a.png" } },
         .{ "", "C:\\x\\a.png", &.{ "C:/x/a.png", "a.png" } },
         .{ "m", "/x/a.png", &.{ "/x/a.png", "m/a.png", "a.png" } },
+        .{ "", "\"C:\\a b.png\"", &.{ "C:/a b.png", "a b.png" } },
         .{ "", "t/", &.{ "t/", "t" } },
     }) |case| {
         const found = try candidates(arena.allocator(), case[0], case[1], &buffer);

@@ -86,13 +86,25 @@ noinline fn slow(text: [:0]const u8, start: *usize) Error!f32 {
 
 /// The same where "nan" and "inf" in all spellings, and what is out of range, are NaN.
 pub inline fn floatOrNan(text: [:0]const u8, start: *usize) error{NotANumber}!f32 {
-    return float(text, start) catch |err| switch (err) {
+    const value = float(text, start) catch |err| return switch (err) {
         error.OutOfRange => skipNan(text, start),
         error.NotANumber => if (isNan(text[start.*..endOf(text, start.*)]))
             skipNan(text, start)
         else
             error.NotANumber,
     };
+    return if (text[start.*] == '#' and isMarked(text[start.*..])) nan: {
+        while (text[start.*] > ' ') start.* += 1;
+        break :nan std.math.nan(f32);
+    } else value;
+}
+
+/// Whether what stands behind a number is its name in Microsoft's libraries: `1.#QNAN`, `-1.#IND`.
+fn isMarked(text: []const u8) bool {
+    for ([_][]const u8{ "#QNAN", "#SNAN", "#INF", "#IND" }) |name| {
+        if (std.mem.startsWith(u8, text, name)) return true;
+    }
+    return false;
 }
 
 fn skipNan(text: [:0]const u8, start: *usize) f32 {
@@ -167,7 +179,7 @@ test "numbers in all their forms" {
 }
 
 test "what is not finite may be NaN" {
-    for ([_][:0]const u8{ "nan", "-NaN(ind)", "inf", "-Infinity", "1e99", "-1e999" }) |word| {
+    for ([_][:0]const u8{ "nan", "-NaN(ind)", "inf", "-Infinity", "1e99", "1.#QNAN0" }) |word| {
         var start: usize = 0;
         try std.testing.expect(std.math.isNan(try floatOrNan(word, &start)));
         try std.testing.expectEqual(word.len, start);

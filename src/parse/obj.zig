@@ -25,8 +25,7 @@ pub fn read(
     const joined = try Words.joined(gpa, bytes);
     defer if (joined) |copy| gpa.free(copy);
     const whole = joined orelse bytes;
-    const mark = "\xef\xbb\xbf";
-    const text = if (std.mem.startsWith(u8, whole, mark)) whole[mark.len..] else whole;
+    const text = Resources.withoutMark(whole);
     var reader: Reader = .{ .gpa = gpa, .words = .{ .text = text }, .diagnostic = diagnostic };
     defer reader.deinit();
     try reader.run();

@@ -25,7 +25,8 @@ pub fn read(
     errdefer builder.deinit();
     builder.scene.file.format = .ply;
     var reason: Message = .{};
-    const mesh = ply.read(gpa, builder.arena(), bytes, .{}, &reason) catch |err| switch (err) {
+    const text = Resources.withoutMark(bytes);
+    const mesh = ply.read(gpa, builder.arena(), text, .{}, &reason) catch |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidPly => return diagnostic.invalid("{s}", .{reason.text()}),
     };

@@ -112,19 +112,24 @@ const Reader = struct {
         return if (colors) |all| all[0..reader.positions.items.len] else null;
     }
 
-    /// As many as the header says, if they are there; programs that write as they go leave 0.
+    /// As many as the header says, if they are there; programs that write as they go leave 0, or
+    /// -1.
     fn binaryCount(reader: *Reader) Resources.Error!usize {
         const claimed = std.mem.readInt(u32, reader.bytes[header_bytes - 4 ..][0..4], .little);
         const left = reader.bytes.len - header_bytes;
         const present = left / triangle_bytes;
+        const is_unknown = claimed == 0 or claimed == std.math.maxInt(u32);
+        if (is_unknown and present > 0 and left % triangle_bytes == 0) {
+            reader.diagnostic.forgive(
+                "STL claims {d} triangles, all {d} are read",
+                .{ claimed, present },
+            );
+            return reader.bounded(present);
+        }
         if (claimed > present) return reader.diagnostic.invalid(
             "STL claims {d} triangles, its {d} bytes hold {d}",
             .{ claimed, reader.bytes.len, present },
         );
-        if (claimed == 0 and present > 0 and left % triangle_bytes == 0) {
-            reader.diagnostic.forgive("STL claims no triangles, all {d} are read", .{present});
-            return reader.bounded(present);
-        }
         if (left > @as(u64, claimed) * triangle_bytes) reader.diagnostic.forgive(
             "{d} bytes behind the triangles are ignored",
             .{left - @as(u64, claimed) * triangle_bytes},
@@ -211,7 +216,7 @@ fn skipSpace(bytes: [:0]const u8, cursor: *usize) void {
 }
 
 fn skipLine(bytes: [:0]const u8, cursor: *usize) void {
-    cursor.* = std.mem.findScalarPos(u8, bytes, cursor.*, '\n') orelse bytes.len;
+    cursor.* = std.mem.findAnyPos(u8, bytes, cursor.*, "\r\n") orelse bytes.len;
 }
 
 fn nextWord(bytes: [:0]const u8, cursor: *usize) ?[]const u8 {

@@ -62,11 +62,14 @@ pub const Material = struct {
     clearcoat_roughness_map: ?Map = null,
 };
 
-const colors: std.StaticStringMap([]const u8) = .initComptime(.{
+/// Statements in any case: exporters write `map_kd` and `map_KD` as well.
+const Names = std.StaticStringMapWithEql([]const u8, std.static_string_map.eqlAsciiIgnoreCase);
+
+const colors: Names = .initComptime(.{
     .{ "Kd", "diffuse" }, .{ "Ks", "specular" }, .{ "Ke", "emissive" }, .{ "Tf", "filter" },
 });
 
-const numbers: std.StaticStringMap([]const u8) = .initComptime(.{
+const numbers: Names = .initComptime(.{
     .{ "Ns", "exponent" },
     .{ "Ni", "ior" },
     .{ "d", "dissolve" },
@@ -81,7 +84,7 @@ const numbers: std.StaticStringMap([]const u8) = .initComptime(.{
     .{ "anisor", "anisotropy_rotation" },
 });
 
-const maps: std.StaticStringMap([]const u8) = .initComptime(.{
+const maps: Names = .initComptime(.{
     .{ "map_Kd", "diffuse_map" },
     .{ "map_Ks", "specular_map" },
     .{ "map_Ke", "emissive_map" },
@@ -89,9 +92,7 @@ const maps: std.StaticStringMap([]const u8) = .initComptime(.{
     .{ "map_Tr", "dissolve_map" },
     .{ "map_opacity", "dissolve_map" },
     .{ "map_Bump", "bump_map" },
-    .{ "map_bump", "bump_map" },
     .{ "bump", "bump_map" },
-    .{ "Bump", "bump_map" },
     .{ "norm", "normal_map" },
     .{ "map_Norm", "normal_map" },
     .{ "map_Kn", "normal_map" },
@@ -131,7 +132,7 @@ pub fn read(
     while (words.nextLine()) : (words.skipLine()) {
         const start = words.cursor;
         const word = words.word();
-        if (std.mem.eql(u8, word, "newmtl")) {
+        if (std.ascii.eqlIgnoreCase(word, "newmtl")) {
             const entry = try library.materials.getOrPut(library.arena, words.rest());
             spare = .{ .folder = folder };
             material = if (entry.found_existing) &spare else entry.value_ptr;
@@ -164,7 +165,7 @@ fn set(material: *Material, words: *Words, word: []const u8) bool {
 
 fn isOneOf(word: []const u8, words: []const []const u8) bool {
     return for (words) |other| {
-        if (std.mem.eql(u8, word, other)) break true;
+        if (std.ascii.eqlIgnoreCase(word, other)) break true;
     } else false;
 }
 

@@ -88,7 +88,8 @@ fn loadOne(materials: *Materials, name: []const u8, reason: *Message) Resources.
                 .{ quote(name), said.text() },
             ),
         };
-        const text = try Words.joined(arena, file.bytes) orelse file.bytes;
+        const joined = try Words.joined(arena, file.bytes) orelse file.bytes;
+        const text = Resources.withoutMark(joined);
         try materials.library.read(text, name, std.fs.path.dirname(path) orelse "");
         return true;
     }
@@ -101,7 +102,7 @@ pub fn get(materials: *Materials, index: u32) Resources.Error!u32 {
     const names = materials.reader.material_names.items;
     const material = if (index >= names.len)
         materials.default()
-    else if (materials.library.materials.getPtr(names[index])) |raw|
+    else if (materials.find(names[index])) |raw|
         try materials.convert(raw)
     else missing: {
         if (materials.library.materials.count() > 0 or materials.reader.libraries.items.len == 0)
@@ -113,6 +114,14 @@ pub fn get(materials: *Materials, index: u32) Resources.Error!u32 {
     const added = try materials.builder.addMaterial(material);
     try materials.known.put(materials.arena, index, added);
     return added;
+}
+
+/// The material of that name. A `#` may be part of it, or begin a comment behind it.
+fn find(materials: *const Materials, name: []const u8) ?*const Library.Material {
+    const all = &materials.library.materials;
+    if (all.getPtr(name)) |raw| return raw;
+    const end = std.mem.find(u8, name, " #") orelse return null;
+    return all.getPtr(std.mem.trimEnd(u8, name[0..end], " \t"));
 }
 
 /// Of what has no material of its own.

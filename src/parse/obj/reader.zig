@@ -116,6 +116,31 @@ pub fn run(reader: *Reader) Resources.Error!void {
     }
     if (reader.elements.items.len == 0) try reader.showVertices();
     reader.sayFaults();
+    try reader.addCloud();
+}
+
+/// Vertices of a file that uses none of them are a cloud of points, as scanners write it.
+fn addCloud(reader: *Reader) Allocator.Error!void {
+    if (reader.elements.items.len > 0 or reader.curves.count > 0 or reader.too_short.count > 0)
+        return;
+    const positions = reader.positions.items;
+    // Each that is not finite is left out by itself.
+    for ([_]bool{ true, false }) |are_finite| for (positions, 0..) |position, vertex| {
+        if (math.vec3.isFinite(position) != are_finite) continue;
+        const first = reader.corners.items.len;
+        try reader.corners.append(reader.gpa, .{ .position = @intCast(vertex) });
+        if (are_finite and first > 0) {
+            reader.elements.items[0].count += 1;
+            continue;
+        }
+        try reader.elements.append(reader.gpa, .{
+            .kind = .points,
+            .first = @intCast(first),
+            .count = 1,
+            .material = none,
+            .smoothing = 0,
+        });
+    };
 }
 
 /// Vertices that nothing connects are a cloud of points, which scanners write without "p".
@@ -149,10 +174,10 @@ fn sayFaults(reader: *Reader) void {
         .{words.lineOf(reader.curves.position)},
     );
     if (reader.unknown.count > 0) diagnostic.forgive(
-        "line {d}: {f} is no statement of OBJ, ignored, as {d} others are",
+        "line {d}: {f} is no statement of OBJ, ignored: {d} of them",
         .{
             words.lineOf(reader.unknown.position), quote(reader.unknown_word),
-            reader.unknown.count - 1,
+            reader.unknown.count,
         },
     );
     for ([_]struct { *const Fault, []const u8 }{

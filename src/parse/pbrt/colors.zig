@@ -105,7 +105,7 @@ fn valueOf(
         .spectrum => {
             if (strings.len >= 1) return colors.spectrumFile(parameter.offset, strings[0]);
             if (values.len == 1) return @splat(values[0]);
-            return spectra.fromPairs(values) orelse return input.fail(
+            return try colors.pairs(parameter.offset, values) orelse return input.fail(
                 parameter.offset,
                 "a spectrum is pairs of rising wavelengths and values",
                 .{},
@@ -134,7 +134,8 @@ fn spectrumFile(colors: *Colors, position: u64, name: []const u8) Error!?Vec3 {
     var value: ?Vec3 = null;
     if (input.readFile(position, name)) |file| {
         defer input.gpa.free(file.bytes);
-        value = try colors.parsePairs(try input.withoutMark(position, name, file.bytes));
+        const text = try input.withoutMark(position, name, file.bytes);
+        value = try colors.parsePairs(position, text);
         if (value == null) try input.warn(
             position,
             "spectrum file",
@@ -159,15 +160,48 @@ fn spectrumFile(colors: *Colors, position: u64, name: []const u8) Error!?Vec3 {
     return value;
 }
 
-fn parsePairs(colors: *Colors, bytes: [:0]const u8) Error!?Vec3 {
+/// Numbers between which there is white space, and perhaps a comma.
+fn parsePairs(colors: *Colors, position: u64, bytes: [:0]const u8) Error!?Vec3 {
     const gpa = colors.input.gpa;
-    var pairs: std.ArrayList(f32) = .empty;
-    defer pairs.deinit(gpa);
+    const text = try gpa.dupeSentinel(u8, bytes, 0);
+    defer gpa.free(text);
+    std.mem.replaceScalar(u8, text, ',', ' ');
+    var values: std.ArrayList(f32) = .empty;
+    defer values.deinit(gpa);
     var cursor: usize = 0;
     while (true) {
-        cursor = Input.skip(bytes, cursor);
-        if (cursor == bytes.len) return spectra.fromPairs(pairs.items);
-        const value = number.float(bytes, &cursor) catch return null;
-        try pairs.append(gpa, value);
+        cursor = Input.skip(text, cursor);
+        if (cursor == text.len) return colors.pairs(position, values.items);
+        const value = number.float(text, &cursor) catch return null;
+        try values.append(gpa, value);
     }
+}
+
+/// The colour of wavelengths and values, which version 3 takes in any order, and without the last
+/// of an odd number; null: there is none.
+fn pairs(colors: *Colors, position: u64, values: []const f32) Error!?Vec3 {
+    if (spectra.fromPairs(values)) |known| return known;
+    if (values.len < 2) return null;
+    const gpa = colors.input.gpa;
+    const sorted = try gpa.alloc([2]f32, values.len / 2);
+    defer gpa.free(sorted);
+    for (sorted, 0..) |*pair, index| pair.* = values[2 * index ..][0..2].*;
+    std.mem.sort([2]f32, sorted, {}, isShorter);
+    var count: usize = 1;
+    for (sorted[1..]) |pair| {
+        if (pair[0] == sorted[count - 1][0]) continue;
+        sorted[count] = pair;
+        count += 1;
+    }
+    try colors.input.forgive(
+        position,
+        "spectrum",
+        "a spectrum is pairs of rising wavelengths and values",
+        .{},
+    );
+    return spectra.fromPairs(@ptrCast(sorted[0..count]));
+}
+
+fn isShorter(_: void, a: [2]f32, b: [2]f32) bool {
+    return a[0] < b[0];
 }

@@ -355,7 +355,9 @@ pub fn includeNext(input: *Input, is_apart: bool) Error!void {
 /// its bytes.
 pub fn readFile(input: *Input, position: u64, path: []const u8) Error!Resources.File {
     var reason: diagnostic_file.Message = .{};
-    const file = input.resources.read(path, &reason) catch |err| {
+    var buffer: [path_bytes_max]u8 = undefined;
+    const found = try input.slashed(position, path, &buffer);
+    const file = input.resources.read(found, &reason) catch |err| {
         if (err == error.OutOfMemory) return err;
         input.fail(position, "{f} {s}", .{ quote(path), reason.text() }) catch {};
         return err;
@@ -377,6 +379,29 @@ pub fn readFile(input: *Input, position: u64, path: []const u8) Error!Resources.
     };
     input.gpa.free(file.bytes);
     return .{ .bytes = plain, .identity = file.identity };
+}
+
+/// Longest path whose backslashes are taken for slashes.
+pub const path_bytes_max = 4096;
+
+/// The path that the scene names at `position`, as it is here: on Windows, backslashes separate.
+pub fn slashed(
+    input: *Input,
+    position: u64,
+    path: []const u8,
+    buffer: *[path_bytes_max]u8,
+) Error![]const u8 {
+    if (std.mem.findScalar(u8, path, '\\') == null or path.len > buffer.len) return path;
+    try input.forgive(
+        position,
+        "backslash",
+        "{f}: backslashes are taken as slashes",
+        .{quote(path)},
+    );
+    const copy = buffer[0..path.len];
+    @memcpy(copy, path);
+    std.mem.replaceScalar(u8, copy, '\\', '/');
+    return copy;
 }
 
 /// The bytes of a file that the scene names at `position`, without the mark that may stand before.

@@ -107,11 +107,23 @@ fn readOne(parameters: *Parameters, input: *Input) Error!void {
         "a parameter is declared as \"type name\", not as {f}",
         .{quote(declaration)},
     );
-    const type_ = type_names.get(type_name) orelse
-        return input.fail(offset, "{f} is no type of parameters", .{quote(type_name)});
+    const known = type_names.get(type_name);
+    if (known == null) try input.forgive(
+        offset,
+        type_name,
+        "{f} is no type of parameters: {f} is left out",
+        .{ quote(type_name), quote(name) },
+    );
     const bracketed = try input.peekInList() == '[';
     if (bracketed) input.top().cursor += 1;
-    const is_string = try input.peekInList() == '"';
+    const first = try input.peekInList();
+    const is_string = first == '"';
+    const type_: Type = known orelse if (is_string)
+        .string
+    else if (first == 't' or first == 'f')
+        .bool
+    else
+        .float;
     var parameter: Parameter = .{
         .type = type_,
         .name = name,
@@ -148,7 +160,7 @@ fn readOne(parameters: *Parameters, input: *Input) Error!void {
         if (input.peek() != ']') return input.fail(input.offset(), "']' is expected", .{});
         input.top().cursor += 1;
     }
-    try parameters.items.append(input.gpa, parameter);
+    if (known != null) try parameters.items.append(input.gpa, parameter);
 }
 
 /// Numbers up to the bracket, or one. The inner loop of large scenes.
@@ -178,6 +190,12 @@ fn readNumbers(
                 cursor = text.cursor;
                 continue;
             }
+            if (Number == i32) if (try wholeNumber(input)) |value| {
+                cursor = text.cursor;
+                try list.append(input.gpa, value);
+                if (!bracketed) break;
+                continue;
+            };
             return failNumber(input, err, if (Number == f32) "number" else "whole number");
         };
         if (list.items.len == list.capacity) try list.ensureUnusedCapacity(input.gpa, 1);
@@ -185,6 +203,25 @@ fn readNumbers(
         if (!bracketed) break;
     }
     text.cursor = cursor;
+}
+
+/// A whole number in the form of one that need not be, as versions 2 and 3 have them; null: it is
+/// none.
+fn wholeNumber(input: *Input) Error!?i32 {
+    const text = input.top();
+    var end = text.cursor;
+    const value = number.float(text.bytes, &end) catch return null;
+    // Those that f32 tells apart.
+    if (value != @trunc(value) or @abs(value) > 1 << 24) return null;
+    const word = text.bytes[text.cursor..end];
+    try input.forgive(
+        input.offset(),
+        "whole number",
+        "a whole number is expected, not {f}: its value counts",
+        .{quote(word)},
+    );
+    text.cursor = end;
+    return @intFromFloat(value);
 }
 
 /// Says what stands where a number should.
@@ -218,10 +255,20 @@ fn readBools(parameters: *Parameters, input: *Input, bracketed: bool) Error!void
         else if (std.mem.eql(u8, word, "false"))
             0
         else
-            return input.fail(offset, "true or false is expected, not {f}", .{quote(word)});
+            try spelledBool(input, offset, word);
         try parameters.integers.append(input.gpa, value);
         if (!bracketed) return;
     }
+}
+
+/// What other languages call true or false.
+fn spelledBool(input: *Input, offset: u64, word: []const u8) Error!i32 {
+    const value: i32 = for ([_][]const u8{ "0", "false", "1", "true" }, 0..) |name, index| {
+        if (std.ascii.eqlIgnoreCase(word, name)) break @intCast(index / 2);
+    } else return input.fail(offset, "true or false is expected, not {f}", .{quote(word)});
+    const message = "true or false is expected, not {f}: its value counts";
+    try input.forgive(offset, "bool", message, .{quote(word)});
+    return value;
 }
 
 fn readStrings(parameters: *Parameters, input: *Input, bracketed: bool) Error!void {
@@ -430,10 +477,31 @@ test "every type, with and without brackets" {
     try std.testing.expectEqualStrings("Shape", state.input.word());
 }
 
+test "types and values that versions of PBRT, or none, have otherwise are forgiven" {
+    var state: TestInput = .{};
+    try state.parse(
+        \\"integer i" [1 2.0 -3e0 4] "integer n" 16. "bool a" "True" "bool b" 0
+        \\"half f" [1 2] "color4 c" "x" "flag g" true "float last" 7 Shape
+    );
+    defer state.deinit();
+    const p = &state.parameters;
+    try std.testing.expectEqualSlices(i32, &.{ 1, 2, -3, 4 }, p.integersOf(p.find("i").?));
+    try std.testing.expectEqual(16, p.integer("n"));
+    try std.testing.expect(p.boolean("a", false) and !p.boolean("b", true));
+    for ([_][]const u8{ "f", "c", "g" }) |name|
+        try std.testing.expectEqual(null, p.find(name));
+    try std.testing.expectEqual(7, p.float("last", 0));
+    try std.testing.expectEqualStrings("Shape", state.input.word());
+    // Once a kind: whole numbers, truths, and each type.
+    try std.testing.expectEqual(5, state.diagnostic.warning_count);
+}
+
 test "what is wrong is named with its place" {
     const cases = .{
         .{ "\"float\" [1]", "x:1:1", "a parameter is declared as \"type name\", not as 'float'" },
-        .{ "\"half f\" [1]", "x:1:1", "'half' is no type of parameters" },
+        .{ "\"half f\" [1]", "x:1:1", "'half' is no type of parameters: 'f' is left out" },
+        .{ "\"integer i\" 2.", "x:1:13", "a whole number is expected, not '2.': its value counts" },
+        .{ "\"bool b\" True", "x:1:10", "true or false is expected, not 'True': its value counts" },
         .{ "\"float f\" [nan]", "x:1:12", "a number is expected, not 'nan'" },
         .{ "\"float f\" [1", "x:1:13", "a number is expected, the text ends" },
         .{ "\"float f\" 1e99", "x:1:11", "'1e99' is out of range" },
@@ -445,6 +513,7 @@ test "what is wrong is named with its place" {
     };
     inline for (cases) |case| {
         var state: TestInput = .{};
+        state.resources.settings.strict = true;
         try std.testing.expectError(error.InvalidInput, state.parse(case[0]));
         try std.testing.expectEqualStrings(case[1], state.diagnostic.place.text());
         try std.testing.expectEqualStrings(case[2], state.diagnostic.message.text());

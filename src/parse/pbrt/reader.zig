@@ -77,6 +77,8 @@ const Material = struct {
 
 const Undefined = struct { index: u32, place: []const u8 };
 
+const Awaited = struct { name: []const u8, place: Transform };
+
 const Phase = enum { options, world, done };
 
 input: *Input,
@@ -101,6 +103,10 @@ depth: ?u32 = null,
 /// The object that is being defined.
 object: ?struct { name: []const u8, first: usize } = null,
 objects: std.StringHashMapUnmanaged(SceneBuilder.Object) = .empty,
+/// Instances of objects that are not yet defined.
+awaited: std.ArrayList(Awaited) = .empty,
+/// Where their names stand first.
+undefined_objects: std.StringHashMapUnmanaged([]const u8) = .empty,
 spaces: std.StringHashMapUnmanaged(Transform) = .empty,
 named: std.StringHashMapUnmanaged(Material) = .empty,
 /// Materials that are named and not yet defined, and where that was.
@@ -535,15 +541,38 @@ fn objectInstance(reader: *Reader) Error!void {
     const name = try reader.text();
     if (reader.object != null)
         return reader.input.failHere("an instance within an object", .{});
-    const object = reader.objects.get(name) orelse
-        return reader.input.failHere("no object {f}", .{quote(name)});
-    try reader.builder.instantiateObject(object, &reader.graphics.transform);
+    const place = &reader.graphics.transform;
+    if (reader.objects.get(name)) |object|
+        return reader.builder.instantiateObject(object, place);
+    const entry = try reader.undefined_objects.getOrPut(reader.arena, name);
+    if (!entry.found_existing) {
+        entry.key_ptr.* = try reader.arena.dupe(u8, name);
+        entry.value_ptr.* = try reader.input.nameOf(reader.arena, reader.input.directive);
+    }
+    try reader.awaited.append(reader.arena, .{ .name = entry.key_ptr.*, .place = place.* });
+}
+
+/// Version 4 allows that an object is instanced before it is defined; version 3 leaves out what
+/// never is.
+fn placeAwaited(reader: *Reader) Error!void {
+    var is_said = false;
+    for (reader.awaited.items) |*one| {
+        if (reader.objects.get(one.name)) |object| {
+            try reader.builder.instantiateObject(object, &one.place);
+        } else if (!is_said) {
+            is_said = true;
+            try reader.input.forgiveFile("{s}: no object {f}: it is left out", .{
+                reader.undefined_objects.get(one.name).?, quote(one.name),
+            });
+        }
+    }
 }
 
 /// Forgets a world that has only prepared the one that follows.
 fn startAgain(reader: *Reader) void {
     reader.builder.clear();
     reader.objects.clearRetainingCapacity();
+    reader.awaited.clearRetainingCapacity();
     reader.known_meshes.clearRetainingCapacity();
     reader.is_preparation = false;
     reader.phase = .options;
@@ -631,10 +660,11 @@ fn integrator(reader: *Reader, name: []const u8) Error!void {
 
 /// A material that has been named before becomes what is defined now.
 fn makeNamedMaterial(reader: *Reader, name: []const u8) Error!void {
-    const type_name = reader.parameters.string("type") orelse "";
-    if (type_name.len == 0)
+    const type_name = reader.parameters.string("type") orelse missing: {
         try reader.forgive("material type", "the material has no type: it is matte", .{});
-    var made = try reader.makeMaterial(if (type_name.len == 0) "matte" else type_name);
+        break :missing "matte";
+    };
+    var made = try reader.makeMaterial(type_name);
     if (reader.undefined_materials.fetchRemove(name)) |used| {
         const all = reader.builder.scene.materials.items;
         all[used.value.index] = all[made.index];
@@ -649,7 +679,7 @@ fn makeNamedMaterial(reader: *Reader, name: []const u8) Error!void {
 
 fn makeMaterial(reader: *Reader, name: []const u8) Error!Material {
     const made: materials.Material = if (std.mem.eql(u8, name, "mix"))
-        .{ .surface = try reader.mixture() }
+        try reader.mixture()
     else
         try materials.convert(&reader.colors, name, &reader.parameters);
     return .{
@@ -658,7 +688,7 @@ fn makeMaterial(reader: *Reader, name: []const u8) Error!Material {
     };
 }
 
-fn mixture(reader: *Reader) Error!scene_data.Material {
+fn mixture(reader: *Reader) Error!materials.Material {
     const parameters = &reader.parameters;
     var names = [_][]const u8{
         parameters.string("namedmaterial1") orelse "",
@@ -671,11 +701,23 @@ fn mixture(reader: *Reader) Error!scene_data.Material {
         names = list[0..2].*;
     } else second_share = 1 - second_share; // The older dialects tell the first one's share.
     var parts: [2]scene_data.Material = undefined;
-    for (names, &parts) |name, *part| {
+    second_share = std.math.clamp(second_share, 0, 1);
+    var shares: [2]f32 = .{ 1 - second_share, second_share };
+    var has_boundary = false;
+    for (names, &parts, &shares) |name, *part, *share| {
         const made = try reader.materialNamed(name);
         part.* = reader.builder.scene.materials.items[made.index];
+        if (!made.is_boundary) continue;
+        has_boundary = true;
+        share.* = 0;
     }
-    return materials.mix(parts[0], parts[1], second_share);
+    if (!has_boundary) return .{ .surface = materials.mix(parts[0], parts[1], second_share) };
+    // The rest of it is seen, if any.
+    var rest = parts[@intFromBool(shares[1] > 0)];
+    const opacity = shares[0] + shares[1];
+    if (opacity < 1) rest.alpha_mode = .blend;
+    rest.base_color[3] *= opacity;
+    return .{ .surface = rest, .is_boundary = opacity == 0 };
 }
 
 fn namedMaterial(reader: *Reader) Error!void {
@@ -867,6 +909,7 @@ pub fn finish(reader: *Reader) Error!void {
     const scene = &builder.scene.scene;
     const view = &reader.view;
     try reader.forgiveUndefined();
+    try reader.placeAwaited();
     if (view.place == null) {
         view.place = .identity;
         try reader.input.warn(

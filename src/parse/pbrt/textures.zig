@@ -82,7 +82,9 @@ pub fn imageOf(textures: *Textures, path: []const u8) Error!?u32 {
     var name: diagnostic.Message = .{};
     name.set("{f}", .{quote(path)});
     var reason: diagnostic.Message = .{};
-    const image = textures.files.get(path, name.text(), &reason) catch |err| switch (err) {
+    var buffer: [Input.path_bytes_max]u8 = undefined;
+    const found = try input.slashed(input.directive, path, &buffer);
+    const image = textures.files.get(found, name.text(), &reason) catch |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.Overwritten => {
             input.failHere("{s} {s}", .{ name.text(), reason.text() }) catch {};

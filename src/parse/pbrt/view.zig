@@ -46,7 +46,9 @@ pub fn setFilm(
     parameters: *const Parameters,
     name: []const u8,
 ) Error!void {
-    var size: [2]u32 = .{ 640, 480 };
+    view.is_version_4 = !std.mem.eql(u8, name, "image");
+    // Version 3's own is that of version 4, but its name is that of version 2.
+    var size: [2]u32 = if (view.is_version_4) .{ 1280, 720 } else .{ 640, 480 };
     for (&size, [_][]const u8{ "xresolution", "yresolution" }) |*side, key| {
         const value = parameters.integer(key) orelse continue;
         if (!settings.side.holds(value))
@@ -57,7 +59,6 @@ pub fn setFilm(
         return input.failHere("the film has over {d} pixels", .{settings.pixel_count_max});
     if (parameters.find("cropwindow") != null or parameters.find("pixelbounds") != null)
         try input.warnHere("cropwindow", "Film: crop windows are not supported", .{});
-    view.is_version_4 = !std.mem.eql(u8, name, "image");
     view.film_scale = parameters.float("scale", 1);
     if (view.is_version_4) {
         view.film_scale = parameters.float("iso", 100) / 100;
@@ -115,7 +116,7 @@ pub fn setCamera(
         result.aspect = aspect;
     }
     if (parameters.floatsNamed("screenwindow")) |window| {
-        if (window.len != 4 or !(window[1] > window[0] and window[3] > window[2]))
+        if (window.len != 4 or window[0] == window[1] or window[2] == window[3])
             return input.failHere("the screen window is not [left right bottom top]", .{});
         result.window = .{ window[0], window[1], window[2], window[3] };
     }
@@ -134,10 +135,19 @@ pub fn exposure(view: *const View) f32 {
 pub fn projection(view: *View, input: *Input) Error!scene.Camera.Projection {
     const film = @as(f64, @floatFromInt(view.size[0])) / @as(f64, @floatFromInt(view.size[1]));
     const aspect = view.aspect orelse film;
-    const window = view.window orelse if (aspect >= 1)
+    var window = view.window orelse if (aspect >= 1)
         [4]f64{ -aspect, aspect, -1, 1 }
     else
         [4]f64{ -1, 1, -1 / aspect, 1 / aspect };
+    // A screen from right to left, or from top to bottom, is a mirror's.
+    for (0..2) |axis| {
+        const ends = window[2 * axis ..][0..2];
+        if (ends[0] < ends[1]) continue;
+        var mirror: math.Vec3d = .{ 1, 1, 1 };
+        mirror[axis] = -1;
+        view.place = view.place.?.compose(.scale(mirror));
+        for (ends) |*end| end.* = -end.*;
+    }
     // Within what a camera can show in the end.
     const half_width = std.math.clamp(0.5 * (window[1] - window[0]), 1e-9, 1e9);
     const half_height = std.math.clamp(0.5 * (window[3] - window[2]), 1e-9, 1e9);

@@ -32,8 +32,8 @@ fn faces(
     comptime what: []const u8,
 ) Error!Geometry {
     const parameters = tessellator.parameters;
-    const from = points(parameters.floatsNamed("P") orelse
-        return tessellator.fail("has no points P", .{}));
+    const list = parameters.find("P") orelse return tessellator.fail("has no points P", .{});
+    const from = points(parameters.floatsOf(list));
     const one = [_]i32{ 0, 1, 2, 3 };
     const indices: []const i32 = if (parameters.find("indices")) |parameter|
         parameters.integersOf(parameter)
@@ -42,7 +42,7 @@ fn faces(
     else
         return tessellator.fail("has no indices", .{});
     if (indices.len % corner_count != 0)
-        return tessellator.fail("{d} indices make no whole " ++ what, .{indices.len});
+        try tessellator.forgive("{d} indices make no whole " ++ what, .{indices.len});
     const face_count = indices.len / corner_count;
     var result: Geometry = .{
         .positions = try tessellator.alloc(Vec3, from.len),
@@ -81,8 +81,10 @@ const patch_corners: []const [3][2]f32 = &.{
 /// `N`, one for each of `vertex_count`, or none.
 fn normals(tessellator: *Tessellator, vertex_count: usize) Error!?[]Vec3 {
     const from = points(tessellator.parameters.floatsNamed("N") orelse return null);
-    if (from.len != vertex_count)
-        return tessellator.fail("has {d} normals N for {d} points", .{ from.len, vertex_count });
+    if (from.len != vertex_count) {
+        try tessellator.forgive("has {d} normals N for {d} points", .{ from.len, vertex_count });
+        return null;
+    }
     const result = try tessellator.alloc(Vec3, vertex_count);
     @memcpy(result, from);
     return result;
@@ -94,10 +96,11 @@ fn texcoords(tessellator: *Tessellator, vertex_count: usize) Error!?[][2]f32 {
     const parameters = tessellator.parameters;
     const from = parameters.floatsNamed("uv") orelse parameters.floatsNamed("st") orelse
         return null;
-    if (from.len != 2 * @as(u64, vertex_count)) return tessellator.fail(
-        "has {d} numbers of coordinates uv for {d} points",
-        .{ from.len, vertex_count },
-    );
+    if (from.len != 2 * @as(u64, vertex_count)) {
+        const message = "has {d} numbers of coordinates uv for {d} points";
+        try tessellator.forgive(message, .{ from.len, vertex_count });
+        return null;
+    }
     const result = try tessellator.alloc([2]f32, vertex_count);
     for (result, 0..) |*to, index| {
         to.* = Tessellator.texcoordOf(from[2 * index], from[2 * index + 1]);

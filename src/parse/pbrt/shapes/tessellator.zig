@@ -53,6 +53,17 @@ pub fn fail(
     return tessellator.input.failHere("{s}: " ++ format, name ++ arguments);
 }
 
+/// Says what is wrong with the shape that it can do without, once a kind.
+pub fn forgive(
+    tessellator: *Tessellator,
+    comptime format: []const u8,
+    arguments: anytype,
+) Error!void {
+    const input = tessellator.input;
+    const name = .{tessellator.name};
+    try input.forgive(input.directive, format, "{s}: " ++ format, name ++ arguments);
+}
+
 /// Memory that lives as long as the scene.
 pub fn alloc(tessellator: *Tessellator, comptime Element: type, count: u64) Error![]Element {
     try tessellator.reserve(count, @sizeOf(Element));
