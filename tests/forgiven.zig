@@ -382,10 +382,10 @@ test "primitives and attributes without elements" {
             .warning = "mesh 0, primitive 1: its vertices or indices are empty, not drawn",
         },
         .{
-            .changes = &.{ more, .{
+            .changes = &.{.{
                 "\"targets\":[{\"POSITION\":4}]}",
                 "\"targets\":[{\"POSITION\":4}]},{\"targets\":[{}]}",
-            } },
+            }},
             .warning = "mesh 0, primitive 1: without POSITION, not drawn",
         },
         .{
