@@ -389,6 +389,13 @@ test "primitives and attributes without elements" {
             .warning = "mesh 0, primitive 1: without POSITION, not drawn",
         },
         .{
+            .changes = &.{
+                .{ "\"skin\":0,\"weights\":[0]", "\"skin\":0" },
+                .{ ",\n\"targets\":[{\"POSITION\":4}]", "" },
+            },
+            .warning = "mesh 0: 1 weights for 0 morph targets",
+        },
+        .{
             .changes = &.{ more, .{ "\"NORMAL\":1", "\"NORMAL\":9" } },
             .warning = "mesh 0, primitive 0: 'NORMAL' is empty, left out",
         },
