@@ -382,11 +382,18 @@ test "primitives and attributes without elements" {
             .warning = "mesh 0, primitive 1: its vertices or indices are empty, not drawn",
         },
         .{
-            .changes = &.{ more, .{
+            .changes = &.{.{
                 "\"targets\":[{\"POSITION\":4}]}",
                 "\"targets\":[{\"POSITION\":4}]},{\"targets\":[{}]}",
-            } },
+            }},
             .warning = "mesh 0, primitive 1: without POSITION, not drawn",
+        },
+        .{
+            .changes = &.{
+                .{ "\"skin\":0,\"weights\":[0]", "\"skin\":0" },
+                .{ ",\n\"targets\":[{\"POSITION\":4}]", "" },
+            },
+            .warning = "mesh 0: 1 weights for 0 morph targets",
         },
         .{
             .changes = &.{ more, .{ "\"NORMAL\":1", "\"NORMAL\":9" } },

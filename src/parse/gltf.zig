@@ -7,7 +7,6 @@
 const std = @import("std");
 const accessors = @import("gltf/accessors.zig");
 const asset = @import("gltf/asset.zig");
-const c = @import("cgltf.zig");
 const container = @import("gltf/container.zig");
 const description = @import("gltf/description.zig");
 const image_based_light = @import("gltf/image_based_light.zig");
@@ -108,7 +107,11 @@ fn fill(source: *Source, resources: *Resources, animations: *Animations) Error!v
         if (node.mesh != null and !is_hidden) {
             try addInstances(origin, node_index, &meshes, &skins, animations);
         }
-        if (node.camera) |raw| try addCamera(source, raw, node.name, node_index, animations);
+        if (node.camera) |raw| {
+            try builder.addCamera(try views.readCamera(source, raw, node.name, node_index));
+            const camera = Source.indexOf(source.data.cameras, raw);
+            try animations.cameras.append(source.gpa, camera);
+        }
         if (node.light) |raw| if (!is_hidden) {
             const light_index = Source.indexOf(source.data.lights, raw);
             try source.need(.lights, light_index);
@@ -125,27 +128,8 @@ fn fill(source: *Source, resources: *Resources, animations: *Animations) Error!v
     for (source.lenience.broken.keys(), source.lenience.broken.values()) |element, broken| {
         const is_image = element.list == @backingInt(schema.List.images);
         if (is_image and textures.images.contains(element.index)) continue; // It has been said.
-        if (element.list == @backingInt(schema.List.cameras))
-            source.forgiveLeftOut(broken.reason)
-        else
-            source.forgiveUnneeded(broken.reason);
+        source.forgiveUnneeded(broken.reason);
     }
-}
-
-/// Adds the camera of a node, or none where it sees nothing: there is the automatic view.
-fn addCamera(
-    source: *Source,
-    raw: *const c.cgltf_camera,
-    node_name: [*c]const u8,
-    node_index: u32,
-    animations: *Animations,
-) Error!void {
-    const index = Source.indexOf(source.data.cameras, raw);
-    if (source.findBroken(.cameras, index) != null) return; // It will be said.
-    const camera = views.readCamera(source, raw, node_name, node_index) catch |err|
-        return source.leaveOut(err);
-    try source.builder.addCamera(camera);
-    try animations.cameras.append(source.gpa, index);
 }
 
 /// Adds what a node of the file draws, whose number in the scene is `node_index`.

@@ -43,14 +43,13 @@ fn openBinary(bytes: []const u8, diagnostic: *Diagnostic) error{InvalidInput}!Co
     if (version != 2)
         return diagnostic.invalid("GLB version {d} is not supported, only 2", .{version});
     const length = readU32(bytes, 8);
-    const is_cut = length > bytes.len;
     // Streams are written before their length is known: some have 0 there, or all bits.
-    const is_wrong = is_cut or length < header_bytes + chunk_header_bytes;
-    const declared = if (is_wrong) bytes.len else length;
-    const chunks = readChunks(bytes, declared, !is_cut, diagnostic) catch |err|
-        return if (is_cut) cutShort(bytes, length, diagnostic) else err;
-    if (is_cut and chunks.container.binary == null) return cutShort(bytes, length, diagnostic);
-    if (is_wrong or chunks.end > declared) diagnostic.forgive(
+    const is_unknown = length == 0 or length == std.math.maxInt(u32);
+    const declared = if (is_unknown) bytes.len else length;
+    if (declared > bytes.len)
+        return diagnostic.invalid("GLB is cut short: {d} bytes of {d}", .{ bytes.len, length });
+    const chunks = try readChunks(bytes, declared, diagnostic);
+    if (is_unknown or chunks.end > declared) diagnostic.forgive(
         "the GLB's chunks end at {d} bytes, its header says {d}",
         .{ chunks.end, length },
     );
@@ -62,22 +61,16 @@ fn openBinary(bytes: []const u8, diagnostic: *Diagnostic) error{InvalidInput}!Co
     return chunks.container;
 }
 
-fn cutShort(bytes: []const u8, length: u32, diagnostic: *Diagnostic) error{InvalidInput} {
-    return diagnostic.invalid("GLB is cut short: {d} bytes of {d}", .{ bytes.len, length });
-}
-
 const Chunks = struct {
     container: Container,
     /// Of the last one that is known.
     end: usize,
 };
 
-/// Reads the chunks that begin before `declared`, the length that the header gives. Where all bytes
-/// are there (`is_whole_file`), a binary chunk that says that it is longer ends with them.
+/// Reads the chunks that begin before `declared`, the length that the header gives.
 fn readChunks(
     bytes: []const u8,
     declared: usize,
-    is_whole_file: bool,
     diagnostic: *Diagnostic,
 ) error{InvalidInput}!Chunks {
     var json: ?[]const u8 = null;
@@ -87,17 +80,10 @@ fn readChunks(
     var index: usize = 0;
     while (offset < declared) : (index += 1) {
         const left = bytes.len - offset;
-        var length: usize = if (left < chunk_header_bytes) left else readU32(bytes, offset);
+        const length = if (left < chunk_header_bytes) left else readU32(bytes, offset);
         const kind = if (left < chunk_header_bytes) 0 else readU32(bytes, offset + 4);
         const is_known = kind == json_type or kind == binary_type;
-        var is_whole = left >= chunk_header_bytes and length <= left - chunk_header_bytes;
-        if (!is_whole and index > 0 and kind == binary_type and is_whole_file) {
-            diagnostic.forgive("GLB chunk {d}: {d} bytes past the end", .{
-                index, length - (left - chunk_header_bytes),
-            });
-            length = left - chunk_header_bytes;
-            is_whole = true;
-        }
+        const is_whole = left >= chunk_header_bytes and length <= left - chunk_header_bytes;
         if (!is_whole and index > 0 and !is_known) {
             diagnostic.forgive("{d} bytes behind the last chunk of the GLB are ignored", .{
                 declared - offset,
@@ -200,7 +186,7 @@ test "lengths and kinds of chunks" {
         header ++ "\x18\x00\x00\x00" ++ "\x04\x00\x00\x00BIN\x00{}  ",
         header ++ "\x18\x00\x00\x00" ++ "\x08\x00\x00\x00JSON{}  ",
         header ++ "\x1f\x00\x00\x00" ++ "\x03\x00\x00\x00JSON{}  1234567",
-        header ++ "\x21\x00\x00\x00" ++ chunk ++ "\x01\x00\x00\x00BIN\x00",
+        header ++ "\x20\x00\x00\x00" ++ chunk ++ "\x01\x00\x00\x00BIN\x00",
     };
     for (bad) |bytes| {
         var diagnostic: Diagnostic = .{};
@@ -257,17 +243,6 @@ test "padding that is missing or not counted, and bytes behind the last chunk" {
         .{ .length = 25, .chunks = "\x04\x00\x00\x00JSON{}   ", .binary = null },
         // Its header says nothing.
         .{ .length = 0, .chunks = "\x04\x00\x00\x00JSON{}  ", .binary = null },
-        // It says more than there is, or its last chunk does.
-        .{
-            .length = 255,
-            .chunks = "\x04\x00\x00\x00JSON{}  \x04\x00\x00\x00BIN\x001234",
-            .binary = "1234",
-        },
-        .{
-            .length = 36,
-            .chunks = "\x04\x00\x00\x00JSON{}  \x08\x00\x00\x00BIN\x001234",
-            .binary = "1234",
-        },
         // It says less than there is.
         .{ .length = 19, .chunks = "\x04\x00\x00\x00JSON{}  ", .binary = null },
         .{

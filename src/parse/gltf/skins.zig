@@ -88,7 +88,7 @@ fn checkNode(skins: *Skins, node: *const c.cgltf_node) Error!void {
     const data = skins.source.data;
     const facts = try skins.get(Source.indexOf(data.meshes, mesh));
     const index = Source.indexOf(data.nodes, node);
-    checkWeights(skins.source, "node", index, node.weights_count, facts.target_count);
+    try checkWeights(skins.source, "node", index, node.weights_count, facts.target_count);
 }
 
 /// Notes what the drawn nodes ask of their meshes, at rest or when they move. `origins` are the
@@ -238,7 +238,7 @@ fn get(skins: *Skins, mesh_index: u32) Error!*Facts {
             .{ mesh_index, facts.target_count, primitive.targets_count },
         );
     }
-    checkWeights(source, "mesh", mesh_index, mesh.weights_count, facts.target_count);
+    try checkWeights(source, "mesh", mesh_index, mesh.weights_count, facts.target_count);
     try skins.known.put(source.gpa, mesh_index, facts);
     return skins.known.getPtr(mesh_index).?;
 }
@@ -249,9 +249,10 @@ fn checkWeights(
     index: usize,
     weight_count: usize,
     target_count: usize,
-) void {
-    if (weight_count != 0 and weight_count != target_count) source.forgive(
-        "{s} {d}: {d} weights for {d} morph targets, others count as 0",
-        .{ owner, index, weight_count, target_count },
-    );
+) Error!void {
+    if (weight_count == 0 or weight_count == target_count) return;
+    const line = "{s} {d}: {d} weights for {d} morph targets";
+    const parts = .{ owner, index, weight_count, target_count };
+    if (target_count > 0) return source.fail(line, parts);
+    source.forgive(line, parts);
 }

@@ -12,7 +12,6 @@ const scene = @import("../../scene.zig");
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
 const Allocator = std.mem.Allocator;
 const Lenience = @import("../json/lenience.zig");
-const Message = @import("../../diagnostic.zig").Message;
 const assert = std.debug.assert;
 const Source = @This();
 
@@ -102,27 +101,11 @@ pub fn findBroken(source: *const Source, list: schema.List, index: usize) ?Lenie
 
 /// Makes an error of what is not drawn, or must not stop the rest, a warning.
 pub fn excuse(source: *const Source, err: Error) Error!void {
-    const said = try source.takeMessage(err);
-    source.forgiveUnneeded(said.text());
-}
-
-/// Makes an error of what can be done without a warning.
-pub fn leaveOut(source: *const Source, err: Error) Error!void {
-    const said = try source.takeMessage(err);
-    source.forgiveLeftOut(said.text());
-}
-
-/// Says why something is left out.
-pub fn forgiveLeftOut(source: *const Source, reason: []const u8) void {
-    source.forgive("{s}; left out", .{reason});
-}
-
-fn takeMessage(source: *const Source, err: Error) Error!Message {
     if (err == error.OutOfMemory) return err;
     const diagnostic = source.diagnostic;
     const said = diagnostic.message;
     if (!diagnostic.refused) diagnostic.message.set("", .{});
-    return said;
+    source.forgiveUnneeded(said.text());
 }
 
 /// Says what is wrong with what is not drawn.

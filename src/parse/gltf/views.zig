@@ -25,6 +25,7 @@ pub fn readCamera(
     node: u32,
 ) Error!scene.Camera {
     const index = Source.indexOf(source.data.cameras, raw);
+    try source.need(.cameras, index);
     const projection: scene.Camera.Projection = switch (raw.type) {
         .perspective => projection: {
             const perspective = &raw.data.perspective;
