@@ -114,7 +114,6 @@ pub fn run(reader: *Reader) Resources.Error!void {
             .g, .o, .mg => {},
         }
     }
-    if (reader.elements.items.len == 0) try reader.showVertices();
     reader.sayFaults();
     try reader.addCloud();
 }
@@ -141,22 +140,6 @@ fn addCloud(reader: *Reader) Allocator.Error!void {
             .smoothing = 0,
         });
     };
-}
-
-/// Vertices that nothing connects are a cloud of points, which scanners write without "p".
-fn showVertices(reader: *Reader) Allocator.Error!void {
-    for (reader.positions.items, 0..) |position, vertex| {
-        if (!math.vec3.isFinite(position)) continue;
-        try reader.corners.append(reader.gpa, .{ .position = @intCast(vertex) });
-    }
-    const count = reader.corners.items.len;
-    if (count > 0) try reader.elements.append(reader.gpa, .{
-        .kind = .points,
-        .first = 0,
-        .count = @intCast(count),
-        .material = reader.material,
-        .smoothing = 0,
-    });
 }
 
 fn passOver(reader: *Reader, word: []const u8, start: usize) void {
@@ -337,7 +320,7 @@ inline fn resolve(value: i64, count: usize) ?u32 {
 test "vertices alone are points, those with faces are not" {
     const gpa = std.testing.allocator;
     for ([_][:0]const u8{
-        "v 0 0 0 1 0 0\nv nan 0 0\nv 1 2 3\n",
+        "v 0 0 0 1 0 0\nv 1 2 3\n",
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
     }, [_]Element.Kind{ .points, .face }, [_]u32{ 2, 3 }) |text, kind, count| {
         var said: Diagnostic = .{};
