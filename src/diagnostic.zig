@@ -98,7 +98,7 @@ pub const Diagnostic = struct {
 
     /// Says what is wrong with a file that can be read all the same: a warning, one for each
     /// `format` with the number of the others. If `strict`, the first one is the error line; see
-    /// `settle`.
+    /// `failIfRefused`.
     pub fn forgive(diagnostic: *Diagnostic, comptime format: []const u8, arguments: anytype) void {
         if (diagnostic.strict) return diagnostic.refuse(format, arguments);
         const count = diagnostic.warning_count;
@@ -131,7 +131,7 @@ pub const Diagnostic = struct {
     }
 
     /// Returns an error if there was something to forgive, and `strict`.
-    pub fn settle(diagnostic: *const Diagnostic) error{InvalidInput}!void {
+    pub fn failIfRefused(diagnostic: *const Diagnostic) error{InvalidInput}!void {
         if (diagnostic.refused) return error.InvalidInput;
     }
 
@@ -317,16 +317,16 @@ test "what is forgiven is a warning for each kind with a count, or an error" {
     try std.testing.expectEqual(2, diagnostic.warning_count);
     try std.testing.expectEqualStrings("node 0: odd (and 2 more)", diagnostic.warnings[0].text());
     try std.testing.expectEqualStrings("mesh 7: odd (and 2 more)", diagnostic.warnings[1].text());
-    try diagnostic.settle();
+    try diagnostic.failIfRefused();
     const long: [1000]u8 = @splat('x');
     for (0..2) |_| diagnostic.forgive("{s}", .{&long});
     try std.testing.expect(std.mem.endsWith(u8, diagnostic.warnings[2].text(), "x (and 1 more)"));
 
     var strict: Diagnostic = .{ .strict = true };
     strict.warn("a gap", .{});
-    try strict.settle();
+    try strict.failIfRefused();
     for (0..3) |index| strict.forgive("node {d}: odd", .{index});
-    try std.testing.expectError(error.InvalidInput, strict.settle());
+    try std.testing.expectError(error.InvalidInput, strict.failIfRefused());
     try std.testing.expectEqualStrings("node 0: odd", strict.message.text());
     try std.testing.expectEqual(1, strict.warning_count);
 }

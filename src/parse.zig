@@ -85,7 +85,7 @@ fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Err
         .ply => ply_scene.read(resources, main.bytes, diagnostic),
     };
     errdefer scene.deinit();
-    try diagnostic.settle();
+    try diagnostic.failIfRefused();
     scene.file.byte_count = resources.bytes_read;
     return scene;
 }

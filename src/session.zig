@@ -49,7 +49,7 @@ pub fn loadScene(
         break :builtin try builtin_scenes.build(gpa, builtin_name, diagnostic);
     } else try parse.parse(gpa, io, name, choices, diagnostic);
     errdefer scene.deinit();
-    try diagnostic.settle();
+    try diagnostic.failIfRefused();
     const is_z_up = if (choices.up_axis) |axis| axis == .z else scene.is_z_up;
     if (is_z_up) try scene.turn(z_to_y);
     return scene;
@@ -238,7 +238,7 @@ pub const Session = struct {
                 .pool = &session.pool,
                 .side_max = session.texture_side_max,
             }, session.diagnostic, &session.times);
-            try session.diagnostic.settle();
+            try session.diagnostic.failIfRefused();
         }
         const loaded = &session.loaded.?;
         const shown = try session.animate(chosen.animation);

@@ -75,7 +75,7 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
     defer animations.deinit();
     try fill(&source, resources, &animations);
     try accessors.checkRest(&source);
-    try diagnostic.settle();
+    try diagnostic.failIfRefused();
     const scene = try builder.finish();
     warnOfGaps(&source, &scene);
     return scene;
