@@ -11,6 +11,8 @@
 //!     init(gpa, frame, settings), deinit(gpa)   *I, one a thread
 //!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it
 //!     counts()                                  of all its passes, `Counts`
+//!     tile_step                                 tiles' sides are multiples of it; none: of 1
+//!     Shared                                    what all threads' have in common; none, void: nothing
 //!
 //! which is compiled in an object of its own: `Integrator` is what its kernel shows of it.
 
@@ -31,6 +33,7 @@ const Rectangle = film_file.Rectangle;
 pub const Settings = struct {
     pool: *parallel.Pool,
     integrator: choices.Integrator = .whitted,
+    lights: choices.Lights = .{},
     /// Samples a pixel, at least 1.
     sample_count: u32 = choices.sample_count.default,
     /// Where these are in each pixel: `render` fills it in.
@@ -43,6 +46,8 @@ pub const Settings = struct {
     progress: std.Progress.Node = .none,
     /// Looked at between tiles: set, it ends the work.
     cancel: ?*const std.atomic.Value(bool) = null,
+    /// The integrator's `Shared`: `render` fills it in.
+    shared: ?*anyopaque = null,
 
     fn isCancelled(settings: *const Settings) bool {
         return if (settings.cancel) |cancel| cancel.load(.monotonic) else false;
@@ -76,6 +81,8 @@ pub const Integrator = extern struct {
     pass: *const fn (*anyopaque, *const Rectangle, u32, u32, *Film) callconv(.c) void,
     counts: *const fn (integrator: *const anyopaque, counts: *Counts) callconv(.c) void,
     counts_tests: bool,
+    tile_step: u32,
+    shared: ?*const Shared,
 
     /// Of the type I.
     pub fn of(comptime I: type) Integrator {
@@ -125,6 +132,68 @@ pub const Integrator = extern struct {
             .pass = erased.pass,
             .counts = erased.counts,
             .counts_tests = I.counts_tests,
+            .tile_step = if (@hasDecl(I, "tile_step")) I.tile_step else 1,
+            .shared = if (@hasDecl(I, "Shared") and I.Shared != void) &Shared.of(I) else null,
+        };
+    }
+};
+
+/// What the integrators of all threads have in common, behind pointers. Its work comes in steps,
+/// some before the tiles and the rest after them, each of which is cut into pieces that threads
+/// take in any order. A type I.Shared has
+///
+///     steps_before, step_count
+///     init(gpa, frame, settings), deinit(gpa)
+///     pieces(step)                              how many
+///     work(integrator, step, piece, film)       returns how many pixels it made black
+const Shared = extern struct {
+    init: *const fn (*const Allocator, *const Frame, *const Settings) callconv(.c) ?*anyopaque,
+    deinit: *const fn (shared: *anyopaque, gpa: *const Allocator) callconv(.c) void,
+    pieces: *const fn (shared: *const anyopaque, step: u32) callconv(.c) u32,
+    work: *const fn (*anyopaque, *anyopaque, u32, u32, *Film) callconv(.c) u64,
+    steps_before: u32,
+    step_count: u32,
+
+    fn of(comptime I: type) Shared {
+        const erased = struct {
+            fn init(
+                gpa: *const Allocator,
+                frame: *const Frame,
+                settings: *const Settings,
+            ) callconv(.c) ?*anyopaque {
+                return I.Shared.init(gpa.*, frame, settings) catch null;
+            }
+
+            fn deinit(shared: *anyopaque, gpa: *const Allocator) callconv(.c) void {
+                ofErased(shared).deinit(gpa.*);
+            }
+
+            fn pieces(shared: *const anyopaque, step: u32) callconv(.c) u32 {
+                return ofErased(@constCast(shared)).pieces(step);
+            }
+
+            fn work(
+                shared: *anyopaque,
+                integrator: *anyopaque,
+                step: u32,
+                piece: u32,
+                film: *Film,
+            ) callconv(.c) u64 {
+                const one: *I = @ptrCast(@alignCast(integrator));
+                return ofErased(shared).work(one, step, piece, film);
+            }
+
+            fn ofErased(shared: *anyopaque) *I.Shared {
+                return @ptrCast(@alignCast(shared));
+            }
+        };
+        return .{
+            .init = erased.init,
+            .deinit = erased.deinit,
+            .pieces = erased.pieces,
+            .work = erased.work,
+            .steps_before = I.Shared.steps_before,
+            .step_count = I.Shared.step_count,
         };
     }
 };
@@ -141,9 +210,13 @@ pub fn render(
     const offsets = try gpa.alloc(sampler.Offset, chosen.sample_count);
     defer gpa.free(offsets);
     sampler.place(offsets);
-    var with_offsets = chosen.*;
-    with_offsets.offsets = offsets;
-    const settings = &with_offsets;
+    var filled_in = chosen.*;
+    filled_in.offsets = offsets;
+    filled_in.tile_size = @divCeil(chosen.tile_size, integrator.tile_step) * integrator.tile_step;
+    if (integrator.shared) |shared|
+        filled_in.shared = shared.init(&gpa, frame, &filled_in) orelse return error.OutOfMemory;
+    defer if (integrator.shared) |shared| shared.deinit(filled_in.shared.?, &gpa);
+    const settings = &filled_in;
     var tiles: Tiles = .init(film.image.width, film.image.height, settings);
     tiles.states = try gpa.alloc(Tiles.State, tiles.count);
     defer gpa.free(tiles.states);
@@ -153,7 +226,7 @@ pub fn render(
         .settings = settings,
         .tiles = &tiles,
         .film = film,
-        .pass = integrator.pass,
+        .integrator = integrator,
         .by_thread = by_thread[0..0],
     };
     defer for (job.by_thread) |one| integrator.deinit(one, &gpa);
@@ -164,7 +237,9 @@ pub fn render(
         };
         job.by_thread = by_thread[0 .. job.by_thread.len + 1];
     }
+    if (integrator.shared) |shared| job.doSteps(0, shared.steps_before);
     settings.pool.share(job.by_thread.len, &job, Job.work);
+    if (integrator.shared) |shared| job.doSteps(shared.steps_before, shared.step_count);
     if (settings.isCancelled()) return error.Canceled;
     var total: Statistics = .{ .non_finite_count = tiles.non_finite_count.load(.monotonic) };
     var tests: statistics.TestCounts = .{};
@@ -183,8 +258,40 @@ const Job = struct {
     settings: *const Settings,
     tiles: *Tiles,
     film: *Film,
-    pass: @FieldType(Integrator, "pass"),
+    integrator: *const Integrator,
     by_thread: []const *anyopaque,
+    /// Of what the threads share: the step under way, its pieces, and the next of these.
+    step: u32 = 0,
+    piece_count: u32 = 0,
+    next_piece: std.atomic.Value(u32) = .init(0),
+
+    /// Work that is shared, from one step to before another.
+    fn doSteps(job: *Job, first: u32, end: u32) void {
+        for (first..end) |step| {
+            job.step = @intCast(step);
+            job.piece_count = job.integrator.shared.?.pieces(job.settings.shared.?, job.step);
+            job.next_piece.store(0, .monotonic);
+            const thread_count = @min(job.by_thread.len, job.piece_count);
+            if (thread_count > 0) job.settings.pool.share(thread_count, job, doPieces);
+        }
+    }
+
+    fn doPieces(job: *Job, thread_index: usize) void {
+        const shared = job.integrator.shared.?;
+        while (!job.settings.isCancelled()) {
+            const piece = job.next_piece.fetchAdd(1, .monotonic);
+            if (piece >= job.piece_count) return;
+            const one = job.by_thread[thread_index];
+            const non_finite =
+                shared.work(job.settings.shared.?, one, job.step, piece, job.film);
+            job.countNonFinite(non_finite);
+        }
+    }
+
+    fn countNonFinite(job: *Job, count: u64) void {
+        if (count == 0) return;
+        _ = job.tiles.non_finite_count.fetchAdd(@intCast(count), .monotonic);
+    }
 
     fn work(job: *Job, thread_index: usize) void {
         while (!job.settings.isCancelled()) {
@@ -205,12 +312,10 @@ const Job = struct {
         const state = &job.tiles.states[number];
         const tile = job.tiles.rectangleOf(number);
         const sample_count = passSamples(state.samples_done, job.settings.sample_count);
-        job.pass(integrator, &tile, state.samples_done, sample_count, job.film);
+        job.integrator.pass(integrator, &tile, state.samples_done, sample_count, job.film);
         state.samples_done += sample_count;
         if (state.samples_done < job.settings.sample_count) return;
-        const non_finite = job.film.finish(tile, job.settings.sample_count);
-        if (non_finite == 0) return;
-        _ = job.tiles.non_finite_count.fetchAdd(@intCast(non_finite), .monotonic);
+        job.countNonFinite(job.film.finish(tile, job.settings.sample_count));
     }
 };
 
