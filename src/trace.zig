@@ -162,6 +162,7 @@ test {
     _ = @import("trace/traverse/beam/grid.zig");
     _ = beam.pixel_window;
     _ = @import("trace/integrate/sampler.zig");
+    _ = @import("trace/integrate/sobol.zig");
     _ = @import("trace/shade/cosine.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/iridescence.zig");
