@@ -427,8 +427,7 @@ const Surface = struct {
         return surface.scatter.eval(.splat(to_light));
     }
 
-    /// By channel, over samples spread evenly by powers of one number
-    /// (Roberts 2018, "The Unreasonable Effectiveness of Quasirandom Sequences").
+    /// By channel.
     fn meanWeight(surface: *const Surface, count: usize) [3]f64 {
         var sums: [3]f64 = @splat(0);
         for (0..count) |index| {
@@ -442,13 +441,18 @@ const Surface = struct {
     }
 };
 
+/// Points of Halton 1960 ("On the Efficiency of Certain Quasi-Random Sequences of Points").
 fn numbersOf(index: usize) [4]f32 {
     var numbers: [4]f32 = undefined;
-    for (&numbers, [_]f64{
-        0.856674883854503, 0.733891856627126, 0.628706721021025, 0.538597257153172,
-    }) |*number, step| {
-        const whole = 0.5 + step * @as(f64, @floatFromInt(index));
-        number.* = @floatCast(@min(whole - @floor(whole), 0.9999999));
+    for (&numbers, [_]usize{ 5, 2, 3, 7 }) |*number, base| {
+        var rest = index;
+        var digit: f64 = 1;
+        var sum: f64 = 0;
+        while (rest > 0) : (rest /= base) {
+            digit /= @floatFromInt(base);
+            sum += digit * @as(f64, @floatFromInt(rest % base));
+        }
+        number.* = @floatCast(sum);
     }
     return numbers;
 }
