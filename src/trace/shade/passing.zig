@@ -180,7 +180,7 @@ pub fn Passing(comptime Lanes: type) type {
                 .bitOr(bent_through.scattered.andNot(reflects));
             const mirrored = seen.reflected.scale(one.div(seen.chance.max(least)));
             return .{
-                .to_light = .select(passing.sharp, straight, rough),
+                .to_light = .select(passing.sharp, straight.normalize(), rough),
                 .alone = passing.sharp.bitOr(scattered),
                 .weight = .select(reflects, mirrored, weight),
             };

@@ -342,104 +342,153 @@ pub fn Scatter(comptime Lanes: type) type {
 
 const Single = simd.Lanes(.scalar, 1);
 
-/// A surface of all lobes that are asked for, off the axes so that frames are in it.
-const Surface = struct {
-    point: Interaction(Single),
-    layers: Layers(Single),
-    bsdf: Bsdf(Single),
-    scatter: Scatter(Single),
-    /// Of all lobes, as the BSDF has it for the view.
-    albedo: Single.Vec3,
+/// What surfaces of all lobes may have.
+const Change = struct {
+    cosine: f32 = 0.8,
+    color: [3]f32 = .{ 1, 1, 1 },
+    metallic: f32 = 0,
+    roughness: f32 = 0.7,
+    transmission: f32 = 0,
+    /// Of a boundary of a volume; null where thin.
+    eta: ?f32 = null,
+    dispersion: f32 = 0,
+    coat: f32 = 0,
+    coat_roughness: f32 = 0.5,
+    coat_tilt: f32 = 0.3,
+    sheen: f32 = 0,
+    anisotropy: f32 = 0,
+    iridescence: f32 = 0,
+    diffuse_transmission: f32 = 0,
+    throughput: [3]f32 = .{ 1, 1, 1 },
+    /// How far the normal for shading is bent away from the triangle's.
+    tilt: f32 = 0,
+    is_layered: bool = true,
+    unlit: bool = false,
+};
 
-    const Change = struct {
-        cosine: f32 = 0.8,
-        color: [3]f32 = .{ 1, 1, 1 },
-        metallic: f32 = 0,
-        roughness: f32 = 0.7,
-        transmission: f32 = 0,
-        /// Of a boundary of a volume; null where thin.
-        eta: ?f32 = null,
-        dispersion: f32 = 0,
-        coat: f32 = 0,
-        coat_roughness: f32 = 0.5,
-        coat_tilt: f32 = 0.3,
-        sheen: f32 = 0,
-        anisotropy: f32 = 0,
-        iridescence: f32 = 0,
-        diffuse_transmission: f32 = 0,
-        throughput: [3]f32 = .{ 1, 1, 1 },
-        is_layered: bool = true,
-        unlit: bool = false,
-    };
+/// Surfaces in lanes, off the axes so that frames are in it.
+fn Surface(comptime Lanes: type) type {
+    return struct {
+        point: Interaction(Lanes),
+        layers: Layers(Lanes),
+        bsdf: Bsdf(Lanes),
+        scatter: Scatter(Lanes),
+        /// Of all lobes, as the BSDF has it for the view.
+        albedo: Lanes.Vec3,
 
-    fn become(surface: *Surface, change: Change) void {
-        const axes = [3]Single.Vec3{
+        const Self = @This();
+        const Changes = [Lanes.count]Change;
+
+        fn become(surface: *Self, lanes: Changes) void {
+            surface.place(lanes);
+            const layers = &surface.layers;
+            layers.* = test_surface.layersOf(Lanes);
+            layers.present = maskOf(lanes, "is_layered");
+            layers.clearcoat = floatOf(lanes, "coat");
+            layers.clearcoat_roughness = floatOf(lanes, "coat_roughness");
+            layers.clearcoat_normal = axes[1].add(axes[2].scale(floatOf(lanes, "coat_tilt")))
+                .normalize();
+            const sheen = floatOf(lanes, "sheen");
+            layers.sheen_color = .{ .x = sheen, .y = sheen, .z = sheen };
+            layers.sheen_roughness = .splat(0.6);
+            layers.tangent = axes[2];
+            inline for (.{
+                "anisotropy", "iridescence", "dispersion", "diffuse_transmission",
+            }) |name| @field(layers, name) = floatOf(lanes, name);
+            const bsdf = &surface.bsdf;
+            bsdf.albedo = .unknown;
+            const is_layered = layers.present.any();
+            if (is_layered)
+                bsdf.becomeLayered(&surface.point, layers)
+            else
+                bsdf.become(&surface.point);
+            surface.albedo = bsdf.specular_albedo.add(bsdf.diffuse_albedo).add(bsdf.back_albedo)
+                .add(bsdf.mirror.transmitted);
+            if (is_layered) {
+                const coat = bsdf.coating.albedo;
+                surface.albedo = surface.albedo.add(bsdf.coating.sheen_albedo)
+                    .add(.{ .x = coat, .y = coat, .z = coat });
+            }
+            const throughput = colorOf(lanes, "throughput");
+            surface.scatter.become(&surface.point, bsdf, layers, .splat(true), throughput);
+        }
+
+        const axes = [3]Lanes.Vec3{
             .splat(.{ 0.8, -0.6, 0 }), .splat(.{ 0.36, 0.48, -0.8 }), .splat(.{ 0.48, 0.64, 0.6 }),
         };
-        const point = &surface.point;
-        point.* = test_surface.pointAt(Single, .{ 0, 1, 0 });
-        point.normal = axes[1];
-        point.normal_geometric = axes[1];
-        const sine = @sqrt(1 - change.cosine * change.cosine);
-        point.view = axes[0].scale(.splat(sine)).add(axes[1].scale(.splat(change.cosine)));
-        const material = &point.material;
-        material.base_color = .splat(change.color);
-        material.metallic = .splat(change.metallic);
-        material.roughness = .splat(change.roughness);
-        material.transmission = .splat(change.transmission);
-        material.volume = .splat(change.eta != null);
-        material.unlit = .splat(change.unlit);
-        point.eta = .splat(change.eta orelse 1);
-        const layers = &surface.layers;
-        layers.* = test_surface.layersOf(Single);
-        layers.clearcoat = .splat(change.coat);
-        layers.clearcoat_roughness = .splat(change.coat_roughness);
-        layers.clearcoat_normal =
-            axes[1].add(axes[2].scale(.splat(change.coat_tilt))).normalize();
-        layers.sheen_color = .splat(@splat(change.sheen));
-        layers.sheen_roughness = .splat(0.6);
-        layers.anisotropy = .splat(change.anisotropy);
-        layers.tangent = axes[2];
-        layers.iridescence = .splat(change.iridescence);
-        layers.dispersion = .splat(change.dispersion);
-        layers.diffuse_transmission = .splat(change.diffuse_transmission);
-        const bsdf = &surface.bsdf;
-        bsdf.albedo = .unknown;
-        if (change.is_layered) bsdf.becomeLayered(point, layers) else bsdf.become(point);
-        surface.albedo = bsdf.specular_albedo.add(bsdf.diffuse_albedo).add(bsdf.back_albedo)
-            .add(bsdf.mirror.transmitted);
-        if (change.is_layered) {
-            const coat = bsdf.coating.albedo;
-            surface.albedo = surface.albedo.add(bsdf.coating.sheen_albedo)
-                .add(.{ .x = coat, .y = coat, .z = coat });
-        }
-        const throughput: Single.Vec3 = .splat(change.throughput);
-        surface.scatter.become(point, bsdf, layers, .splat(true), throughput);
-    }
 
-    fn draw(surface: *const Surface, numbers: [4]f32) Sample(Single) {
-        var lanes: [4]Single.F32 = undefined;
-        for (&lanes, numbers) |*lane, number| lane.* = .splat(number);
-        return surface.scatter.sample(lanes);
-    }
-
-    fn eval(surface: *const Surface, to_light: [3]f32) Seen(Single) {
-        return surface.scatter.eval(.splat(to_light));
-    }
-
-    /// By channel.
-    fn meanWeight(surface: *const Surface, count: usize) [3]f64 {
-        var sums: [3]f64 = @splat(0);
-        for (0..count) |index| {
-            const found = surface.draw(numbersOf(index));
-            if (found.is_end.lane(0)) continue;
-            for (&sums, found.weight.lane(0)) |*sum, channel| {
-                sum.* += channel / @as(f64, @floatFromInt(count));
+        fn place(surface: *Self, lanes: Changes) void {
+            const point = &surface.point;
+            point.* = test_surface.pointAt(Lanes, .{ 0, 1, 0 });
+            point.normal_geometric = axes[1];
+            point.normal = axes[1].sub(axes[0].scale(floatOf(lanes, "tilt"))).normalize();
+            const cosine = floatOf(lanes, "cosine");
+            const sine = Lanes.F32.splat(1).sub(cosine.mul(cosine)).sqrt();
+            point.view = axes[0].scale(sine).add(axes[1].scale(cosine));
+            const material = &point.material;
+            material.base_color = colorOf(lanes, "color");
+            inline for (.{ "metallic", "roughness", "transmission" }) |name| {
+                @field(material, name) = floatOf(lanes, name);
             }
+            material.unlit = maskOf(lanes, "unlit");
+            var etas: [Lanes.count]f32 = undefined;
+            var volumes: [Lanes.count]bool = undefined;
+            for (&etas, &volumes, lanes) |*eta, *volume, change| {
+                eta.* = change.eta orelse 1;
+                volume.* = change.eta != null;
+            }
+            material.volume = .fromArray(volumes);
+            point.eta = .fromArray(etas);
         }
-        return sums;
-    }
-};
+
+        fn floatOf(lanes: Changes, comptime name: []const u8) Lanes.F32 {
+            var array: [Lanes.count]f32 = undefined;
+            for (&array, lanes) |*to, change| to.* = @field(change, name);
+            return .fromArray(array);
+        }
+
+        fn maskOf(lanes: Changes, comptime name: []const u8) Lanes.Mask {
+            var array: [Lanes.count]bool = undefined;
+            for (&array, lanes) |*to, change| to.* = @field(change, name);
+            return .fromArray(array);
+        }
+
+        fn colorOf(lanes: Changes, comptime name: []const u8) Lanes.Vec3 {
+            var channels: [3][Lanes.count]f32 = undefined;
+            for (lanes, 0..) |change, lane| {
+                for (&channels, @field(change, name)) |*to, channel| to[lane] = channel;
+            }
+            return .{
+                .x = .fromArray(channels[0]),
+                .y = .fromArray(channels[1]),
+                .z = .fromArray(channels[2]),
+            };
+        }
+
+        fn draw(surface: *const Self, numbers: [4]f32) Sample(Lanes) {
+            var all: [4]Lanes.F32 = undefined;
+            for (&all, numbers) |*to, number| to.* = .splat(number);
+            return surface.scatter.sample(all);
+        }
+
+        fn eval(surface: *const Self, to_light: [3]f32) Seen(Lanes) {
+            return surface.scatter.eval(.splat(to_light));
+        }
+
+        /// Of lane 0, by channel.
+        fn meanWeight(surface: *const Self, count: usize) [3]f64 {
+            var sums: [3]f64 = @splat(0);
+            for (0..count) |index| {
+                const found = surface.draw(numbersOf(index));
+                if (found.is_end.lane(0)) continue;
+                for (&sums, found.weight.lane(0)) |*sum, channel| {
+                    sum.* += channel / @as(f64, @floatFromInt(count));
+                }
+            }
+            return sums;
+        }
+    };
+}
 
 /// Points of Halton 1960 ("On the Efficiency of Certain Quasi-Random Sequences of Points").
 fn numbersOf(index: usize) [4]f32 {
@@ -458,7 +507,7 @@ fn numbersOf(index: usize) [4]f32 {
 }
 
 /// Of every lobe, alone and with others.
-const changes = [_]Surface.Change{
+const changes = [_]Change{
     .{ .roughness = 0.4, .is_layered = false },
     .{ .metallic = 1, .roughness = 1 },
     .{ .metallic = 1, .roughness = 0.2, .cosine = 0.1 },
@@ -481,9 +530,9 @@ const changes = [_]Surface.Change{
 };
 
 test "white furnace: the mean weight of every lobe's samples is its albedo" {
-    var surface: Surface = undefined;
+    var surface: Surface(Single) = undefined;
     for (changes) |change| {
-        surface.become(change);
+        surface.become(.{change});
         errdefer std.debug.print("{any}\n", .{change});
         // Channels together, for one alone may be chosen.
         const weight = surface.meanWeight(1024);
@@ -493,10 +542,10 @@ test "white furnace: the mean weight of every lobe's samples is its albedo" {
 }
 
 test "weight times density is the BSDF times cosine, and no weight is far from the mean" {
-    var surface: Surface = undefined;
+    var surface: Surface(Single) = undefined;
     var seen: [3]usize = @splat(0);
     for (changes) |change| {
-        surface.become(change);
+        surface.become(.{change});
         errdefer std.debug.print("{any}\n", .{change});
         var worst: f32 = 0;
         for (0..64) |index| {
@@ -528,7 +577,7 @@ test "weight times density is the BSDF times cosine, and no weight is far from t
 
 /// For `chi_squared.zig`, whose three numbers become four: the low bits of one are another.
 const Distributed = struct {
-    surface: *const Surface,
+    surface: *const Surface(Single),
 
     pub fn sample(lobe: *const Distributed, numbers: [3]f32) ?[3]f32 {
         const shifted = numbers[1] * 4096;
@@ -544,7 +593,7 @@ const Distributed = struct {
 };
 
 test "samples have their density, by chi-squared" {
-    const some = [_]Surface.Change{
+    const some = [_]Change{
         .{
             .metallic = 0.5,
             .roughness = 0.6,
@@ -553,27 +602,26 @@ test "samples have their density, by chi-squared" {
             .coat = 1,
             .diffuse_transmission = 0.5,
         },
-        .{ .roughness = 0.6, .transmission = 0.5, .is_layered = false },
         .{ .roughness = 0.7, .transmission = 1, .eta = 1.5, .cosine = 0.6, .is_layered = false },
         .{ .roughness = 0.8, .transmission = 0.8, .eta = 1.0 / 1.5, .dispersion = 5, .sheen = 1 },
     };
-    var surface: Surface = undefined;
+    var surface: Surface(Single) = undefined;
     for (some) |change| {
-        surface.become(change);
+        surface.become(.{change});
         errdefer std.debug.print("{any}\n", .{change});
         try chi_squared.expectDistributed(&Distributed{ .surface = &surface });
     }
 }
 
 test "every lobe is chosen by its share of the albedo" {
-    var surface: Surface = undefined;
-    const all: Surface.Change = .{
+    var surface: Surface(Single) = undefined;
+    const all: Change = .{
         .coat = 1,
         .sheen = 0.5,
         .transmission = 0.5,
         .diffuse_transmission = 0.5,
     };
-    surface.become(all);
+    surface.become(.{all});
     const whole = surface.albedo.x.lane(0);
     const bsdf = &surface.bsdf;
     const shares = &surface.scatter.shares;
@@ -588,6 +636,138 @@ test "every lobe is chosen by its share of the albedo" {
     const rest = shares.specular.add(shares.cosine).lane(0);
     try std.testing.expectApproxEqAbs(base / whole, rest, 1e-5);
     // Red light alone: blue lobes are not worth a ray.
-    surface.become(.{ .transmission = 0.5, .color = .{ 0, 0, 1 }, .throughput = .{ 1, 0, 0 } });
+    surface.become(.{.{
+        .transmission = 0.5,
+        .color = .{ 0, 0, 1 },
+        .throughput = .{ 1, 0, 0 },
+    }});
     try std.testing.expectEqual(0, surface.scatter.shares.through.lane(0));
+}
+
+test "edges: finite, of unit length, never more than the lobes have" {
+    const roughnesses = [_]f32{ 0, 1e-3, 0.032, 0.1, 1 };
+    const cosines = [_]f32{ 0, 1e-3, 0.4, 1 };
+    const corners = [_][4]f32{
+        .{ 0, 0, 0, 0 },           .{ 0.9999999, 0.5, 0.5, 0 },
+        .{ 0.5, 0.9999999, 0, 1 }, .{ 0.9999999, 0, 0.9999999, 0.9999999 },
+    };
+    var surface: Surface(Single) = undefined;
+    for ([_]?f32{ null, 1, 0.999, 1.003, 1.0 / 1.5, 2.4 }) |eta| {
+        for (0..roughnesses.len * cosines.len) |index| {
+            const roughness = roughnesses[index / cosines.len];
+            const cosine = cosines[index % cosines.len];
+            const change: Change = .{
+                .eta = eta,
+                .roughness = roughness,
+                .cosine = cosine,
+                .transmission = 1,
+                .tilt = if (cosine > 0.5) 0.8 else 0,
+                .dispersion = if (cosine > 0.3) 1 else 0,
+                .is_layered = cosine > 0.3,
+            };
+            surface.become(.{change});
+            errdefer std.debug.print("{any}\n", .{change});
+            for (corners) |numbers| try expectSane(&surface, numbers);
+            const view = surface.point.view.lane(0);
+            for ([_][3]f32{ view, .{ -view[0], -view[1], -view[2] } }) |way| {
+                const seen = surface.eval(way);
+                try std.testing.expect(isSane(seen.pdf.lane(0)));
+                for (seen.value.lane(0)) |part| try std.testing.expect(isSane(part));
+            }
+        }
+    }
+}
+
+fn isSane(value: f32) bool {
+    return std.math.isFinite(value) and value >= 0;
+}
+
+fn expectSane(surface: *const Surface(Single), numbers: [4]f32) !void {
+    const found = surface.draw(numbers);
+    try std.testing.expect(isSane(found.pdf.lane(0)));
+    for (found.weight.lane(0)) |part| try std.testing.expect(isSane(part) and part < 30);
+    if (found.is_end.lane(0)) return;
+    try std.testing.expectApproxEqAbs(1, found.to_light.length().lane(0), 1e-5);
+    const above = surface.point.normal_geometric.dot(found.to_light).lane(0);
+    try std.testing.expect(found.is_delta.lane(0) or above != 0);
+}
+
+test "total reflection inside: nothing comes through, but where microfacets let it" {
+    var surface: Surface(Single) = undefined;
+    for ([_]f32{ 0, 0.6 }) |roughness| {
+        const change: Change =
+            .{ .transmission = 1, .eta = 1.5, .cosine = 0.5, .roughness = roughness };
+        surface.become(.{change});
+        var passed: usize = 0;
+        for (0..200) |index| {
+            const found = surface.draw(numbersOf(index));
+            if (roughness == 0) try std.testing.expect(found.is_delta.lane(0));
+            try std.testing.expectApproxEqAbs(1, found.weight.x.lane(0), 1e-4);
+            if (found.crosses.lane(0)) passed += 1;
+        }
+        if (roughness == 0) try std.testing.expectEqual(0, passed);
+        if (roughness > 0) try std.testing.expect(passed > 10 and passed < 150);
+    }
+}
+
+test "paths end at unlit and at black surfaces" {
+    var surface: Surface(Single) = undefined;
+    const black: Change = .{ .metallic = 1, .color = @splat(0), .cosine = 1 };
+    for ([_]Change{ .{ .unlit = true }, black }) |one| {
+        surface.become(.{one});
+        for (0..16) |index| {
+            const found = surface.draw(numbersOf(index));
+            if (one.unlit) try std.testing.expect(found.is_end.lane(0));
+            try std.testing.expect(found.is_end.lane(0) or found.weight.x.lane(0) < 0.2);
+        }
+    }
+}
+
+test "reciprocity: light and view change places on opaque surfaces, smooth ones as well" {
+    var surface: Surface(Single) = undefined;
+    for ([_]f32{ 0.06, 0.3, 1 }) |roughness| for (0..8) |index| {
+        const change: Change = .{ .roughness = roughness, .metallic = 0.5 };
+        surface.become(.{change});
+        const found = surface.draw(numbersOf(index));
+        if (found.is_end.lane(0)) continue;
+        const view = surface.point.view;
+        const cosines = [2]f32{
+            surface.point.normal.dot(view).lane(0),
+            surface.point.normal.dot(found.to_light).lane(0),
+        };
+        const there = surface.eval(found.to_light.lane(0)).value.x.lane(0) / cosines[1];
+        surface.point.view = found.to_light;
+        const bsdf = &surface.bsdf;
+        bsdf.becomeLayered(&surface.point, &surface.layers);
+        surface.scatter
+            .become(&surface.point, bsdf, &surface.layers, .splat(true), .splat(.{ 1, 1, 1 }));
+        const back = surface.eval(view.lane(0)).value.x.lane(0) / cosines[0];
+        try std.testing.expectApproxEqRel(there, back, 0.01);
+    };
+}
+
+test "every lane has the bits that its surface has alone" {
+    const Four = simd.Lanes(.vector, 4);
+    var together: Surface(Four) = undefined;
+    var alone: Surface(Single) = undefined;
+    var first: usize = 0;
+    while (first + 4 <= changes.len) : (first += 3) {
+        const four = changes[first..][0..4].*;
+        together.become(four);
+        for (0..12) |index| {
+            const all = together.draw(numbersOf(index));
+            for (four, 0..) |change, lane| {
+                alone.become(.{change});
+                const one = alone.draw(numbersOf(index));
+                errdefer std.debug.print("{any}\n", .{change});
+                try std.testing.expectEqual(one.is_end.lane(0), all.is_end.lane(lane));
+                if (one.is_end.lane(0)) continue;
+                try std.testing.expectEqual(one.to_light.lane(0), all.to_light.lane(lane));
+                try std.testing.expectEqual(one.weight.lane(0), all.weight.lane(lane));
+                try std.testing.expectEqual(one.pdf.lane(0), all.pdf.lane(lane));
+                try std.testing.expectEqual(one.is_delta.lane(0), all.is_delta.lane(lane));
+                try std.testing.expectEqual(one.crosses.lane(0), all.crosses.lane(lane));
+            }
+        }
+    }
 }
