@@ -41,6 +41,7 @@ pub fn build(b: *std.Build) void {
         .bench_poses = b.step("bench:poses", "Posed triangles: -- SCENE ANIMATION SECONDS"),
         .bench_frames = b.step("bench:frames", "Time frames in motion: -- SCENE [FRAMES [SIZE]]"),
         .bench_structures = b.step("bench:structures", "Trees beside each other: -- SCENE"),
+        .bench_light = b.step("bench:light", "Rays by bounce, by every traversal: -- SCENE [options]"),
         .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
         .vendor = b.step("vendor", "Fetch and check the third-party files"),
@@ -69,6 +70,7 @@ pub fn build(b: *std.Build) void {
     addBenchmark(steps.check, steps.bench_frames, package.renderer("frames", "bench/frames.zig"));
     const structures = package.benchmark("structures", "bench/structures.zig");
     addBenchmark(steps.check, steps.bench_structures, structures);
+    addBenchmark(steps.check, steps.bench_light, package.benchmark("light", "bench/light.zig"));
     const full: Package = .init(b, target, optimize orelse .fast, vendor.headers, all);
     addCompare(steps.compare, full, vendor.headers);
 
