@@ -64,13 +64,11 @@ pub fn build(b: *std.Build) void {
     addRun(steps.run, program);
     steps.@"asm".dependOn(&b.addInstallFile(package.assembly(), "raylane.s").step);
 
-    addBenchmark(steps.check, steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
-    addBenchmark(steps.check, steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
-    addBenchmark(steps.check, steps.bench_poses, package.benchmark("poses", "bench/poses.zig"));
+    inline for (.{ "rays", "parse", "poses", "structures", "light" }) |name| {
+        const benchmark = package.benchmark(name, "bench/" ++ name ++ ".zig");
+        addBenchmark(steps.check, @field(steps, "bench_" ++ name), benchmark);
+    }
     addBenchmark(steps.check, steps.bench_frames, package.renderer("frames", "bench/frames.zig"));
-    const structures = package.benchmark("structures", "bench/structures.zig");
-    addBenchmark(steps.check, steps.bench_structures, structures);
-    addBenchmark(steps.check, steps.bench_light, package.benchmark("light", "bench/light.zig"));
     const full: Package = .init(b, target, optimize orelse .fast, vendor.headers, all);
     addCompare(steps.compare, full, vendor.headers);
 
