@@ -41,7 +41,7 @@ pub fn build(b: *std.Build) void {
         .bench_poses = b.step("bench:poses", "Posed triangles: -- SCENE ANIMATION SECONDS"),
         .bench_frames = b.step("bench:frames", "Time frames in motion: -- SCENE [FRAMES [SIZE]]"),
         .bench_structures = b.step("bench:structures", "Trees beside each other: -- SCENE"),
-        .bench_light = b.step("bench:light", "Rays by bounce, by every traversal: -- SCENE [options]"),
+        .bench_light = b.step("bench:light", "Rays by bounce and traversal: -- SCENE [options]"),
         .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
         .vendor = b.step("vendor", "Fetch and check the third-party files"),
