@@ -89,7 +89,8 @@ pub fn main(init: std.process.Init) u8 {
     const arguments = init.minimal.args.toSlice(arena) catch return 1;
     const options = parse(arguments[@min(1, arguments.len)..]) orelse {
         std.debug.print("{s}", .{help});
-        return 2;
+        const is_asked = arguments.len == 2 and std.mem.eql(u8, arguments[1], "--help");
+        return if (is_asked) 0 else 2;
     };
     var diagnostic: Diagnostic = .{};
     var bench: Bench = .{
