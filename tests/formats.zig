@@ -567,6 +567,25 @@ test "PLY: colours of vertices, of faces, and coordinates of corners" {
     try std.testing.expectEqualStrings("image", own.images[0].bytes);
 }
 
+test "PLY: names in any case, and alpha of 0 everywhere is none" {
+    var said: Diagnostic = .{};
+    var scene = try read("a", "ply\nformat ascii 1.0\nelement Vertex 3\nproperty FLOAT X\n" ++
+        "property float Y\nproperty float Z\nproperty uchar Red\nproperty uchar Alpha\n" ++
+        "element FACE 1\nproperty list uchar int Vertex_Indices\nend_header\n" ++
+        "1 2 3 255 0 4 5 6 0 0 7 8 9 0 0 3 0 1 2", &said);
+    defer scene.deinit();
+    const mesh = &scene.meshes[0];
+    try expectEqual(Vec3{ 1, 2, 3 }, mesh.positions[0]);
+    try expectEqual(1, scene.triangleCount());
+    try expectEqual([4]f32{ 1, 0, 0, 1 }, mesh.colors.?[0]);
+    try expectEqual(.@"opaque", scene.materials[0].alpha_mode);
+    try expectEqual(1, said.warning_count);
+    try std.testing.expectEqualStrings(
+        "alpha is 0 everywhere: taken as opaque",
+        said.warnings[0].text(),
+    );
+}
+
 test "PLY: nothing at all is a warning" {
     var said: Diagnostic = .{};
     var scene = try read("a", "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n" ++

@@ -38,6 +38,7 @@ pub fn read(
         "{d} normals or coordinates of textures that are not finite are dropped",
         .{mesh.dropped_count},
     );
+    if (mesh.is_alpha_dropped) diagnostic.warn("alpha is 0 everywhere: taken as opaque", .{});
     // Upwards in files, downwards in scenes.
     if (mesh.texcoords) |texcoords| for (texcoords) |*texcoord| {
         texcoord[1] = 1 - texcoord[1];
