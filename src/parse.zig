@@ -173,10 +173,10 @@ pub fn parsePbrt(
 test {
     _ = Resources;
     _ = @import("parse/cgltf.zig");
+    _ = @import("parse/file_search.zig");
     _ = format_file;
     _ = gltf;
     _ = pbrt;
-    _ = @import("parse/named_images.zig");
     _ = @import("parse/number.zig");
     _ = @import("parse/orientation.zig");
     _ = @import("parse/plain.zig");
