@@ -282,12 +282,6 @@ fn loadFile(
     return .{ .bytes = bytes, .identity = identity };
 }
 
-/// A text without the byte order mark that editors of Windows put before it (RFC 3629, section 6).
-pub fn withoutMark(text: [:0]const u8) [:0]const u8 {
-    const mark = "\xef\xbb\xbf";
-    return if (std.mem.startsWith(u8, text, mark)) text[mark.len..] else text;
-}
-
 /// Of one file, as far as memory reaches.
 fn bytesMax() u64 {
     return @min(file_bytes_max, std.math.maxInt(usize) / 2);

@@ -20,6 +20,7 @@ const Resources = @import("../resource.zig");
 const Vec3 = math.Vec3;
 const Words = @import("words.zig");
 const quote = @import("../../diagnostic.zig").quote;
+const markBytes = @import("../format.zig").markBytes;
 const Materials = @This();
 
 resources: *Resources,
@@ -94,7 +95,7 @@ fn loadOne(materials: *Materials, name: []const u8, reason: *Message) Resources.
             .{ quote(name), quote(path) },
         );
         const joined = try Words.joined(arena, file.bytes) orelse file.bytes;
-        const text = Resources.withoutMark(joined);
+        const text = joined[markBytes(joined)..];
         try materials.library.read(text, name, std.fs.path.dirname(path) orelse "");
         return true;
     }

@@ -18,6 +18,7 @@ const Allocator = std.mem.Allocator;
 const Diagnostic = diagnostic_file.Diagnostic;
 const Identity = @import("../../identity.zig").Identity;
 const Resources = @import("../resource.zig");
+const markBytes = @import("../format.zig").markBytes;
 const assert = std.debug.assert;
 const printable = diagnostic_file.printable;
 const quote = diagnostic_file.quote;
@@ -96,8 +97,8 @@ pub fn start(input: *Input) Error!void {
         if (std.mem.startsWith(u8, text.bytes, mark))
             return input.fail(text.start, "is in UTF-16, not in UTF-8", .{});
     }
-    if (!std.mem.startsWith(u8, text.bytes, byte_order_mark)) return;
-    text.cursor = byte_order_mark.len;
+    text.cursor = markBytes(text.bytes);
+    if (text.cursor == 0) return;
     try input.forgive(text.start, "mark", "a byte order mark (BOM) is passed over", .{});
 }
 
@@ -411,14 +412,15 @@ pub fn withoutMark(
     name: []const u8,
     bytes: [:0]const u8,
 ) Error![:0]const u8 {
-    if (!std.mem.startsWith(u8, bytes, byte_order_mark)) return bytes;
+    const mark_bytes = markBytes(bytes);
+    if (mark_bytes == 0) return bytes;
     try input.forgive(
         position,
         "mark",
         "{f}: a byte order mark (BOM) is passed over",
         .{quote(name)},
     );
-    return bytes[byte_order_mark.len..];
+    return bytes[mark_bytes..];
 }
 
 /// What a gzip file holds; it counts as text that is read. The caller frees it.
@@ -433,9 +435,6 @@ pub fn inflate(
     input.resources.bytes_read += plain.len;
     return plain;
 }
-
-/// What some editors put before a text: RFC 3629, section 6.
-const byte_order_mark = "\xef\xbb\xbf";
 
 test placeOf {
     const text = "a\nbc\n\nd";
