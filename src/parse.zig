@@ -61,10 +61,15 @@ pub fn parseNamed(
     const copy = try gpa.dupeSentinel(u8, bytes, 0);
     var opened: Resources.Scene = .{
         .main = .{ .bytes = copy, .identity = null },
-        .resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings },
+        .resources = .{
+            .gpa = gpa,
+            .io = io,
+            .folder = folder,
+            .settings = settings,
+            .bytes_read = bytes.len,
+        },
     };
     defer gpa.free(opened.main.bytes);
-    opened.resources.bytes_read = bytes.len;
     return read(&opened, name, diagnostic);
 }
 
@@ -140,8 +145,8 @@ pub fn checkOnly(
         return diagnostic.fail(error.MaterialVariantUnknown, "it has no material variants", .{});
 }
 
-/// Reads a glTF file that is in memory, JSON or binary; what it names is looked for in `folder`.
-/// Otherwise like `parse`.
+/// Reads a glTF file that is in memory, JSON or binary, whatever it seems to be. Otherwise like
+/// `parseNamed`.
 pub fn parseBytes(
     gpa: Allocator,
     io: std.Io,
@@ -150,8 +155,9 @@ pub fn parseBytes(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!Scene {
-    var resources: Resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings };
-    return gltf.read(&resources, bytes, diagnostic);
+    var own = settings;
+    own.format = .gltf;
+    return parseNamed(gpa, io, "text", bytes, folder, own, diagnostic);
 }
 
 /// The same for a PBRT text.
@@ -163,11 +169,9 @@ pub fn parsePbrt(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!Scene {
-    const copy = try gpa.dupeSentinel(u8, bytes, 0);
-    defer gpa.free(copy);
-    var resources: Resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings };
-    resources.bytes_read = bytes.len;
-    return pbrt.read(&resources, "text", .{ .bytes = copy, .identity = null }, diagnostic);
+    var own = settings;
+    own.format = .pbrt;
+    return parseNamed(gpa, io, "text", bytes, folder, own, diagnostic);
 }
 
 test {

@@ -35,7 +35,6 @@ pub const Error = Source.Error || error{ SceneUnknown, MaterialVariantUnknown };
 /// Reads a file that is in memory; what it names comes from `resources`.
 pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) Error!Scene {
     const gpa = resources.gpa;
-    diagnostic.strict = resources.settings.strict;
     const parts = try container.open(bytes, diagnostic);
     var text: Text = try .open(gpa, parts.json, diagnostic);
     defer text.deinit();
