@@ -258,7 +258,7 @@ fn ofMarkup(text: []const u8) []const u8 {
 }
 
 /// The format that a name's extension stands for.
-pub fn ofName(name: []const u8) ?Format {
+fn ofName(name: []const u8) ?Format {
     const plain = if (std.ascii.endsWithIgnoreCase(name, ".gz")) name[0 .. name.len - 3] else name;
     const extension = std.fs.path.extension(plain);
     if (extension.len == 0) return null;
