@@ -1,8 +1,8 @@
 //! Stage 1: a scene file becomes a `Scene`.
 //!
-//! In: the path of a file, or standard input: glTF 2.0, JSON or binary, or a PBRT scene. Out: a
-//! checked `Scene`, or one line that says what is wrong. What format it is, its contents tell, and
-//! that is found out here and nowhere else.
+//! In: the path of a file, or standard input: glTF 2.0 (JSON or binary), PBRT, OBJ, STL or PLY, or
+//! gzip of it. Out: a checked `Scene`, or one line that says what is wrong. What format it is,
+//! its contents tell, and that is found out here and nowhere else.
 
 const std = @import("std");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;

@@ -27,8 +27,7 @@ const sections: []const Section = &.{
         .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
         .{
             .usage = "--format-in FORMAT",
-            .help = "how to read the scene where its contents do not tell:\n" ++
-                arguments_file.namesOf(settings.SceneFormat),
+            .help = arguments_file.namesOf(settings.SceneFormat) ++ ", whatever it holds",
         },
         .{
             .usage = "--allow-outside",
