@@ -99,18 +99,18 @@ fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Err
 fn unpack(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Error!void {
     const packed_bytes = opened.main.bytes;
     if (!gzip.isGzip(packed_bytes)) return;
-    const gpa = opened.resources.gpa;
-    const limit = Resources.file_bytes_max;
-    const reason = &diagnostic.message;
-    opened.main.bytes = gzip.inflate(gpa, packed_bytes, limit, reason) catch |err| switch (err) {
+    opened.main.bytes = opened.resources.inflate(
+        packed_bytes,
+        Resources.file_bytes_max,
+        &diagnostic.message,
+    ) catch |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidGzip => return error.InvalidInput,
     };
     if (!std.ascii.endsWithIgnoreCase(path, ".gz") and
         !std.mem.eql(u8, path, settings_file.standard_input))
         diagnostic.forgive("is gzip without being called so", .{});
-    gpa.free(packed_bytes);
-    opened.resources.bytes_read += opened.main.bytes.len;
+    opened.resources.gpa.free(packed_bytes);
 }
 
 /// What a file is to be read as, or what else it is.

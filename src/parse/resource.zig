@@ -23,6 +23,7 @@ const Io = std.Io;
 const Reason = diagnostic_data.Message;
 const Settings = @import("../settings.zig").Load;
 const format = @import("format.zig");
+const gzip = @import("../decode.zig").gzip;
 const standard_input = @import("../settings.zig").standard_input;
 const stream = @import("stream.zig");
 const assert = std.debug.assert;
@@ -280,6 +281,19 @@ fn loadFile(
     if (count < bytes.len) return refuse(reason, error.InputOutput, "changed while it was read");
     resources.bytes_read += bytes.len;
     return .{ .bytes = bytes, .identity = identity };
+}
+
+/// What a gzip file holds, `limit` bytes at most; it counts as read. The caller frees it. Otherwise
+/// as `gzip.inflate`.
+pub fn inflate(
+    resources: *Resources,
+    file: []const u8,
+    limit: u64,
+    reason: *Reason,
+) gzip.Error![:0]u8 {
+    const bytes = try gzip.inflate(resources.gpa, file, @min(limit, file_bytes_max), reason);
+    resources.bytes_read += bytes.len;
+    return bytes;
 }
 
 /// Of one file, as far as memory reaches.

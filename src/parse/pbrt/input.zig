@@ -10,8 +10,8 @@
 //! for its strings point into them. A position is a number for a byte of any text.
 
 const std = @import("std");
-const decode = @import("../../decode.zig");
 const diagnostic_file = @import("../../diagnostic.zig");
+const gzip = @import("../../decode.zig").gzip;
 const limits = @import("limits.zig");
 const number = @import("../number.zig");
 const Allocator = std.mem.Allocator;
@@ -369,10 +369,11 @@ pub fn readFile(input: *Input, position: u64, path: []const u8) Error!Resources.
         "the files of the scene are over {d} bytes together",
         .{limits.text_bytes_max},
     );
-    if (!decode.gzip.isGzip(file.bytes)) return file;
+    if (!gzip.isGzip(file.bytes)) return file;
     if (!std.ascii.endsWithIgnoreCase(path, ".gz"))
         try input.forgive(position, "gzip", "{f} is gzip without being called so", .{quote(path)});
-    const plain = input.inflate(file.bytes, &reason) catch |err| switch (err) {
+    const left = limits.text_bytes_max -| input.resources.bytes_read;
+    const plain = input.resources.inflate(file.bytes, left, &reason) catch |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidGzip => return input.fail(position, "{f} {s}", .{
             quote(path), reason.text(),
@@ -421,19 +422,6 @@ pub fn withoutMark(
         .{quote(name)},
     );
     return bytes[mark_bytes..];
-}
-
-/// What a gzip file holds; it counts as text that is read. The caller frees it.
-pub fn inflate(
-    input: *Input,
-    file: []const u8,
-    reason: *diagnostic_file.Message,
-) decode.gzip.Error![:0]u8 {
-    const left = limits.text_bytes_max -| input.resources.bytes_read;
-    const bytes_max = @min(left, Resources.file_bytes_max);
-    const plain = try decode.gzip.inflate(input.gpa, file, bytes_max, reason);
-    input.resources.bytes_read += plain.len;
-    return plain;
 }
 
 test placeOf {
