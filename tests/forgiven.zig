@@ -174,9 +174,15 @@ test "what nobody looks at" {
             .warning = "cameras[0].perspective.zfar: 1e39 is out of range; left out",
             .refusal = "cameras[0].perspective.zfar: 1e39 is out of range",
         },
+        .{
+            .changes = &.{.{ "\"scene\":0,", "\"scene\":0,\"textures\":{\"source\":[]}," }},
+            .warning = "textures: a list is expected; left out",
+            .refusal = "textures: a list is expected",
+        },
     });
 }
 
+const lens = "\"orthographic\":{\"xmag\":1,\"ymag\":1,\"znear\":0,\"zfar\":1}";
 const unneeded = "; nothing drawn needs it";
 
 /// What is added behind a part of the document, and the fault.
@@ -238,6 +244,11 @@ test "what nothing drawn needs" {
             .fault = "textures[0].source: 4 of 0",
         },
         .{
+            .behind = "\"znear\":0.1,\"zfar\":100}}",
+            .added = ",{\"perspective\":{\"yfov\":1}," ++ lens ++ "}",
+            .fault = "cameras[1].orthographic: stands beside 'perspective'",
+        },
+        .{
             .behind = "\"scene\":0,",
             .added = "\"images\":[{\"bufferView\":-1}],",
             .fault = "images[0].bufferView: -1 is not a whole number from 0 to 2^53 - 1",
@@ -289,25 +300,30 @@ test "what nothing drawn needs" {
 
 test "what is drawn is needed, and so is what that is made of" {
     const last_node = "0,0,0,1]}";
-    for ([_]Addition{
+    const is_shown: Change = .{ "[0,3]", "[0,3,4]" };
+    for ([_]struct { []const Change, []const u8 }{
         .{
-            .behind = last_node,
-            .added = ",{\"children\":[2]}",
-            .fault = "nodes[4].children[0]: 2 has two parents",
+            &.{ .{ last_node, last_node ++ ",{\"children\":[2]}" }, is_shown },
+            "nodes[4].children[0]: 2 has two parents",
         },
         .{
-            .behind = last_node,
-            .added = ",{\"mesh\":5}",
-            .fault = "nodes[4].mesh: 5 of 1",
+            &.{ .{ last_node, last_node ++ ",{\"mesh\":5}" }, is_shown },
+            "nodes[4].mesh: 5 of 1",
         },
-    }) |addition| {
-        const new = try std.mem.concat(gpa, u8, &.{ addition.behind, addition.added });
-        defer gpa.free(new);
-        const bytes = try change(&.{ .{ addition.behind, new }, .{ "[0,3]", "[0,3,4]" } });
+        .{
+            &.{.{ "\"skins\":", "\"skins\":{},\"unread\":" }},
+            "nodes[1].skin: 0 of 0",
+        },
+        .{
+            &.{.{ "\"perspective\":", lens ++ ",\"perspective\":" }},
+            "cameras[0].perspective: stands beside 'orthographic'",
+        },
+    }) |case| {
+        const bytes = try change(case[0]);
         defer gpa.free(bytes);
         var said: Diagnostic = .{};
         try testing.expectError(error.InvalidInput, read(bytes, .{}, &said));
-        try testing.expectEqualStrings(addition.fault, said.message.text());
+        try testing.expectEqualStrings(case[1], said.message.text());
     }
 }
 
@@ -316,16 +332,18 @@ test "a broken animation is left out" {
     for ([_][2][]const u8{
         .{
             "[{\"channels\":[{}]}]",
-            "animations[0].channels[0]: 'sampler' is missing; nothing drawn needs it",
+            "animations[0].channels[0]: 'sampler' is missing; left out",
         },
         .{
             "[{\"samplers\":[],\"channels\":[" ++ channel ++ "]}]",
-            "animations refer to what is not there, left out",
+            "animation 0, channel 0: there is no sampler 0, left out",
         },
         .{
             "[{\"samplers\":[{\"input\":70,\"output\":0}]}]",
-            "animations[0].samplers[0].input: 70 of 9; nothing drawn needs it",
+            "animations[0].samplers[0].input: 70 of 9; left out",
         },
+        .{ "[7]", "animations[0]: an object is expected; nothing drawn needs it" },
+        .{ "{}", "animations: a list is expected; left out" },
     }) |case| {
         const new = try std.mem.concat(gpa, u8, &.{ "\"scene\":0,\"animations\":", case[0] });
         defer gpa.free(new);

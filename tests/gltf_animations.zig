@@ -358,6 +358,64 @@ test "what cannot be read of an animation is left out with a warning, and the re
     }
 }
 
+test "a channel or a sampler that is broken costs no other" {
+    const good = "{\"sampler\":0,\"target\":{\"node\":0,\"path\":\"scale\"}}";
+    const sampler = "{\"input\":2,\"output\":3}";
+    const cases = comptime [_]struct { []const u8, []const u8, []const u8 }{
+        .{
+            "{\"sampler\":5,\"target\":{\"node\":1,\"path\":\"scale\"}}",
+            sampler,
+            "animation 0, channel 0: there is no sampler 5, left out",
+        },
+        .{
+            "{\"sampler\":4294967296,\"target\":{\"node\":1,\"path\":\"scale\"}}",
+            sampler,
+            "animation 0, channel 0: there is no sampler 4294967296, left out",
+        },
+        .{
+            "{\"sampler\":0,\"target\":{\"node\":9,\"path\":\"scale\"}}",
+            sampler,
+            "animations[0].channels[0].target.node: 9 of 5; left out",
+        },
+        .{
+            "{\"sampler\":0,\"target\":[]}",
+            sampler,
+            "animations[0].channels[0].target: an object is expected; left out",
+        },
+        .{ "7", sampler, "animations[0].channels[0]: an object is expected; left out" },
+        .{
+            "{\"sampler\":0,\"target\":{\"extensions\":{\"KHR_animation_pointer\":" ++
+                "{\"pointer\":1}}}}",
+            sampler,
+            "animations[0].channels[0].target.extensions.KHR_animation_pointer.pointer: " ++
+                "a string is expected; left out",
+        },
+        .{
+            "{\"sampler\":1,\"target\":{\"node\":1,\"path\":\"scale\"}}",
+            sampler ++ ",{\"input\":2,\"output\":99}",
+            "animations[0].samplers[1].output: 99 of 11; left out",
+        },
+        .{
+            "{\"sampler\":1,\"target\":{\"node\":1,\"path\":\"scale\"}}",
+            sampler ++ ",{\"input\":2}",
+            "animations[0].samplers[1]: 'output' is missing; left out",
+        },
+    };
+    inline for (cases) |case| {
+        errdefer std.debug.print("expected: {s}\n", .{case[2]});
+        var said: Diagnostic = .{};
+        var scene = try read(gpa, "{\"channels\":[" ++ case[0] ++ "," ++ good ++
+            "],\"samplers\":[" ++ case[1] ++ "]}", &said);
+        defer scene.deinit();
+        scene.check();
+        try testing.expectEqual(1, said.warning_count);
+        try testing.expectEqualStrings(case[2], said.warnings[0].text());
+        try testing.expectEqual(1, scene.animations.len);
+        try testing.expectEqual(1, scene.animations[0].channels.len);
+        try testing.expectEqual(1, scene.file.counts.?.animations);
+    }
+}
+
 test "all that an animation shows is framed, whatever moment is seen" {
     const line = comptime animation(node("1", "translation"), times, vectors, "LINEAR");
     var said: Diagnostic = .{};
