@@ -327,6 +327,19 @@ test "what is drawn is needed, and so is what that is made of" {
     }
 }
 
+test "the first of several faults is the error line of a strict reader" {
+    const text = try change(&.{});
+    defer gpa.free(text);
+    const lost = ",{\"byteLength\":4,\"uri\":\"lost.bin\"}]}";
+    const parts = [_][]const u8{ "\xef\xbb\xbf", text[0 .. text.len - "]}".len], lost };
+    const bytes = try std.mem.concat(gpa, u8, &parts);
+    defer gpa.free(bytes);
+    var said: Diagnostic = .{};
+    try testing.expectError(error.InvalidInput, read(bytes, .{ .strict = true }, &said));
+    const mark = "the JSON text begins with a byte order mark, ignored";
+    try testing.expectEqualStrings(mark, said.message.text());
+}
+
 test "a broken animation is left out" {
     const channel = "{\"sampler\":0,\"target\":{\"node\":0,\"path\":\"scale\"}}";
     for ([_][2][]const u8{

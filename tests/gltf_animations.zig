@@ -416,6 +416,33 @@ test "a channel or a sampler that is broken costs no other" {
     }
 }
 
+test "key frames in a file that is missing" {
+    const text = try makeText(comptime animation(node("1", "scale"), times, "11", "LINEAR"));
+    defer gpa.free(text);
+    const buffers = "\"bufferViews\":[";
+    const at = std.mem.find(u8, text, buffers).? - "],\n".len;
+    const parts = [_][]const u8{
+        text[0..at],
+        ",{\"bufferView\":10,\"componentType\":5126,\"count\":2,\"type\":\"VEC3\"}",
+        text[at .. text.len - "]}".len],
+        ",{\"byteLength\":24,\"uri\":\"lost.bin\"}]}",
+    };
+    const with_buffer = try std.mem.concat(gpa, u8, &parts);
+    defer gpa.free(with_buffer);
+    const view = "{\"buffer\":0,\"byteOffset\":216,\"byteLength\":8}";
+    const lost = view ++ ",{\"buffer\":1,\"byteLength\":24}";
+    const with_view = try texts.replace(with_buffer, view, lost);
+    defer gpa.free(with_view);
+    var said: Diagnostic = .{};
+    var scene = try raylane.parse.parseBytes(gpa, testing.io, with_view, .cwd(), .{}, &said);
+    defer scene.deinit();
+    try testing.expectEqualStrings(
+        "animation 0, channel 0: sampler 0: buffer 1: 'lost.bin' does not exist, left out",
+        said.warnings[0].text(),
+    );
+    try testing.expectEqual(1, scene.triangleCount());
+}
+
 test "all that an animation shows is framed, whatever moment is seen" {
     const line = comptime animation(node("1", "translation"), times, vectors, "LINEAR");
     var said: Diagnostic = .{};

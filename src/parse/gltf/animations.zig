@@ -328,14 +328,9 @@ fn decodeNew(animations: *Animations, index: u32) Error!Decoded {
     const source = animations.source;
     if (index >= source.data.accessors_count) return .{ .wrong = "names no accessor" };
     if (source.findBroken(.accessors, index)) |broken| return .{ .wrong = broken.reason };
-    const before = source.diagnostic.message;
-    const resolved = gltf_accessors.resolve(source, index) catch |err| switch (err) {
-        error.InvalidInput => {
-            const message = source.diagnostic.message;
-            source.diagnostic.message = before;
-            return .{ .wrong = try animations.scratch.allocator().dupe(u8, message.text()) };
-        },
-        else => |other| return other,
+    const resolved = gltf_accessors.resolve(source, index) catch |err| {
+        const line = try source.takeLine(err);
+        return .{ .wrong = try animations.scratch.allocator().dupe(u8, line.text()) };
     };
     const accessor = resolved orelse return .{ .wrong = "has no data, or only compressed data" };
     const width = accessor.component_count;
