@@ -7,6 +7,7 @@
 const std = @import("std");
 const raylane = @import("raylane");
 const malformed = @import("malformed.zig");
+const texts = @import("gltf_text.zig");
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Scene = raylane.scene.Scene;
 const parse = raylane.parse;
@@ -14,23 +15,14 @@ const testing = std.testing;
 const gpa = testing.allocator;
 const io = testing.io;
 
-/// A part of the document, and what stands there instead.
-const Change = [2][]const u8;
+const Change = texts.Replacement;
 
 /// Changes, the warning of a reader that forgives, and how the line of one that does not begins;
 /// the same where it is empty.
 const Case = struct { changes: []const Change, warning: []const u8, refusal: []const u8 = "" };
 
 fn change(changes: []const Change) ![]u8 {
-    const buffer = malformed.makeBuffer();
-    var text = try malformed.makeText(&buffer);
-    errdefer gpa.free(text);
-    for (changes) |one| {
-        const changed = try malformed.replace(text, one[0], one[1]);
-        gpa.free(text);
-        text = changed;
-    }
-    return text;
+    return texts.make(malformed.document, &malformed.makeBuffer(), changes);
 }
 
 fn read(bytes: []const u8, settings: raylane.settings.Load, said: *Diagnostic) parse.Error!Scene {
@@ -483,13 +475,8 @@ test "weights and colours that are not finite" {
     };
     var buffer = malformed.makeBuffer();
     @memcpy(buffer[208..212], nan); // The second vertex; the matrices' diagonals are 1.
-    var text = try malformed.makeText(&buffer);
+    const text = try texts.make(malformed.document, &buffer, &changes);
     defer gpa.free(text);
-    for (changes) |one| {
-        const changed = try malformed.replace(text, one[0], one[1]);
-        gpa.free(text);
-        text = changed;
-    }
     var said: Diagnostic = .{};
     var scene = try read(text, .{}, &said);
     defer scene.deinit();

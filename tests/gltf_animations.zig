@@ -6,7 +6,7 @@
 
 const std = @import("std");
 const raylane = @import("raylane");
-const texts = @import("gltf_textures.zig");
+const texts = @import("gltf_text.zig");
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Scene = raylane.scene.Scene;
 const Session = raylane.session.Session;
@@ -115,12 +115,7 @@ fn read(allocator: std.mem.Allocator, animations: []const u8, said: *Diagnostic)
 
 /// The caller frees it.
 fn makeText(animations: []const u8) ![]u8 {
-    const encoder = std.base64.standard.Encoder;
-    const buffer = makeBuffer();
-    var digits: [encoder.calcSize(buffer.len)]u8 = undefined;
-    const with_data = try texts.replace(document, "$DATA", encoder.encode(&digits, &buffer));
-    defer gpa.free(with_data);
-    return texts.replace(with_data, "$ANIMATIONS", animations);
+    return texts.make(document, &makeBuffer(), &.{.{ "$ANIMATIONS", animations }});
 }
 
 /// The scene, posed; the session is the caller's.
