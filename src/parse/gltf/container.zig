@@ -264,7 +264,7 @@ test "padding that is missing or not counted, and bytes behind the last chunk" {
             if (case.binary) |binary| {
                 try std.testing.expectEqualStrings(binary, container.binary.?);
             }
-            try std.testing.expectEqual(strict, diagnostic.refused);
+            try std.testing.expectEqual(strict, diagnostic.refusal != null);
             try std.testing.expectEqual(!strict, diagnostic.warning_count > 0);
         }
     }

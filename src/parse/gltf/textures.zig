@@ -216,14 +216,10 @@ fn fromView(textures: *Textures, index: u32, raw: *const c.cgltf_buffer_view) Er
         .size = raw.size,
     };
     if (textures.ranges.get(range)) |image| return image;
-    const view_bytes = buffer_views.contents(source, raw) catch |err| switch (err) {
-        error.OutOfMemory => |failure| return failure,
-        error.InvalidInput, error.InputOutput => {
-            const said = source.diagnostic.message;
-            if (!source.diagnostic.refused) source.diagnostic.message.set("", .{});
-            source.forgiveEach("image {d}: {s}, left out", .{ index, said.text() });
-            return null;
-        },
+    const view_bytes = buffer_views.contents(source, raw) catch |err| {
+        const line = try source.takeLine(err);
+        source.forgiveEach("image {d}: {s}, left out", .{ index, line.text() });
+        return null;
     } orelse {
         source.forgiveEach("image {d}: its buffer has no data, left out", .{index});
         return null;
