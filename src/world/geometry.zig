@@ -270,24 +270,6 @@ pub const Geometry = struct {
         return geometry.shared.face(geometry, primitive);
     }
 
-    /// A triangle by its number, with corners for `positionAt` and `colorAt`.
-    pub fn triangleAt(geometry: *const Geometry, primitive: u32) Triangle {
-        if (geometry.shared.runs.len == 0) return geometry.triangles[primitive];
-        return geometry.shared.triangleAt(geometry, primitive);
-    }
-
-    /// A vertex by its number.
-    pub fn positionAt(geometry: *const Geometry, vertex: u32) Vec3 {
-        if (geometry.shared.runs.len == 0) return geometry.positions[vertex];
-        return geometry.shared.positionAt(geometry, vertex);
-    }
-
-    /// The colour of a vertex by its number; asserts that some have one.
-    pub fn colorAt(geometry: *const Geometry, vertex: u32) [4]f32 {
-        if (geometry.shared.runs.len == 0) return geometry.colors[vertex];
-        return geometry.shared.colorAt(geometry, vertex);
-    }
-
     /// Without anything to hit, and without a tree.
     pub const empty: Geometry = .{
         .tree = .{ .w4 = .{ .nodes = &.{}, .packs = &.{} } },
