@@ -85,6 +85,14 @@ pub fn Node(comptime width: comptime_int) type {
             return box;
         }
 
+        /// Sets it.
+        pub fn setChildBox(node: *Self, index: usize, box: Box3) void {
+            for (0..3) |axis| {
+                node.bounds[0][axis][index] = box.lower[axis];
+                node.bounds[1][axis][index] = box.upper[axis];
+            }
+        }
+
         comptime {
             assert(@sizeOf(Self) == 32 * width);
             assert(@alignOf(Self) == cache_line_bytes);

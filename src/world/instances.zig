@@ -443,10 +443,7 @@ pub fn MappedCluster(comptime width: comptime_int) type {
                     boxes[index] = boxes[index].join(box);
                     const is_there = child != Child.missing;
                     const grown = if (is_there) box.grow(padding.marginOfBox(box)) else box;
-                    for (0..3) |axis| {
-                        node.bounds[0][axis][slot] = grown.lower[axis];
-                        node.bounds[1][axis][slot] = grown.upper[axis];
-                    }
+                    node.setChildBox(slot, grown);
                 }
             }
         }
