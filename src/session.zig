@@ -317,7 +317,8 @@ pub const Session = struct {
             session.gpa,
             &session.scene.?,
             &session.loaded.?,
-            &session.posed.?,
+            session.posed.?.moment.running,
+            &session.pose_cache.?,
             &session.pool,
             &session.motion,
         );
