@@ -72,6 +72,21 @@ pub fn counting(arena: Allocator, variants: []const Variant) []const Variant {
     return list.items;
 }
 
+/// Those of `variants` that hold the integrators besides Whitted's, which take as long to compile:
+/// the default and, of all, those that tell how rays that bounce are best traced.
+pub fn lit(arena: Allocator, variants: []const Variant) []const Variant {
+    var list: std.ArrayList(Variant) = .empty;
+    for (variants, 0..) |variant, index| {
+        const is_told = switch (variant.backend) {
+            .vector => variant.lanes == 4 or variant.traversal == .beam,
+            .scalar => variant.traversal == .single,
+            .intrinsics => variant.traversal == .beam,
+        };
+        if (index == 0 or (is_told and variants.len > 2)) add(arena, &list, variant);
+    }
+    return list.items;
+}
+
 fn add(arena: Allocator, list: *std.ArrayList(Variant), variant: Variant) void {
     for (list.items) |other| if (std.meta.eql(other, variant)) return;
     list.append(arena, variant) catch @panic("OOM");

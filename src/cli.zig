@@ -293,6 +293,10 @@ const sections: []const Section = &.{
                 "held once for all its instances: less memory, more\n" ++
                 "time; the image is always the same",
         },
+        .{
+            .usage = "--integrator NAME",
+            .help = namesOf(settings.Integrator) ++ " (default: whitted)",
+        },
         .{ .usage = "--variant NAME", .help = "how rays are traced; the image is always the same" },
         .{
             .usage = "--list-variants",
@@ -403,6 +407,8 @@ const Parser = struct {
         if (parser.has_time and animation.which == .default) animation.which = .{ .index = 0 };
         try parser.checkViewpoint();
         try parser.settleFormat();
+        if (parser.options.count_tests and parser.options.render.integrator != .whitted)
+            return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
         return .{ .render = parser.options };
     }
 
@@ -469,6 +475,8 @@ const Parser = struct {
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
             .variant => options.render.variant = try parser.variantOf(given.value),
+            .integrator => options.render.integrator =
+                try reader.choice(given, settings.Integrator),
             .count_tests => options.count_tests = true,
             .point_size => options.view.point_size = pointSizeOf(given.value) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
@@ -935,6 +943,7 @@ test "numbers keep to their ranges" {
         .{ .flag = "--stats", .good = &.{ "text", "json", "none" }, .bad = &.{ "JSON", "" } },
         .{ .flag = "--bvh", .good = &.{ "fast", "default", "high" }, .bad = &.{ "High", "" } },
         .{ .flag = "--instances", .good = &.{ "auto", "share", "flatten" }, .bad = &.{"all"} },
+        .{ .flag = "--integrator", .good = &.{ "whitted", "lights", "path" }, .bad = &.{"bdpt"} },
         .{
             .flag = "--format",
             .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },

@@ -61,6 +61,15 @@ fn run(init: std.process.Init) ExitCode {
             break :list list;
         }),
         .render => |*options| {
+            const chosen = &options.render;
+            if (chosen.integrator != .whitted and
+                raylane.variant.litIndexOf(chosen.variant) == null)
+            {
+                say(io, "raylane: variant '{s}' has no integrator '{t}', but '{s}' has\n", .{
+                    names[chosen.variant], chosen.integrator, names[0],
+                });
+                return .usage;
+            }
             var account: Account = .init(init.gpa, options.memory_max);
             return renderAndReport(&account, io, options, &diagnostic);
         },

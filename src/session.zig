@@ -507,6 +507,7 @@ pub const Session = struct {
         var film: Film = try .init(session.gpa, world.view.width, world.view.height, layers);
         errdefer film.deinit(session.gpa);
         var chosen = session.traceSettings(session.rendered);
+        chosen.integrator = .whitted;
         chosen.sample_count = 1;
         chosen.progress = .none;
         const variant_index = session.rendered.variant;
@@ -645,6 +646,7 @@ pub const Session = struct {
     fn traceSettings(session: *Session, choices: settings.Render) trace.Settings {
         return .{
             .pool = &session.pool,
+            .integrator = choices.integrator,
             .sample_count = session.sampleCount(choices),
             .depth_max = session.depthOf(choices),
             .tile_size = choices.tile_size,

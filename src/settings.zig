@@ -340,8 +340,20 @@ pub const View = struct {
     }
 };
 
+/// How light finds its way from where it starts to the eye.
+pub const Integrator = enum {
+    /// Whitted's ray tracing (1980): light that comes straight, mirrors and glass; the rest is
+    /// smooth light from all around, less what is in its way.
+    whitted,
+    /// Instant radiosity (Keller 1997): light that has bounced, too, as of many points.
+    lights,
+    /// Path tracing (Kajiya 1986): all light, with noise that ends as samples grow.
+    path,
+};
+
 /// How rays are traced.
 pub const Render = struct {
+    integrator: Integrator = .whitted,
     /// Index into `variant.compiled`.
     variant: usize = 0,
     /// Null: the scene's, or by `samplesFor`.

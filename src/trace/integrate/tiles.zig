@@ -30,6 +30,7 @@ const Rectangle = film_file.Rectangle;
 /// How a frame is traced, and who does the work.
 pub const Settings = struct {
     pool: *parallel.Pool,
+    integrator: choices.Integrator = .whitted,
     /// Samples a pixel, at least 1.
     sample_count: u32 = choices.sample_count.default,
     /// Where these are in each pixel: `render` fills it in.
