@@ -21,6 +21,7 @@ pub const Camera = view_file.Camera;
 pub const Child = geometry_file.Child;
 pub const Environment = environment_file.Environment;
 pub const EnvironmentLevel = environment_file.EnvironmentLevel;
+pub const Cursor = instances.Cursor;
 pub const EnvironmentMap = environment_file.EnvironmentMap;
 pub const EnvironmentPart = environment_file.EnvironmentPart;
 pub const EnvironmentSource = environment_file.EnvironmentSource;
