@@ -637,11 +637,12 @@ pub const Session = struct {
     fn sampleCount(session: *const Session, choices: settings.Render) u32 {
         const seen = &session.world.?.view;
         return choices.sample_count orelse session.facts.sample_count orelse
-            settings.samplesFor(seen.width, seen.height);
+            settings.samplesFor(choices.integrator, seen.width, seen.height);
     }
 
     fn depthOf(session: *const Session, choices: settings.Render) u32 {
-        return choices.depth orelse session.facts.depth orelse settings.depth.default;
+        return choices.depth orelse session.facts.depth orelse
+            settings.depthFor(choices.integrator);
     }
 
     fn traceSettings(session: *Session, choices: settings.Render) trace.Settings {

@@ -22,7 +22,7 @@ pub const Whitted = @import("trace/integrate/whitted.zig").Whitted;
 /// Instant radiosity, by one kernel.
 pub const Lights = Whitted;
 /// Path tracing, by one kernel.
-pub const PathTracer = Whitted;
+pub const PathTracer = @import("trace/integrate/path_tracer.zig").PathTracer;
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
 pub const kernel = @import("trace/traverse/kernel.zig");
 /// Rays in lanes.
@@ -156,6 +156,7 @@ test {
     _ = @import("trace/integrate/camera.zig");
     _ = @import("trace/integrate/numbers.zig");
     _ = @import("trace/integrate/path.zig");
+    _ = @import("trace/integrate/path_records.zig");
     _ = tiles;
     _ = @import("trace/traverse/beam/budget.zig");
     _ = @import("trace/traverse/beam/tile_depth_buffer.zig");
