@@ -27,6 +27,7 @@ const Identity = @import("identity.zig").Identity;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
+const Frame = @import("world.zig").Frame;
 const World = @import("world.zig").World;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -130,6 +131,7 @@ pub const Session = struct {
         sample_count: ?u32 = null,
         depth: ?u32 = null,
         has_background: bool = false,
+        has_area_lights: bool = false,
         /// Something drawn has colours of the display.
         has_unlit: bool = false,
     };
@@ -190,6 +192,7 @@ pub const Session = struct {
             .sample_count = scene.sample_count,
             .depth = scene.depth,
             .has_background = scene.background != null,
+            .has_area_lights = scene.has_area_lights,
             .has_unlit = for (scene.instances) |instance| {
                 if (scene.materials[scene.meshes[instance.mesh].material].unlit) break true;
             } else false,
@@ -368,10 +371,14 @@ pub const Session = struct {
         session.metered = null;
         try session.weighEmitters();
         try session.dimStudio();
+        var frame = session.world.?.frame();
+        var lights = try session.makeLightSampler(choices.integrator, &frame);
+        defer if (lights) |*made| made.deinit();
+        if (lights) |*made| frame.light_sampler = &made.sampler;
         session.traced = try trace.trace(
             session.gpa,
             choices.variant,
-            &session.world.?.frame(),
+            &frame,
             film,
             session.traceSettings(choices),
         );
@@ -380,6 +387,17 @@ pub const Session = struct {
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
+    }
+
+    /// The list of an integrator that chooses lights at random; null for others.
+    fn makeLightSampler(
+        session: *Session,
+        integrator: settings.Integrator,
+        frame: *const Frame,
+    ) Error!?prepare.OwnedLightSampler {
+        if (integrator != .path) return null;
+        const has_emitters = session.seen.emitters or session.facts.has_area_lights;
+        return try prepare.makeLightSampler(session.gpa, frame, has_emitters, &session.pool);
     }
 
     /// Traces the same picture again to count intersection tests, without timing.
