@@ -41,6 +41,9 @@ pub const Record = struct {
     /// Density by solid angle of the ray's direction where light could have been chosen there as
     /// well; 0: it could not, and all light that the ray meets counts.
     scatter_pdf: f32,
+    /// Where that was, see `light_sampling.Receiver`.
+    receiver: [3]f32,
+    receiver_normal: [3]f32,
     /// Bounces up to here, and surfaces that the ray has gone on through without one.
     depth: u32,
     transparency_depth: u32,

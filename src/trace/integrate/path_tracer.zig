@@ -242,6 +242,8 @@ pub fn PathTracer(comptime Kernel: type) type {
                         .cone_width = if (has_cones) path.cone_width[group].lane(lane) else 0,
                         .cone_spread = if (has_cones) path.cone_spread[group].lane(lane) else 0,
                         .scatter_pdf = 0,
+                        .receiver = .{ 0, 0, 0 },
+                        .receiver_normal = .{ 0, 0, 0 },
                         .depth = 0,
                         .transparency_depth = 0,
                         .radiance = .{ 0, 0, 0 },
@@ -361,7 +363,8 @@ pub fn PathTracer(comptime Kernel: type) type {
                 if (!std.math.isFinite(light[0] + light[1] + light[2])) light = .{ 0, 0, 0 };
                 film.add(column, row, number, light ++ .{record.escaped});
                 if (!tracer.step.keeps_display) continue;
-                film.addDisplay(column, row, number, record.displayed ++ .{record.display_share});
+                const shown = record.displayed ++ .{record.display_share};
+                film.addApart(.display, column, row, number, shown);
             };
         }
     };
