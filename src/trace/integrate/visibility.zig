@@ -132,6 +132,7 @@ pub fn Visibility(comptime Kernel: type) type {
                 return visibility.occluded(bundle, &no_light, .none, transmittances);
             var limits: [group_count]ray_file.Hit(Rays) = undefined;
             for (&limits, &bundle.groups) |*limit, *ray| limit.* = ray.closest;
+            transmittances.* = @splat(.splat(.{ 1, 1, 1 }));
             visibility.attenuated(bundle, &no_light, &limits, vertices, straight, transmittances);
         }
 
