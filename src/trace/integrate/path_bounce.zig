@@ -6,6 +6,7 @@
 const std = @import("std");
 const ray_cone = @import("../shade/ray_cone.zig");
 const scatter_file = @import("../shade/scatter.zig");
+const path_features = @import("path_features.zig");
 const path_light = @import("path_light.zig");
 const records_file = @import("path_records.zig");
 const PathStep = @import("path_step.zig").PathStep;
@@ -41,6 +42,8 @@ pub noinline fn bounce(
         throughput =
             throughput.scale(.select(asked, F32.splat(1).div(chance), .splat(1)));
     }
+    if (step.keeps_features)
+        path_features.bounce(Kernel, step, going, sampled.is_delta, sampled.pdf);
     if (going.any()) leave(Kernel, step, going, &sampled, throughput);
 }
 
@@ -95,7 +98,7 @@ fn leave(
             record.sigma_t = sigma.at(lane);
             record.nesting = point.beyond[lane];
         }
-        step.rays.count(record.depth, .{ .closest = 1 });
+        step.rays.count(record.depth + record.scatter_count, .{ .closest = 1 });
         step.goOn(lane);
     }
 }

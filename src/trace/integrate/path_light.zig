@@ -12,6 +12,7 @@
 
 const std = @import("std");
 const light_sampling = @import("../shade/light_sampling.zig");
+const phase = @import("../shade/phase.zig");
 const PathStep = @import("path_step.zig").PathStep;
 
 /// Shadow rays to triangles end this share before them: their neighbours are in the same place.
@@ -72,10 +73,64 @@ pub noinline fn addLight(
         .straight = light.is_delta,
         .light = worth,
     }, &step.numbers);
-    var bits = lit.bits();
-    const depths = step.depth.toArray();
+    countShadows(Kernel, step, lit);
+}
+
+fn countShadows(
+    comptime Kernel: type,
+    step: *const PathStep(Kernel),
+    lanes: Kernel.Rays.Mask,
+) void {
+    const turns = step.turns.toArray();
+    var bits = lanes.bits();
     while (bits != 0) : (bits &= bits - 1)
-        step.rays.count(@intCast(depths[@ctz(bits)]), .{ .shadow = 1 });
+        step.rays.count(@intCast(turns[@ctz(bits)]), .{ .shadow = 1 });
+}
+
+/// The same for points in volumes, at which light that goes `along` is scattered.
+pub noinline fn addScattered(
+    comptime Kernel: type,
+    step: *PathStep(Kernel),
+    lanes: Kernel.Rays.Mask,
+    position: Kernel.Rays.Vec3,
+    along: Kernel.Rays.Vec3,
+    anisotropy: Kernel.Rays.F32,
+) void {
+    const Rays = Kernel.Rays;
+    const F32 = Rays.F32;
+    const Vec3 = Rays.Vec3;
+    const receiver: light_sampling.Receiver(Rays) = .{
+        .position = position,
+        .normal = .splat(.{ 0, 0, 0 }),
+    };
+    const choice = step.chances.at(.light);
+    const place = step.chances.at(.light_point);
+    const numbers = [3]F32{ choice[0], place[0], place[1] };
+    const light = light_sampling.sample(Rays, step.frame, &receiver, numbers, lanes);
+    const found = phase.eval(Rays, along.dot(light.to_light), anisotropy);
+    const weight = heuristic(Rays, light.pdf, found);
+    const share = F32.select(light.is_delta, .splat(1), weight)
+        .div(light.pdf.max(.splat(std.math.floatMin(f32))));
+    const worth = step.throughput.mul(light.radiance).scale(share.mul(found));
+    const largest = worth.x.max(worth.y).max(worth.z);
+    const lit = lanes.bitAnd(light.pdf.gt(.zero())).bitAnd(largest.gt(.zero()))
+        .bitAnd(largest.lt(.splat(std.math.inf(f32))));
+    if (lit.none()) return;
+    const is_far = light.distance.eq(.splat(std.math.inf(f32)));
+    const has_primitive = light.primitive.gt(.splat(light_sampling.no_primitive));
+    const end = F32.select(has_primitive, .splat(end_share), .splat(1));
+    const reach: Vec3 = light.to_light.scale(.select(is_far, .splat(1), light.distance));
+    step.shadows.take(&.{
+        .lanes = lit,
+        .origin = position,
+        .direction = reach,
+        .end = .select(is_far, light.distance, end),
+        .skip = light.primitive,
+        .cone_width = .zero(),
+        .straight = light.is_delta,
+        .light = worth,
+    }, &step.numbers);
+    countShadows(Kernel, step, lit);
 }
 
 /// Vertices as those who get light.

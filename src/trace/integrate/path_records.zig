@@ -44,8 +44,10 @@ pub const Record = struct {
     /// Where that was, see `light_sampling.Receiver`.
     receiver: [3]f32,
     receiver_normal: [3]f32,
-    /// Bounces up to here, and surfaces that the ray has gone on through without one.
+    /// Bounces off surfaces and scatterings in volumes up to here, and surfaces that the ray has
+    /// gone on through without one.
     depth: u32,
+    scatter_count: u32,
     transparency_depth: u32,
     /// Sums of the sample, see `sample.Sample`.
     radiance: [3]f32,

@@ -16,8 +16,10 @@ const environment_file = @import("../shade/environment.zig");
 const light_sampling = @import("../shade/light_sampling.zig");
 const scatter_file = @import("../shade/scatter.zig");
 const path_bounce = @import("path_bounce.zig");
+const path_features = @import("path_features.zig");
 const path_file = @import("path.zig");
 const path_light = @import("path_light.zig");
+const path_medium = @import("path_medium.zig");
 const records_file = @import("path_records.zig");
 const shadows_file = @import("path_shadows.zig");
 const visibility_file = @import("visibility.zig");
@@ -37,6 +39,9 @@ pub fn PathStep(comptime Kernel: type) type {
         frame: *const Frame,
         visibility: *visibility_file.Visibility(Kernel),
         records: []Record,
+        /// By path; left alone unless the film keeps them.
+        features: []path_features.Features,
+        keeps_features: bool,
         shadows: *shadows_file.PathShadows(Kernel),
         rays: *RayCounts,
         depth_max: u32,
@@ -57,6 +62,8 @@ pub fn PathStep(comptime Kernel: type) type {
         numbers: [Rays.count]u32,
         chances: PathNumbers(Rays),
         depth: I32,
+        /// Bounces and scatterings.
+        turns: I32,
         transparency_depth: I32,
         scatter_pdf: F32,
         /// Share of what is at the end of the rays that reaches the pixel.
@@ -109,12 +116,15 @@ pub fn PathStep(comptime Kernel: type) type {
             step.group = group;
             step.numbers = numbers.*;
             step.depth = integers(Rays, all, numbers, "depth");
+            step.turns = step.depth.add(integers(Rays, all, numbers, "scatter_count"));
             step.transparency_depth = integers(Rays, all, numbers, "transparency_depth");
             step.scatter_pdf = floats(Rays, all, numbers, "scatter_pdf");
             step.throughput = step.path.throughput[group];
             step.findChances();
             var gone = ray.active.bitAnd(ray.closest.primitive.eq(.splat(ray_file.no_primitive)));
-            const hit = ray.active.andNot(gone);
+            var hit = ray.active.andNot(gone);
+            if (hit.any() and step.frame.materials.has_scattering)
+                hit = hit.andNot(path_medium.scatter(Kernel, step, hit));
             if (hit.any()) gone = gone.bitOr(step.shadeHits(hit));
             if (gone.any()) step.addSurroundings(gone);
         }
@@ -128,7 +138,7 @@ pub fn PathStep(comptime Kernel: type) type {
                 places[2][lane] = @intCast(step.rectangle.y0 + y);
             }
             const x: I32 = .fromArray(places[1]);
-            step.chances = .init(x, .fromArray(places[2]), .fromArray(places[0]), step.depth);
+            step.chances = .init(x, .fromArray(places[2]), .fromArray(places[0]), step.turns);
         }
 
         /// Returns the lanes that have gone straight on through as many surfaces as they may.
@@ -148,6 +158,7 @@ pub fn PathStep(comptime Kernel: type) type {
                 step.pass(passing.andNot(gone));
             }
             if (stopped.none()) return gone;
+            if (step.keeps_features) path_features.addVertices(Kernel, step, stopped);
             step.addGlow(stopped);
             const scattering = stopped.andNot(point.material.unlit)
                 .andNot(step.depth.gt(.splat(@intCast(step.depth_max))));
@@ -170,7 +181,7 @@ pub fn PathStep(comptime Kernel: type) type {
             if (frame.materials.volumes.len > 0)
                 step.visibility.boundaries[step.group].apply(point);
             // Backs that the eye does not see are there for other light.
-            const unseen = point.culled.bitAnd(step.depth.eq(.zero()));
+            const unseen = point.culled.bitAnd(step.turns.eq(.zero()));
             point.opacity = .select(unseen, .zero(), point.opacity);
             if (!frame.hasLayers()) return vertex.bsdf.become(point);
             visibility_file.findLayers(Rays, frame, ray, point, &vertex.layers);
@@ -235,8 +246,9 @@ pub fn PathStep(comptime Kernel: type) type {
 
         /// Adds what is around the scene, for rays that leave it.
         fn addSurroundings(step: *Self, gone: Mask) void {
+            if (step.keeps_features) path_features.addEscaped(Kernel, step, gone);
             const around = step.frame.environment;
-            const first = gone.bitAnd(step.depth.eq(.zero()));
+            const first = gone.bitAnd(step.turns.eq(.zero()));
             const later = gone.andNot(first);
             if (later.any()) step.add(later, path_light.fromAround(Kernel, step, later));
             if (first.none()) return;
@@ -277,7 +289,7 @@ pub fn PathStep(comptime Kernel: type) type {
             const glow = path_light.fromSurface(Kernel, step, lanes);
             const shown: Vec3 = .select(material.unlit, material.base_color, glow);
             const arriving = step.throughput.mul(shown);
-            const displayed = lanes.bitAnd(material.unlit).bitAnd(step.depth.eq(.zero()));
+            const displayed = lanes.bitAnd(material.unlit).bitAnd(step.turns.eq(.zero()));
             if (!step.keeps_display or displayed.none()) return step.add(lanes, arriving);
             step.add(lanes.andNot(displayed), arriving);
             const numbers = &step.numbers;

@@ -15,6 +15,7 @@ const ray_file = @import("../traverse/ray.zig");
 const boundaries_file = @import("boundaries.zig");
 const camera = @import("camera.zig");
 const floor = @import("floor.zig");
+const path_features = @import("path_features.zig");
 const path_file = @import("path.zig");
 const records_file = @import("path_records.zig");
 const shadows_file = @import("path_shadows.zig");
@@ -83,6 +84,8 @@ pub fn PathTracer(comptime Kernel: type) type {
             tracer.live = tracer.numbers[0..count];
             tracer.next = tracer.numbers[count..][0..count];
             tracer.sorted = tracer.numbers[2 * count ..];
+            const features = try gpa.alloc(path_features.Features, count);
+            errdefer gpa.free(features);
             tracer.keys = try gpa.alloc(u16, count);
             errdefer gpa.free(tracer.keys);
             try tracer.shadows.init(gpa);
@@ -95,6 +98,7 @@ pub fn PathTracer(comptime Kernel: type) type {
             step.frame = frame;
             step.visibility = &tracer.visibility;
             step.records = tracer.records;
+            step.features = features;
             step.shadows = &tracer.shadows;
             step.rays = &tracer.rays;
             step.depth_max = settings.depth_max;
@@ -106,6 +110,7 @@ pub fn PathTracer(comptime Kernel: type) type {
         pub fn deinit(tracer: *Self, gpa: std.mem.Allocator) void {
             tracer.shadows.deinit(gpa);
             gpa.free(tracer.keys);
+            gpa.free(tracer.step.features);
             gpa.free(tracer.numbers);
             gpa.free(tracer.records);
             tracer.own_frame.deinit(gpa);
@@ -127,6 +132,7 @@ pub fn PathTracer(comptime Kernel: type) type {
         ) void {
             const step = &tracer.step;
             step.rectangle = rectangle;
+            step.keeps_features = path_features.areKept(film);
             step.is_transparent = film.layers.contains(.alpha);
             step.keeps_display = film.layers.contains(.display);
             var done: u32 = 0;
@@ -245,6 +251,7 @@ pub fn PathTracer(comptime Kernel: type) type {
                         .receiver = .{ 0, 0, 0 },
                         .receiver_normal = .{ 0, 0, 0 },
                         .depth = 0,
+                        .scatter_count = 0,
                         .transparency_depth = 0,
                         .radiance = .{ 0, 0, 0 },
                         .escaped = 0,
@@ -252,6 +259,7 @@ pub fn PathTracer(comptime Kernel: type) type {
                         .display_share = 0,
                         .floor_light = tracer.floor_light[group].lane(lane),
                     };
+                    if (tracer.step.keeps_features) tracer.step.features[number] = .start;
                     tracer.live[count] = number;
                     count += 1;
                 }
@@ -362,6 +370,8 @@ pub fn PathTracer(comptime Kernel: type) type {
                 var light = record.radiance;
                 if (!std.math.isFinite(light[0] + light[1] + light[2])) light = .{ 0, 0, 0 };
                 film.add(column, row, number, light ++ .{record.escaped});
+                if (tracer.step.keeps_features)
+                    path_features.expose(&tracer.step.features[place], film, column, row, number);
                 if (!tracer.step.keeps_display) continue;
                 const shown = record.displayed ++ .{record.display_share};
                 film.addApart(.display, column, row, number, shown);
