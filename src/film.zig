@@ -84,9 +84,13 @@ pub const Film = struct {
         pixel.* = sum + @select(f32, value > limit, limit, value);
     }
 
-    /// Makes the means of pixels that have all their samples. Returns how many came out as not a
-    /// number; these are black.
+    /// Makes the means of pixels that have so many samples; without any they are black, or clear.
+    /// Returns how many came out as not a number; these are black.
     pub fn finish(film: *Film, rectangle: Rectangle, sample_count: u32) u64 {
+        if (sample_count == 0) {
+            film.clear(rectangle);
+            return 0;
+        }
         const count: V4 = @splat(@floatFromInt(sample_count));
         const none: V4 = @splat(0);
         var non_finite_count: u64 = 0;
@@ -112,6 +116,35 @@ pub const Film = struct {
             }
         }
         return non_finite_count;
+    }
+
+    /// Pixels without samples: nothing is there.
+    fn clear(film: *Film, rectangle: Rectangle) void {
+        const nothing: [4]f32 = .{ 0, 0, 0, if (film.layers.contains(.alpha)) 0 else 1 };
+        for (rectangle.y0..rectangle.y1) |y| {
+            const start = y * film.image.width;
+            const from, const to = .{ start + rectangle.x0, start + rectangle.x1 };
+            @memset(film.image.pixels[from..to], nothing);
+            if (film.display) |*display| @memset(display.pixels[from..to], @splat(0));
+        }
+    }
+
+    /// Makes pixels of another film, of the same size and layers, what these are with the samples
+    /// that they have, and leaves them as they are.
+    pub fn copyFinished(
+        film: *const Film,
+        other: *Film,
+        rectangle: Rectangle,
+        sample_count: u32,
+    ) void {
+        for (rectangle.y0..rectangle.y1) |y| {
+            const start = y * film.image.width;
+            const from, const to = .{ start + rectangle.x0, start + rectangle.x1 };
+            @memcpy(other.image.pixels[from..to], film.image.pixels[from..to]);
+            const display = if (film.display) |*image| image else continue;
+            @memcpy(other.display.?.pixels[from..to], display.pixels[from..to]);
+        }
+        _ = other.finish(rectangle, sample_count);
     }
 
     /// The identity of the picture: that of its image, where the film has no other.
