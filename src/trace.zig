@@ -176,7 +176,8 @@ test {
     _ = @import("trace/shade/microfacet.zig");
     _ = @import("trace/shade/coating.zig");
     _ = @import("trace/shade/interface.zig");
-    _ = @import("trace/shade/sampling.zig");
+    _ = @import("trace/shade/passing.zig");
+    _ = @import("trace/shade/scatter.zig");
     _ = @import("trace/shade/sheen.zig");
     _ = @import("trace/shade/phase.zig");
     _ = @import("trace/shade/transmission.zig");
