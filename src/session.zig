@@ -424,7 +424,7 @@ pub const Session = struct {
         const film = &session.film.?;
         const tally = try output.write(session.gpa, .{
             .image = &film.image,
-            .display = if (film.display) |*display| display else null,
+            .display = film.imageOf(.display),
         }, .{
             .format = choices.format,
             .exposure_ev = if (session.appearance) |appearance| appearance.exposure_ev else 0,
@@ -488,7 +488,7 @@ pub const Session = struct {
         }
         var film = try session.traceSmall();
         defer film.deinit(session.gpa);
-        const display = if (film.display) |*other| other else null;
+        const display = film.imageOf(.display);
         session.metered = try output.meter(session.gpa, &film.image, display);
         return session.metered.?;
     }
@@ -697,10 +697,7 @@ pub const Session = struct {
         const view_size = &session.world.?.view;
         const layers = session.layersOf();
         if (session.film) |*film| {
-            film.layers = layers;
-            const image = &film.image;
-            if (image.width == view_size.width and image.height == view_size.height and
-                (film.display != null) == layers.contains(.display)) return film;
+            if (film.become(view_size.width, view_size.height, layers)) return film;
             film.deinit(session.gpa);
             session.film = null;
         }

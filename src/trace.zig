@@ -162,6 +162,7 @@ test {
     _ = @import("trace/traverse/beam/grid.zig");
     _ = beam.pixel_window;
     _ = @import("trace/integrate/sampler.zig");
+    _ = @import("trace/integrate/sobol.zig");
     _ = @import("trace/shade/cosine.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/iridescence.zig");
@@ -174,7 +175,8 @@ test {
     _ = @import("trace/shade/microfacet.zig");
     _ = @import("trace/shade/coating.zig");
     _ = @import("trace/shade/interface.zig");
-    _ = @import("trace/shade/sampling.zig");
+    _ = @import("trace/shade/passing.zig");
+    _ = @import("trace/shade/scatter.zig");
     _ = @import("trace/shade/sheen.zig");
     _ = @import("trace/shade/phase.zig");
     _ = @import("trace/shade/transmission.zig");
