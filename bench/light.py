@@ -2,7 +2,7 @@
 """What packets buy when light bounces: writes the tables of docs/light.md.
 
 Usage: bench/light.py [-o FILE.md] [--json FILE] [--scenes LIST] [--size N] [--stride N] [--depth N]
-                      [--programs DIR] [--raylane PROGRAM] [--only PART...]
+                      [--machines LIST] [--programs DIR] [--raylane PROGRAM] [--only PART...]
 
 Builds bench/light.zig for AArch64 (Cortex-A72) and x86-64 (v3: AVX2), counts its instructions under
 qemu, and for this machine, whose time it takes; and a raylane with all variants, for `lights` and
@@ -20,6 +20,7 @@ import importlib.machinery
 import importlib.util
 import json
 import math
+import os
 import pathlib
 import statistics
 import subprocess
@@ -45,6 +46,12 @@ SHARED = [("sun", "pixels", "to the sun"), ("sun", "interleaved", "to the sun, e
           ("point", "pixels", "to a point light"),
           ("point", "interleaved", "to a point light, every third pixel")]
 PARTS = ["rays", "frames", "error"]
+# Of pictures whose error is measured: pixels along each side, and samples a pixel of the truth, of
+# `lights` and of `path` at most.
+ERROR_SIZE = 256
+TRUTH_SAMPLES = 2048
+LIGHTS_SAMPLES = [1, 4, 16]
+PATH_SAMPLES_MAX = 512
 
 
 def load_count():
@@ -75,10 +82,10 @@ def build_raylane(options):
     return CACHE / "all" / "bin" / "raylane"
 
 
-def measure_rays(count, options):
-    """By machine and scene: {(set, depth, order): {method: cost}} and {order: cost of sorting}."""
-    result = {}
-    for machine in MACHINES:
+def measure_rays(count, options, result):
+    """Adds by machine and scene {"set depth order": {method: cost}} and {order: cost of sorting}
+    to `result`."""
+    for machine in options.machines.split(","):
         program = build(options, machine)
         result[machine] = []
         for scene in options.scenes.split(","):
@@ -95,7 +102,6 @@ def measure_rays(count, options):
     hashes = [[found["hashes"] for found in scenes] for scenes in result.values()]
     if any(other != hashes[0] for other in hashes):
         raise count.Failed("the machines do not agree on the hits")
-    return result
 
 
 def summary(report, tags):
@@ -150,7 +156,7 @@ def sets_of(options):
     for depth in range(int(options.depth) + 1):
         name = "primary" if depth == 0 else f"{ordinals[depth - 1]} bounce"
         rows.append((name, f"{'primary' if depth == 0 else 'bounce'} {depth} pixels"))
-        rows += [(f"- shadow: lamp", f"lamp {depth} pixels"), (f"- shadow: sky",
+        rows += [("- shadow: lamp", f"lamp {depth} pixels"), (f"- shadow: sky",
                                                                f"sky {depth} pixels")]
     return rows
 
@@ -255,6 +261,62 @@ def frames_table(results):
     return lines
 
 
+def render(program, arguments, out):
+    """Processor time of one picture, from the file to the picture, in seconds."""
+    command = [program, *arguments, "-o", out, "-q", "--stats", "none", "-r",
+               f"{ERROR_SIZE}x{ERROR_SIZE}", "-t", "2"]
+    process = subprocess.Popen([str(word) for word in command])
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    return usage.ru_utime + usage.ru_stime
+
+
+def measure_error(program, options):
+    """By scene: of `lights`, `path` and `path --denoise` rows of samples, seconds and FLIP to what
+    `path` converges to."""
+    found = []
+    with tempfile.TemporaryDirectory() as name:
+        truth, picture = pathlib.Path(name) / "truth.png", pathlib.Path(name) / "picture.png"
+        for scene in options.scenes.split(","):
+            print(f"light: error, {scene}", file=sys.stderr)
+            render(program, [scene, "--integrator", "path", "--spp", TRUTH_SAMPLES], truth)
+
+            def point(samples, *flags):
+                time_s = render(program, [scene, "--spp", samples, *flags], picture)
+                done = subprocess.run([program, "compare", picture, truth, "--stats", "json"],
+                                      check=True, text=True, stdout=subprocess.PIPE)
+                return [samples, time_s, json.loads(done.stdout)["flip"]]
+            rows = {"lights": [point(samples, "--integrator", "lights")
+                               for samples in LIGHTS_SAMPLES]}
+            for key, flags in [("path", []), ("path --denoise", ["--denoise"])]:
+                rows[key], samples = [], 1
+                while samples <= PATH_SAMPLES_MAX:
+                    rows[key].append(point(samples, "--integrator", "path", *flags))
+                    if rows[key][-1][2] <= min(row[2] for row in rows["lights"]):
+                        break
+                    samples *= 2
+            found.append({"scene": scene, "rows": rows})
+    return found
+
+
+def error_table(found):
+    """Of `lights` what it takes and how wrong it is, and what `path` takes to be as good."""
+    lines = [row(["scene", "`lights`, samples", "s", "FLIP", "`path` of that FLIP: samples", "s",
+                  "`path --denoise`: samples", "s"]), "|---|" + "---:|" * 7]
+    for scene in found:
+        name = scene["scene"].removeprefix("builtin:")
+        for samples, time_s, flip in scene["rows"]["lights"]:
+            cells = [name, str(samples), f"{time_s:.2f}", f"{flip:.3f}"]
+            for key in ("path", "path --denoise"):
+                fit = next((each for each in scene["rows"][key] if each[2] <= flip), None)
+                cells += [str(fit[0]), f"{fit[1]:.2f}"] if fit else \
+                    [f"above {scene['rows'][key][-1][0]}", f"above {scene['rows'][key][-1][1]:.2f}"]
+            lines.append(row(cells))
+    return lines
+
+
 def replace(text, name, lines):
     """Puts a table where it belongs."""
     start = text.index(f"<!-- light.py: {name} -->")
@@ -268,8 +330,9 @@ def parse():
     parser.add_argument("--json", type=pathlib.Path)
     parser.add_argument("--scenes", default=SCENES)
     parser.add_argument("--size", default=960)
-    parser.add_argument("--stride", default=5)
-    parser.add_argument("--depth", default=4)
+    parser.add_argument("--stride", default=7)
+    parser.add_argument("--depth", default=3)
+    parser.add_argument("--machines", default=",".join(MACHINES))
     parser.add_argument("--programs")
     parser.add_argument("--raylane")
     parser.add_argument("--only", nargs="*", choices=PARTS, default=PARTS)
@@ -285,19 +348,23 @@ def main():
         found = json.loads(options.json.read_text())
     try:
         if "rays" in options.only:
-            found["rays"] = measure_rays(count, options)
+            measure_rays(count, options, found.setdefault("rays", {}))
         if "frames" in options.only:
             found["frames"] = measure_frames(build_raylane(options), options)
+        if "error" in options.only:
+            found["error"] = measure_error(build_raylane(options), options)
     except (count.Failed, OSError, subprocess.CalledProcessError) as error:
         print(f"light: {error}", file=sys.stderr)
         return 1
     if options.json:
         options.json.write_text(json.dumps(found, indent=1) + "\n")
     tables = {}
-    if "rays" in found:
+    if set(found.get("rays", {})) == set(MACHINES):
         tables.update(rays_tables(found["rays"], options))
     if "frames" in found:
         tables["frames"] = frames_table(found["frames"])
+    if "error" in found:
+        tables["error"] = error_table(found["error"])
     text = options.output.read_text()
     for name, lines in tables.items():
         text = replace(text, name, lines)
