@@ -24,9 +24,11 @@ optional: libraries.Optional,
 /// The library, `@import("raylane")`.
 raylane: *Module,
 shows_searches: bool,
-/// The variants of its programs, the default one first, and those of them that count.
+/// The variants of its programs, the default one first, and those that count for them.
 held: []const Variant,
 counting: []const Variant,
+/// Those that hold the integrators besides Whitted's.
+lit: []const Variant,
 /// A kernel of each: see `addKernels`.
 kernels: []const *Compile,
 intrinsics: *Compile,
@@ -75,12 +77,18 @@ pub fn init(
         .shows_searches = options.shows_searches,
         .held = held,
         .counting = counting,
+        .lit = variants.lit(b.allocator, held, options.extent),
         .raylane = undefined,
         .config = undefined,
         .intrinsics = undefined,
         .kernels = undefined,
     };
-    const config = package.configOf(held, counting, options.extent == .all);
+    const config = package.configOf(.{
+        .variants = held,
+        .counting = counting,
+        .lit = package.lit,
+        .are_all = options.extent == .all,
+    });
     config.addOption(bool, "has_draco", options.optional.draco); // Not for kernels to know.
     package.config = config.createModule();
     package.raylane = package.library();
@@ -114,18 +122,22 @@ fn moduleOf(package: Package, root: []const u8) *Module {
     });
 }
 
-fn configOf(
-    package: Package,
-    held: []const Variant,
-    counting: []const Variant,
-    are_all: bool,
-) *std.Build.Step.Options {
+/// The variants that our code is told of, as in `Package`.
+const Held = struct {
+    variants: []const Variant,
+    counting: []const Variant = &.{},
+    lit: []const Variant = &.{},
+    are_all: bool = false,
+};
+
+fn configOf(package: Package, told: Held) *std.Build.Step.Options {
     const b = package.owner;
     const options = b.addOptions();
     options.addOption([]const u8, "version", manifest.version);
-    options.addOption([]const []const u8, "variants", package.names(held));
-    options.addOption([]const []const u8, "counting", package.names(counting));
-    options.addOption(bool, "are_all", are_all);
+    options.addOption([]const []const u8, "variants", package.names(told.variants));
+    options.addOption([]const []const u8, "counting", package.names(told.counting));
+    options.addOption([]const []const u8, "lit", package.names(told.lit));
+    options.addOption(bool, "are_all", told.are_all);
     options.addOption(bool, "shows_searches", package.shows_searches);
     return options;
 }
@@ -155,15 +167,20 @@ fn intrinsicsObject(package: Package) *Compile {
     return object;
 }
 
-/// One object for each variant, and one more for each that counts: they are compiled side by side,
-/// and shared by all programs of the package.
+/// One object for each variant, one more for each that counts, and one for each that holds further
+/// integrators, so that these change nothing of Whitted's: they are compiled side by side, and
+/// shared by all programs of the package.
 fn kernelObjects(package: Package) []*Compile {
     const arena = package.owner.allocator;
     var list: std.ArrayList(*Compile) = .empty;
-    for ([_][]const Variant{ package.held, package.counting }, 0..) |part, is_counting| {
+    for ([_]Kind{ .whitted, .counting, .lit }) |kind| {
+        const part = switch (kind) {
+            .whitted => package.held,
+            .counting => package.counting,
+            .lit => package.lit,
+        };
         for (part) |variant| {
-            const object = package.kernel(variant, is_counting == 1);
-            list.append(arena, object) catch @panic("OOM");
+            list.append(arena, package.kernel(variant, kind)) catch @panic("OOM");
         }
     }
     return list.items;
@@ -172,19 +189,25 @@ fn kernelObjects(package: Package) []*Compile {
 /// Assembly of the default variant's kernel, by a compile step of its own: whoever is asked for
 /// assembly generates code twice.
 pub fn assembly(package: Package) LazyPath {
-    return package.kernel(package.held[0], false).getEmittedAsm();
+    return package.kernel(package.held[0], .whitted).getEmittedAsm();
 }
 
-fn kernel(package: Package, variant: Variant, is_counting: bool) *Compile {
+/// What an object of a variant holds.
+const Kind = enum { whitted, counting, lit };
+
+fn kernel(package: Package, variant: Variant, kind: Kind) *Compile {
     const b = package.owner;
     const root = package.moduleOf("src/kernel.zig");
     const own: []const Variant = &.{variant};
-    const config = package.configOf(own, if (is_counting) own else &.{}, false);
+    const config = package.configOf(.{
+        .variants = own,
+        .counting = if (kind == .counting) own else &.{},
+        .lit = if (kind == .lit) own else &.{},
+    });
     root.addImport("config", config.createModule());
     // What LLVM does for a debugger is two fifths of its time.
     root.strip = package.optimize != .debug;
-    const suffix = if (is_counting) "-counting" else "";
-    const name = b.fmt("kernel-{s}{s}", .{ variant.name(b.allocator), suffix });
+    const name = b.fmt("kernel-{s}-{t}", .{ variant.name(b.allocator), kind });
     const object = package.archive(name, root);
     if (package.optimize == .fast and variant.backend == .intrinsics) object.lto = .full;
     return object;

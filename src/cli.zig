@@ -251,15 +251,17 @@ const sections: []const Section = &.{
         .{
             .usage = "--spp N",
             .help = comptimePrint("samples a pixel, {s} (default: {d}, or {d} where\n" ++
-                "the long side is below {d})", .{
+                "the long side is below {d}; path: {d})", .{
                 settings.sample_count.text(), settings.sample_count.default,
                 settings.sample_count_small,  settings.side_small,
+                settings.sample_count_path,
             }),
         },
         .{
             .usage = "--depth N",
-            .help = comptimePrint("reflections and refractions in a row, {s}\n(default: {d})", .{
-                settings.depth.text(), settings.depth.default,
+            .help = comptimePrint("reflections and refractions in a row, {s}\n" ++
+                "(default: {d}; path, all bounces of light: {d})", .{
+                settings.depth.text(), settings.depth.default, settings.depth_path,
             }),
         },
         .{
@@ -292,6 +294,10 @@ const sections: []const Section = &.{
             .help = namesOf(settings.Instances) ++ ": whether a mesh is\n" ++
                 "held once for all its instances: less memory, more\n" ++
                 "time; the image is always the same",
+        },
+        .{
+            .usage = "--integrator NAME",
+            .help = namesOf(settings.Integrator) ++ " (default: whitted)",
         },
         .{ .usage = "--variant NAME", .help = "how rays are traced; the image is always the same" },
         .{
@@ -403,6 +409,8 @@ const Parser = struct {
         if (parser.has_time and animation.which == .default) animation.which = .{ .index = 0 };
         try parser.checkViewpoint();
         try parser.settleFormat();
+        if (parser.options.count_tests and parser.options.render.integrator != .whitted)
+            return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
         return .{ .render = parser.options };
     }
 
@@ -469,6 +477,8 @@ const Parser = struct {
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
             .variant => options.render.variant = try parser.variantOf(given.value),
+            .integrator => options.render.integrator =
+                try reader.choice(given, settings.Integrator),
             .count_tests => options.count_tests = true,
             .point_size => options.view.point_size = pointSizeOf(given.value) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
@@ -935,6 +945,7 @@ test "numbers keep to their ranges" {
         .{ .flag = "--stats", .good = &.{ "text", "json", "none" }, .bad = &.{ "JSON", "" } },
         .{ .flag = "--bvh", .good = &.{ "fast", "default", "high" }, .bad = &.{ "High", "" } },
         .{ .flag = "--instances", .good = &.{ "auto", "share", "flatten" }, .bad = &.{"all"} },
+        .{ .flag = "--integrator", .good = &.{ "whitted", "lights", "path" }, .bad = &.{"bdpt"} },
         .{
             .flag = "--format",
             .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },
@@ -1164,10 +1175,7 @@ test "points and lines are as wide as they may be" {
 }
 
 test "the help fits a screen and says what flags take and may be" {
-    var line_count: usize = 0;
-    var lines = std.mem.splitScalar(u8, help, '\n');
-    while (lines.next()) |line| : (line_count += 1) try std.testing.expect(line.len <= 80);
-    try std.testing.expect(line_count <= 100);
+    try std.testing.expect(try @import("cli/testing.zig").expectFits(help) <= 100);
     for ([_][]const u8{
         "\n  -o, --output FILE        name ending in",
         "\n                           4 to 1024 (default: 32)\n",

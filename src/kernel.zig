@@ -1,8 +1,9 @@
 //! A kernel: the tracer of one variant, compiled into an object of its own.
 //!
-//! In: the build options, which name the variant and whether it counts tests. Out: one symbol, the
-//! integrator behind pointers. Nothing in it is mutable but what it is handed, and no thread is
-//! started: the program that it is linked to does that, and panics for it.
+//! In: the build options, which name the variant, and whether it counts tests or holds the
+//! integrators besides Whitted's. Out: a symbol for each integrator, behind pointers. Nothing in it
+//! is mutable but what it is handed, and no thread is started: the program that it is linked to
+//! does that, and panics for it.
 
 const std = @import("std");
 const config = @import("config");
@@ -11,16 +12,27 @@ const variant = @import("variant.zig");
 
 const is_counting = config.counting.len > 0;
 const Kernel = trace.kernel.Kernel(variant.default, is_counting);
-const integrator: trace.Integrator = .of(trace.Whitted(Kernel));
 
 comptime {
-    const symbol = trace.link.symbolOf(trace.Integrator, variant.default, is_counting);
-    @export(&integrator, .{ .name = symbol });
-    if (config.shows_searches and !is_counting) {
-        const Searches = trace.searches.Searches(Kernel);
-        const name = trace.link.symbolOf(Searches, variant.default, false);
-        @export(&Searches.of, .{ .name = name });
+    if (variant.lit.len > 0) {
+        show(trace.Lights(Kernel), "lights");
+        show(trace.PathTracer(Kernel), "path");
+    } else {
+        show(trace.Whitted(Kernel), if (is_counting) "counting" else "whitted");
+        if (config.shows_searches and !is_counting) {
+            const Searches = trace.searches.Searches(Kernel);
+            const name = trace.link.symbolOf(Searches, variant.default, "searches");
+            @export(&Searches.of, .{ .name = name });
+        }
     }
+}
+
+fn show(comptime Integrator: type, comptime what: []const u8) void {
+    const face = struct {
+        const integrator: trace.Integrator = .of(Integrator);
+    };
+    const name = trace.link.symbolOf(trace.Integrator, variant.default, what);
+    @export(&face.integrator, .{ .name = name });
 }
 
 /// The program's: what prints a trace of the stack is large and has state.

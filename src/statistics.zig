@@ -25,12 +25,32 @@ pub const RayCounts = struct {
     shadow: u64 = 0,
     /// Reflected and refracted.
     secondary: u64 = 0,
+    /// By bounces up to where they start, where the integrator tells: those that look for surfaces,
+    /// and those that look for light from where they end.
+    by_bounce: [bounce_count]ByBounce = @splat(.{}),
+
+    /// Bounces that are told apart; the last stands for all beyond, too.
+    pub const bounce_count = 9;
+    pub const ByBounce = struct { closest: u64 = 0, shadow: u64 = 0 };
 
     /// Adds another thread's counts.
     pub fn add(counts: *RayCounts, other: RayCounts) void {
         counts.primary += other.primary;
         counts.shadow += other.shadow;
         counts.secondary += other.secondary;
+        for (&counts.by_bounce, other.by_bounce) |*to, more| {
+            to.closest += more.closest;
+            to.shadow += more.shadow;
+        }
+    }
+
+    /// Counts rays after so many bounces.
+    pub fn count(counts: *RayCounts, depth: u32, more: ByBounce) void {
+        (if (depth == 0) &counts.primary else &counts.secondary).* += more.closest;
+        counts.shadow += more.shadow;
+        const to = &counts.by_bounce[@min(depth, bounce_count - 1)];
+        to.closest += more.closest;
+        to.shadow += more.shadow;
     }
 };
 

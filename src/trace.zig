@@ -13,11 +13,16 @@ const Film = @import("film.zig").Film;
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Frame = world_file.Frame;
+const Variant = variant_file.Variant;
 
 /// How kernels are found.
 pub const link = @import("trace/link.zig");
 /// Whitted's ray tracing, by one kernel.
 pub const Whitted = @import("trace/integrate/whitted.zig").Whitted;
+/// Instant radiosity, by one kernel.
+pub const Lights = Whitted;
+/// Path tracing, by one kernel.
+pub const PathTracer = @import("trace/integrate/path_tracer.zig").PathTracer;
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
 pub const kernel = @import("trace/traverse/kernel.zig");
 /// Rays in lanes.
@@ -51,6 +56,9 @@ pub const beam = struct {
     pub const shadow_plane = @import("trace/traverse/beam/shadow_plane.zig");
     pub const shadow_receivers = @import("trace/traverse/beam/shadow_receivers.zig");
 };
+/// The light list in lanes, and the tree of it.
+pub const light_sampling = @import("trace/shade/light_sampling.zig");
+pub const light_tree = @import("trace/shade/light_tree.zig");
 /// What tests of traversal ask of a kernel.
 pub const searches = @import("trace/traverse/searches.zig");
 /// A bundle in the variant's own way.
@@ -59,7 +67,7 @@ pub const dispatch = @import("trace/traverse/dispatch.zig");
 /// The searches of a kernel, where the build has kernels show them.
 pub fn searchesOf(comptime Kernel: type) *const searches.Searches(Kernel) {
     const Face = searches.Searches(Kernel);
-    return @extern(*const Face, .{ .name = link.symbolOf(Face, Kernel.variant, false) });
+    return @extern(*const Face, .{ .name = link.symbolOf(Face, Kernel.variant, "searches") });
 }
 
 /// A kernel's face.
@@ -69,7 +77,8 @@ pub const Statistics = tiles.Statistics;
 pub const Error = tiles.Error;
 
 /// Traces the picture with variant `variant_index` of `variant.compiled`. Asserts that the film has
-/// the view's size and the tree the variant's width. The film may hold an earlier picture.
+/// the view's size, the tree the variant's width, and that the variant holds the integrator. The
+/// film may hold an earlier picture.
 pub fn trace(
     gpa: Allocator,
     variant_index: usize,
@@ -81,6 +90,7 @@ pub fn trace(
 }
 
 /// The same with boxes and triangles counted, which takes longer: for a second pass, untimed.
+/// Asserts that the integrator is Whitted's.
 pub fn traceCounting(
     gpa: Allocator,
     variant_index: usize,
@@ -101,16 +111,37 @@ fn run(
 ) Error!Statistics {
     assert(film.image.width == frame.view.width and film.image.height == frame.view.height);
     assert(settings.sample_count >= 1 and choices.depth.holds(settings.depth_max));
-    const integrators = comptime integrators: {
-        var list: [variant_file.compiled.len]*const Integrator = undefined;
-        for (&list, variant_file.compiled) |*to, held| {
-            const chosen = if (counting) variant_file.countingOf(held) else held;
-            const symbol = link.symbolOf(Integrator, chosen, counting);
+    const whitted = comptime integratorsOf(if (counting) "counting" else "whitted", list: {
+        var list: [variant_file.compiled.len]Variant = variant_file.compiled[0..].*;
+        if (counting) for (&list) |*variant| {
+            variant.* = variant_file.countingOf(variant.*);
+        };
+        break :list &list;
+    });
+    const integrator = switch (settings.integrator) {
+        .whitted => whitted[variant_index],
+        inline .lights, .path => |which| integrator: {
+            assert(!counting);
+            const list = comptime integratorsOf(@tagName(which), variant_file.lit);
+            break :integrator list[variant_file.litIndexOf(variant_index).?];
+        },
+    };
+    return tiles.render(integrator, gpa, frame, film, settings);
+}
+
+/// By variant.
+fn integratorsOf(
+    comptime what: []const u8,
+    comptime variants: []const Variant,
+) [variants.len]*const Integrator {
+    comptime {
+        var list: [variants.len]*const Integrator = undefined;
+        for (&list, variants) |*to, variant| {
+            const symbol = link.symbolOf(Integrator, variant, what);
             to.* = @extern(*const Integrator, .{ .name = symbol });
         }
-        break :integrators list;
-    };
-    return tiles.render(integrators[variant_index], gpa, frame, film, settings);
+        return list;
+    }
 }
 
 test {
@@ -128,16 +159,21 @@ test {
     _ = @import("trace/integrate/camera.zig");
     _ = @import("trace/integrate/numbers.zig");
     _ = @import("trace/integrate/path.zig");
+    _ = @import("trace/integrate/path_records.zig");
     _ = tiles;
+    _ = @import("trace/integrate/adaptive.zig");
     _ = @import("trace/traverse/beam/budget.zig");
     _ = @import("trace/traverse/beam/tile_depth_buffer.zig");
     _ = @import("trace/traverse/beam/grid.zig");
     _ = beam.pixel_window;
     _ = @import("trace/integrate/sampler.zig");
+    _ = @import("trace/integrate/sobol.zig");
     _ = @import("trace/shade/cosine.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/iridescence.zig");
     _ = @import("trace/shade/light.zig");
+    _ = light_sampling;
+    _ = @import("trace/shade/environment_sampling.zig");
     _ = @import("trace/shade/offset.zig");
     _ = @import("trace/shade/albedo.zig");
     _ = @import("trace/shade/anisotropy.zig");

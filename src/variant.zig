@@ -45,6 +45,21 @@ pub const compiled: []const Variant = listOf(config.variants);
 /// The variant of the build options.
 pub const default: Variant = compiled[0];
 
+/// Those of them whose kernels hold the integrators besides Whitted's.
+pub const lit: []const Variant = listOf(config.lit);
+
+/// Index into `lit` of a variant of `compiled`, or null.
+pub fn litIndexOf(index: usize) ?usize {
+    const found = comptime found: {
+        var list: [compiled.len]?usize = @splat(null);
+        for (&list, compiled) |*to, variant| for (lit, 0..) |other, number| {
+            if (std.meta.eql(variant, other)) to.* = number;
+        };
+        break :found list;
+    };
+    return found[index];
+}
+
 /// Whether there are no others.
 pub const are_all = config.are_all;
 

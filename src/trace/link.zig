@@ -7,15 +7,14 @@
 const std = @import("std");
 const Variant = @import("../variant.zig").Variant;
 
-/// Name of the symbol of a variant's `Face`, through which it is called.
+/// Name of the symbol of a variant's `Face`, through which it is called; `what` tells those of one
+/// variant apart.
 pub fn symbolOf(
     comptime Face: type,
     comptime variant: Variant,
-    comptime counting: bool,
+    comptime what: []const u8,
 ) [:0]const u8 {
-    return std.fmt.comptimePrint("rl_{s}{s}_{x:0>16}", .{
-        variant.name(), if (counting) "_counting" else "", layoutOf(Face),
-    });
+    return std.fmt.comptimePrint("rl_{s}_{s}_{x:0>16}", .{ variant.name(), what, layoutOf(Face) });
 }
 
 /// Ends the program with a message; exported by the program, for its kernels.
