@@ -1,4 +1,5 @@
-//! Where paths in lanes go on from surfaces: a direction of the BSDF, or an end by chance.
+//! Where paths in lanes go on from surfaces: straight on, a direction of the BSDF, or an end by
+//! chance.
 //!
 //! In: vertices. Out: records of paths with their next rays. What a path is worth decides by chance
 //! whether it goes on (Russian roulette, Arvo and Kirk 1990).
@@ -18,7 +19,28 @@ const roulette_depth = 3;
 /// density stands for: what such a ray sees is blurred by the lobe anyway.
 const cone_per_lobe = 0.05;
 
-/// Sends paths on.
+/// Sends paths straight on behind what they hit.
+pub fn pass(comptime Kernel: type, step: *PathStep(Kernel), lanes: Kernel.Rays.Mask) void {
+    const point = &step.vertex.point;
+    const closest = step.path.bundle.groups[step.group].closest;
+    const ts = closest.t.toArray();
+    const primitives = closest.primitive.toArray();
+    const throughputs: records_file.Stored(Kernel.Rays) = .of(step.throughput);
+    const hidden = point.hidden.bits();
+    var bits = lanes.bits();
+    while (bits != 0) : (bits &= bits - 1) {
+        const lane = @ctz(bits);
+        const record = &step.records[step.numbers[lane]];
+        record.start_t = ts[lane];
+        record.start_primitive = primitives[lane];
+        record.throughput = throughputs.at(lane);
+        record.transparency_depth += 1;
+        if (hidden >> @intCast(lane) & 1 != 0) record.nesting = point.beyond[lane];
+        step.goOn(lane);
+    }
+}
+
+/// Sends paths on by what surfaces scatter.
 pub noinline fn bounce(
     comptime Kernel: type,
     step: *PathStep(Kernel),

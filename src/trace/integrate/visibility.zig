@@ -250,7 +250,8 @@ pub fn Visibility(comptime Kernel: type) type {
             value.* = .select(stopped.bitAnd(ray.active), none, value.*);
             ray.active = ray.active.andNot(stopped);
             const passage = &visibility.passages[group];
-            const transmits = visibility.frame.materials.has_transmission;
+            const frame = visibility.frame;
+            const transmits = frame.materials.has_transmission;
             if (transmits)
                 passage.take(&visibility.hits, group, ray.line.direction, ray.active);
             for (0..multi_hit.hits_max) |index| {
@@ -259,7 +260,7 @@ pub fn Visibility(comptime Kernel: type) type {
                 if (ray.active.none()) return;
                 ray.tnear = next;
                 const passing: F32 = if (transmits) .fromArray(passage.passing[index]) else one;
-                var through = visibility.attenuationAt(ray, light, cone_width, next, passing);
+                var through = attenuationAt(Rays, frame, ray, light, cone_width, next, passing);
                 if (!straight.all()) through.scatter(straight.bitNot());
                 if (transmits) through.hide(.fromBits(passage.hidden[index]));
                 value.* = .select(ray.active, value.mul(through.share), value.*);
@@ -272,54 +273,55 @@ pub fn Visibility(comptime Kernel: type) type {
                 ray.active = ray.active.andNot(ended).andNot(dark);
             }
         }
-
-        /// What active rays lose at the triangles that they hit.
-        fn attenuationAt(
-            visibility: *const Self,
-            ray: *const ray_file.Ray(Rays),
-            light: *const Light,
-            cone_width: F32,
-            hit: ray_file.Hit(Rays),
-            passing: F32,
-        ) material_file.Attenuation(Rays) {
-            const Corners = interaction_file.Corners(Rays);
-            const frame = visibility.frame;
-            const geometry = frame.geometry;
-            const all = frame.materials.all;
-            // Without vertex colours and textures it is the material's alone.
-            if (!geometry.hasColors() and !frame.hasTextures()) {
-                const numbers = Corners.materialsOf(geometry, hit.primitive, ray.active);
-                return .of(&.of(all, numbers, ray.active), .white, passing);
-            }
-            const corners: Corners = .of(geometry, hit.primitive, ray.active);
-            const weights = triangle.edgeFunctionsOf(Rays, corners.position, ray.line);
-            const barycentrics = weights.barycentrics();
-            const materials: material_file.Materials(Rays) =
-                .of(all, corners.material, ray.active);
-            const color = corners.colorAt(geometry, barycentrics);
-            if (!frame.hasTextures()) return .of(&materials, color, passing);
-            // As wide as what the shadow falls on is seen; a cone with its apex in the light.
-            const share: F32 = if (light.kind == .directional)
-                .splat(1)
-            else if (light.from_receiver)
-                F32.splat(1).sub(hit.t)
-            else
-                hit.t;
-            const place: texturing.Place(Rays) = .{
-                .asked = ray.active,
-                .primitive = hit.primitive,
-                .barycentrics = barycentrics,
-                .axes = .ofCorners(
-                    corners.position,
-                    ray.line.direction.normalize(),
-                    cone_width.mul(share),
-                ),
-            };
-            const colored = texturing.colored(Rays, frame, &materials, &place, color);
-            const clear = texturing.transmission(Rays, frame, &materials, &place);
-            return .of(&materials, colored, passing.mul(clear));
-        }
     };
+}
+
+/// What active rays lose at the triangles that they hit.
+fn attenuationAt(
+    comptime Rays: type,
+    frame: *const Frame,
+    ray: *const ray_file.Ray(Rays),
+    light: *const Light,
+    cone_width: Rays.F32,
+    hit: ray_file.Hit(Rays),
+    passing: Rays.F32,
+) material_file.Attenuation(Rays) {
+    const F32 = Rays.F32;
+    const Corners = interaction_file.Corners(Rays);
+    const geometry = frame.geometry;
+    const all = frame.materials.all;
+    // Without vertex colours and textures it is the material's alone.
+    if (!geometry.hasColors() and !frame.hasTextures()) {
+        const numbers = Corners.materialsOf(geometry, hit.primitive, ray.active);
+        return .of(&.of(all, numbers, ray.active), .white, passing);
+    }
+    const corners: Corners = .of(geometry, hit.primitive, ray.active);
+    const weights = triangle.edgeFunctionsOf(Rays, corners.position, ray.line);
+    const barycentrics = weights.barycentrics();
+    const materials: material_file.Materials(Rays) =
+        .of(all, corners.material, ray.active);
+    const color = corners.colorAt(geometry, barycentrics);
+    if (!frame.hasTextures()) return .of(&materials, color, passing);
+    // As wide as what the shadow falls on is seen; a cone with its apex in the light.
+    const share: F32 = if (light.kind == .directional)
+        .splat(1)
+    else if (light.from_receiver)
+        F32.splat(1).sub(hit.t)
+    else
+        hit.t;
+    const place: texturing.Place(Rays) = .{
+        .asked = ray.active,
+        .primitive = hit.primitive,
+        .barycentrics = barycentrics,
+        .axes = .ofCorners(
+            corners.position,
+            ray.line.direction.normalize(),
+            cone_width.mul(share),
+        ),
+    };
+    const colored = texturing.colored(Rays, frame, &materials, &place, color);
+    const clear = texturing.transmission(Rays, frame, &materials, &place);
+    return .of(&materials, colored, passing.mul(clear));
 }
 
 /// The points that the rays of a group of a `PathState` see. Asserts that some active ray hit
