@@ -1175,10 +1175,7 @@ test "points and lines are as wide as they may be" {
 }
 
 test "the help fits a screen and says what flags take and may be" {
-    var line_count: usize = 0;
-    var lines = std.mem.splitScalar(u8, help, '\n');
-    while (lines.next()) |line| : (line_count += 1) try std.testing.expect(line.len <= 80);
-    try std.testing.expect(line_count <= 100);
+    try std.testing.expect(try @import("cli/testing.zig").expectFits(help) <= 100);
     for ([_][]const u8{
         "\n  -o, --output FILE        name ending in",
         "\n                           4 to 1024 (default: 32)\n",

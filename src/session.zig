@@ -44,13 +44,11 @@ pub fn loadScene(
     choices: settings.Load,
     diagnostic: *Diagnostic,
 ) LoadError!Scene {
-    diagnostic.strict = choices.strict;
     var scene = if (std.mem.cutPrefix(u8, name, settings.builtin_prefix)) |builtin_name| builtin: {
         try parse.checkOnly(choices, diagnostic);
         break :builtin try builtin_scenes.build(gpa, builtin_name, diagnostic);
     } else try parse.parse(gpa, io, name, choices, diagnostic);
     errdefer scene.deinit();
-    try diagnostic.failIfRefused();
     const is_z_up = if (choices.up_axis) |axis| axis == .z else scene.is_z_up;
     if (is_z_up) try scene.turn(z_to_y);
     return scene;
@@ -322,7 +320,8 @@ pub const Session = struct {
             session.gpa,
             &session.scene.?,
             &session.loaded.?,
-            &session.posed.?,
+            session.posed.?.moment.running,
+            &session.pose_cache.?,
             &session.pool,
             &session.motion,
         );

@@ -359,6 +359,12 @@ pub const Integrator = enum {
     lights,
     /// Path tracing (Kajiya 1986): all light, with noise that ends as samples grow.
     path,
+
+    /// Whether a sample is the same whatever the number of them, so that more can be added to a
+    /// picture.
+    pub fn isOpen(integrator: Integrator) bool {
+        return integrator == .path;
+    }
 };
 
 /// How rays are traced.

@@ -161,6 +161,7 @@ test {
     _ = @import("trace/integrate/path.zig");
     _ = @import("trace/integrate/path_records.zig");
     _ = tiles;
+    _ = @import("trace/integrate/adaptive.zig");
     _ = @import("trace/traverse/beam/budget.zig");
     _ = @import("trace/traverse/beam/tile_depth_buffer.zig");
     _ = @import("trace/traverse/beam/grid.zig");

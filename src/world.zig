@@ -24,6 +24,7 @@ pub const DirectionalChoice = light_sampler_file.DirectionalChoice;
 pub const Environment = environment_file.Environment;
 pub const EnvironmentDistribution = light_sampler_file.EnvironmentDistribution;
 pub const EnvironmentLevel = environment_file.EnvironmentLevel;
+pub const Cursor = instances.Cursor;
 pub const EnvironmentMap = environment_file.EnvironmentMap;
 pub const EnvironmentPart = environment_file.EnvironmentPart;
 pub const EnvironmentSource = environment_file.EnvironmentSource;
