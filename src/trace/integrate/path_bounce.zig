@@ -10,6 +10,8 @@ const scatter_file = @import("../shade/scatter.zig");
 const path_features = @import("path_features.zig");
 const path_light = @import("path_light.zig");
 const records_file = @import("path_records.zig");
+const visibility_file = @import("visibility.zig");
+const Frame = @import("../../world.zig").Frame;
 const PathStep = @import("path_step.zig").PathStep;
 
 /// Bounces after which paths that are worth little may end.
@@ -99,6 +101,7 @@ fn leave(
     const crossing = sampled.crosses.bitAnd(point.material.volume);
     const entering = if (has_volumes) crossing.bits() else 0;
     const sigma: Stored = if (entering != 0) .of(point.sigma_beyond) else undefined;
+    const panes = sampled.is_delta.bitAnd(sampled.crosses).bits();
     var bits = lanes.bits();
     while (bits != 0) : (bits &= bits - 1) {
         const lane = @ctz(bits);
@@ -109,9 +112,12 @@ fn leave(
         record.start_primitive = std.math.maxInt(i32);
         record.skip = primitives[lane];
         record.throughput = throughputs.at(lane);
-        record.scatter_pdf = pdfs[lane];
-        record.receiver = positions.at(lane);
-        record.receiver_normal = normals.at(lane);
+        // Light that is met through panes could have been chosen before them.
+        if (panes >> @intCast(lane) & 1 == 0 or !isPane(step.frame, primitives[lane])) {
+            record.scatter_pdf = pdfs[lane];
+            record.receiver = positions.at(lane);
+            record.receiver_normal = normals.at(lane);
+        }
         record.cone_width = widths[lane];
         record.cone_spread = spreads[lane];
         record.depth += 1;
@@ -123,6 +129,10 @@ fn leave(
         step.rays.count(record.depth + record.scatter_count, .{ .closest = 1 });
         step.goOn(lane);
     }
+}
+
+fn isPane(frame: *const Frame, primitive: i32) bool {
+    return visibility_file.clarityOf(frame, @intCast(primitive)) == .pane;
 }
 
 /// Of the cones of rays that go on: as the surface bends them, and at least a part of the lobe.

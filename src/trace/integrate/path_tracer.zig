@@ -240,19 +240,9 @@ pub fn PathTracer(comptime Kernel: type) type {
         /// Those that go much the same way become neighbours.
         fn sortByDirection(tracer: *Self, numbers: []u32) void {
             const keys = tracer.keys[0..numbers.len];
-            for (keys, numbers) |*key, number| key.* = wayOf(tracer.records[number].direction);
+            for (keys, numbers) |*key, number|
+                key.* = records_file.wayOf(tracer.records[number].direction);
             records_file.sort(numbers, keys, tracer.sorted);
         }
     };
-}
-
-/// The octant of a direction, and of its longest axis which it is.
-fn wayOf(direction: [3]f32) u16 {
-    var key: u16 = 0;
-    for (direction) |component| key = key << 1 | @intFromBool(component < 0);
-    const size = [3]f32{ @abs(direction[0]), @abs(direction[1]), @abs(direction[2]) };
-    const longest: u16 = if (size[0] >= size[1] and size[0] >= size[2])
-        0
-    else if (size[1] >= size[2]) 1 else 2;
-    return key << 2 | longest;
 }

@@ -19,7 +19,9 @@ const triangle = @import("../traverse/triangle.zig");
 const interaction_file = @import("../shade/interaction.zig");
 const layers_file = @import("../shade/layers.zig");
 const material_file = @import("../shade/material.zig");
+const sampling = @import("../shade/sampling.zig");
 const texturing = @import("../shade/texturing.zig");
+const transmission = @import("../shade/transmission.zig");
 const Grid = @import("../traverse/beam/grid.zig").Grid;
 const Frame = world_file.Frame;
 const Light = world_file.Light;
@@ -117,9 +119,9 @@ pub fn Visibility(comptime Kernel: type) type {
         }
 
         /// The same of shadow rays that have no light in common: each has a direction and an end of
-        /// its own, `closest` of the bundle. In the lanes of `straight` light goes straight through
-        /// what transmits, as it does for `transmittance`; elsewhere that stops it, and only holes
-        /// and what alpha leaves open let it through.
+        /// its own, `closest` of the bundle. What scatters light stops it: it goes through what
+        /// alpha leaves open and smooth panes, and in the lanes of `straight` as if straight
+        /// through smooth boundaries of volumes.
         pub fn transmittanceOfEach(
             visibility: *Self,
             bundle: *Bundle,
@@ -194,7 +196,7 @@ pub fn Visibility(comptime Kernel: type) type {
                         ray,
                         light,
                         vertices[group].point.cone_width,
-                        if (straight) |lanes| lanes[group] else .splat(true),
+                        if (straight) |lanes| lanes[group] else null,
                         group,
                         value,
                         &weakened_counts[group],
@@ -239,7 +241,7 @@ pub fn Visibility(comptime Kernel: type) type {
             ray: *ray_file.Ray(Rays),
             light: *const Light,
             cone_width: F32,
-            straight: Mask,
+            straight: ?Mask,
             group: usize,
             value: *Vec3,
             weakened_count: *F32,
@@ -261,7 +263,8 @@ pub fn Visibility(comptime Kernel: type) type {
                 ray.tnear = next;
                 const passing: F32 = if (transmits) .fromArray(passage.passing[index]) else one;
                 var through = attenuationAt(Rays, frame, ray, light, cone_width, next, passing);
-                if (!straight.all()) through.scatter(straight.bitNot());
+                if (straight) |lanes| through
+                    .sharpen(clearLanes(Rays, frame, next.primitive, ray.active, lanes));
                 if (transmits) through.hide(.fromBits(passage.hidden[index]));
                 value.* = .select(ray.active, value.mul(through.share), value.*);
                 weakened_count.* =
@@ -274,6 +277,52 @@ pub fn Visibility(comptime Kernel: type) type {
             }
         }
     };
+}
+
+/// Of lanes asked for, those whose triangles light goes straight through, or in those of `straight`
+/// as if.
+fn clearLanes(
+    comptime Rays: type,
+    frame: *const Frame,
+    primitives: Rays.I32,
+    asked: Rays.Mask,
+    straight: Rays.Mask,
+) Rays.Mask {
+    if (!frame.materials.has_transmission) return .splat(false);
+    const numbers = primitives.toArray();
+    const bent = straight.bits();
+    var clear: u32 = 0;
+    var bits = asked.bits();
+    while (bits != 0) : (bits &= bits - 1) {
+        const lane = @ctz(bits);
+        const is_straight = bent >> @intCast(lane) & 1 != 0;
+        const is_clear = switch (clarityOf(frame, @intCast(numbers[lane]))) {
+            .scattering => false,
+            .bending => is_straight,
+            .pane => true,
+        };
+        clear |= @as(u32, @intFromBool(is_clear)) << @intCast(lane);
+    }
+    return .fromBits(clear);
+}
+
+/// What a surface does to light that comes through: not in one direction, in another, or straight.
+pub const Clarity = enum { scattering, bending, pane };
+
+/// That of a triangle, whatever its textures say.
+pub fn clarityOf(frame: *const Frame, primitive: u32) Clarity {
+    const material = &frame.materials.all[frame.geometry.face(primitive).material];
+    if (!material.transmits()) return .scattering;
+    const Single = ray_file.Single;
+    const alpha: Single.F32 = .splat(material.roughness * material.roughness);
+    const ior: Single.F32 = .splat(material.ior);
+    const is_thin = material.volume == 0;
+    const width = if (is_thin)
+        transmission.thinAlpha(Single, alpha, ior)
+    else
+        transmission.equalAlpha(Single, alpha, ior);
+    if (width.lane(0) > sampling.sharp_alpha_least) return .scattering;
+    return if (is_thin) .pane else .bending;
 }
 
 /// What active rays lose at the triangles that they hit.
