@@ -20,6 +20,7 @@ const trace = @import("trace.zig");
 const variant = @import("variant.zig");
 const Environment = @import("session/environment.zig").Environment;
 const emission = @import("session/emission.zig");
+const course_file = @import("session/course.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
 const Film = film_file.Film;
@@ -31,6 +32,9 @@ const World = @import("world.zig").World;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
 const assert = std.debug.assert;
+
+/// A picture of work under way.
+pub const ProgressImage = @import("session/progress_image.zig").ProgressImage;
 
 /// Why there is no scene.
 pub const LoadError = parse.Error;
@@ -85,6 +89,10 @@ pub const Session = struct {
     pool: parallel.Pool,
     /// Told of every finished tile.
     progress: std.Progress.Node = .none,
+    /// Where pictures are shown on which `render` is at work; the caller's.
+    progress_image: ?*ProgressImage = null,
+    /// Set, it ends what `render` traces when every pixel has a sample.
+    stop: ?*const std.atomic.Value(bool) = null,
     /// Of the latest call of each stage.
     times: statistics.StageTimes = .{},
     /// When `load` began.
@@ -368,13 +376,7 @@ pub const Session = struct {
         session.metered = null;
         try session.weighEmitters();
         try session.dimStudio();
-        session.traced = try trace.trace(
-            session.gpa,
-            choices.variant,
-            &session.world.?.frame(),
-            film,
-            session.traceSettings(choices),
-        );
+        try session.traceInRounds(film, choices);
         session.times.trace_ns = session.since(start);
         if (session.traced.non_finite_count > 0) session.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
@@ -382,14 +384,77 @@ pub const Session = struct {
         );
     }
 
+    fn traceInRounds(session: *Session, film: *Film, choices: settings.Render) trace.Error!void {
+        var chosen = session.traceSettings(choices);
+        chosen.stop = session.stop;
+        if (choices.noise) |noise| chosen.noise = .{
+            .error_max = noise.error_max,
+            .exposure_scale = output.exposureScale(try session.exposureOf(noise.exposure)),
+        };
+        var course: course_file.Course = .{
+            .io = session.io,
+            .start = Io.Clock.awake.now(session.io),
+        };
+        if (choices.time_budget_s) |budget_s| {
+            const budget_ns: u64 = @intFromFloat(@as(f64, budget_s) * std.time.ns_per_s);
+            if (choices.integrator.isOpen()) {
+                course.budget_ns = budget_ns;
+            } else if (try session.traceOne(film, &chosen, budget_ns)) return;
+        }
+        if (session.progress_image) |image| {
+            // Now, for what is metered is traced with other lights.
+            _ = try session.appearanceOf(image.choices);
+            try image.size(session.gpa, film);
+            course.viewer = .{ .context = session, .show = showProgress };
+        }
+        defer if (session.progress_image) |image| image.dropFilm(session.gpa);
+        if (course.budget_ns != null or course.viewer != null) chosen.course = course.asked();
+        try session.traceFilm(film, chosen);
+    }
+
+    fn traceFilm(session: *Session, film: *Film, chosen: trace.Settings) trace.Error!void {
+        const variant_index = session.rendered.variant;
+        const frame = session.world.?.frame();
+        session.traced = try trace.trace(session.gpa, variant_index, &frame, film, chosen);
+    }
+
+    /// Traces a picture of one sample, to find how many fit into the time, and chooses so many;
+    /// true: no more than the one.
+    fn traceOne(
+        session: *Session,
+        film: *Film,
+        chosen: *trace.Settings,
+        budget_ns: u64,
+    ) trace.Error!bool {
+        const start = Io.Clock.awake.now(session.io);
+        var one = chosen.*;
+        one.sample_count = 1;
+        try session.traceFilm(film, one);
+        const sample_ns = session.since(start);
+        const count = course_file.fitting(budget_ns -| sample_ns, sample_ns);
+        chosen.sample_count = @intCast(@min(chosen.sample_count, count));
+        return chosen.sample_count <= 1 or session.traced.is_partial;
+    }
+
+    fn showProgress(context: *anyopaque, standing: *const trace.Standing) void {
+        const session: *Session = @ptrCast(@alignCast(context));
+        const image = session.progress_image.?;
+        standing.copyTo(&image.film.?) catch return;
+        const appearance = session.appearanceOf(image.choices) catch return;
+        const chosen = session.outputSettings(image.choices, appearance);
+        image.write(session.gpa, chosen, session.diagnostic);
+    }
+
     /// Traces the same picture again to count intersection tests, without timing.
     pub fn countTests(session: *Session, choices: settings.Render) Error!statistics.TestCounts {
+        var chosen = session.traceSettings(choices);
+        chosen.sample_count = session.traced.sample_count;
         const counted = try trace.traceCounting(
             session.gpa,
             choices.variant,
             &session.world.?.frame(),
             &session.film.?,
-            session.traceSettings(choices),
+            chosen,
         );
         session.traced.tests = counted.tests;
         return counted.tests.?;
@@ -415,28 +480,42 @@ pub const Session = struct {
         choices: settings.Write,
     ) output.Error!void {
         defer target.abandon();
-        session.appearance = if (output.isLinear(choices.format)) null else .{
-            .exposure_ev = try session.exposureOf(choices.exposure),
-            .is_automatic = session.isMetered(choices.exposure),
-            .tone_mapping = choices.tone_mapping,
-        };
+        session.appearance = try session.appearanceOf(choices);
         const start = Io.Clock.awake.now(session.io);
         const film = &session.film.?;
         const tally = try output.write(session.gpa, .{
             .image = &film.image,
             .display = film.imageOf(.display),
-        }, .{
+        }, session.outputSettings(choices, session.appearance), target, session.diagnostic);
+        session.times.output_ns = session.since(start);
+        session.times.total_ns = session.since(session.start);
+        session.hint(tally);
+    }
+
+    /// Null: the format keeps radiance as it is.
+    fn appearanceOf(session: *Session, choices: settings.Write) trace.Error!?Report.Appearance {
+        if (output.isLinear(choices.format)) return null;
+        return .{
+            .exposure_ev = try session.exposureOf(choices.exposure),
+            .is_automatic = session.isMetered(choices.exposure),
+            .tone_mapping = choices.tone_mapping,
+        };
+    }
+
+    fn outputSettings(
+        session: *Session,
+        choices: settings.Write,
+        appearance: ?Report.Appearance,
+    ) output.Settings {
+        return .{
             .format = choices.format,
-            .exposure_ev = if (session.appearance) |appearance| appearance.exposure_ev else 0,
+            .exposure_ev = if (appearance) |chosen| chosen.exposure_ev else 0,
             .tone_mapping = choices.tone_mapping,
             .transparent = session.seen.background == .transparent,
             .background = session.behind(),
             .jpeg_quality = @intCast(choices.jpeg_quality),
             .pool = &session.pool,
-        }, target, session.diagnostic);
-        session.times.output_ns = session.since(start);
-        session.times.total_ns = session.since(session.start);
-        session.hint(tally);
+        };
     }
 
     fn isMetered(session: *const Session, exposure: settings.Exposure) bool {
@@ -611,7 +690,11 @@ pub const Session = struct {
                 session.world.?.facts.stroke_triangle_count,
             .width = image.width,
             .height = image.height,
-            .sample_count = session.sampleCount(choices),
+            .sample_count = session.traced.sample_count,
+            .sample_mean = float(session.traced.sample_sum) /
+                float(@as(u64, image.width) * image.height),
+            .is_partial = session.traced.is_partial,
+            .is_timed = choices.time_budget_s != null,
             .depth = session.depthOf(choices),
             .thread_count = session.pool.thread_count,
             .variant = variant.names[choices.variant],
@@ -635,9 +718,11 @@ pub const Session = struct {
     }
 
     fn sampleCount(session: *const Session, choices: settings.Render) u32 {
+        if (choices.sample_count) |count| return count;
+        if (choices.noise != null) return settings.noise_sample_count;
+        if (choices.time_budget_s != null) return settings.sample_count.max;
         const seen = &session.world.?.view;
-        return choices.sample_count orelse session.facts.sample_count orelse
-            settings.samplesFor(seen.width, seen.height);
+        return session.facts.sample_count orelse settings.samplesFor(seen.width, seen.height);
     }
 
     fn depthOf(session: *const Session, choices: settings.Render) u32 {
@@ -709,6 +794,10 @@ pub const Session = struct {
         return @intCast(start.untilNow(session.io, .awake).toNanoseconds());
     }
 };
+
+fn float(count: u64) f64 {
+    return @floatFromInt(count);
+}
 
 /// Threads where nobody says how many.
 pub fn processorCount() usize {

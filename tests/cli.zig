@@ -411,7 +411,7 @@ test "help is for everybody, fits a screen and keeps its promises" {
     defer sandbox.deinit();
     const help = try sandbox.expectExit(0, &.{"--help"});
     try testing.expectEqualStrings("", help.stderr);
-    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 100);
+    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 120);
     const again = try sandbox.expectExit(0, &.{ "absent.glb", "--no-such-flag", "-h" });
     try testing.expectEqualStrings(help.stdout, again.stdout);
     // The built-in scenes that the help names are those that there are.
