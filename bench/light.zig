@@ -37,8 +37,8 @@ const help =
     \\usage: light SCENE [options]
     \\  --camera FILE  as of bench/rays.zig
     \\  --size N       pixels along each side, a multiple of 48 (default 960)
-    \\  --stride N     trace every Nth square of 48x48 pixels along each axis (default 4)
-    \\  --depth N      bounces (default 4)
+    \\  --stride N     trace every Nth square of 48x48 pixels along each axis (default 7)
+    \\  --depth N      bounces (default 3)
     \\  --reps N       repetitions, of all ways in turns (default 5)
     \\  --json         one JSON object in place of the table
     \\  --count        mark sets for bench/count and do not look at the clock
@@ -49,8 +49,8 @@ const Options = struct {
     scene: []const u8 = "",
     camera: ?[]const u8 = null,
     size: u32 = 960,
-    stride: u32 = 4,
-    depth: u32 = 4,
+    stride: u32 = 7,
+    depth: u32 = 3,
     repetitions: u32 = 5,
     json: bool = false,
     count: bool = false,

@@ -255,9 +255,10 @@ const sections: []const Section = &.{
         .{
             .usage = "--spp N",
             .help = comptimePrint("samples a pixel, {s} (default: {d}, or {d} where\n" ++
-                "the long side is below {d})", .{
+                "the long side is below {d}; path: {d})", .{
                 settings.sample_count.text(), settings.sample_count.default,
                 settings.sample_count_small,  settings.side_small,
+                settings.sample_count_path,
             }),
         },
         .{
@@ -282,8 +283,9 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--depth N",
-            .help = comptimePrint("reflections and refractions in a row, {s}\n(default: {d})", .{
-                settings.depth.text(), settings.depth.default,
+            .help = comptimePrint("reflections and refractions in a row, {s}\n" ++
+                "(default: {d}; path, all bounces of light: {d})", .{
+                settings.depth.text(), settings.depth.default, settings.depth_path,
             }),
         },
         .{
@@ -1226,10 +1228,7 @@ test "points and lines are as wide as they may be" {
 }
 
 test "the help fits a screen and says what flags take and may be" {
-    var line_count: usize = 0;
-    var lines = std.mem.splitScalar(u8, help, '\n');
-    while (lines.next()) |line| : (line_count += 1) try std.testing.expect(line.len <= 80);
-    try std.testing.expect(line_count <= 120);
+    try std.testing.expect(try @import("cli/testing.zig").expectFits(help) <= 120);
     for ([_][]const u8{
         "\n  -o, --output FILE        name ending in",
         "\n                           4 to 1024 (default: 32)\n",

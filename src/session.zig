@@ -28,6 +28,7 @@ const Identity = @import("identity.zig").Identity;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
+const Frame = @import("world.zig").Frame;
 const World = @import("world.zig").World;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -47,13 +48,11 @@ pub fn loadScene(
     choices: settings.Load,
     diagnostic: *Diagnostic,
 ) LoadError!Scene {
-    diagnostic.strict = choices.strict;
     var scene = if (std.mem.cutPrefix(u8, name, settings.builtin_prefix)) |builtin_name| builtin: {
         try parse.checkOnly(choices, diagnostic);
         break :builtin try builtin_scenes.build(gpa, builtin_name, diagnostic);
     } else try parse.parse(gpa, io, name, choices, diagnostic);
     errdefer scene.deinit();
-    try diagnostic.failIfRefused();
     const is_z_up = if (choices.up_axis) |axis| axis == .z else scene.is_z_up;
     if (is_z_up) try scene.turn(z_to_y);
     return scene;
@@ -138,6 +137,7 @@ pub const Session = struct {
         sample_count: ?u32 = null,
         depth: ?u32 = null,
         has_background: bool = false,
+        has_area_lights: bool = false,
         /// Something drawn has colours of the display.
         has_unlit: bool = false,
     };
@@ -198,6 +198,7 @@ pub const Session = struct {
             .sample_count = scene.sample_count,
             .depth = scene.depth,
             .has_background = scene.background != null,
+            .has_area_lights = scene.has_area_lights,
             .has_unlit = for (scene.instances) |instance| {
                 if (scene.materials[scene.meshes[instance.mesh].material].unlit) break true;
             } else false,
@@ -327,7 +328,8 @@ pub const Session = struct {
             session.gpa,
             &session.scene.?,
             &session.loaded.?,
-            &session.posed.?,
+            session.posed.?.moment.running,
+            &session.pose_cache.?,
             &session.pool,
             &session.motion,
         );
@@ -376,7 +378,11 @@ pub const Session = struct {
         session.metered = null;
         try session.weighEmitters();
         try session.dimStudio();
-        try session.traceInRounds(film, choices);
+        var frame = session.world.?.frame();
+        var lights = try session.makeLightSampler(choices.integrator, &frame);
+        defer if (lights) |*made| made.deinit();
+        if (lights) |*made| frame.light_sampler = &made.sampler;
+        try session.traceInRounds(&frame, film, choices);
         session.times.trace_ns = session.since(start);
         if (session.traced.non_finite_count > 0) session.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
@@ -384,7 +390,12 @@ pub const Session = struct {
         );
     }
 
-    fn traceInRounds(session: *Session, film: *Film, choices: settings.Render) trace.Error!void {
+    fn traceInRounds(
+        session: *Session,
+        frame: *const Frame,
+        film: *Film,
+        choices: settings.Render,
+    ) trace.Error!void {
         var chosen = session.traceSettings(choices);
         chosen.stop = session.stop;
         if (choices.noise) |noise| chosen.noise = .{
@@ -399,7 +410,7 @@ pub const Session = struct {
             const budget_ns: u64 = @intFromFloat(@as(f64, budget_s) * std.time.ns_per_s);
             if (choices.integrator.isOpen()) {
                 course.budget_ns = budget_ns;
-            } else if (try session.traceOne(film, &chosen, budget_ns)) return;
+            } else if (try session.traceOne(frame, film, &chosen, budget_ns)) return;
         }
         if (session.progress_image) |image| {
             // Now, for what is metered is traced with other lights.
@@ -409,19 +420,24 @@ pub const Session = struct {
         }
         defer if (session.progress_image) |image| image.dropFilm(session.gpa);
         if (course.budget_ns != null or course.viewer != null) chosen.course = course.asked();
-        try session.traceFilm(film, chosen);
+        try session.traceFilm(frame, film, chosen);
     }
 
-    fn traceFilm(session: *Session, film: *Film, chosen: trace.Settings) trace.Error!void {
+    fn traceFilm(
+        session: *Session,
+        frame: *const Frame,
+        film: *Film,
+        chosen: trace.Settings,
+    ) trace.Error!void {
         const variant_index = session.rendered.variant;
-        const frame = session.world.?.frame();
-        session.traced = try trace.trace(session.gpa, variant_index, &frame, film, chosen);
+        session.traced = try trace.trace(session.gpa, variant_index, frame, film, chosen);
     }
 
     /// Traces a picture of one sample, to find how many fit into the time, and chooses so many;
     /// true: no more than the one.
     fn traceOne(
         session: *Session,
+        frame: *const Frame,
         film: *Film,
         chosen: *trace.Settings,
         budget_ns: u64,
@@ -429,7 +445,7 @@ pub const Session = struct {
         const start = Io.Clock.awake.now(session.io);
         var one = chosen.*;
         one.sample_count = 1;
-        try session.traceFilm(film, one);
+        try session.traceFilm(frame, film, one);
         const sample_ns = session.since(start);
         const count = course_file.fitting(budget_ns -| sample_ns, sample_ns);
         chosen.sample_count = @intCast(@min(chosen.sample_count, count));
@@ -443,6 +459,17 @@ pub const Session = struct {
         const appearance = session.appearanceOf(image.choices) catch return;
         const chosen = session.outputSettings(image.choices, appearance);
         image.write(session.gpa, chosen, session.diagnostic);
+    }
+
+    /// The list of an integrator that chooses lights at random; null for others.
+    fn makeLightSampler(
+        session: *Session,
+        integrator: settings.Integrator,
+        frame: *const Frame,
+    ) Error!?prepare.OwnedLightSampler {
+        if (integrator != .path) return null;
+        const has_emitters = session.seen.emitters or session.facts.has_area_lights;
+        return try prepare.makeLightSampler(session.gpa, frame, has_emitters, &session.pool);
     }
 
     /// Traces the same picture again to count intersection tests, without timing.
@@ -722,11 +749,13 @@ pub const Session = struct {
         if (choices.noise != null) return settings.noise_sample_count;
         if (choices.time_budget_s != null) return settings.sample_count.max;
         const seen = &session.world.?.view;
-        return session.facts.sample_count orelse settings.samplesFor(seen.width, seen.height);
+        return session.facts.sample_count orelse
+            settings.samplesFor(choices.integrator, seen.width, seen.height);
     }
 
     fn depthOf(session: *const Session, choices: settings.Render) u32 {
-        return choices.depth orelse session.facts.depth orelse settings.depth.default;
+        return choices.depth orelse session.facts.depth orelse
+            settings.depthFor(choices.integrator);
     }
 
     fn traceSettings(session: *Session, choices: settings.Render) trace.Settings {

@@ -41,10 +41,14 @@ pub const noise_sample_count = 1024;
 pub const noise_error: struct { min: f32, max: f32 } = .{ .min = 0.0001, .max = 1 };
 /// Seconds that tracing may take.
 pub const time_budget_s: struct { min: f32, max: f32 } = .{ .min = 0.01, .max = 1_000_000 };
+/// Of path tracing, whose samples are single paths.
+pub const sample_count_path = 64;
 /// Pictures whose long side has fewer pixels are small.
 pub const side_small = 512;
 /// Bounces after the primary ray: reflections and refractions in a row.
 pub const depth: Range = .{ .min = 0, .max = 32, .default = 6 };
+/// The same of path tracing, where light that surfaces scatter bounces, too.
+pub const depth_path = 16;
 /// Straight pieces that a full circle becomes.
 pub const tessellation: Range = .{ .min = 4, .max = 1024, .default = 32 };
 /// Longest side of a texture, in texels; larger images are halved until they fit.
@@ -287,8 +291,14 @@ pub const thesis: struct {
 };
 
 /// Samples a pixel of a picture, where nobody says how many.
-pub fn samplesFor(width: u32, height: u32) u32 {
+pub fn samplesFor(integrator: Integrator, width: u32, height: u32) u32 {
+    if (integrator == .path) return sample_count_path;
     return if (@max(width, height) < side_small) sample_count_small else sample_count.default;
+}
+
+/// Bounces at most, where nobody says how many.
+pub fn depthFor(integrator: Integrator) u32 {
+    return if (integrator == .path) depth_path else depth.default;
 }
 
 /// How a scene is read.
@@ -384,7 +394,7 @@ pub const Render = struct {
     noise: ?Noise = null,
     /// Seconds to trace for, within `time_budget_s`; null: however long it takes.
     time_budget_s: ?f32 = null,
-    /// Null: the scene's, or `depth.default`.
+    /// Null: the scene's, or by `depthFor`.
     depth: ?u32 = null,
     tile_size: u32 = tile_size.default,
 };
