@@ -506,7 +506,8 @@ const Parser = struct {
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
             .count_tests => options.count_tests = true,
-            .point_size => options.view.point_size = numberWithin(given.value, settings.point_size) orelse
+            .point_size => options.view.point_size =
+                numberWithin(given.value, settings.point_size) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
                     settings.point_size.min, settings.point_size.max,
                 })),
@@ -963,6 +964,8 @@ test "numbers keep to their ranges" {
             .bad = &.{ "0", "257", "-1", "+1", "1.0", "1_0", "x", " 1", "99999999999999999999" },
         },
         .{ .flag = "--spp", .good = &.{ "1", "4096" }, .bad = &.{ "0", "4097", "" } },
+        .{ .flag = "--time-budget", .good = &.{ "0.5", "3600" }, .bad = &.{ "0", "-1", "1s", "" } },
+        .{ .flag = "--progress-image", .good = &.{"p.png"}, .bad = &.{ "", "-", "/dev/stdout" } },
         .{ .flag = "--depth", .good = &.{ "0", "32" }, .bad = &.{ "33", "-1" } },
         .{ .flag = "--tile-size", .good = &.{ "4", "36", "512" }, .bad = &.{ "0", "2", "516" } },
         .{
@@ -1216,6 +1219,19 @@ test outputName {
     const pfm = try outputName(gpa, &.{ .scene = "a.glb", .write = .{ .format = .pfm } });
     defer gpa.free(pfm);
     try std.testing.expectEqualStrings("a.pfm", pfm);
+}
+
+test "noise is told of path tracing alone, as the picture is exposed" {
+    const options = try optionsForTest(&.{
+        "--noise=0.01", "--exposure=2", "--integrator=path", "--partial",
+    });
+    try std.testing.expectEqual(0.01, options.render.noise.?.error_max);
+    try std.testing.expectEqual(2, options.render.noise.?.exposure.ev);
+    try std.testing.expect(options.partial and options.progress_image == null);
+    try expectUsage("'--integrator path'", &.{ "--noise=0.01", "s" });
+    for ([_][:0]const u8{ "0", "-1", "2", "nan", "" }) |text| {
+        try std.testing.expectEqual(null, numberWithin(text, settings.noise_error));
+    }
 }
 
 test "points and lines are as wide as they may be" {

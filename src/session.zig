@@ -417,6 +417,8 @@ pub const Session = struct {
             _ = try session.appearanceOf(image.choices);
             try image.size(session.gpa, film);
             course.viewer = .{ .context = session, .show = showProgress };
+            course.interval_ns = image.interval_ns;
+            course.due_ns = image.interval_ns;
         }
         defer if (session.progress_image) |image| image.dropFilm(session.gpa);
         if (course.budget_ns != null or course.viewer != null) chosen.course = course.asked();
@@ -945,4 +947,110 @@ test "every stage ends when it is cancelled, and no file is left" {
     try testing.expectError(error.Canceled, session.view(.{ .resolution = .{ 4, 4 } }));
     var entries = folder.dir.iterate();
     try testing.expectEqual(null, try entries.next(io));
+}
+
+/// A session and a folder for its pictures.
+const TestFolder = struct {
+    folder: testing.TmpDir,
+    path: []const u8,
+    temporaries: output.TemporaryFiles = .{},
+    diagnostic: Diagnostic = .{},
+
+    fn init() !TestFolder {
+        const folder = testing.tmpDir(.{ .iterate = true });
+        var buffer: [std.fs.max_path_bytes]u8 = undefined;
+        const length = try folder.dir.realPath(testing.io, &buffer);
+        return .{ .folder = folder, .path = try testing.allocator.dupe(u8, buffer[0..length]) };
+    }
+
+    fn deinit(self: *TestFolder) void {
+        testing.allocator.free(self.path);
+        self.folder.cleanup();
+    }
+
+    /// The caller frees it.
+    fn pathOf(self: *const TestFolder, name: []const u8) ![]const u8 {
+        return std.fs.path.join(testing.allocator, &.{ self.path, name });
+    }
+
+    /// The caller frees it.
+    fn read(self: *const TestFolder, name: []const u8) ![]const u8 {
+        const limit: Io.Limit = .limited(1 << 20);
+        return self.folder.dir.readFileAlloc(testing.io, name, testing.allocator, limit);
+    }
+};
+
+test "a time budget's picture is that of as many samples, and one that is stopped has some" {
+    var diagnostic: Diagnostic = .{};
+    var session: Session = .init(testing.allocator, testing.io, 2, &diagnostic);
+    defer session.deinit();
+    try openForTest(&session);
+    try session.view(.{ .resolution = .{ 12, 8 } });
+    var stop: std.atomic.Value(bool) = .init(true);
+    for ([_]settings.Integrator{ .whitted, .path }) |integrator| {
+        try session.render(.{
+            .integrator = integrator,
+            .sample_count = 5,
+            .time_budget_s = 0.05,
+        });
+        const timed = session.report(.{ .time_budget_s = 0.05 });
+        try testing.expect(timed.sample_count >= 1 and timed.sample_count <= 5);
+        try session.render(.{ .integrator = integrator, .sample_count = timed.sample_count });
+        try testing.expectEqual(timed.image_hash, session.film.?.hash());
+
+        session.stop = &stop;
+        defer session.stop = null;
+        try session.render(.{ .integrator = integrator, .sample_count = 64 });
+        const stopped = session.report(.{});
+        try testing.expect(stopped.is_partial and stopped.sample_count == 1);
+        try testing.expectEqual(1, stopped.sample_mean);
+    }
+    const stopped_hash = session.film.?.hash();
+    try session.render(.{ .integrator = .path, .sample_count = 1 });
+    try testing.expectEqual(stopped_hash, session.film.?.hash());
+}
+
+test "a picture of work under way is the one of the samples so far, in a whole file" {
+    const gpa = testing.allocator;
+    var folder: TestFolder = try .init();
+    defer folder.deinit();
+    var session: Session = .init(gpa, testing.io, 2, &folder.diagnostic);
+    defer session.deinit();
+    try openForTest(&session);
+    try session.view(.{ .resolution = .{ 12, 8 } });
+    const choices: settings.Write = .{ .format = .ppm, .exposure = .auto };
+    const shown_path = try folder.pathOf("shown.ppm");
+    defer gpa.free(shown_path);
+    var image: ProgressImage = try .open(
+        testing.io,
+        &folder.temporaries,
+        shown_path,
+        choices,
+        &folder.diagnostic,
+    );
+    defer image.close();
+    image.interval_ns = 0;
+    session.progress_image = &image;
+    try session.render(.{ .integrator = .path, .sample_count = 3 });
+    const whole_hash = session.film.?.hash();
+    session.progress_image = null;
+    try session.render(.{ .integrator = .path, .sample_count = 3 });
+    try testing.expectEqual(whole_hash, session.film.?.hash());
+
+    // It was shown for the last time before the last round, of the third sample.
+    try session.render(.{ .integrator = .path, .sample_count = 2 });
+    const path = try folder.pathOf("two.ppm");
+    defer gpa.free(path);
+    var target: output.Target =
+        try .openFile(testing.io, &folder.temporaries, path, &folder.diagnostic);
+    try session.write(&target, choices);
+    const wanted = try folder.read("two.ppm");
+    defer gpa.free(wanted);
+    const shown = try folder.read("shown.ppm");
+    defer gpa.free(shown);
+    try testing.expectEqualSlices(u8, wanted, shown);
+    var entries = folder.folder.dir.iterate();
+    var count: usize = 0;
+    while (try entries.next(testing.io)) |_| count += 1;
+    try testing.expectEqual(2, count);
 }

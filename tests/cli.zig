@@ -1139,6 +1139,25 @@ test "signals end a long render and leave nothing behind" {
     }
 }
 
+test "a signal has the picture so far written where that is asked for" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    var child = try startLong(&sandbox, "exec \"$@\" -r24x16 --partial -v 2>log", 2);
+    errdefer child.kill(io);
+    for (0..2000) |_| {
+        const log = try sandbox.folder.dir.readFileAlloc(io, "log", testing.allocator, .unlimited);
+        defer testing.allocator.free(log);
+        if (std.mem.find(u8, log, "tracer: ") != null) break;
+        try io.sleep(.fromMilliseconds(10), .awake);
+    } else return error.NotStarted;
+    try expectEndedBy(&child, &.{}, .INT);
+    const gpa = testing.allocator;
+    const picture = try sandbox.folder.dir.readFileAlloc(io, "a.png", gpa, .unlimited);
+    defer gpa.free(picture);
+    try testing.expectEqualStrings("IEND", picture[picture.len - 8 ..][0..4]);
+    try testing.expectEqual(2, (try sandbox.names()).len);
+}
+
 test "the limit of CPU time ends a render like a signal" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();

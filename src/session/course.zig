@@ -11,9 +11,6 @@ const Io = std.Io;
 
 const second_ns = std.time.ns_per_s;
 
-/// From one picture of work under way to the next.
-pub const interval_ns = 2 * second_ns;
-
 /// Of one picture.
 pub const Course = struct {
     io: Io,
@@ -22,8 +19,10 @@ pub const Course = struct {
     budget_ns: ?u64 = null,
     /// Null: nobody looks.
     viewer: ?Viewer = null,
-    /// When the picture is to be shown.
-    due_ns: u64 = interval_ns,
+    /// From one time that it is shown to the next.
+    interval_ns: u64 = second_ns,
+    /// When it is to be shown.
+    due_ns: u64 = second_ns,
     /// Where the round under way began.
     round: struct { samples: u32 = 0, start_ns: u64 = 0 } = .{},
 
@@ -47,7 +46,7 @@ pub const Course = struct {
         if (course.viewer) |viewer| if (done > 0 and now_ns >= course.due_ns) {
             viewer.show(viewer.context, standing);
             course.round.start_ns = course.now();
-            course.due_ns = course.round.start_ns + interval_ns;
+            course.due_ns = course.round.start_ns + course.interval_ns;
         };
         return done + course.roundOf(done, course.round.start_ns, sample_ns);
     }
@@ -66,7 +65,8 @@ pub const Course = struct {
     fn roundOf(course: *const Course, done: u32, now_ns: u64, sample_ns: u64) u32 {
         if (done == 0) return 1;
         var count: u64 = done;
-        if (course.budget_ns) |budget_ns| count = @min(count, fitting(budget_ns -| now_ns, sample_ns));
+        if (course.budget_ns) |budget_ns|
+            count = @min(count, fitting(budget_ns -| now_ns, sample_ns));
         if (count > 0 and course.viewer != null)
             count = @min(count, @max(1, (course.due_ns -| now_ns) / sample_ns));
         return @intCast(count);
@@ -84,6 +84,7 @@ test "rounds double, end where the picture is due, and fit into the time" {
     try std.testing.expectEqual(1, course.roundOf(1, second_ns, second_ns));
     try std.testing.expectEqual(64, course.roundOf(64, 64 * second_ns, second_ns));
     course.viewer = undefined;
+    course.due_ns = 2 * second_ns;
     try std.testing.expectEqual(10, course.roundOf(64, second_ns, second_ns / 10));
     try std.testing.expectEqual(1, course.roundOf(64, 5 * second_ns, second_ns));
     course.viewer = null;

@@ -18,6 +18,8 @@ pub const ProgressImage = struct {
     path: []const u8,
     /// How it is encoded: as the output.
     choices: settings.Write,
+    /// From one picture to the next.
+    interval_ns: u64 = 2 * std.time.ns_per_s,
     /// For the next picture; null: to be opened.
     target: ?output.Target,
     /// Where the work so far is made a picture.

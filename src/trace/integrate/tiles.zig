@@ -49,8 +49,8 @@ pub const Settings = struct {
     progress: std.Progress.Node = .none,
     /// Looked at between tiles: set, it ends the work.
     cancel: ?*const std.atomic.Value(bool) = null,
-    /// Looked at between tiles: set, it ends the work when every pixel has a sample, and the picture
-    /// is what there is.
+    /// Looked at between tiles: set, it ends the work as soon as every pixel has a sample, and the
+    /// picture is what there is.
     stop: ?*const std.atomic.Value(bool) = null,
     /// Blocks with less of it get no more samples. Asserts that the integrator is open.
     noise: ?adaptive.Noise = null,
