@@ -6,11 +6,11 @@ Usage: bench/light.py [-o FILE.md] [--json FILE] [--scenes LIST] [--size N] [--s
 
 Builds bench/light.zig for AArch64 (Cortex-A72) and x86-64 (v3: AVX2), counts its instructions under
 qemu, and takes the time on x86-64, which this machine has to be; and a raylane with all variants,
-for `lights` and `path`. A table stands between `<!-- light.py: NAME -->` and `<!-- end -->`; what is
-around them stays. --programs takes programs MACHINE/bin/light that were built before, of the
-machines aarch64 and x86_64; --raylane a raylane. --only: of `rays` (how rays are best traced), `frames` (what
-frames of the integrators cost by bounce) and `error` (time to equal error). --json keeps what was
-measured, and what of it is not measured anew is read from there.
+for `lights` and `path`. A table stands between `<!-- light.py: NAME -->` and `<!-- end -->`; what
+is around them stays. --programs takes programs MACHINE/bin/light that were built before, of the
+machines aarch64 and x86_64; --raylane a raylane. --only: of `rays` (how rays are best traced),
+`frames` (what frames of the integrators cost by bounce) and `error` (time to equal error). --json
+keeps what was measured, and what of it is not measured anew is read from there.
 
 Needs what bench/count needs.
 """
