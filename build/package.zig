@@ -24,7 +24,7 @@ optional: libraries.Optional,
 /// The library, `@import("raylane")`.
 raylane: *Module,
 shows_searches: bool,
-/// The variants of its programs, the default one first, and those of them that count.
+/// The variants of its programs, the default one first, and those that count for them.
 held: []const Variant,
 counting: []const Variant,
 /// Those that hold the integrators besides Whitted's.
@@ -77,7 +77,7 @@ pub fn init(
         .shows_searches = options.shows_searches,
         .held = held,
         .counting = counting,
-        .lit = variants.lit(b.allocator, held),
+        .lit = variants.lit(b.allocator, held, options.extent),
         .raylane = undefined,
         .config = undefined,
         .intrinsics = undefined,

@@ -251,15 +251,17 @@ const sections: []const Section = &.{
         .{
             .usage = "--spp N",
             .help = comptimePrint("samples a pixel, {s} (default: {d}, or {d} where\n" ++
-                "the long side is below {d})", .{
+                "the long side is below {d}; path: {d})", .{
                 settings.sample_count.text(), settings.sample_count.default,
                 settings.sample_count_small,  settings.side_small,
+                settings.sample_count_path,
             }),
         },
         .{
             .usage = "--depth N",
-            .help = comptimePrint("reflections and refractions in a row, {s}\n(default: {d})", .{
-                settings.depth.text(), settings.depth.default,
+            .help = comptimePrint("reflections and refractions in a row, {s}\n" ++
+                "(default: {d}; path, all bounces of light: {d})", .{
+                settings.depth.text(), settings.depth.default, settings.depth_path,
             }),
         },
         .{
@@ -1173,10 +1175,7 @@ test "points and lines are as wide as they may be" {
 }
 
 test "the help fits a screen and says what flags take and may be" {
-    var line_count: usize = 0;
-    var lines = std.mem.splitScalar(u8, help, '\n');
-    while (lines.next()) |line| : (line_count += 1) try std.testing.expect(line.len <= 80);
-    try std.testing.expect(line_count <= 100);
+    try std.testing.expect(try @import("cli/testing.zig").expectFits(help) <= 100);
     for ([_][]const u8{
         "\n  -o, --output FILE        name ending in",
         "\n                           4 to 1024 (default: 32)\n",

@@ -207,9 +207,7 @@ fn compare(gpa: Allocator, io: Io, options: *const cli.Compare, diagnostic: *Dia
             ev,
             diagnostic,
         ) catch |err| {
-            if (err == error.OutOfMemory) account.explain(&diagnostic.message);
-            say(io, "raylane: {f}: {s}\n", .{ printable(name), diagnostic.message.text() });
-            return exitCodeOf(err);
+            return fail(&account, io, name, err, diagnostic);
         };
         count += 1;
     }
@@ -297,18 +295,16 @@ fn info(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagnosti
     var text: Io.Writer.Allocating = .init(account.allocator());
     defer text.deinit();
     const outcome = describe(&account, io, options, diagnostic, &text.writer);
-    const title = printable(raylane.parse.title(options.scene));
-    if (!options.quiet) for (diagnostic.warnings[0..diagnostic.warning_count]) |*warning| {
-        say(io, "raylane: {f}: warning: {s}\n", .{ title, warning.text() });
-    };
-    outcome catch |err| switch (err) {
-        error.WriteFailed => return outOfMemory(io),
-        else => |other| {
-            if (other == error.OutOfMemory) account.explain(&diagnostic.message);
-            const place = printable(placeOf(diagnostic, raylane.parse.title(options.scene)));
-            say(io, "raylane: {f}: {s}\n", .{ place, diagnostic.message.text() });
-            return exitCodeOf(other);
-        },
+    const scene = options.scene;
+    if (!options.quiet) {
+        for (diagnostic.warnings[0..diagnostic.warning_count]) |*warning| {
+            sayOf(io, scene, "warning: {s}", .{warning.text()});
+        }
+        sayDropped(io, scene, diagnostic);
+    }
+    outcome catch |err| return switch (err) {
+        error.WriteFailed => outOfMemory(io),
+        else => |other| fail(&account, io, placeOf(diagnostic, scene), other, diagnostic),
     };
     return print(io, text.written());
 }
@@ -337,6 +333,21 @@ fn describe(
         raylane.info.writeText(&found, writer);
 }
 
+/// Says why a file could not be had.
+fn fail(
+    account: *const Account,
+    io: Io,
+    file: []const u8,
+    err: (Job.Error || raylane.bench.Error),
+    diagnostic: *Diagnostic,
+) ExitCode {
+    if (err == error.OutOfMemory) account.explain(&diagnostic.message);
+    const text = diagnostic.message.text();
+    assert(text.len > 0);
+    say(io, "raylane: {f}: {s}\n", .{ printable(file), text });
+    return exitCodeOf(err);
+}
+
 fn exitCodeOf(err: (Job.Error || raylane.bench.Error)) ExitCode {
     return switch (err) {
         error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
@@ -358,7 +369,7 @@ fn openJson(io: Io, path: ?[]const u8, diagnostic: *Diagnostic) raylane.output.T
 /// Where an error of a scene is: a place in its text, or the file as a whole.
 fn placeOf(diagnostic: *const Diagnostic, scene: []const u8) []const u8 {
     const place = diagnostic.place.text();
-    return if (place.len > 0) place else scene;
+    return if (place.len > 0) place else raylane.parse.title(scene);
 }
 
 fn outOfMemory(io: Io) ExitCode {
@@ -395,19 +406,13 @@ fn renderAndReport(
     defer job.session.deinit();
     const outcome = job.run();
     job.sayWarnings();
-    if (diagnostic.warning_dropped_count > 0 and !options.quiet) {
-        job.sayOfScene("warning: {d} more", .{diagnostic.warning_dropped_count});
-    }
+    if (!options.quiet) sayDropped(io, options.scene, diagnostic);
     const report = outcome catch |err| {
         const file = if (err == error.OutputFailed)
             job.outputTitle()
         else
-            placeOf(diagnostic, raylane.parse.title(options.scene));
-        if (err == error.OutOfMemory) account.explain(&diagnostic.message);
-        const text = diagnostic.message.text();
-        assert(text.len > 0);
-        say(io, "raylane: {f}: {s}\n", .{ printable(file), text });
-        return exitCodeOf(err);
+            placeOf(diagnostic, options.scene);
+        return fail(account, io, file, err, diagnostic);
     };
     return job.printReport(&report);
 }
@@ -535,8 +540,7 @@ const Job = struct {
     }
 
     fn sayOfScene(job: *Job, comptime format: []const u8, arguments: anytype) void {
-        const scene = printable(raylane.parse.title(job.options.scene));
-        say(job.io, "raylane: {f}: " ++ format ++ "\n", .{scene} ++ arguments);
+        sayOf(job.io, job.options.scene, format, arguments);
     }
 
     /// Prints the report that the user wants, to standard error where the image has the output.
@@ -588,6 +592,17 @@ fn writeToStdout(
 ) raylane.output.TargetError!void {
     var target: Target = .openStdout(io);
     return target.finish(&.{text}, diagnostic);
+}
+
+/// Says something of a scene.
+fn sayOf(io: Io, scene: []const u8, comptime format: []const u8, arguments: anytype) void {
+    const title = printable(raylane.parse.title(scene));
+    say(io, "raylane: {f}: " ++ format ++ "\n", .{title} ++ arguments);
+}
+
+fn sayDropped(io: Io, scene: []const u8, diagnostic: *const Diagnostic) void {
+    const count = diagnostic.warning_dropped_count;
+    if (count > 0) sayOf(io, scene, "warning: {d} more", .{count});
 }
 
 /// Writes to standard error, beside the progress that may be shown there. When that fails there is

@@ -27,6 +27,7 @@ const Identity = @import("identity.zig").Identity;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
+const Frame = @import("world.zig").Frame;
 const World = @import("world.zig").World;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -43,13 +44,11 @@ pub fn loadScene(
     choices: settings.Load,
     diagnostic: *Diagnostic,
 ) LoadError!Scene {
-    diagnostic.strict = choices.strict;
     var scene = if (std.mem.cutPrefix(u8, name, settings.builtin_prefix)) |builtin_name| builtin: {
         try parse.checkOnly(choices, diagnostic);
         break :builtin try builtin_scenes.build(gpa, builtin_name, diagnostic);
     } else try parse.parse(gpa, io, name, choices, diagnostic);
     errdefer scene.deinit();
-    try diagnostic.failIfRefused();
     const is_z_up = if (choices.up_axis) |axis| axis == .z else scene.is_z_up;
     if (is_z_up) try scene.turn(z_to_y);
     return scene;
@@ -130,6 +129,7 @@ pub const Session = struct {
         sample_count: ?u32 = null,
         depth: ?u32 = null,
         has_background: bool = false,
+        has_area_lights: bool = false,
         /// Something drawn has colours of the display.
         has_unlit: bool = false,
     };
@@ -190,6 +190,7 @@ pub const Session = struct {
             .sample_count = scene.sample_count,
             .depth = scene.depth,
             .has_background = scene.background != null,
+            .has_area_lights = scene.has_area_lights,
             .has_unlit = for (scene.instances) |instance| {
                 if (scene.materials[scene.meshes[instance.mesh].material].unlit) break true;
             } else false,
@@ -319,7 +320,8 @@ pub const Session = struct {
             session.gpa,
             &session.scene.?,
             &session.loaded.?,
-            &session.posed.?,
+            session.posed.?.moment.running,
+            &session.pose_cache.?,
             &session.pool,
             &session.motion,
         );
@@ -368,10 +370,14 @@ pub const Session = struct {
         session.metered = null;
         try session.weighEmitters();
         try session.dimStudio();
+        var frame = session.world.?.frame();
+        var lights = try session.makeLightSampler(choices.integrator, &frame);
+        defer if (lights) |*made| made.deinit();
+        if (lights) |*made| frame.light_sampler = &made.sampler;
         session.traced = try trace.trace(
             session.gpa,
             choices.variant,
-            &session.world.?.frame(),
+            &frame,
             film,
             session.traceSettings(choices),
         );
@@ -380,6 +386,17 @@ pub const Session = struct {
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
+    }
+
+    /// The list of an integrator that chooses lights at random; null for others.
+    fn makeLightSampler(
+        session: *Session,
+        integrator: settings.Integrator,
+        frame: *const Frame,
+    ) Error!?prepare.OwnedLightSampler {
+        if (integrator != .path) return null;
+        const has_emitters = session.seen.emitters or session.facts.has_area_lights;
+        return try prepare.makeLightSampler(session.gpa, frame, has_emitters, &session.pool);
     }
 
     /// Traces the same picture again to count intersection tests, without timing.
@@ -637,11 +654,12 @@ pub const Session = struct {
     fn sampleCount(session: *const Session, choices: settings.Render) u32 {
         const seen = &session.world.?.view;
         return choices.sample_count orelse session.facts.sample_count orelse
-            settings.samplesFor(seen.width, seen.height);
+            settings.samplesFor(choices.integrator, seen.width, seen.height);
     }
 
     fn depthOf(session: *const Session, choices: settings.Render) u32 {
-        return choices.depth orelse session.facts.depth orelse settings.depth.default;
+        return choices.depth orelse session.facts.depth orelse
+            settings.depthFor(choices.integrator);
     }
 
     fn traceSettings(session: *Session, choices: settings.Render) trace.Settings {

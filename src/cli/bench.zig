@@ -191,14 +191,11 @@ fn isList(value: []const u8) bool {
     return true;
 }
 
+const common = @import("testing.zig");
 const testing = std.testing;
 
 fn expectUsage(needle: []const u8, arguments: []const [:0]const u8) !void {
-    var diagnostic: Diagnostic = .{};
-    try testing.expectError(error.UsageInvalid, parse(arguments, &diagnostic));
-    errdefer std.debug.print("{s}\n", .{diagnostic.message.text()});
-    try testing.expect(std.mem.find(u8, diagnostic.message.text(), needle) != null);
-    try testing.expectStringEndsWith(diagnostic.message.text(), "(see raylane bench --help)");
+    return common.expectUsage("bench", parse, needle, arguments);
 }
 
 test "what is not said is as in the thesis" {
@@ -241,6 +238,5 @@ test "mistakes name the option" {
 }
 
 test "the help fits a screen" {
-    var lines = std.mem.splitScalar(u8, help, '\n');
-    while (lines.next()) |line| try testing.expect(line.len <= 80);
+    _ = try common.expectFits(help);
 }
