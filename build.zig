@@ -41,6 +41,7 @@ pub fn build(b: *std.Build) void {
         .bench_poses = b.step("bench:poses", "Posed triangles: -- SCENE ANIMATION SECONDS"),
         .bench_frames = b.step("bench:frames", "Time frames in motion: -- SCENE [FRAMES [SIZE]]"),
         .bench_structures = b.step("bench:structures", "Trees beside each other: -- SCENE"),
+        .bench_light = b.step("bench:light", "Rays by bounce and traversal: -- SCENE [options]"),
         .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
         .vendor = b.step("vendor", "Fetch and check the third-party files"),
@@ -63,12 +64,11 @@ pub fn build(b: *std.Build) void {
     addRun(steps.run, program);
     steps.@"asm".dependOn(&b.addInstallFile(package.assembly(), "raylane.s").step);
 
-    addBenchmark(steps.check, steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
-    addBenchmark(steps.check, steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
-    addBenchmark(steps.check, steps.bench_poses, package.benchmark("poses", "bench/poses.zig"));
+    inline for (.{ "rays", "parse", "poses", "structures", "light" }) |name| {
+        const benchmark = package.benchmark(name, "bench/" ++ name ++ ".zig");
+        addBenchmark(steps.check, @field(steps, "bench_" ++ name), benchmark);
+    }
     addBenchmark(steps.check, steps.bench_frames, package.renderer("frames", "bench/frames.zig"));
-    const structures = package.benchmark("structures", "bench/structures.zig");
-    addBenchmark(steps.check, steps.bench_structures, structures);
     const full: Package = .init(b, target, optimize orelse .fast, vendor.headers, all);
     addCompare(steps.compare, full, vendor.headers);
 

@@ -251,15 +251,17 @@ const sections: []const Section = &.{
         .{
             .usage = "--spp N",
             .help = comptimePrint("samples a pixel, {s} (default: {d}, or {d} where\n" ++
-                "the long side is below {d})", .{
+                "the long side is below {d}; path: {d})", .{
                 settings.sample_count.text(), settings.sample_count.default,
                 settings.sample_count_small,  settings.side_small,
+                settings.sample_count_path,
             }),
         },
         .{
             .usage = "--depth N",
-            .help = comptimePrint("reflections and refractions in a row, {s}\n(default: {d})", .{
-                settings.depth.text(), settings.depth.default,
+            .help = comptimePrint("reflections and refractions in a row, {s}\n" ++
+                "(default: {d}; path, all bounces of light: {d})", .{
+                settings.depth.text(), settings.depth.default, settings.depth_path,
             }),
         },
         .{

@@ -84,7 +84,10 @@ fn bench(init: std.process.Init, options: *const cli.Bench, diagnostic: *Diagnos
     const io = init.io;
     var settings = benchSettings(options);
     if (std.mem.findScalar(bool, &settings.wanted, true) == null) {
-        say(io, "raylane: no variant's name contains {f}; --list-variants names them\n", .{
+        const integrator = settings.integrator orelse .whitted;
+        say(io, "raylane: no variant{s} has a name that contains {f}; --list-variants names " ++
+            "them\n", .{
+            if (integrator == .whitted) "" else " with that integrator",
             raylane.diagnostic.quote(options.variants.?),
         });
         return .usage;
@@ -137,6 +140,7 @@ fn benchSettings(options: *const cli.Bench) raylane.bench.Settings {
         .sample_count = options.sample_count,
         .depth = options.depth,
         .tree_quality = options.tree_quality,
+        .integrator = options.integrator,
         .wanted = undefined,
         .round_count = if (options.round_count) |count| count else null,
         .time_s = options.time_s,
@@ -146,8 +150,10 @@ fn benchSettings(options: *const cli.Bench) raylane.bench.Settings {
         } else null,
     };
     if (options.scene_count == 0) settings.scenes = raylane.bench.default_scenes;
-    for (&settings.wanted, raylane.variant.names) |*is_wanted, name| {
-        is_wanted.* = options.wants(name);
+    const is_lit = (options.integrator orelse .whitted) != .whitted;
+    for (&settings.wanted, raylane.variant.names, 0..) |*is_wanted, name, index| {
+        const holds = !is_lit or raylane.variant.litIndexOf(index) != null;
+        is_wanted.* = holds and options.wants(name);
     }
     return settings;
 }

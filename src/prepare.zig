@@ -30,6 +30,7 @@ const environment = @import("prepare/environment.zig");
 const sharing_file = @import("prepare/instances.zig");
 const join = @import("prepare/bvh/join.zig");
 const light = @import("prepare/light.zig");
+const light_sampler = @import("prepare/light_sampler.zig");
 const material = @import("prepare/material.zig");
 const motion_file = @import("prepare/motion.zig");
 const place_file = @import("prepare/pose.zig");
@@ -223,6 +224,10 @@ pub const EnvironmentError = environment.Error;
 pub const EnvironmentSource = environment.Source;
 /// See `makeEnvironment`.
 pub const OwnedEnvironmentMap = environment.OwnedMap;
+/// Makes light lists.
+pub const makeLightSampler = light_sampler.make;
+/// See `makeLightSampler`.
+pub const OwnedLightSampler = light_sampler.OwnedLightSampler;
 /// How a map is placed around the scene.
 pub const EnvironmentSettings = light.EnvironmentSettings;
 
@@ -1636,6 +1641,7 @@ test {
     _ = flatten;
     _ = strokes;
     _ = light;
+    _ = light_sampler;
     _ = material;
     _ = place_file;
     _ = tangents;

@@ -27,6 +27,7 @@ const Identity = @import("identity.zig").Identity;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
+const Frame = @import("world.zig").Frame;
 const World = @import("world.zig").World;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -128,6 +129,7 @@ pub const Session = struct {
         sample_count: ?u32 = null,
         depth: ?u32 = null,
         has_background: bool = false,
+        has_area_lights: bool = false,
         /// Something drawn has colours of the display.
         has_unlit: bool = false,
     };
@@ -188,6 +190,7 @@ pub const Session = struct {
             .sample_count = scene.sample_count,
             .depth = scene.depth,
             .has_background = scene.background != null,
+            .has_area_lights = scene.has_area_lights,
             .has_unlit = for (scene.instances) |instance| {
                 if (scene.materials[scene.meshes[instance.mesh].material].unlit) break true;
             } else false,
@@ -367,10 +370,14 @@ pub const Session = struct {
         session.metered = null;
         try session.weighEmitters();
         try session.dimStudio();
+        var frame = session.world.?.frame();
+        var lights = try session.makeLightSampler(choices.integrator, &frame);
+        defer if (lights) |*made| made.deinit();
+        if (lights) |*made| frame.light_sampler = &made.sampler;
         session.traced = try trace.trace(
             session.gpa,
             choices.variant,
-            &session.world.?.frame(),
+            &frame,
             film,
             session.traceSettings(choices),
         );
@@ -379,6 +386,17 @@ pub const Session = struct {
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
+    }
+
+    /// The list of an integrator that chooses lights at random; null for others.
+    fn makeLightSampler(
+        session: *Session,
+        integrator: settings.Integrator,
+        frame: *const Frame,
+    ) Error!?prepare.OwnedLightSampler {
+        if (integrator != .path) return null;
+        const has_emitters = session.seen.emitters or session.facts.has_area_lights;
+        return try prepare.makeLightSampler(session.gpa, frame, has_emitters, &session.pool);
     }
 
     /// Traces the same picture again to count intersection tests, without timing.
@@ -423,7 +441,7 @@ pub const Session = struct {
         const film = &session.film.?;
         const tally = try output.write(session.gpa, .{
             .image = &film.image,
-            .display = if (film.display) |*display| display else null,
+            .display = film.imageOf(.display),
         }, .{
             .format = choices.format,
             .exposure_ev = if (session.appearance) |appearance| appearance.exposure_ev else 0,
@@ -487,7 +505,7 @@ pub const Session = struct {
         }
         var film = try session.traceSmall();
         defer film.deinit(session.gpa);
-        const display = if (film.display) |*other| other else null;
+        const display = film.imageOf(.display);
         session.metered = try output.meter(session.gpa, &film.image, display);
         return session.metered.?;
     }
@@ -636,11 +654,12 @@ pub const Session = struct {
     fn sampleCount(session: *const Session, choices: settings.Render) u32 {
         const seen = &session.world.?.view;
         return choices.sample_count orelse session.facts.sample_count orelse
-            settings.samplesFor(seen.width, seen.height);
+            settings.samplesFor(choices.integrator, seen.width, seen.height);
     }
 
     fn depthOf(session: *const Session, choices: settings.Render) u32 {
-        return choices.depth orelse session.facts.depth orelse settings.depth.default;
+        return choices.depth orelse session.facts.depth orelse
+            settings.depthFor(choices.integrator);
     }
 
     fn traceSettings(session: *Session, choices: settings.Render) trace.Settings {
@@ -696,10 +715,7 @@ pub const Session = struct {
         const view_size = &session.world.?.view;
         const layers = session.layersOf();
         if (session.film) |*film| {
-            film.layers = layers;
-            const image = &film.image;
-            if (image.width == view_size.width and image.height == view_size.height and
-                (film.display != null) == layers.contains(.display)) return film;
+            if (film.become(view_size.width, view_size.height, layers)) return film;
             film.deinit(session.gpa);
             session.film = null;
         }

@@ -79,6 +79,7 @@ const rooms = [_]Row{
 const roots = [_][]const u8{
     "build.zig",
     "bench/kernels.zig",
+    "bench/light.zig",
     "bench/lowering.zig",
     "bench/frames.zig",
     "bench/parse.zig",

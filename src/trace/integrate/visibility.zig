@@ -37,6 +37,18 @@ comptime {
     std.debug.assert(transparency_depth_max % multi_hit.hits_max == 0);
 }
 
+/// Stands for the lights of shadow rays that have none in common.
+const no_light: Light = .{
+    .kind = .directional,
+    .from_receiver = true,
+    .position = @splat(0),
+    .direction = @splat(0),
+    .intensity = @splat(0),
+    .range_inv_squared = 0,
+    .cone_scale = 0,
+    .cone_offset = 1,
+};
+
 /// One thread's view of a scene.
 pub fn Visibility(comptime Kernel: type) type {
     const Rays = Kernel.Rays;
@@ -46,7 +58,6 @@ pub fn Visibility(comptime Kernel: type) type {
     const group_count = Kernel.group_count;
     const Bundle = bundle_file.Bundle(Kernel);
     const Coherence = dispatch.Coherence;
-    const Interaction = interaction_file.Interaction(Rays);
 
     return struct {
         frame: *const Frame,
@@ -95,10 +106,34 @@ pub fn Visibility(comptime Kernel: type) type {
             transmittances: *[group_count]Vec3,
         ) void {
             const materials = visibility.frame.materials;
-            if (materials.has_transparency or materials.has_holes)
-                visibility.attenuated(bundle, light, vertices, coherence, transmittances)
-            else
-                visibility.occluded(bundle, light, coherence, transmittances);
+            if (!materials.has_transparency and !materials.has_holes)
+                return visibility.occluded(bundle, light, coherence, transmittances);
+            transmittances.* = @splat(.splat(.{ 1, 1, 1 }));
+            visibility.occlusionPrepass(bundle, light, coherence, transmittances);
+            var limits: [group_count]ray_file.Hit(Rays) = undefined;
+            for (&limits, &bundle.groups) |*limit, *ray|
+                limit.* = shadowLimit(Rays, light, ray.line.direction);
+            visibility.attenuated(bundle, light, &limits, vertices, null, transmittances);
+        }
+
+        /// The same of shadow rays that have no light in common: each has a direction and an end of
+        /// its own, `closest` of the bundle. In the lanes of `straight` light goes straight through
+        /// what transmits, as it does for `transmittance`; elsewhere that stops it, and only holes
+        /// and what alpha leaves open let it through.
+        pub fn transmittanceOfEach(
+            visibility: *Self,
+            bundle: *Bundle,
+            vertices: anytype,
+            straight: *const [group_count]Mask,
+            transmittances: *[group_count]Vec3,
+        ) void {
+            const materials = visibility.frame.materials;
+            if (!materials.has_transparency and !materials.has_holes)
+                return visibility.occluded(bundle, &no_light, .none, transmittances);
+            var limits: [group_count]ray_file.Hit(Rays) = undefined;
+            for (&limits, &bundle.groups) |*limit, *ray| limit.* = ray.closest;
+            transmittances.* = @splat(.splat(.{ 1, 1, 1 }));
+            visibility.attenuated(bundle, &no_light, &limits, vertices, straight, transmittances);
         }
 
         /// Light is stopped by anything: the quick path of scenes where all is opaque.
@@ -123,19 +158,18 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *Self,
             bundle: *Bundle,
             light: *const Light,
+            limits: *const [group_count]ray_file.Hit(Rays),
             vertices: anytype,
-            coherence: Coherence,
+            straight: ?*const [group_count]Mask,
             transmittances: *[group_count]Vec3,
         ) void {
-            transmittances.* = @splat(.splat(.{ 1, 1, 1 }));
-            visibility.occlusionPrepass(bundle, light, coherence, transmittances);
             const frame = visibility.frame;
             const passages = &visibility.passages;
             const transmits = frame.materials.has_transmission;
             if (transmits) for (passages) |*passage| passage.start(frame);
-            visibility.weaken(bundle, light, vertices, transmittances);
+            visibility.weaken(bundle, light, limits, vertices, straight, transmittances);
             if (transmits and frame.materials.volumes.len > 0)
-                passage_file.absorb(Kernel, passages, bundle, shadowEnd(light), transmittances);
+                passage_file.absorb(Kernel, passages, bundle, limits, transmittances);
         }
 
         /// By surfaces.
@@ -143,23 +177,24 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *Self,
             bundle: *Bundle,
             light: *const Light,
+            limits: *const [group_count]ray_file.Hit(Rays),
             vertices: anytype,
+            straight: ?*const [group_count]Mask,
             transmittances: *[group_count]Vec3,
         ) void {
             const none: Vec3 = .splat(.{ 0, 0, 0 });
             var weakened_counts: [group_count]F32 = @splat(.zero());
             for (0..transparency_depth_max / multi_hit.hits_max) |_| {
-                for (&bundle.groups) |*ray|
-                    ray.closest = shadowLimit(Rays, light, ray.line.direction);
+                for (&bundle.groups, limits) |*ray, limit| ray.closest = limit;
                 visibility.hits.trace(bundle, &visibility.tests);
                 var any_left = false;
                 for (&bundle.groups, transmittances, 0..) |*ray, *value, group| {
                     if (ray.active.none()) continue;
-                    const point = &vertices[group].point;
                     visibility.attenuate(
                         ray,
                         light,
-                        point,
+                        vertices[group].point.cone_width,
+                        if (straight) |lanes| lanes[group] else .splat(true),
                         group,
                         value,
                         &weakened_counts[group],
@@ -203,7 +238,8 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *Self,
             ray: *ray_file.Ray(Rays),
             light: *const Light,
-            point: *const Interaction,
+            cone_width: F32,
+            straight: Mask,
             group: usize,
             value: *Vec3,
             weakened_count: *F32,
@@ -223,7 +259,8 @@ pub fn Visibility(comptime Kernel: type) type {
                 if (ray.active.none()) return;
                 ray.tnear = next;
                 const passing: F32 = if (transmits) .fromArray(passage.passing[index]) else one;
-                var through = visibility.attenuationAt(ray, light, point, next, passing);
+                var through = visibility.attenuationAt(ray, light, cone_width, next, passing);
+                if (!straight.all()) through.scatter(straight.bitNot());
                 if (transmits) through.hide(.fromBits(passage.hidden[index]));
                 value.* = .select(ray.active, value.mul(through.share), value.*);
                 weakened_count.* =
@@ -241,7 +278,7 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *const Self,
             ray: *const ray_file.Ray(Rays),
             light: *const Light,
-            point: *const Interaction,
+            cone_width: F32,
             hit: ray_file.Hit(Rays),
             passing: F32,
         ) material_file.Attenuation(Rays) {
@@ -275,7 +312,7 @@ pub fn Visibility(comptime Kernel: type) type {
                 .axes = .ofCorners(
                     corners.position,
                     ray.line.direction.normalize(),
-                    point.cone_width.mul(share),
+                    cone_width.mul(share),
                 ),
             };
             const colored = texturing.colored(Rays, frame, &materials, &place, color);

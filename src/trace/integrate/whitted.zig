@@ -13,6 +13,7 @@ const bounces_file = @import("bounces.zig");
 const camera = @import("camera.zig");
 const direct = @import("direct.zig");
 const environment_light = @import("environment.zig");
+const features_file = @import("features.zig");
 const floor = @import("floor.zig");
 const medium_file = @import("medium.zig");
 const path_file = @import("path.zig");
@@ -180,6 +181,7 @@ pub fn Whitted(comptime Kernel: type) type {
             vertex.find(&whitted.visibility, &whitted.path, group);
             whitted.bounces.choose(group, vertex, whitted.isEnd());
             if (vertex.seen.none()) return;
+            if (whitted.sample.features.kept) whitted.addFeatures(group, vertex);
             const environment = whitted.frame.environment;
             var glow = vertex.point.material.emissive.scale(whitted.path.emission[group]);
             if (vertex.bsdf.layered) glow = glow.scale(vertex.bsdf.coating.below_coat);
@@ -191,6 +193,21 @@ pub fn Whitted(comptime Kernel: type) type {
                 whitted.isEnd(),
             ));
             whitted.sample.addSurface(group, vertex, glow, whitted.path.depth);
+        }
+
+        /// Adds what denoisers are guided by.
+        noinline fn addFeatures(whitted: *Self, group: usize, vertex: *const Vertex) void {
+            const path = &whitted.path;
+            const features = &whitted.sample.features;
+            const none: Rays.Vec3 = .splat(.{ 0, 0, 0 });
+            const mirror = &vertex.bsdf.mirror;
+            const smooth = vertex.point.material.roughness
+                .le(.splat(features_file.smooth_roughness_max));
+            const reflected = smooth.bitAnd(whitted.bounces.reflected[group]);
+            var traced: Rays.Vec3 = .select(reflected, mirror.reflected, none);
+            if (!whitted.isEnd()) traced = traced.add(.select(smooth, mirror.transmitted, none));
+            features.addVertex(group, path, vertex, traced);
+            if (path.depth == 0) features.addDepth(group, whitted.frame.view, vertex);
         }
 
         /// Adds what volumes scatter that rays go through.

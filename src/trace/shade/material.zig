@@ -146,6 +146,8 @@ pub fn Attenuation(comptime Lanes: type) type {
         share: Lanes.Vec3,
         /// Lanes where the surface is there at all: not in holes.
         weakens: Lanes.Mask,
+        /// Of the share, what alpha leaves open.
+        open: Lanes.F32,
 
         /// Past what alpha leaves open, and in the base colour through what transmits, by a share
         /// that textures and reflection leave of it.
@@ -169,7 +171,15 @@ pub fn Attenuation(comptime Lanes: type) type {
             return .{
                 .share = through.scale(stopped).add(.{ .x = rest, .y = rest, .z = rest }),
                 .weakens = stopped.gt(.zero()),
+                .open = rest,
             };
+        }
+
+        /// Only what alpha leaves open comes out in these lanes.
+        pub inline fn scatter(attenuation: *@This(), lanes: Lanes.Mask) void {
+            const open = attenuation.open;
+            attenuation.share =
+                .select(lanes, .{ .x = open, .y = open, .z = open }, attenuation.share);
         }
 
         /// Surfaces in these lanes are not there.
