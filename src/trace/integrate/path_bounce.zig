@@ -1,4 +1,5 @@
-//! Where paths in lanes go on from surfaces: a direction of the BSDF, or an end by chance.
+//! Where paths in lanes go on from surfaces: straight on, a direction of the BSDF, or an end by
+//! chance.
 //!
 //! In: vertices. Out: records of paths with their next rays. What a path is worth decides by chance
 //! whether it goes on (Russian roulette, Arvo and Kirk 1990).
@@ -9,6 +10,8 @@ const scatter_file = @import("../shade/scatter.zig");
 const path_features = @import("path_features.zig");
 const path_light = @import("path_light.zig");
 const records_file = @import("path_records.zig");
+const visibility_file = @import("visibility.zig");
+const Frame = @import("../../world.zig").Frame;
 const PathStep = @import("path_step.zig").PathStep;
 
 /// Bounces after which paths that are worth little may end.
@@ -18,7 +21,28 @@ const roulette_depth = 3;
 /// density stands for: what such a ray sees is blurred by the lobe anyway.
 const cone_per_lobe = 0.05;
 
-/// Sends paths on.
+/// Sends paths straight on behind what they hit.
+pub fn pass(comptime Kernel: type, step: *PathStep(Kernel), lanes: Kernel.Rays.Mask) void {
+    const point = &step.vertex.point;
+    const closest = step.path.bundle.groups[step.group].closest;
+    const ts = closest.t.toArray();
+    const primitives = closest.primitive.toArray();
+    const throughputs: records_file.Stored(Kernel.Rays) = .of(step.throughput);
+    const hidden = point.hidden.bits();
+    var bits = lanes.bits();
+    while (bits != 0) : (bits &= bits - 1) {
+        const lane = @ctz(bits);
+        const record = &step.records[step.numbers[lane]];
+        record.start_t = ts[lane];
+        record.start_primitive = primitives[lane];
+        record.throughput = throughputs.at(lane);
+        record.transparency_depth += 1;
+        if (hidden >> @intCast(lane) & 1 != 0) record.nesting = point.beyond[lane];
+        step.goOn(lane);
+    }
+}
+
+/// Sends paths on by what surfaces scatter.
 pub noinline fn bounce(
     comptime Kernel: type,
     step: *PathStep(Kernel),
@@ -77,6 +101,7 @@ fn leave(
     const crossing = sampled.crosses.bitAnd(point.material.volume);
     const entering = if (has_volumes) crossing.bits() else 0;
     const sigma: Stored = if (entering != 0) .of(point.sigma_beyond) else undefined;
+    const panes = sampled.is_delta.bitAnd(sampled.crosses).bits();
     var bits = lanes.bits();
     while (bits != 0) : (bits &= bits - 1) {
         const lane = @ctz(bits);
@@ -87,9 +112,12 @@ fn leave(
         record.start_primitive = std.math.maxInt(i32);
         record.skip = primitives[lane];
         record.throughput = throughputs.at(lane);
-        record.scatter_pdf = pdfs[lane];
-        record.receiver = positions.at(lane);
-        record.receiver_normal = normals.at(lane);
+        // Light that is met through panes could have been chosen before them.
+        if (panes >> @intCast(lane) & 1 == 0 or !isPane(step.frame, primitives[lane])) {
+            record.scatter_pdf = pdfs[lane];
+            record.receiver = positions.at(lane);
+            record.receiver_normal = normals.at(lane);
+        }
         record.cone_width = widths[lane];
         record.cone_spread = spreads[lane];
         record.depth += 1;
@@ -101,6 +129,10 @@ fn leave(
         step.rays.count(record.depth + record.scatter_count, .{ .closest = 1 });
         step.goOn(lane);
     }
+}
+
+fn isPane(frame: *const Frame, primitive: i32) bool {
+    return visibility_file.clarityOf(frame, @intCast(primitive)) == .pane;
 }
 
 /// Of the cones of rays that go on: as the surface bends them, and at least a part of the lobe.

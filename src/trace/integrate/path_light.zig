@@ -6,9 +6,10 @@
 //! light is weighed by the power heuristic (Veach and Guibas 1995). Light that has no size is found
 //! by shadow rays alone, and what smooth surfaces show by rays that meet it alone.
 //!
-//! Shadow rays to light that rays can meet are stopped by what scatters or bends light, for the
-//! rays themselves go through it. Those to light without a size go straight through it, as they do
-//! for other integrators: nothing else would light what is behind glass.
+//! Shadow rays are stopped by what scatters light, for whatever is found there by chance is lit
+//! itself; and by what bends it, since rays that are bent themselves meet the light. Smooth panes
+//! they go through, as do the rays. Those to light without a size, which no ray can meet, go as if
+//! straight through smooth boundaries of volumes: nothing else would light what is behind glass.
 
 const std = @import("std");
 const light_sampling = @import("../shade/light_sampling.zig");

@@ -158,6 +158,17 @@ pub inline fn groupOf(comptime Lanes: type, all: []const u32, numbers: *[Lanes.c
     return @truncate((@as(u64, 1) << @intCast(count)) - 1);
 }
 
+/// A key of rays that go much the same way: the octant of a direction, and of its axes the longest.
+pub fn wayOf(direction: [3]f32) u16 {
+    var key: u16 = 0;
+    for (direction) |component| key = key << 1 | @intFromBool(component < 0);
+    const size = [3]f32{ @abs(direction[0]), @abs(direction[1]), @abs(direction[2]) };
+    const longest: u16 = if (size[0] >= size[1] and size[0] >= size[2])
+        0
+    else if (size[1] >= size[2]) 1 else 2;
+    return key << 2 | longest;
+}
+
 /// Keys are smaller.
 pub const key_count = 1024;
 

@@ -1,7 +1,7 @@
 //! Shadow rays of paths: each to a light of its own, collected until lanes are full of them.
 //!
 //! In: points in lanes, the light that they would send on. Out: what of it arrives, added to the
-//! radiance of their paths, in the order in which it was taken.
+//! radiance of their paths. They are traced sorted by direction.
 
 const std = @import("std");
 const bundle_file = @import("../traverse/bundle.zig");
@@ -19,7 +19,7 @@ const ShadowRecord = struct {
     skip: i32,
     /// Of the path where the ray starts, in metres.
     cone_width: f32,
-    /// 1: goes straight through what transmits, see `Visibility.transmittanceOfEach`.
+    /// 1: goes as if straight, see `Visibility.transmittanceOfEach`.
     straight: f32,
     /// What arrives unless something is in the way.
     light: [3]f32,
@@ -38,6 +38,11 @@ pub fn PathShadows(comptime Kernel: type) type {
     return struct {
         records: []ShadowRecord,
         count: usize,
+        /// Numbers of the records in the order in which they are traced, room to sort them, and by
+        /// what.
+        order: []u32,
+        room: []u32,
+        keys: []u16,
         /// Of the bundle under way.
         bundle: bundle_file.Bundle(Kernel),
         straight: [group_count]Mask,
@@ -62,12 +67,22 @@ pub fn PathShadows(comptime Kernel: type) type {
 
         /// To be freed by `deinit`.
         pub fn init(shadows: *Self, gpa: std.mem.Allocator) error{OutOfMemory}!void {
-            shadows.records = try gpa.alloc(ShadowRecord, records_file.path_count_max);
+            const most = records_file.path_count_max;
+            shadows.records = try gpa.alloc(ShadowRecord, most);
+            errdefer gpa.free(shadows.records);
+            shadows.order = try gpa.alloc(u32, most);
+            errdefer gpa.free(shadows.order);
+            shadows.room = try gpa.alloc(u32, most);
+            errdefer gpa.free(shadows.room);
+            shadows.keys = try gpa.alloc(u16, most);
             shadows.count = 0;
         }
 
         /// Frees everything.
         pub fn deinit(shadows: *Self, gpa: std.mem.Allocator) void {
+            gpa.free(shadows.keys);
+            gpa.free(shadows.room);
+            gpa.free(shadows.order);
             gpa.free(shadows.records);
             shadows.* = undefined;
         }
@@ -101,13 +116,18 @@ pub fn PathShadows(comptime Kernel: type) type {
 
         /// Traces all rays that were taken and adds what arrives.
         pub fn trace(shadows: *Self, visibility: *Visibility, paths: []Record) void {
-            const room = group_count * Rays.count;
-            var numbers: [room]u32 = undefined;
+            const order = shadows.order[0..shadows.count];
+            const keys = shadows.keys[0..shadows.count];
+            for (order, keys, shadows.records[0..shadows.count], 0..) |*to, *key, *record, at| {
+                to.* = @intCast(at);
+                key.* = records_file.wayOf(record.direction);
+            }
+            records_file.sort(order, keys, shadows.room);
+            const most = group_count * Rays.count;
             var first: usize = 0;
-            while (first < shadows.count) : (first += room) {
-                const count = @min(shadows.count - first, room);
-                for (numbers[0..count], first..) |*number, index| number.* = @intCast(index);
-                shadows.traceBundle(visibility, paths, numbers[0..count]);
+            while (first < order.len) : (first += most) {
+                const rest = order[first..];
+                shadows.traceBundle(visibility, paths, rest[0..@min(rest.len, most)]);
             }
             shadows.count = 0;
         }

@@ -71,7 +71,6 @@ pub fn PathStep(comptime Kernel: type) type {
 
         const Self = @This();
         pub const Rays = Kernel.Rays;
-        const Stored = records_file.Stored(Rays);
         const vectors = records_file.vectors;
         const floats = records_file.floats;
         const integers = records_file.integers;
@@ -155,7 +154,7 @@ pub fn PathStep(comptime Kernel: type) type {
             if (passing.any()) {
                 const most: I32 = .splat(visibility_file.transparency_depth_max);
                 gone = passing.andNot(step.transparency_depth.lt(most));
-                step.pass(passing.andNot(gone));
+                path_bounce.pass(Kernel, step, passing.andNot(gone));
             }
             if (stopped.none()) return gone;
             if (step.keeps_features) path_features.addVertices(Kernel, step, stopped);
@@ -203,27 +202,6 @@ pub fn PathStep(comptime Kernel: type) type {
                 .y = exponential.expNegative(Rays, sigma_t.y.mul(way)),
                 .z = exponential.expNegative(Rays, sigma_t.z.mul(way)),
             });
-        }
-
-        /// Goes straight on behind what is hit.
-        fn pass(step: *Self, lanes: Mask) void {
-            const point = &step.vertex.point;
-            const closest = step.path.bundle.groups[step.group].closest;
-            const ts = closest.t.toArray();
-            const primitives = closest.primitive.toArray();
-            const throughputs: Stored = .of(step.throughput);
-            const hidden = point.hidden.bits();
-            var bits = lanes.bits();
-            while (bits != 0) : (bits &= bits - 1) {
-                const lane = @ctz(bits);
-                const record = &step.records[step.numbers[lane]];
-                record.start_t = ts[lane];
-                record.start_primitive = primitives[lane];
-                record.throughput = throughputs.at(lane);
-                record.transparency_depth += 1;
-                if (hidden >> @intCast(lane) & 1 != 0) record.nesting = point.beyond[lane];
-                step.goOn(lane);
-            }
         }
 
         /// The path of a lane takes another step.

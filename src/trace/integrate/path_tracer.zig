@@ -1,10 +1,10 @@
 //! Path tracing (Kajiya 1986, "The Rendering Equation") by streams of paths.
 //!
-//! In: the frame, squares of pixels. Out: samples on the film. The paths of an area, some samples of
-//! each of its pixels, take their steps together: rays are traced, what they hit is shaded, shadow
-//! rays are traced. In between they are sorted, by where rays go and by material, so that lanes are
-//! full and neighbours need the same. What a path does depends on its pixel and sample alone, and
-//! its light is added up along it, so that all variants, tiles and threads have the same bits.
+//! In: the frame, squares of pixels. Out: samples on the film. The paths of an area, some samples
+//! of each of its pixels, take their steps together: rays are traced, what they hit is shaded,
+//! shadow rays are traced. In between they are sorted, by where rays go and by material, so that
+//! lanes are full and neighbours need the same. What a path does depends on its pixel and sample
+//! alone, and its light is added up along it: all variants, tiles and threads have the same bits.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -13,10 +13,9 @@ const statistics = @import("../../statistics.zig");
 const dispatch = @import("../traverse/dispatch.zig");
 const ray_file = @import("../traverse/ray.zig");
 const boundaries_file = @import("boundaries.zig");
-const camera = @import("camera.zig");
-const floor = @import("floor.zig");
 const path_features = @import("path_features.zig");
 const path_file = @import("path.zig");
+const path_primary = @import("path_primary.zig");
 const records_file = @import("path_records.zig");
 const shadows_file = @import("path_shadows.zig");
 const step_file = @import("path_step.zig");
@@ -140,7 +139,8 @@ pub fn PathTracer(comptime Kernel: type) type {
                 const count = @min(sample_count - done, records_file.area_samples);
                 step.first_sample = first_sample + done;
                 tracer.run(count);
-                for (0..count) |sample| tracer.expose(@intCast(sample), film);
+                for (0..count) |sample|
+                    path_primary.expose(&tracer.step, @intCast(sample), film);
                 done += count;
             }
         }
@@ -148,7 +148,7 @@ pub fn PathTracer(comptime Kernel: type) type {
         /// All steps of the paths of some samples.
         fn run(tracer: *Self, sample_count: u32) void {
             const step = &tracer.step;
-            var live_count = tracer.start(sample_count);
+            var live_count = path_primary.start(Kernel, tracer, sample_count);
             while (live_count > 0) {
                 const live = tracer.live[0..live_count];
                 tracer.sortByMaterial(live);
@@ -162,109 +162,6 @@ pub fn PathTracer(comptime Kernel: type) type {
                 tracer.sortByDirection(going);
                 tracer.trace(going);
             }
-        }
-
-        /// Starts the paths of some samples with their primary rays. Returns how many there are.
-        fn start(tracer: *Self, sample_count: u32) usize {
-            const all = tracer.step.rectangle;
-            var count: usize = 0;
-            for (0..sample_count) |sample| {
-                var y = all.y0;
-                while (y < all.y1) : (y += Kernel.bundle_height) {
-                    var x = all.x0;
-                    while (x < all.x1) : (x += Kernel.bundle_width) {
-                        const part: Rectangle = .{
-                            .x0 = x,
-                            .y0 = y,
-                            .x1 = @min(x + Kernel.bundle_width, all.x1),
-                            .y1 = @min(y + Kernel.bundle_height, all.y1),
-                        };
-                        tracer.tracePrimary(part, @intCast(sample));
-                        count = tracer.takePrimary(part, @intCast(sample), count);
-                    }
-                }
-            }
-            tracer.rays.count(0, .{ .closest = count });
-            return count;
-        }
-
-        fn tracePrimary(tracer: *Self, part: Rectangle, sample: u32) void {
-            const frame = tracer.frame;
-            const path = &tracer.step.path;
-            const number = tracer.step.first_sample + sample;
-            const offset = tracer.settings.offsets[number];
-            camera.primaryRays(Kernel, frame.view, part, offset, &path.bundle);
-            path.start();
-            if (frame.needsFootprints())
-                path.startCones(camera.footprint(frame.view, tracer.settings.sample_count));
-            tracer.floor_light = @splat(.splat(1));
-            if (frame.environment.floor_height != null) {
-                path.depth = 0;
-                tracer.rays.shadow += floor.lightShare(
-                    Kernel,
-                    &tracer.visibility,
-                    &tracer.environment_lights,
-                    number,
-                    path,
-                    &tracer.floor_points,
-                    &tracer.floor_light,
-                );
-            }
-            const grid = camera.grid(frame.view, part, offset);
-            const known = if (grid) |*one| one else null;
-            const tests = &tracer.visibility.tests;
-            _ = dispatch.closestHit(Kernel, frame.geometry, &path.bundle, known, tests);
-        }
-
-        /// Makes records of the primary rays of a bundle. Returns how many paths there are then.
-        fn takePrimary(tracer: *Self, part: Rectangle, sample: u32, first: usize) usize {
-            const path = &tracer.step.path;
-            const has_cones = tracer.frame.needsFootprints();
-            var count = first;
-            for (&path.bundle.groups, 0..) |*ray, group| {
-                const origins: records_file.Stored(Rays) = .of(ray.line.origin);
-                const directions: records_file.Stored(Rays) = .of(ray.line.direction);
-                const ts = ray.closest.t.toArray();
-                const primitives = ray.closest.primitive.toArray();
-                var bits = ray.active.bits();
-                while (bits != 0) : (bits &= bits - 1) {
-                    const lane = @ctz(bits);
-                    const number = Record.numberOf(
-                        sample,
-                        part.x0 - tracer.step.rectangle.x0 + Kernel.pixelX(group, lane),
-                        part.y0 - tracer.step.rectangle.y0 + Kernel.pixelY(group, lane),
-                    );
-                    tracer.records[number] = .{
-                        .origin = origins.at(lane),
-                        .direction = directions.at(lane),
-                        .start_t = 0,
-                        .start_primitive = std.math.maxInt(i32),
-                        .t = ts[lane],
-                        .primitive = primitives[lane],
-                        .skip = ray_file.no_primitive,
-                        .throughput = .{ 1, 1, 1 },
-                        .sigma_t = .{ 0, 0, 0 },
-                        .nesting = .air,
-                        .cone_width = if (has_cones) path.cone_width[group].lane(lane) else 0,
-                        .cone_spread = if (has_cones) path.cone_spread[group].lane(lane) else 0,
-                        .scatter_pdf = 0,
-                        .receiver = .{ 0, 0, 0 },
-                        .receiver_normal = .{ 0, 0, 0 },
-                        .depth = 0,
-                        .scatter_count = 0,
-                        .transparency_depth = 0,
-                        .radiance = .{ 0, 0, 0 },
-                        .escaped = 0,
-                        .displayed = .{ 0, 0, 0 },
-                        .display_share = 0,
-                        .floor_light = tracer.floor_light[group].lane(lane),
-                    };
-                    if (tracer.step.keeps_features) tracer.step.features[number] = .start;
-                    tracer.live[count] = number;
-                    count += 1;
-                }
-            }
-            return count;
         }
 
         /// Numbers of the next bundle of some paths; other rays of the bundle are not active.
@@ -343,39 +240,9 @@ pub fn PathTracer(comptime Kernel: type) type {
         /// Those that go much the same way become neighbours.
         fn sortByDirection(tracer: *Self, numbers: []u32) void {
             const keys = tracer.keys[0..numbers.len];
-            for (keys, numbers) |*key, number| key.* = wayOf(tracer.records[number].direction);
+            for (keys, numbers) |*key, number|
+                key.* = records_file.wayOf(tracer.records[number].direction);
             records_file.sort(numbers, keys, tracer.sorted);
-        }
-
-        /// The octant of a direction, and of its longest axis which it is.
-        fn wayOf(direction: [3]f32) u16 {
-            var key: u16 = 0;
-            for (direction) |component| key = key << 1 | @intFromBool(component < 0);
-            const size = [3]f32{ @abs(direction[0]), @abs(direction[1]), @abs(direction[2]) };
-            const longest: u16 = if (size[0] >= size[1] and size[0] >= size[2])
-                0
-            else if (size[1] >= size[2]) 1 else 2;
-            return key << 2 | longest;
-        }
-
-        /// Adds a sample of each pixel to the film; what is not a number is none.
-        fn expose(tracer: *const Self, sample: u32, film: *Film) void {
-            const all = tracer.step.rectangle;
-            const number = tracer.step.first_sample + sample;
-            for (all.y0..all.y1) |y| for (all.x0..all.x1) |x| {
-                const column: u32 = @intCast(x);
-                const row: u32 = @intCast(y);
-                const place = Record.numberOf(sample, column - all.x0, row - all.y0);
-                const record = &tracer.records[place];
-                var light = record.radiance;
-                if (!std.math.isFinite(light[0] + light[1] + light[2])) light = .{ 0, 0, 0 };
-                film.add(column, row, number, light ++ .{record.escaped});
-                if (tracer.step.keeps_features)
-                    path_features.expose(&tracer.step.features[place], film, column, row, number);
-                if (!tracer.step.keeps_display) continue;
-                const shown = record.displayed ++ .{record.display_share};
-                film.addApart(.display, column, row, number, shown);
-            };
         }
     };
 }
