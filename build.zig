@@ -240,8 +240,8 @@ const TestPackages = struct {
         var options = packages.options;
         // Traces of the stack are of the first target; -Dtarget= makes another one it.
         options.is_stripped = list.items.len != 0;
-        // Each backend with each traversal is this machine's to test. Under qemu, AArch64's show that
-        // the bits agree and that NEON's intrinsics do, two more of ARMv7 that they are 32-bit safe.
+        // Each backend with each traversal is this machine's to test. Under qemu, some of AArch64
+        // show that the bits agree, those of NEON's intrinsics too, and two of ARMv7 are enough.
         if (!is_here and options.extent == .all) {
             options.extent = if (target.result.cpu.arch == .arm) .few else .some;
         }

@@ -10,8 +10,8 @@ const Allocator = std.mem.Allocator;
 pub const Backend = enum { scalar, vector, intrinsics };
 /// How rays are bundled; `src/variant.zig` says what each means.
 pub const Traversal = enum { single, packet2x2, beam };
-/// What a program holds: the default variant; the scalar reference beside it; some others as well, so
-/// that there is each backend and each traversal; or all there are.
+/// What a program holds: the default variant; the scalar reference beside it; some others as well,
+/// so that there is each backend and each traversal; or all there are.
 pub const Extent = enum { one, few, some, all };
 
 /// As in `src/variant.zig`.
@@ -60,7 +60,8 @@ pub fn held(
     if (extent != .one) add(arena, &list, .reference);
     for ([_]u8{ 4, 8, 16 }) |lanes| for (std.enums.values(Backend)) |backend| {
         for (std.enums.values(Traversal)) |traversal| {
-            const variant: Variant = .{ .backend = backend, .traversal = traversal, .lanes = lanes };
+            const variant: Variant =
+                .{ .backend = backend, .traversal = traversal, .lanes = lanes };
             const is_held = switch (extent) {
                 .one, .few => false,
                 .some => variant.isOfSome(),
@@ -88,9 +89,9 @@ pub fn counting(arena: Allocator, variants: []const Variant) []const Variant {
     return list.items;
 }
 
-/// Those of `variants`, which are `extent` of all, that hold the integrators besides Whitted's: these
-/// take as long to compile. The default and, of all, those that tell how rays that bounce are best
-/// traced.
+/// Those of `variants`, which are `extent` of all, that hold the integrators besides Whitted's:
+/// these take as long to compile. The default and, of all, those that tell how rays that bounce are
+/// best traced.
 pub fn lit(arena: Allocator, variants: []const Variant, extent: Extent) []const Variant {
     var list: std.ArrayList(Variant) = .empty;
     for (variants, 0..) |variant, index| {
