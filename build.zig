@@ -41,6 +41,7 @@ pub fn build(b: *std.Build) void {
         .bench_poses = b.step("bench:poses", "Posed triangles: -- SCENE ANIMATION SECONDS"),
         .bench_frames = b.step("bench:frames", "Time frames in motion: -- SCENE [FRAMES [SIZE]]"),
         .bench_structures = b.step("bench:structures", "Trees beside each other: -- SCENE"),
+        .bench_light = b.step("bench:light", "Rays by bounce and traversal: -- SCENE [options]"),
         .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
         .vendor = b.step("vendor", "Fetch and check the third-party files"),
@@ -63,12 +64,11 @@ pub fn build(b: *std.Build) void {
     addRun(steps.run, program);
     steps.@"asm".dependOn(&b.addInstallFile(package.assembly(), "raylane.s").step);
 
-    addBenchmark(steps.check, steps.bench_rays, package.benchmark("rays", "bench/rays.zig"));
-    addBenchmark(steps.check, steps.bench_parse, package.benchmark("parse", "bench/parse.zig"));
-    addBenchmark(steps.check, steps.bench_poses, package.benchmark("poses", "bench/poses.zig"));
+    inline for (.{ "rays", "parse", "poses", "structures", "light" }) |name| {
+        const benchmark = package.benchmark(name, "bench/" ++ name ++ ".zig");
+        addBenchmark(steps.check, @field(steps, "bench_" ++ name), benchmark);
+    }
     addBenchmark(steps.check, steps.bench_frames, package.renderer("frames", "bench/frames.zig"));
-    const structures = package.benchmark("structures", "bench/structures.zig");
-    addBenchmark(steps.check, steps.bench_structures, structures);
     const full: Package = .init(b, target, optimize orelse .fast, vendor.headers, all);
     addCompare(steps.compare, full, vendor.headers);
 
@@ -103,7 +103,8 @@ fn variantOptions(b: *std.Build, optional: libraries.Optional) [2]Package.Option
         .extent = undefined,
         .optional = optional,
     };
-    const description = "Hold that variant (one), the scalar reference beside it (few), or all";
+    const description = "Hold that variant (one), the scalar reference beside it (few), each " ++
+        "backend and traversal (some), or all";
     const extent = b.option(variants.Extent, "variants", description);
     options.extent = extent orelse .few;
     var all = options;
@@ -239,9 +240,11 @@ const TestPackages = struct {
         var options = packages.options;
         // Traces of the stack are of the first target; -Dtarget= makes another one it.
         options.is_stripped = list.items.len != 0;
-        // ARMv7 has AArch64's variants of the same code: two of them show that the bits agree.
-        const is_second_arm = target.result.cpu.arch == .arm and !is_here;
-        if (is_second_arm and options.extent == .all) options.extent = .few;
+        // Each backend with each traversal is this machine's to test. Under qemu, some of AArch64
+        // show that the bits agree, those of NEON's intrinsics too, and two of ARMv7 are enough.
+        if (!is_here and options.extent == .all) {
+            options.extent = if (target.result.cpu.arch == .arm) .few else .some;
+        }
         const package: Package = .init(b, target, packages.optimize, packages.headers, options);
         list.append(b.allocator, .{
             .name = name,

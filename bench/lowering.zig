@@ -14,6 +14,9 @@ const shifts = struct {
     pub inline fn shiftLeft(a: L.I32) L.I32 {
         return a.shiftLeft(7);
     }
+    pub inline fn shiftRight(a: L.I32) L.I32 {
+        return a.shiftRight(7);
+    }
 };
 
 /// How a value of the library's type passes in registers.
@@ -151,10 +154,10 @@ comptime {
     });
     if (L.count > 1) exportAll("F32", L.F32, &.{ "interleaveLow", "interleaveHigh" });
     exportAll("I32", L.I32, &.{
-        "add", "sub", "min", "max", "bitAnd", "bitOr",
+        "add", "sub", "mul", "min", "max",    "bitAnd", "bitOr", "bitXor",
         "eq",  "lt",  "le",  "gt",  "select", "toF32",
     });
-    exportAll("I32", shifts, &.{"shiftLeft"});
+    exportAll("I32", shifts, &.{ "shiftLeft", "shiftRight" });
     exportAll("Mask", L.Mask, &.{
         "fromBits", "bitAnd", "bitOr", "bitNot", "andNot",
         "any",      "all",    "none",  "bits",   "popCount",

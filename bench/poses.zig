@@ -52,13 +52,14 @@ fn write(
     var buffer: [1 << 16]u8 = undefined;
     var stdout: std.Io.File.Writer = .initStreaming(.stdout(), io, &buffer);
     const out = &stdout.interface;
+    var cursor: raylane.world.Cursor = .init(geometry);
     for (0..geometry.surfaceCount()) |primitive| {
-        const triangle = geometry.triangleAt(@intCast(primitive));
+        const triangle = cursor.triangleAt(@intCast(primitive));
         for (triangle.corner) |vertex| {
             const position: [3]f32 = if (triangle.isDropped())
                 @splat(std.math.nan(f32))
             else
-                geometry.positionAt(vertex);
+                cursor.positionAt(vertex);
             for (position) |number| try out.writeInt(u32, @bitCast(number), .little);
         }
     }

@@ -24,7 +24,7 @@ optional: libraries.Optional,
 /// The library, `@import("raylane")`.
 raylane: *Module,
 shows_searches: bool,
-/// The variants of its programs, the default one first, and those of them that count.
+/// The variants of its programs, the default one first, and those that count for them.
 held: []const Variant,
 counting: []const Variant,
 /// Those that hold the integrators besides Whitted's.
@@ -77,7 +77,7 @@ pub fn init(
         .shows_searches = options.shows_searches,
         .held = held,
         .counting = counting,
-        .lit = variants.lit(b.allocator, held),
+        .lit = variants.lit(b.allocator, held, options.extent),
         .raylane = undefined,
         .config = undefined,
         .intrinsics = undefined,
@@ -91,18 +91,27 @@ pub fn init(
     });
     config.addOption(bool, "has_draco", options.optional.draco); // Not for kernels to know.
     package.config = config.createModule();
-    package.raylane = package.library();
+    package.raylane = package.withLibrary("src/raylane.zig");
     package.intrinsics = package.intrinsicsObject();
     package.kernels = package.kernelObjects();
     return package;
 }
 
-/// The library as a module of its own, for a program that has it as its root.
-pub fn library(package: Package) *Module {
-    const root = package.moduleOf("src/raylane.zig");
-    const is_musl = package.target.result.isMuslLibC();
+/// All tests of the library as the root of a program; the C that they need besides is the caller's.
+pub fn tests(package: Package) *Module {
+    const root = package.withLibrary("tests.zig");
+    const raylane = package.moduleOf("tests/raylane.zig");
+    raylane.addImport("tests", root);
+    root.addImport("raylane", raylane);
+    return root;
+}
+
+/// A module that holds the library, with all that this imports.
+fn withLibrary(package: Package, path: []const u8) *Module {
+    const root = package.moduleOf(path);
     root.addImport("config", package.config);
     const held = libraries.held(package.optional);
+    const is_musl = package.target.result.isMuslLibC();
     root.addImport("licenses", libraries.licenses(package.owner, package.headers, held, is_musl));
     for (held) |each| each.addTo(root, package.headers);
     return root;

@@ -1,9 +1,10 @@
 //! The test suites, on this machine and under qemu, and the line that counts them.
 //!
 //! In: the targets to test, with a `Package` for each. Out: steps that run suites and close with
-//! the count. A suite is a program with `tests/runner.zig` as its main; `tests/launch.zig` runs it
-//! and keeps its log, whatever becomes of it; `tests/summary.zig` adds up the logs. Suites run
-//! every time: what they read (scenes, pictures, the source tree) is more than the build knows of.
+//! the count. A suite is a program with `tests/runner.zig` as its main, or a part of one;
+//! `tests/launch.zig` runs it and keeps its log, whatever becomes of it; `tests/summary.zig` adds
+//! up the logs. Suites run every time: what they read (scenes, pictures, the source tree) is more
+//! than the build knows of.
 
 const std = @import("std");
 const libraries = @import("libraries.zig");
@@ -56,8 +57,11 @@ pub fn addAll(tests: Tests, step: *std.Build.Step, targets: []const Target) void
         tests.format(), tests.tidy(), tests.machinery(), tests.report(), tests.fetcher(),
     }) catch @panic("OOM");
     for (targets) |target| {
+        const tested = tests.ofLibrary(target.package, null);
         logs.appendSlice(arena, &.{
-            tests.unit(target), tests.integration(target), tests.commandLine(target),
+            tests.runOn(.unit, target, tested),
+            tests.runOn(.integration, target, tested),
+            tests.commandLine(target),
         }) catch @panic("OOM");
     }
     tests.close(step, logs.items, .with_sources);
@@ -71,8 +75,10 @@ pub fn addHere(
     integration_step: *std.Build.Step,
     target: Target,
 ) void {
-    tests.close(unit_step, &.{tests.unit(target)}, .with_sources);
-    tests.close(integration_step, &.{tests.integration(target)}, .logs_only);
+    const unit = tests.ofLibrary(target.package, .unit);
+    tests.close(unit_step, &.{tests.runOn(.unit, target, unit)}, .with_sources);
+    const integration = tests.ofLibrary(target.package, .integration);
+    tests.close(integration_step, &.{tests.runOn(.integration, target, integration)}, .logs_only);
 }
 
 /// Makes `step` check the formatting.
@@ -92,8 +98,7 @@ pub fn addReport(tests: Tests, step: *std.Build.Step) void {
 
 /// Makes `step` compile the test programs of `target` without a file as the result.
 pub fn addCheck(tests: Tests, step: *std.Build.Step, target: Target) void {
-    step.dependOn(&tests.unitProgram(target).step);
-    step.dependOn(&tests.integrationProgram(target).step);
+    step.dependOn(&tests.ofLibrary(target.package, null).step);
     step.dependOn(&tests.hostProgram("cli").step);
 }
 
@@ -133,14 +138,6 @@ fn machinery(tests: Tests) LazyPath {
     return log;
 }
 
-fn unit(tests: Tests, target: Target) LazyPath {
-    return tests.runOn("unit", target, tests.unitProgram(target));
-}
-
-fn integration(tests: Tests, target: Target) LazyPath {
-    return tests.runOn("integration", target, tests.integrationProgram(target));
-}
-
 /// The command line's tests run here; they start the target's program, under its emulator.
 fn commandLine(tests: Tests, target: Target) LazyPath {
     const b = tests.owner;
@@ -160,25 +157,31 @@ fn commandLine(tests: Tests, target: Target) LazyPath {
     return log;
 }
 
-fn unitProgram(tests: Tests, target: Target) *Compile {
-    const root = target.package.library();
-    target.package.addKernels(root);
-    return tests.program("unit", root);
-}
+/// What tests of the library are of: a file of its own, or what others see of it.
+const Part = enum {
+    unit,
+    integration,
 
-fn integrationProgram(tests: Tests, target: Target) *Compile {
-    const b = tests.owner;
-    const root = b.createModule(.{
-        .root_source_file = b.path("tests/integration.zig"),
-        .target = target.package.target,
-        .optimize = target.package.optimize,
-        .error_tracing = target.package.raylane.error_tracing,
-        .strip = target.package.raylane.strip,
-        .imports = &.{.{ .name = "raylane", .module = target.package.raylane }},
-    });
-    libraries.stb_image_of_tests.addTo(root, target.package.headers);
-    target.package.addKernels(root);
-    return tests.program("integration", root);
+    /// How the names of its tests begin: with the folder.
+    fn prefix(part: Part) []const u8 {
+        return switch (part) {
+            .unit => "src.",
+            .integration => "tests.",
+        };
+    }
+};
+
+/// The program of one part; null: of all, for all are compiled in little more time than one.
+fn ofLibrary(tests: Tests, package: Package, part: ?Part) *Compile {
+    const root = package.tests();
+    libraries.stb_image_of_tests.addTo(root, package.headers);
+    package.addKernels(root);
+    var own = tests;
+    if (part) |one| {
+        if (tests.filters.len == 0) own.filters = tests.owner.dupeStrings(&.{one.prefix()});
+        return own.program(@tagName(one), root);
+    }
+    return own.program("library", root);
 }
 
 /// A test program of this machine whose root is `tests/NAME.zig`.
@@ -206,8 +209,8 @@ fn program(tests: Tests, name: []const u8, root: *std.Build.Module) *Compile {
     });
 }
 
-fn runOn(tests: Tests, suite: []const u8, target: Target, tested: *Compile) LazyPath {
-    const run, const log = tests.start(suite, target.name);
+fn runOn(tests: Tests, part: Part, target: Target, tested: *Compile) LazyPath {
+    const run, const log = tests.start(@tagName(part), target.name);
     if (target.emulator.len != 0) {
         run.addArg(tests.owner.fmt("--needs={s}", .{target.emulator[0]}));
         run.addArg("--env=RAYLANE_EMULATED=1");
@@ -215,6 +218,7 @@ fn runOn(tests: Tests, suite: []const u8, target: Target, tested: *Compile) Lazy
     run.addArg("--");
     run.addArgs(target.emulator);
     run.addArtifactArg(tested);
+    run.addArg(part.prefix());
     return log;
 }
 

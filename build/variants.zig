@@ -1,4 +1,4 @@
-//! Which variants a program holds, and which of them count tests.
+//! Which variants a program holds, which count tests, and which hold further integrators.
 //!
 //! In: the default variant, how many are wanted, the target. Out: lists that the build makes a
 //! kernel of each, and that `src/variant.zig` gets by name.
@@ -10,8 +10,9 @@ const Allocator = std.mem.Allocator;
 pub const Backend = enum { scalar, vector, intrinsics };
 /// How rays are bundled; `src/variant.zig` says what each means.
 pub const Traversal = enum { single, packet2x2, beam };
-/// What a program holds: the default variant, the scalar reference beside it, or all there are.
-pub const Extent = enum { one, few, all };
+/// What a program holds: the default variant; the scalar reference beside it; some others as well,
+/// so that there is each backend and each traversal; or all there are.
+pub const Extent = enum { one, few, some, all };
 
 /// As in `src/variant.zig`.
 pub const Variant = struct {
@@ -29,9 +30,21 @@ pub const Variant = struct {
         }) catch @panic("OOM");
     }
 
-    /// Whether the numbers of tests are the same.
-    fn countsAs(variant: Variant, other: Variant) bool {
-        return variant.traversal == other.traversal and variant.lanes == other.lanes;
+    /// Whether it is one of all. The C intrinsics and the thesis's packets are 4 wide. Wide scalar
+    /// loops tell nothing that narrow ones do not, but take longest to compile; they are built by
+    /// name.
+    fn isBuilt(variant: Variant) bool {
+        return variant.lanes == 4 or
+            (variant.backend == .vector and variant.traversal != .packet2x2);
+    }
+
+    /// Whether it is one of some: each backend and each traversal, but not each with each.
+    fn isOfSome(variant: Variant) bool {
+        return variant.lanes == 4 and switch (variant.backend) {
+            .scalar => variant.traversal == .single,
+            .vector => true,
+            .intrinsics => variant.traversal == .beam,
+        };
     }
 };
 
@@ -45,44 +58,45 @@ pub fn held(
     var list: std.ArrayList(Variant) = .empty;
     add(arena, &list, default);
     if (extent != .one) add(arena, &list, .reference);
-    // The wide ones pay on x86 only.
-    const lane_counts: []const u8 = if (cpu.arch.isX86()) &.{ 4, 8, 16 } else &.{4};
-    if (extent == .all) for (lane_counts) |lanes| {
-        for (std.enums.values(Backend)) |backend| for (std.enums.values(Traversal)) |traversal| {
-            // The C intrinsics and the thesis's packets are 4 wide. Wide scalar loops tell nothing
-            // that narrow ones do not, but take longest to compile; they are built by name.
-            if (lanes > 4 and (backend != .vector or traversal == .packet2x2)) continue;
-            add(arena, &list, .{ .backend = backend, .traversal = traversal, .lanes = lanes });
-        };
+    for ([_]u8{ 4, 8, 16 }) |lanes| for (std.enums.values(Backend)) |backend| {
+        for (std.enums.values(Traversal)) |traversal| {
+            const variant: Variant =
+                .{ .backend = backend, .traversal = traversal, .lanes = lanes };
+            const is_held = switch (extent) {
+                .one, .few => false,
+                .some => variant.isOfSome(),
+                // The wide ones pay on x86 only.
+                .all => variant.isBuilt() and (lanes == 4 or cpu.arch.isX86()),
+            };
+            if (is_held) add(arena, &list, variant);
+        }
     };
     return list.items;
 }
 
-/// Those of `variants` that count tests: one for each traversal and number of lanes, of Zig's
-/// vectors where they are there.
+/// Those that count tests: one for each traversal and number of lanes of `variants`, on which alone
+/// the numbers depend. They are of Zig's vectors, which compile in a quarter of the scalar loops'
+/// time, whether the program holds that variant or not.
 pub fn counting(arena: Allocator, variants: []const Variant) []const Variant {
     var list: std.ArrayList(Variant) = .empty;
-    for ([_]bool{ true, false }) |by_vector| for (variants) |variant| {
-        if ((variant.backend == .vector) != by_vector) continue;
-        const is_counted = for (list.items) |other| {
-            if (other.countsAs(variant)) break true;
-        } else false;
-        if (!is_counted) add(arena, &list, variant);
-    };
+    for (variants) |variant| {
+        add(arena, &list, .{
+            .backend = .vector,
+            .traversal = variant.traversal,
+            .lanes = variant.lanes,
+        });
+    }
     return list.items;
 }
 
-/// Those of `variants` that hold the integrators besides Whitted's, which take as long to compile:
-/// the default and, of all, those that tell how rays that bounce are best traced.
-pub fn lit(arena: Allocator, variants: []const Variant) []const Variant {
+/// Those of `variants`, which are `extent` of all, that hold the integrators besides Whitted's:
+/// these take as long to compile. The default and, of all, those that tell how rays that bounce are
+/// best traced.
+pub fn lit(arena: Allocator, variants: []const Variant, extent: Extent) []const Variant {
     var list: std.ArrayList(Variant) = .empty;
     for (variants, 0..) |variant, index| {
-        const is_told = switch (variant.backend) {
-            .vector => variant.lanes == 4 or variant.traversal == .beam,
-            .scalar => variant.traversal == .single,
-            .intrinsics => variant.traversal == .beam,
-        };
-        if (index == 0 or (is_told and variants.len > 2)) add(arena, &list, variant);
+        const is_told = variant.isOfSome() and variant.backend != .intrinsics;
+        if (index == 0 or (is_told and extent == .all)) add(arena, &list, variant);
     }
     return list.items;
 }

@@ -8,8 +8,9 @@
 
 const std = @import("std");
 const energy = @import("energy.zig");
+const bounces = @import("bench/bounces.zig");
+const choices = @import("settings.zig");
 const machine = @import("bench/machine.zig");
-const TreeQuality = @import("settings.zig").TreeQuality;
 const results_file = @import("bench/results.zig");
 const rounds_file = @import("bench/rounds.zig");
 const stages_file = @import("bench/stages.zig");
@@ -49,7 +50,10 @@ pub const Settings = struct {
     thread_count: usize,
     sample_count: u32,
     depth: u32,
-    tree_quality: TreeQuality,
+    tree_quality: choices.TreeQuality,
+    /// Null: the thesis's, Whitted's. Else what each bounce costs is measured as well, and scenes
+    /// have all their light.
+    integrator: ?choices.Integrator = null,
     /// By variant of `variant.compiled`: whether it is measured. At least one is.
     wanted: [variant_file.compiled.len]bool,
     /// Null: until intervals are narrow.
@@ -64,6 +68,8 @@ pub const Error = Stages.Error || error{ImagesDiffer};
 
 /// Share of the time that the numbers of threads get, where there is more than one.
 const scaling_share = 0.15;
+/// Share of a scene's time that its bounces get, where they are measured.
+const bounces_share = 0.4;
 /// Share of the time to look at the machine at rest, and the most of it.
 const idle_share = 1.0 / 48.0;
 const idle_s_max = 10.0;
@@ -103,6 +109,7 @@ pub const Bench = struct {
                 .height = settings.height,
                 .samples = settings.sample_count,
                 .depth = settings.depth,
+                .integrator = @tagName(settings.integrator orelse .whitted),
                 .threads = settings.thread_count,
                 .bvh = @tagName(settings.tree_quality),
                 .time_limit_s = settings.time_s,
@@ -239,25 +246,16 @@ pub const Bench = struct {
         const title = try bench.arena.print("{f}", .{printable(name)});
         const progress = bench.progress.start(title, 0);
         defer progress.end();
-        var stages: Stages = .init(bench.gpa, bench.io, .{
-            .scene = name,
-            .load = .{ .allow_outside = settings.allow_outside, .output = settings.output },
-            .tree_quality = settings.tree_quality,
-            .view = .{
-                .resolution = .{ settings.width, settings.height },
-                .environment = .{ .source = .none },
-                .display_referred = false,
-                .emitters = false,
-            },
-            .sample_count = settings.sample_count,
-            .depth = settings.depth,
-        }, settings.thread_count, bench.diagnostic, bench.meter, progress);
+        var stages: Stages = .init(bench.gpa, bench.io, bench.stagesOf(name), settings.thread_count, bench.diagnostic, bench.meter, progress);
         defer stages.deinit();
         var rounds = try Rounds.measure(bench.arena, &stages, .{
             .variants = bench.order,
             .thread_count = settings.thread_count,
             .round_count = settings.round_count,
-            .deadline_ns = deadline_ns,
+            .deadline_ns = if (settings.integrator == null)
+                deadline_ns
+            else
+                deadline_ns -| bounceTime(stages.now(), deadline_ns),
             .idle_w = bench.idle_w,
         }, bench.diagnostic);
         const variants = try rounds.variants();
@@ -272,7 +270,48 @@ pub const Bench = struct {
             .rounds = rounds.round_count,
             .ended_by = rounds.end,
             .variants = variants,
+            .bounces = try bench.bouncesOf(&stages, deadline_ns),
         };
+    }
+
+    /// What a scene is rendered with. The thesis's light is that of lamps alone.
+    fn stagesOf(bench: *const Bench, name: []const u8) stages_file.Settings {
+        const settings = bench.settings;
+        var view: choices.View = .{
+            .resolution = .{ settings.width, settings.height },
+            .display_referred = false,
+        };
+        if (settings.integrator == null) {
+            view.environment = .{ .source = .none };
+            view.emitters = false;
+        }
+        return .{
+            .scene = name,
+            .load = .{ .allow_outside = settings.allow_outside, .output = settings.output },
+            .tree_quality = settings.tree_quality,
+            .view = view,
+            .integrator = settings.integrator orelse .whitted,
+            .sample_count = settings.sample_count,
+            .depth = settings.depth,
+        };
+    }
+
+    /// Measures each bounce, where an integrator was asked for.
+    fn bouncesOf(
+        bench: *Bench,
+        stages: *Stages,
+        deadline_ns: u64,
+    ) Error![]const results_file.Bounce {
+        const settings = bench.settings;
+        if (settings.integrator == null) return &.{};
+        return bounces.measure(bench.arena, stages, .{
+            .variants = bench.order,
+            .thread_count = settings.thread_count,
+            .depth_max = settings.depth,
+            .round_count = settings.round_count,
+            .deadline_ns = deadline_ns,
+            .idle_w = bench.idle_w,
+        }, bench.diagnostic);
     }
 
     /// The reference and the quickest variant by more and more threads.
@@ -306,6 +345,11 @@ pub const Bench = struct {
     }
 };
 
+/// Of a scene's time.
+fn bounceTime(now_ns: u64, deadline_ns: u64) u64 {
+    return @trunc(bounces_share * @as(f64, @floatFromInt(deadline_ns -| now_ns)));
+}
+
 fn seconds(duration: Io.Duration) f64 {
     return @as(f64, @floatFromInt(duration.toNanoseconds())) * 1e-9;
 }
@@ -331,6 +375,7 @@ pub fn writeJson(results: *const Results, writer: *Io.Writer) Io.Writer.Error!vo
 }
 
 test {
+    _ = bounces;
     _ = machine;
     _ = rounds_file;
     _ = stages_file;

@@ -62,8 +62,8 @@ pub const Diagnostic = struct {
     warning_dropped_count: usize = 0,
     /// Whether what could be forgiven is an error.
     strict: bool = false,
-    /// Whether `forgive` has set the error line.
-    refused: bool = false,
+    /// What would have been the first warning of `forgive`, if `strict`: the error line to come.
+    refusal: ?Message = null,
 
     /// A kind of what is wrong with a file: what its warning says of the first one, and how many
     /// there are.
@@ -126,13 +126,16 @@ pub const Diagnostic = struct {
     }
 
     fn refuse(diagnostic: *Diagnostic, comptime format: []const u8, arguments: anytype) void {
-        if (!diagnostic.refused) diagnostic.message.set(format, arguments);
-        diagnostic.refused = true;
+        if (diagnostic.refusal != null) return;
+        var line: Message = .{};
+        line.set(format, arguments);
+        diagnostic.refusal = line;
     }
 
-    /// Returns an error if there was something to forgive, and `strict`.
-    pub fn failIfRefused(diagnostic: *const Diagnostic) error{InvalidInput}!void {
-        if (diagnostic.refused) return error.InvalidInput;
+    /// Sets the error line and returns an error if there was something to forgive, and `strict`.
+    pub fn failIfRefused(diagnostic: *Diagnostic) error{InvalidInput}!void {
+        diagnostic.message = diagnostic.refusal orelse return;
+        return error.InvalidInput;
     }
 
     /// The texts of all warnings so far.
@@ -326,6 +329,7 @@ test "what is forgiven is a warning for each kind with a count, or an error" {
     strict.warn("a gap", .{});
     try strict.failIfRefused();
     for (0..3) |index| strict.forgive("node {d}: odd", .{index});
+    strict.message.set("an error that was no reason to give up", .{});
     try std.testing.expectError(error.InvalidInput, strict.failIfRefused());
     try std.testing.expectEqualStrings("node 0: odd", strict.message.text());
     try std.testing.expectEqual(1, strict.warning_count);

@@ -113,17 +113,11 @@ pub fn collect(
 }
 
 fn countsOf(scene: *const Scene) scene_data.File.Counts {
-    return .{
-        .nodes = scene.nodes.len,
-        .meshes = scene.meshes.len,
-        .materials = scene.materials.len,
-        .textures = scene.textures.len,
-        .images = scene.images.len,
-        .skins = scene.skins.len,
-        .animations = scene.animations.len,
-        .cameras = scene.cameras.len,
-        .lights = scene.lights.len,
-    };
+    var counts: scene_data.File.Counts = undefined;
+    inline for (comptime std.meta.fieldNames(scene_data.File.Counts)) |name| {
+        @field(counts, name) = @field(scene, name).len;
+    }
+    return counts;
 }
 
 fn drawnOf(scene: *const Scene) Drawn {
@@ -206,6 +200,7 @@ fn writeForTest(
     defer arena.deinit();
     var found = try collect(gpa, arena.allocator(), &scene, &diagnostic);
     found.name = "a\x1b.gltf";
+    scene.file.byte_count = 4 << 10;
     scene.file.extensions = extensions orelse scene.file.extensions;
     found.memory_bytes = 5 << 20;
     try write(&found, writer);
@@ -216,7 +211,7 @@ test "the text" {
     defer text.deinit();
     try writeForTest(.{ .force = true }, null, writeText, &text.writer);
     try testing.expectEqualStrings(
-        \\file         a?.gltf
+        \\file         a?.gltf, 4.0 KiB with what it names
         \\format       glTF 2.0
         \\generator    by "hand"?
         \\scene        0 'points'

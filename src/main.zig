@@ -28,6 +28,8 @@ const ExitCode = enum(u8) {
     invalid = 3,
     /// Images that must be the same are not.
     differ = 4,
+    /// 128 and the number of the signal that asked for a picture before it was finished.
+    _,
 };
 
 pub fn main(init: std.process.Init) u8 {
@@ -84,7 +86,10 @@ fn bench(init: std.process.Init, options: *const cli.Bench, diagnostic: *Diagnos
     const io = init.io;
     var settings = benchSettings(options);
     if (std.mem.findScalar(bool, &settings.wanted, true) == null) {
-        say(io, "raylane: no variant's name contains {f}; --list-variants names them\n", .{
+        const integrator = settings.integrator orelse .whitted;
+        say(io, "raylane: no variant{s} has a name that contains {f}; --list-variants names " ++
+            "them\n", .{
+            if (integrator == .whitted) "" else " with that integrator",
             raylane.diagnostic.quote(options.variants.?),
         });
         return .usage;
@@ -137,6 +142,7 @@ fn benchSettings(options: *const cli.Bench) raylane.bench.Settings {
         .sample_count = options.sample_count,
         .depth = options.depth,
         .tree_quality = options.tree_quality,
+        .integrator = options.integrator,
         .wanted = undefined,
         .round_count = if (options.round_count) |count| count else null,
         .time_s = options.time_s,
@@ -146,8 +152,10 @@ fn benchSettings(options: *const cli.Bench) raylane.bench.Settings {
         } else null,
     };
     if (options.scene_count == 0) settings.scenes = raylane.bench.default_scenes;
-    for (&settings.wanted, raylane.variant.names) |*is_wanted, name| {
-        is_wanted.* = options.wants(name);
+    const is_lit = (options.integrator orelse .whitted) != .whitted;
+    for (&settings.wanted, raylane.variant.names, 0..) |*is_wanted, name, index| {
+        const holds = !is_lit or raylane.variant.litIndexOf(index) != null;
+        is_wanted.* = holds and options.wants(name);
     }
     return settings;
 }
@@ -201,9 +209,7 @@ fn compare(gpa: Allocator, io: Io, options: *const cli.Compare, diagnostic: *Dia
             ev,
             diagnostic,
         ) catch |err| {
-            if (err == error.OutOfMemory) account.explain(&diagnostic.message);
-            say(io, "raylane: {f}: {s}\n", .{ printable(name), diagnostic.message.text() });
-            return exitCodeOf(err);
+            return fail(&account, io, name, err, diagnostic);
         };
         count += 1;
     }
@@ -291,18 +297,16 @@ fn info(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagnosti
     var text: Io.Writer.Allocating = .init(account.allocator());
     defer text.deinit();
     const outcome = describe(&account, io, options, diagnostic, &text.writer);
-    const title = printable(raylane.parse.title(options.scene));
-    if (!options.quiet) for (diagnostic.warnings[0..diagnostic.warning_count]) |*warning| {
-        say(io, "raylane: {f}: warning: {s}\n", .{ title, warning.text() });
-    };
-    outcome catch |err| switch (err) {
-        error.WriteFailed => return outOfMemory(io),
-        else => |other| {
-            if (other == error.OutOfMemory) account.explain(&diagnostic.message);
-            const place = printable(placeOf(diagnostic, raylane.parse.title(options.scene)));
-            say(io, "raylane: {f}: {s}\n", .{ place, diagnostic.message.text() });
-            return exitCodeOf(other);
-        },
+    const scene = options.scene;
+    if (!options.quiet) {
+        for (diagnostic.warnings[0..diagnostic.warning_count]) |*warning| {
+            sayOf(io, scene, "warning: {s}", .{warning.text()});
+        }
+        sayDropped(io, scene, diagnostic);
+    }
+    outcome catch |err| return switch (err) {
+        error.WriteFailed => outOfMemory(io),
+        else => |other| fail(&account, io, placeOf(diagnostic, scene), other, diagnostic),
     };
     return print(io, text.written());
 }
@@ -331,6 +335,21 @@ fn describe(
         raylane.info.writeText(&found, writer);
 }
 
+/// Says why a file could not be had.
+fn fail(
+    account: *const Account,
+    io: Io,
+    file: []const u8,
+    err: (Job.Error || raylane.bench.Error),
+    diagnostic: *Diagnostic,
+) ExitCode {
+    if (err == error.OutOfMemory) account.explain(&diagnostic.message);
+    const text = diagnostic.message.text();
+    assert(text.len > 0);
+    say(io, "raylane: {f}: {s}\n", .{ printable(file), text });
+    return exitCodeOf(err);
+}
+
 fn exitCodeOf(err: (Job.Error || raylane.bench.Error)) ExitCode {
     return switch (err) {
         error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
@@ -352,7 +371,7 @@ fn openJson(io: Io, path: ?[]const u8, diagnostic: *Diagnostic) raylane.output.T
 /// Where an error of a scene is: a place in its text, or the file as a whole.
 fn placeOf(diagnostic: *const Diagnostic, scene: []const u8) []const u8 {
     const place = diagnostic.place.text();
-    return if (place.len > 0) place else scene;
+    return if (place.len > 0) place else raylane.parse.title(scene);
 }
 
 fn outOfMemory(io: Io) ExitCode {
@@ -389,21 +408,17 @@ fn renderAndReport(
     defer job.session.deinit();
     const outcome = job.run();
     job.sayWarnings();
-    if (diagnostic.warning_dropped_count > 0 and !options.quiet) {
-        job.sayOfScene("warning: {d} more", .{diagnostic.warning_dropped_count});
-    }
+    if (!options.quiet) sayDropped(io, options.scene, diagnostic);
     const report = outcome catch |err| {
         const file = if (err == error.OutputFailed)
-            job.outputTitle()
+            job.failed_output orelse job.outputTitle()
         else
-            placeOf(diagnostic, raylane.parse.title(options.scene));
-        if (err == error.OutOfMemory) account.explain(&diagnostic.message);
-        const text = diagnostic.message.text();
-        assert(text.len > 0);
-        say(io, "raylane: {f}: {s}\n", .{ printable(file), text });
-        return exitCodeOf(err);
+            placeOf(diagnostic, options.scene);
+        return fail(account, io, file, err, diagnostic);
     };
-    return job.printReport(&report);
+    const exit_code = job.printReport(&report);
+    if (exit_code != .ok or !report.is_partial) return exit_code;
+    return @fromBackingInt(@intCast(128 + signals.stop.signal.load(.monotonic)));
 }
 
 /// The way of one scene through the session.
@@ -413,6 +428,8 @@ const Job = struct {
     output_name: []const u8,
     diagnostic: *Diagnostic,
     session: Session,
+    /// Where the picture could not be written, if it is not the output.
+    failed_output: ?[]const u8 = null,
     /// Warnings that the user has seen.
     warning_count: usize = 0,
 
@@ -428,6 +445,10 @@ const Job = struct {
         // Before the work, so that a place that cannot be written is an error in the first second.
         var target = try job.openTarget();
         defer target.abandon();
+        var progress_image = try job.openProgressImage();
+        defer if (progress_image) |*image| image.close();
+        session.progress_image = if (progress_image) |*image| image else null;
+        session.stop = &signals.stop.is_asked;
         var load = options.load;
         load.output = target.replaces;
         try session.load(options.scene, load);
@@ -443,9 +464,11 @@ const Job = struct {
         job.sayVariants(session.scene.?.material_variants);
         job.sayAnimations();
         session.dropScene();
+        signals.stop.is_awaited.store(options.partial, .release);
         job.sayFacts(&session.world.?);
         session.checkWrite(options.write) catch return error.OutputFailed;
         try session.render(options.render);
+        signals.stop.is_awaited.store(false, .release);
         session.write(&target, options.write) catch |err| return switch (err) {
             error.OutOfMemory, error.Canceled => |other| other,
             error.InputOutput => error.OutputFailed,
@@ -468,6 +491,17 @@ const Job = struct {
         const temporaries = &signals.temporary_files;
         return Target.openFile(job.io, temporaries, job.output_name, job.diagnostic) catch
             error.OutputFailed;
+    }
+
+    fn openProgressImage(job: *Job) error{OutputFailed}!?raylane.session.ProgressImage {
+        const path = job.options.progress_image orelse return null;
+        const temporaries = &signals.temporary_files;
+        const choices = job.options.write;
+        return raylane.session.ProgressImage
+            .open(job.io, temporaries, path, choices, job.diagnostic) catch {
+            job.failed_output = path;
+            return error.OutputFailed;
+        };
     }
 
     /// Says the warnings that have not been said yet.
@@ -529,8 +563,7 @@ const Job = struct {
     }
 
     fn sayOfScene(job: *Job, comptime format: []const u8, arguments: anytype) void {
-        const scene = printable(raylane.parse.title(job.options.scene));
-        say(job.io, "raylane: {f}: " ++ format ++ "\n", .{scene} ++ arguments);
+        sayOf(job.io, job.options.scene, format, arguments);
     }
 
     /// Prints the report that the user wants, to standard error where the image has the output.
@@ -582,6 +615,17 @@ fn writeToStdout(
 ) raylane.output.TargetError!void {
     var target: Target = .openStdout(io);
     return target.finish(&.{text}, diagnostic);
+}
+
+/// Says something of a scene.
+fn sayOf(io: Io, scene: []const u8, comptime format: []const u8, arguments: anytype) void {
+    const title = printable(raylane.parse.title(scene));
+    say(io, "raylane: {f}: " ++ format ++ "\n", .{title} ++ arguments);
+}
+
+fn sayDropped(io: Io, scene: []const u8, diagnostic: *const Diagnostic) void {
+    const count = diagnostic.warning_dropped_count;
+    if (count > 0) sayOf(io, scene, "warning: {d} more", .{count});
 }
 
 /// Writes to standard error, beside the progress that may be shown there. When that fails there is

@@ -1,8 +1,8 @@
 //! Stage 1: a scene file becomes a `Scene`.
 //!
-//! In: the path of a file, or standard input: glTF 2.0, JSON or binary, or a PBRT scene. Out: a
-//! checked `Scene`, or one line that says what is wrong. What format it is, its contents tell, and
-//! that is found out here and nowhere else.
+//! In: the path of a file, or standard input: glTF 2.0 (JSON or binary), PBRT, OBJ, STL or PLY, or
+//! gzip of it. Out: a checked `Scene`, or one line that says what is wrong. What format it is,
+//! its contents tell, and that is found out here and nowhere else.
 
 const std = @import("std");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
@@ -61,10 +61,15 @@ pub fn parseNamed(
     const copy = try gpa.dupeSentinel(u8, bytes, 0);
     var opened: Resources.Scene = .{
         .main = .{ .bytes = copy, .identity = null },
-        .resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings },
+        .resources = .{
+            .gpa = gpa,
+            .io = io,
+            .folder = folder,
+            .settings = settings,
+            .bytes_read = bytes.len,
+        },
     };
     defer gpa.free(opened.main.bytes);
-    opened.resources.bytes_read = bytes.len;
     return read(&opened, name, diagnostic);
 }
 
@@ -94,18 +99,18 @@ fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Err
 fn unpack(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Error!void {
     const packed_bytes = opened.main.bytes;
     if (!gzip.isGzip(packed_bytes)) return;
-    const gpa = opened.resources.gpa;
-    const limit = Resources.file_bytes_max;
-    const reason = &diagnostic.message;
-    opened.main.bytes = gzip.inflate(gpa, packed_bytes, limit, reason) catch |err| switch (err) {
+    opened.main.bytes = opened.resources.inflate(
+        packed_bytes,
+        Resources.file_bytes_max,
+        &diagnostic.message,
+    ) catch |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidGzip => return error.InvalidInput,
     };
     if (!std.ascii.endsWithIgnoreCase(path, ".gz") and
         !std.mem.eql(u8, path, settings_file.standard_input))
         diagnostic.forgive("is gzip without being called so", .{});
-    gpa.free(packed_bytes);
-    opened.resources.bytes_read += opened.main.bytes.len;
+    opened.resources.gpa.free(packed_bytes);
 }
 
 /// What a file is to be read as, or what else it is.
@@ -140,8 +145,8 @@ pub fn checkOnly(
         return diagnostic.fail(error.MaterialVariantUnknown, "it has no material variants", .{});
 }
 
-/// Reads a glTF file that is in memory, JSON or binary; what it names is looked for in `folder`.
-/// Otherwise like `parse`.
+/// Reads a glTF file that is in memory, JSON or binary, whatever it seems to be. Otherwise like
+/// `parseNamed`.
 pub fn parseBytes(
     gpa: Allocator,
     io: std.Io,
@@ -150,8 +155,9 @@ pub fn parseBytes(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!Scene {
-    var resources: Resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings };
-    return gltf.read(&resources, bytes, diagnostic);
+    var own = settings;
+    own.format = .gltf;
+    return parseNamed(gpa, io, "text", bytes, folder, own, diagnostic);
 }
 
 /// The same for a PBRT text.
@@ -163,20 +169,18 @@ pub fn parsePbrt(
     settings: Settings,
     diagnostic: *Diagnostic,
 ) Error!Scene {
-    const copy = try gpa.dupeSentinel(u8, bytes, 0);
-    defer gpa.free(copy);
-    var resources: Resources = .{ .gpa = gpa, .io = io, .folder = folder, .settings = settings };
-    resources.bytes_read = bytes.len;
-    return pbrt.read(&resources, "text", .{ .bytes = copy, .identity = null }, diagnostic);
+    var own = settings;
+    own.format = .pbrt;
+    return parseNamed(gpa, io, "text", bytes, folder, own, diagnostic);
 }
 
 test {
     _ = Resources;
     _ = @import("parse/cgltf.zig");
+    _ = @import("parse/file_search.zig");
     _ = format_file;
     _ = gltf;
     _ = pbrt;
-    _ = @import("parse/named_images.zig");
     _ = @import("parse/number.zig");
     _ = @import("parse/orientation.zig");
     _ = @import("parse/plain.zig");

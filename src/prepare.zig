@@ -30,6 +30,7 @@ const environment = @import("prepare/environment.zig");
 const sharing_file = @import("prepare/instances.zig");
 const join = @import("prepare/bvh/join.zig");
 const light = @import("prepare/light.zig");
+const light_sampler = @import("prepare/light_sampler.zig");
 const material = @import("prepare/material.zig");
 const motion_file = @import("prepare/motion.zig");
 const place_file = @import("prepare/pose.zig");
@@ -223,6 +224,10 @@ pub const EnvironmentError = environment.Error;
 pub const EnvironmentSource = environment.Source;
 /// See `makeEnvironment`.
 pub const OwnedEnvironmentMap = environment.OwnedMap;
+/// Makes light lists.
+pub const makeLightSampler = light_sampler.make;
+/// See `makeLightSampler`.
+pub const OwnedLightSampler = light_sampler.OwnedLightSampler;
 /// How a map is placed around the scene.
 pub const EnvironmentSettings = light.EnvironmentSettings;
 
@@ -246,6 +251,8 @@ pub const PoseCache = struct {
     sharing: sharing_file.Sharing,
     plan: flatten.Plan,
     arrays: flatten.Arrays,
+    /// What was subtracted from all places.
+    shift: math.Vec3d = @splat(0),
     tree: ?bvh_refit.AnyRefit = null,
     lanes: u8,
     tree_quality: TreeQuality,
@@ -288,7 +295,8 @@ pub fn pose(
     const parts = &loaded.parts;
     const point_size = settings.point_size;
     const attributes = attributesOf(&loaded.textures);
-    const sharing = try shareMeshes(&posed.world, gpa, from, loaded, settings);
+    const snapshot: Snapshot = try .of(posed.world.pose_arena.allocator(), from, loaded);
+    const sharing = try shareMeshes(&posed.world, gpa, &snapshot, loaded, settings);
     var plan: flatten.Plan = try .init(gpa, sharing.flat, parts.meshes, point_size, diagnostic);
     errdefer plan.deinit(gpa);
     try expectRoom(gpa, plan.with_room.triangle_count);
@@ -302,7 +310,17 @@ pub fn pose(
         .point_size = point_size,
     };
     const planned_ns = nanoseconds(start.durationTo(Clock.awake.now(io)));
-    try placeAll(&posed.world, &posed.cache, io, from, loaded, settings, diagnostic, times);
+    try placeAll(
+        &posed.world,
+        &posed.cache,
+        io,
+        from,
+        &snapshot,
+        loaded,
+        settings,
+        diagnostic,
+        times,
+    );
     times.prepare_ns += planned_ns;
     return posed;
 }
@@ -322,26 +340,42 @@ fn expectRoom(gpa: Allocator, triangle_count: u32) error{OutOfMemory}!void {
     gpa.rawFree(room[0..bytes], .@"64", @returnAddress());
 }
 
+/// Where a scene's nodes are, and what is drawn of it.
+const Snapshot = struct {
+    place: place_file.Pose,
+    drawn: Drawn,
+
+    /// As the scene stands. Not inlined, see `chooseView`.
+    noinline fn of(
+        arena: Allocator,
+        from: *const Scene,
+        loaded: *const Loaded,
+    ) error{OutOfMemory}!Snapshot {
+        const mode = simd.setFlushToZero();
+        defer simd.setFloatControl(mode);
+        return .{
+            .place = try place_file.compose(arena, from),
+            .drawn = try .of(arena, from, &loaded.parts, &loaded.textures),
+        };
+    }
+};
+
 /// What instances share, where they do. Not inlined, see `chooseView`.
 noinline fn shareMeshes(
     posed: *World,
     gpa: Allocator,
-    from: *const Scene,
+    snapshot: *const Snapshot,
     loaded: *const Loaded,
     settings: PoseSettings,
 ) PoseError!sharing_file.Sharing {
     const mode = simd.setFlushToZero();
     defer simd.setFloatControl(mode);
-    const place = try place_file.compose(gpa, from);
-    defer place.deinit(gpa);
-    const arena = posed.arena.allocator();
-    const drawn: Drawn = try .of(arena, from, &loaded.parts, &loaded.textures);
     return sharing_file.share(
         gpa,
-        arena,
-        &drawn.parts,
+        posed.arena.allocator(),
+        &snapshot.drawn.parts,
         attributesOf(&loaded.textures),
-        &place,
+        &snapshot.place,
         &.{
             .rule = settings.sharing,
             .lanes = settings.lanes,
@@ -366,7 +400,12 @@ pub fn poseAgain(
     times: *StageTimes,
 ) PoseError!void {
     assert(cache.fits(&settings));
-    return placeAll(posed, cache, io, from, loaded, settings, diagnostic, times);
+    const start = Clock.awake.now(io);
+    _ = posed.pose_arena.reset(.retain_capacity);
+    const snapshot: Snapshot = try .of(posed.pose_arena.allocator(), from, loaded);
+    const composed_ns = nanoseconds(start.durationTo(Clock.awake.now(io)));
+    try placeAll(posed, cache, io, from, &snapshot, loaded, settings, diagnostic, times);
+    times.prepare_ns += composed_ns;
 }
 
 fn placeAll(
@@ -374,6 +413,7 @@ fn placeAll(
     cache: *PoseCache,
     io: std.Io,
     from: *const Scene,
+    snapshot: *const Snapshot,
     loaded: *const Loaded,
     settings: PoseSettings,
     diagnostic: *Diagnostic,
@@ -383,27 +423,26 @@ fn placeAll(
     defer simd.setFloatControl(mode);
     const start = Clock.awake.now(io);
     const gpa = cache.gpa;
-    _ = posed.pose_arena.reset(.retain_capacity);
     const arena = posed.pose_arena.allocator();
-    const place = try place_file.compose(arena, from);
-    const drawn: Drawn = try .of(arena, from, &loaded.parts, &loaded.textures);
-    const parts = &drawn.parts;
+    const place = &snapshot.place;
+    const parts = &snapshot.drawn.parts;
+    cache.shift = place.shift;
     var soup = try cache.plan.place(
         gpa,
         arena,
         &cache.arrays,
         if (cache.sharing.instances.len > 0) cache.sharing.flat else parts.instances,
         parts.meshes,
-        &place,
+        place,
         settings.pool,
         diagnostic,
     );
-    var geometry = geometryOf(&soup, &place, &cache.sharing);
+    var geometry = geometryOf(&soup, place, &cache.sharing);
     if (soup.strokes.spheres.len > 0) {
         const materials = parts.materials;
         const pixel = try view_file.pixelSize(gpa, from, materials, &geometry, &settings.view);
         try strokes.draw(gpa, &soup, pixel * settings.point_size / 2, settings.pool);
-        geometry = geometryOf(&soup, &place, &cache.sharing);
+        geometry = geometryOf(&soup, place, &cache.sharing);
     }
     geometry.shared = try sharing_file.numberAll(
         gpa,
@@ -413,7 +452,7 @@ fn placeAll(
         &soup,
         attributesOf(&loaded.textures),
     );
-    const materials = try material.place(arena, parts, &drawn.textures, &geometry);
+    const materials = try material.place(arena, parts, &snapshot.drawn.textures, &geometry);
     const tree_start = Clock.awake.now(io);
     const tree_facts = try fitTree(&posed.tree_arena, cache, &geometry, settings);
     const end = Clock.awake.now(io);
@@ -465,29 +504,27 @@ fn geometryOf(
     return geometry;
 }
 
-/// Brings `motion` up to all that the animations show which run at the moment that is posed, where
-/// it is not that already; null where there are none. `from` is the scene at rest.
+/// Brings `motion` up to all that these animations show, where it is not that already; null where
+/// there are none. `from` is the scene at rest, `cache` that of the pose that is shown.
 pub fn gatherMotion(
     gpa: Allocator,
     from: *const Scene,
     loaded: *const Loaded,
-    posed: *const AnimatedScene,
+    running: animate.Running,
+    cache: *const PoseCache,
     pool: *parallel.Pool,
     motion: *?Motion,
 ) PoseError!void {
-    const mode = simd.setFlushToZero();
-    defer simd.setFloatControl(mode);
-    const place = try place_file.compose(gpa, &posed.scene);
-    defer place.deinit(gpa);
     if (motion.*) |*known| {
-        if (std.meta.eql(known.shift, place.shift)) return;
+        if (std.meta.eql(known.shift, cache.shift)) return;
         known.deinit();
         motion.* = null;
     }
-    const running = posed.moment.running;
+    const mode = simd.setFlushToZero();
+    defer simd.setFloatControl(mode);
     const parts = &loaded.parts;
     motion.* =
-        try .gather(gpa, from, parts, &loaded.textures, running, place.shift, pool);
+        try .gather(gpa, from, parts, &loaded.textures, running, cache.shift, pool);
 }
 
 fn nanoseconds(duration: std.Io.Duration) u64 {
@@ -757,6 +794,56 @@ const TestScene = struct {
         }
         const positions: [*]const math.Vec3 = @ptrCast(corners.ptr);
         return init(gpa, positions[0 .. 3 * corners.len], triangles);
+    }
+};
+
+/// A scene, loaded and posed.
+const TestPose = struct {
+    pool: parallel.Pool,
+    diagnostic: Diagnostic = .{},
+    times: StageTimes = .{},
+    loaded: Loaded = undefined,
+    posed: Posed = undefined,
+
+    fn init(made: *TestPose, gpa: Allocator, from: *const Scene) !void {
+        made.* = .{ .pool = .init(2) };
+        errdefer made.pool.deinit();
+        const io = std.testing.io;
+        const pool = &made.pool;
+        made.loaded = try load(gpa, io, from, .{ .pool = pool }, &made.diagnostic, &made.times);
+        errdefer made.loaded.deinit();
+        made.posed = try pose(
+            gpa,
+            io,
+            from,
+            &made.loaded,
+            made.settings(),
+            &made.diagnostic,
+            &made.times,
+        );
+    }
+
+    fn again(made: *TestPose, from: *const Scene) !void {
+        try poseAgain(
+            &made.posed.world,
+            &made.posed.cache,
+            std.testing.io,
+            from,
+            &made.loaded,
+            made.settings(),
+            &made.diagnostic,
+            &made.times,
+        );
+    }
+
+    fn settings(made: *TestPose) PoseSettings {
+        return .{ .lanes = 4, .pool = &made.pool };
+    }
+
+    fn deinit(made: *TestPose) void {
+        made.posed.deinit();
+        made.loaded.deinit();
+        made.pool.deinit();
     }
 };
 
@@ -1156,17 +1243,10 @@ test "tangents of deformed meshes go with the joints" {
     from.skins = &.{.{ .joints = &.{0}, .inverse_bind_maps = &.{.identity} }};
     from.instances = &.{.{ .mesh = 0, .node = 0, .morph_weights = &.{1}, .skin = 0 }};
     from.check();
-    var pool: parallel.Pool = .init(1);
-    defer pool.deinit();
-    var diagnostic: Diagnostic = .{};
-    var times: StageTimes = .{};
-    const io = std.testing.io;
-    var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
-    defer loaded.deinit();
-    const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
-    var posed = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
-    defer posed.deinit();
-    const result = &posed.world;
+    var made: TestPose = undefined;
+    try made.init(gpa, &from);
+    defer made.deinit();
+    const result = &made.posed.world;
     for (result.geometry.tangents, result.geometry.normals) |tangent, normal| {
         for ([4]f32{ -0.6, 0.8, 0, -1 }, tangent) |wanted, found| {
             try std.testing.expectApproxEqAbs(wanted, found, 1e-6);
@@ -1224,19 +1304,11 @@ test "texture coordinates and tangents are placed where a texture asks for them"
         .{ .mesh = 0, .node = 0 }, .{ .mesh = 0, .node = 1 }, .{ .mesh = 1, .node = 0 },
     };
     from.check();
-    var pool: parallel.Pool = .init(2);
-    defer pool.deinit();
-    var diagnostic: Diagnostic = .{};
-    var times: StageTimes = .{};
-    const io = std.testing.io;
-    var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
-    defer loaded.deinit();
-    var posed = try pose(gpa, io, &from, &loaded, .{
-        .lanes = 4,
-        .pool = &pool,
-    }, &diagnostic, &times);
-    defer posed.deinit();
-    const geometry = &posed.world.geometry;
+    var made: TestPose = undefined;
+    try made.init(gpa, &from);
+    defer made.deinit();
+    const placed_world = &made.posed.world;
+    const geometry = &placed_world.geometry;
     for ([_]usize{ 0, 2, 3 }) |set| try std.testing.expectEqual(0, geometry.texcoords[set].len);
     for ([_]usize{ 0, 3 }) |first| {
         const placed = geometry.texcoords[1][first..][0..3];
@@ -1259,14 +1331,14 @@ test "texture coordinates and tangents are placed where a texture asks for them"
         try std.testing.expect(math.vec3.dot(bitangent, mapped) > 0.5);
         for (expected, direction) |a, b| try std.testing.expectApproxEqAbs(a, b, 1e-6);
     };
-    const used = &posed.world.materials.all[0];
+    const used = &placed_world.materials.all[0];
     try std.testing.expectEqual(0.5, used.normal_scale);
     try std.testing.expectEqual(1, used.lookup_count);
-    const lookup = &posed.world.materials.lookups[used.first_lookup];
+    const lookup = &placed_world.materials.lookups[used.first_lookup];
     try std.testing.expectEqual(1, lookup.texcoord_set);
-    const texture_of = &posed.world.frame().textures.all[lookup.texture];
+    const texture_of = &placed_world.frame().textures.all[lookup.texture];
     try std.testing.expectEqualSlices(u8, &texels, texture_of.levels[0].texels);
-    try std.testing.expectEqual(0, posed.world.materials.all[1].lookup_count);
+    try std.testing.expectEqual(0, placed_world.materials.all[1].lookup_count);
 }
 
 test "layers are there where a drawn material has some, and tangents for what has a direction" {
@@ -1279,20 +1351,13 @@ test "layers are there where a drawn material has some, and tangents for what ha
     for (&meshes) |*mesh| mesh.texcoords[0] = &.{ .{ 0, 0 }, .{ 1, 0 }, .{ 0, 1 } };
     from.meshes = &meshes;
     const instances = [_]scene.Instance{ .{ .mesh = 0, .node = 0 }, .{ .mesh = 1, .node = 0 } };
-    var pool: parallel.Pool = .init(1);
-    defer pool.deinit();
     for (1..3) |drawn_count| {
         from.instances = instances[0..drawn_count];
         from.check();
-        var diagnostic: Diagnostic = .{};
-        var times: StageTimes = .{};
-        const io = std.testing.io;
-        var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
-        defer loaded.deinit();
-        const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
-        var posed = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
-        defer posed.deinit();
-        const result = &posed.world;
+        var made: TestPose = undefined;
+        try made.init(gpa, &from);
+        defer made.deinit();
+        const result = &made.posed.world;
         const layers = result.materials.layers;
         if (drawn_count == 1) {
             try std.testing.expectEqual(0, layers.len);
@@ -1443,29 +1508,23 @@ test "a tree is fitted until it costs 1.3 times what it did, and is then built a
     var weights: [1]f32 = .{0};
     from.instances = &.{.{ .mesh = 0, .node = 0, .morph_weights = &weights }};
     from.check();
-    var pool: parallel.Pool = .init(2);
-    defer pool.deinit();
-    var diagnostic: Diagnostic = .{};
-    var times: StageTimes = .{};
-    const io = std.testing.io;
-    var loaded = try load(gpa, io, &from, .{ .pool = &pool }, &diagnostic, &times);
-    defer loaded.deinit();
-    const settings: PoseSettings = .{ .lanes = 4, .pool = &pool };
-    var posed = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
-    defer posed.deinit();
-    const world_posed = &posed.world;
-    const built = world_posed.facts.tree.sah_cost;
+    var made: TestPose = undefined;
+    try made.init(gpa, &from);
+    defer made.deinit();
+    const again = &made.posed.world;
+    const built = again.facts.tree.sah_cost;
     for ([_]f32{ 0.01, 1, 1.01, 0 }, [_]bool{ true, false, true, false }) |weight, is_fitted| {
         weights[0] = weight;
-        const cache = &posed.cache;
-        try poseAgain(world_posed, cache, io, &from, &loaded, settings, &diagnostic, &times);
-        try check.check(gpa, world_posed);
-        try std.testing.expectEqual(is_fitted, cache.tree.?.w4.sums.len > 0);
-        var fresh = try pose(gpa, io, &from, &loaded, settings, &diagnostic, &times);
+        try made.again(&from);
+        try check.check(gpa, again);
+        try std.testing.expectEqual(is_fitted, made.posed.cache.tree.?.w4.sums.len > 0);
+        var fresh: TestPose = undefined;
+        try fresh.init(gpa, &from);
         defer fresh.deinit();
-        try expectSameBytes(fresh.world.geometry.positions, world_posed.geometry.positions);
-        const cost = world_posed.facts.tree.sah_cost;
-        const new_cost = fresh.world.facts.tree.sah_cost;
+        const anew = &fresh.posed.world;
+        try expectSameBytes(anew.geometry.positions, again.geometry.positions);
+        const cost = again.facts.tree.sah_cost;
+        const new_cost = anew.facts.tree.sah_cost;
         if (!is_fitted) try std.testing.expectEqual(new_cost, cost);
         try std.testing.expect(cost <= 1.3 * @max(built, new_cost));
     }
@@ -1582,6 +1641,7 @@ test {
     _ = flatten;
     _ = strokes;
     _ = light;
+    _ = light_sampler;
     _ = material;
     _ = place_file;
     _ = tangents;

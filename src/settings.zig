@@ -35,10 +35,20 @@ pub const thread_count: Range = .{ .min = 1, .max = 256 };
 pub const sample_count: Range = .{ .min = 1, .max = 4096, .default = 4 };
 /// See `samplesFor`.
 pub const sample_count_small = 8;
+/// Samples of pixels that stay noisy, unless the user says.
+pub const noise_sample_count = 1024;
+/// See `Noise`.
+pub const noise_error: struct { min: f32, max: f32 } = .{ .min = 0.0001, .max = 1 };
+/// Seconds that tracing may take.
+pub const time_budget_s: struct { min: f32, max: f32 } = .{ .min = 0.01, .max = 1_000_000 };
+/// Of path tracing, whose samples are single paths.
+pub const sample_count_path = 64;
 /// Pictures whose long side has fewer pixels are small.
 pub const side_small = 512;
 /// Bounces after the primary ray: reflections and refractions in a row.
 pub const depth: Range = .{ .min = 0, .max = 32, .default = 6 };
+/// The same of path tracing, where light that surfaces scatter bounces, too.
+pub const depth_path = 16;
 /// Straight pieces that a full circle becomes.
 pub const tessellation: Range = .{ .min = 4, .max = 1024, .default = 32 };
 /// Longest side of a texture, in texels; larger images are halved until they fit.
@@ -285,8 +295,14 @@ pub const thesis: struct {
 };
 
 /// Samples a pixel of a picture, where nobody says how many.
-pub fn samplesFor(width: u32, height: u32) u32 {
+pub fn samplesFor(integrator: Integrator, width: u32, height: u32) u32 {
+    if (integrator == .path) return sample_count_path;
     return if (@max(width, height) < side_small) sample_count_small else sample_count.default;
+}
+
+/// Bounces at most, where nobody says how many.
+pub fn depthFor(integrator: Integrator) u32 {
+    return if (integrator == .path) depth_path else depth.default;
 }
 
 /// How a scene is read.
@@ -353,6 +369,21 @@ pub const Integrator = enum {
     lights,
     /// Path tracing (Kajiya 1986): all light, with noise that ends as samples grow.
     path,
+
+    /// Whether a sample is the same whatever the number of them, so that more can be added to a
+    /// picture.
+    pub fn isOpen(integrator: Integrator) bool {
+        return integrator == .path;
+    }
+};
+
+/// How much noise may be left in a block of pixels, for it to get no more samples.
+pub const Noise = struct {
+    /// Standard error of pixels, of the square root of radiance that is exposed, 1 being white;
+    /// within `noise_error`.
+    error_max: f32,
+    /// What is chosen for the picture.
+    exposure: Exposure = .default,
 };
 
 /// Lights of `Integrator.lights` in each sample; samples take turns with sets of them.
@@ -372,9 +403,14 @@ pub const Render = struct {
     lights: Lights = .{},
     /// Index into `variant.compiled`.
     variant: usize = 0,
-    /// Null: the scene's, or by `samplesFor`.
+    /// With `noise` or `time_budget_s`, the most. Null: the scene's, or by `samplesFor`; with
+    /// these `noise_sample_count`, or as many as there may be.
     sample_count: ?u32 = null,
-    /// Null: the scene's, or `depth.default`.
+    /// Null: all pixels have as many samples. For integrators that are open.
+    noise: ?Noise = null,
+    /// Seconds to trace for, within `time_budget_s`; null: however long it takes.
+    time_budget_s: ?f32 = null,
+    /// Null: the scene's, or by `depthFor`.
     depth: ?u32 = null,
     tile_size: u32 = tile_size.default,
 };

@@ -22,7 +22,7 @@ pub const Whitted = @import("trace/integrate/whitted.zig").Whitted;
 /// Instant radiosity, by one kernel.
 pub const Lights = @import("trace/integrate/instant_radiosity.zig").InstantRadiosity;
 /// Path tracing, by one kernel.
-pub const PathTracer = Whitted;
+pub const PathTracer = @import("trace/integrate/path_tracer.zig").PathTracer;
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
 pub const kernel = @import("trace/traverse/kernel.zig");
 /// Rays in lanes.
@@ -56,6 +56,9 @@ pub const beam = struct {
     pub const shadow_plane = @import("trace/traverse/beam/shadow_plane.zig");
     pub const shadow_receivers = @import("trace/traverse/beam/shadow_receivers.zig");
 };
+/// The light list in lanes, and the tree of it.
+pub const light_sampling = @import("trace/shade/light_sampling.zig");
+pub const light_tree = @import("trace/shade/light_tree.zig");
 /// What tests of traversal ask of a kernel.
 pub const searches = @import("trace/traverse/searches.zig");
 /// A bundle in the variant's own way.
@@ -70,6 +73,8 @@ pub fn searchesOf(comptime Kernel: type) *const searches.Searches(Kernel) {
 /// A kernel's face.
 pub const Integrator = tiles.Integrator;
 pub const Settings = tiles.Settings;
+pub const Course = tiles.Course;
+pub const Standing = tiles.Standing;
 pub const Statistics = tiles.Statistics;
 pub const Error = tiles.Error;
 
@@ -156,16 +161,21 @@ test {
     _ = @import("trace/integrate/camera.zig");
     _ = @import("trace/integrate/numbers.zig");
     _ = @import("trace/integrate/path.zig");
+    _ = @import("trace/integrate/path_records.zig");
     _ = tiles;
+    _ = @import("trace/integrate/adaptive.zig");
     _ = @import("trace/traverse/beam/budget.zig");
     _ = @import("trace/traverse/beam/tile_depth_buffer.zig");
     _ = @import("trace/traverse/beam/grid.zig");
     _ = beam.pixel_window;
     _ = @import("trace/integrate/sampler.zig");
+    _ = @import("trace/integrate/sobol.zig");
     _ = @import("trace/shade/cosine.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/iridescence.zig");
     _ = @import("trace/shade/light.zig");
+    _ = light_sampling;
+    _ = @import("trace/shade/environment_sampling.zig");
     _ = @import("trace/shade/offset.zig");
     _ = @import("trace/shade/albedo.zig");
     _ = @import("trace/shade/anisotropy.zig");
@@ -174,7 +184,8 @@ test {
     _ = @import("trace/shade/microfacet.zig");
     _ = @import("trace/shade/coating.zig");
     _ = @import("trace/shade/interface.zig");
-    _ = @import("trace/shade/sampling.zig");
+    _ = @import("trace/shade/passing.zig");
+    _ = @import("trace/shade/scatter.zig");
     _ = @import("trace/shade/sheen.zig");
     _ = @import("trace/shade/phase.zig");
     _ = @import("trace/shade/transmission.zig");

@@ -14,13 +14,17 @@ pub const instances = @import("world/instances.zig");
 const geometry_file = @import("world/geometry.zig");
 const materials_file = @import("world/materials.zig");
 const textures_file = @import("world/textures.zig");
+const light_sampler_file = @import("world/light_sampler.zig");
 const view_file = @import("world/view.zig");
 
 pub const AnyTree = geometry_file.AnyTree;
 pub const Camera = view_file.Camera;
 pub const Child = geometry_file.Child;
+pub const DirectionalChoice = light_sampler_file.DirectionalChoice;
 pub const Environment = environment_file.Environment;
+pub const EnvironmentDistribution = light_sampler_file.EnvironmentDistribution;
 pub const EnvironmentLevel = environment_file.EnvironmentLevel;
+pub const Cursor = instances.Cursor;
 pub const EnvironmentMap = environment_file.EnvironmentMap;
 pub const EnvironmentPart = environment_file.EnvironmentPart;
 pub const EnvironmentSource = environment_file.EnvironmentSource;
@@ -30,6 +34,10 @@ pub const Geometry = geometry_file.Geometry;
 pub const Layers = @import("world/layers.zig").Layers;
 pub const Lookup = textures_file.Lookup;
 pub const Light = @import("world/light.zig").Light;
+pub const LightLeaf = light_sampler_file.LightLeaf;
+pub const LightNode = light_sampler_file.LightNode;
+pub const LightSampler = light_sampler_file.LightSampler;
+pub const LightTree = light_sampler_file.LightTree;
 pub const Material = materials_file.Material;
 pub const Materials = materials_file.Materials;
 pub const Node = geometry_file.Node;
@@ -48,6 +56,8 @@ pub const View = view_file.View;
 pub const Volume = @import("world/volume.zig").Volume;
 pub const Wrap = textures_file.Wrap;
 pub const cache_line_bytes = geometry_file.cache_line_bytes;
+pub const light_tree_depth_max = light_sampler_file.light_tree_depth_max;
+pub const light_tree_width = light_sampler_file.light_tree_width;
 pub const none = geometry_file.none;
 pub const tree_depth_max = geometry_file.tree_depth_max;
 pub const walk_depth_max = geometry_file.walk_depth_max;
@@ -60,6 +70,8 @@ pub const Frame = struct {
     lights: []const Light,
     environment: *const Environment,
     view: *const View,
+    /// For integrators that choose lights at random; null: nobody asked for it.
+    light_sampler: ?*const LightSampler = null,
 
     /// Whether what is seen depends on how wide rays are: they have cones then.
     pub inline fn needsFootprints(frame: *const Frame) bool {

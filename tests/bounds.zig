@@ -379,10 +379,7 @@ const Tile = struct {
     /// A box from `lower` to `upper` as the third child of a node.
     fn meets(tile: *const Tile, lower: [3]f32, upper: [3]f32, depth_max: f32) ?f32 {
         var node: raylane.world.Node(4) = .empty;
-        for (0..3) |axis| {
-            node.bounds[0][axis][2] = lower[axis];
-            node.bounds[1][axis][2] = upper[axis];
-        }
+        node.setChildBox(2, .{ .lower = lower, .upper = upper });
         const met = tile.frustum.meet(&node, depth_max);
         return if (met.mask.lane(2)) met.near.lane(2) else null;
     }

@@ -137,6 +137,7 @@ pub const Builder = struct {
 
 /// How a test wants its picture.
 pub const Options = struct {
+    integrator: raylane.settings.Integrator = .whitted,
     width: u32 = 32,
     height: u32 = 32,
     depth_max: u32 = 6,
@@ -213,6 +214,7 @@ pub fn trace(session: *Session, options: Options) !*Image {
     // Every pixel must be written.
     @memset(session.film.?.image.pixels, @splat(std.math.nan(f32)));
     try session.render(.{
+        .integrator = options.integrator,
         .variant = options.variant,
         .sample_count = options.sample_count,
         .depth = options.depth_max,

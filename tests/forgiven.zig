@@ -7,6 +7,7 @@
 const std = @import("std");
 const raylane = @import("raylane");
 const malformed = @import("malformed.zig");
+const texts = @import("gltf_text.zig");
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Scene = raylane.scene.Scene;
 const parse = raylane.parse;
@@ -14,23 +15,14 @@ const testing = std.testing;
 const gpa = testing.allocator;
 const io = testing.io;
 
-/// A part of the document, and what stands there instead.
-const Change = [2][]const u8;
+const Change = texts.Replacement;
 
 /// Changes, the warning of a reader that forgives, and how the line of one that does not begins;
 /// the same where it is empty.
 const Case = struct { changes: []const Change, warning: []const u8, refusal: []const u8 = "" };
 
 fn change(changes: []const Change) ![]u8 {
-    const buffer = malformed.makeBuffer();
-    var text = try malformed.makeText(&buffer);
-    errdefer gpa.free(text);
-    for (changes) |one| {
-        const changed = try malformed.replace(text, one[0], one[1]);
-        gpa.free(text);
-        text = changed;
-    }
-    return text;
+    return texts.make(malformed.document, &malformed.makeBuffer(), changes);
 }
 
 fn read(bytes: []const u8, settings: raylane.settings.Load, said: *Diagnostic) parse.Error!Scene {
@@ -174,9 +166,15 @@ test "what nobody looks at" {
             .warning = "cameras[0].perspective.zfar: 1e39 is out of range; left out",
             .refusal = "cameras[0].perspective.zfar: 1e39 is out of range",
         },
+        .{
+            .changes = &.{.{ "\"scene\":0,", "\"scene\":0,\"textures\":{\"source\":[]}," }},
+            .warning = "textures: a list is expected; left out",
+            .refusal = "textures: a list is expected",
+        },
     });
 }
 
+const lens = "\"orthographic\":{\"xmag\":1,\"ymag\":1,\"znear\":0,\"zfar\":1}";
 const unneeded = "; nothing drawn needs it";
 
 /// What is added behind a part of the document, and the fault.
@@ -238,6 +236,11 @@ test "what nothing drawn needs" {
             .fault = "textures[0].source: 4 of 0",
         },
         .{
+            .behind = "\"znear\":0.1,\"zfar\":100}}",
+            .added = ",{\"perspective\":{\"yfov\":1}," ++ lens ++ "}",
+            .fault = "cameras[1].orthographic: stands beside 'perspective'",
+        },
+        .{
             .behind = "\"scene\":0,",
             .added = "\"images\":[{\"bufferView\":-1}],",
             .fault = "images[0].bufferView: -1 is not a whole number from 0 to 2^53 - 1",
@@ -289,26 +292,44 @@ test "what nothing drawn needs" {
 
 test "what is drawn is needed, and so is what that is made of" {
     const last_node = "0,0,0,1]}";
-    for ([_]Addition{
+    const is_shown: Change = .{ "[0,3]", "[0,3,4]" };
+    for ([_]struct { []const Change, []const u8 }{
         .{
-            .behind = last_node,
-            .added = ",{\"children\":[2]}",
-            .fault = "nodes[4].children[0]: 2 has two parents",
+            &.{ .{ last_node, last_node ++ ",{\"children\":[2]}" }, is_shown },
+            "nodes[4].children[0]: 2 has two parents",
         },
         .{
-            .behind = last_node,
-            .added = ",{\"mesh\":5}",
-            .fault = "nodes[4].mesh: 5 of 1",
+            &.{ .{ last_node, last_node ++ ",{\"mesh\":5}" }, is_shown },
+            "nodes[4].mesh: 5 of 1",
         },
-    }) |addition| {
-        const new = try std.mem.concat(gpa, u8, &.{ addition.behind, addition.added });
-        defer gpa.free(new);
-        const bytes = try change(&.{ .{ addition.behind, new }, .{ "[0,3]", "[0,3,4]" } });
+        .{
+            &.{.{ "\"skins\":", "\"skins\":{},\"unread\":" }},
+            "nodes[1].skin: 0 of 0",
+        },
+        .{
+            &.{.{ "\"perspective\":", lens ++ ",\"perspective\":" }},
+            "cameras[0].perspective: stands beside 'orthographic'",
+        },
+    }) |case| {
+        const bytes = try change(case[0]);
         defer gpa.free(bytes);
         var said: Diagnostic = .{};
         try testing.expectError(error.InvalidInput, read(bytes, .{}, &said));
-        try testing.expectEqualStrings(addition.fault, said.message.text());
+        try testing.expectEqualStrings(case[1], said.message.text());
     }
+}
+
+test "the first of several faults is the error line of a strict reader" {
+    const text = try change(&.{});
+    defer gpa.free(text);
+    const lost = ",{\"byteLength\":4,\"uri\":\"lost.bin\"}]}";
+    const parts = [_][]const u8{ "\xef\xbb\xbf", text[0 .. text.len - "]}".len], lost };
+    const bytes = try std.mem.concat(gpa, u8, &parts);
+    defer gpa.free(bytes);
+    var said: Diagnostic = .{};
+    try testing.expectError(error.InvalidInput, read(bytes, .{ .strict = true }, &said));
+    const mark = "the JSON text begins with a byte order mark, ignored";
+    try testing.expectEqualStrings(mark, said.message.text());
 }
 
 test "a broken animation is left out" {
@@ -316,16 +337,18 @@ test "a broken animation is left out" {
     for ([_][2][]const u8{
         .{
             "[{\"channels\":[{}]}]",
-            "animations[0].channels[0]: 'sampler' is missing; nothing drawn needs it",
+            "animations[0].channels[0]: 'sampler' is missing; left out",
         },
         .{
             "[{\"samplers\":[],\"channels\":[" ++ channel ++ "]}]",
-            "animations refer to what is not there, left out",
+            "animation 0, channel 0: there is no sampler 0, left out",
         },
         .{
             "[{\"samplers\":[{\"input\":70,\"output\":0}]}]",
-            "animations[0].samplers[0].input: 70 of 9; nothing drawn needs it",
+            "animations[0].samplers[0].input: 70 of 9; left out",
         },
+        .{ "[7]", "animations[0]: an object is expected; nothing drawn needs it" },
+        .{ "{}", "animations: a list is expected; left out" },
     }) |case| {
         const new = try std.mem.concat(gpa, u8, &.{ "\"scene\":0,\"animations\":", case[0] });
         defer gpa.free(new);
@@ -452,13 +475,8 @@ test "weights and colours that are not finite" {
     };
     var buffer = malformed.makeBuffer();
     @memcpy(buffer[208..212], nan); // The second vertex; the matrices' diagonals are 1.
-    var text = try malformed.makeText(&buffer);
+    const text = try texts.make(malformed.document, &buffer, &changes);
     defer gpa.free(text);
-    for (changes) |one| {
-        const changed = try malformed.replace(text, one[0], one[1]);
-        gpa.free(text);
-        text = changed;
-    }
     var said: Diagnostic = .{};
     var scene = try read(text, .{}, &said);
     defer scene.deinit();

@@ -199,6 +199,34 @@ test "MTL: a byte order mark, quotes and comments about names, statements in any
     try std.testing.expectEqualStrings("image", scene.images[0].bytes);
 }
 
+test "MTL: names of files with escapes of URIs, and in another letter case" {
+    var folder = std.testing.tmpDir(.{});
+    defer folder.cleanup();
+    try folder.dir.createDir(io, "Maps", .default_dir);
+    try folder.dir.writeFile(io, .{
+        .sub_path = "A.MTL",
+        .data = "newmtl m\nmap_Kd maps\\c.png\nmap_d c%20d.png\nmap_Ke e.png",
+    });
+    try folder.dir.writeFile(io, .{ .sub_path = "Maps/C.PNG", .data = "one" });
+    try folder.dir.writeFile(io, .{ .sub_path = "Maps/c.Png", .data = "other" });
+    try folder.dir.writeFile(io, .{ .sub_path = "c d.png", .data = "holes" });
+    const text = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";
+    var said: Diagnostic = .{};
+    var scene = try readIn(folder.dir, "a.obj", text, &said);
+    defer scene.deinit();
+    try expectEqual(2, scene.images.len);
+    try std.testing.expectEqualStrings("one", scene.images[0].bytes);
+    try std.testing.expectEqualStrings("holes", scene.images[1].bytes);
+    try expectEqual(3, said.warning_count);
+    for ([_][]const u8{
+        "material library 'a.mtl' is 'A.MTL'",
+        "image 'maps\\c.png' is 'Maps/C.PNG'",
+        "image 'e.png' does not exist, left out",
+    }, said.warnings[0..3]) |expected, *warning| {
+        try std.testing.expectEqualStrings(expected, warning.text());
+    }
+}
+
 test "STL: lines that end in returns alone; PLY: a byte order mark" {
     var text = try readClean("a.stl", "solid a\rfacet normal 1.#IND 0 0\router loop\r" ++
         "vertex 0 0 0\rvertex 1 0 0\rvertex 0 1 0\rendloop\rendfacet\rendsolid a\r");
@@ -565,6 +593,25 @@ test "PLY: colours of vertices, of faces, and coordinates of corners" {
     try expectEqual([2]f32{ 0, 1 }, mesh.texcoords[0].?[0]);
     try expectEqual([4]f32{ 0, 1, 0, 1 }, mesh.colors.?[4]);
     try std.testing.expectEqualStrings("image", own.images[0].bytes);
+}
+
+test "PLY: names in any case, and alpha of 0 everywhere is none" {
+    var said: Diagnostic = .{};
+    var scene = try read("a", "ply\nformat ascii 1.0\nelement Vertex 3\nproperty FLOAT X\n" ++
+        "property float Y\nproperty float Z\nproperty uchar Red\nproperty uchar Alpha\n" ++
+        "element FACE 1\nproperty list uchar int Vertex_Indices\nend_header\n" ++
+        "1 2 3 255 0 4 5 6 0 0 7 8 9 0 0 3 0 1 2", &said);
+    defer scene.deinit();
+    const mesh = &scene.meshes[0];
+    try expectEqual(Vec3{ 1, 2, 3 }, mesh.positions[0]);
+    try expectEqual(1, scene.triangleCount());
+    try expectEqual([4]f32{ 1, 0, 0, 1 }, mesh.colors.?[0]);
+    try expectEqual(.@"opaque", scene.materials[0].alpha_mode);
+    try expectEqual(1, said.warning_count);
+    try std.testing.expectEqualStrings(
+        "alpha is 0 everywhere: taken as opaque",
+        said.warnings[0].text(),
+    );
 }
 
 test "PLY: nothing at all is a warning" {

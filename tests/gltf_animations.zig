@@ -6,7 +6,7 @@
 
 const std = @import("std");
 const raylane = @import("raylane");
-const texts = @import("gltf_textures.zig");
+const texts = @import("gltf_text.zig");
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Scene = raylane.scene.Scene;
 const Session = raylane.session.Session;
@@ -115,12 +115,7 @@ fn read(allocator: std.mem.Allocator, animations: []const u8, said: *Diagnostic)
 
 /// The caller frees it.
 fn makeText(animations: []const u8) ![]u8 {
-    const encoder = std.base64.standard.Encoder;
-    const buffer = makeBuffer();
-    var digits: [encoder.calcSize(buffer.len)]u8 = undefined;
-    const with_data = try texts.replace(document, "$DATA", encoder.encode(&digits, &buffer));
-    defer gpa.free(with_data);
-    return texts.replace(with_data, "$ANIMATIONS", animations);
+    return texts.make(document, &makeBuffer(), &.{.{ "$ANIMATIONS", animations }});
 }
 
 /// The scene, posed; the session is the caller's.
@@ -356,6 +351,91 @@ test "what cannot be read of an animation is left out with a warning, and the re
         try testing.expectEqual(case[1], said.warning_count);
         try testing.expectEqual(case[2], scene.animations[0].channels.len);
     }
+}
+
+test "a channel or a sampler that is broken costs no other" {
+    const good = "{\"sampler\":0,\"target\":{\"node\":0,\"path\":\"scale\"}}";
+    const sampler = "{\"input\":2,\"output\":3}";
+    const cases = comptime [_]struct { []const u8, []const u8, []const u8 }{
+        .{
+            "{\"sampler\":5,\"target\":{\"node\":1,\"path\":\"scale\"}}",
+            sampler,
+            "animation 0, channel 0: there is no sampler 5, left out",
+        },
+        .{
+            "{\"sampler\":4294967296,\"target\":{\"node\":1,\"path\":\"scale\"}}",
+            sampler,
+            "animation 0, channel 0: there is no sampler 4294967296, left out",
+        },
+        .{
+            "{\"sampler\":0,\"target\":{\"node\":9,\"path\":\"scale\"}}",
+            sampler,
+            "animations[0].channels[0].target.node: 9 of 5; left out",
+        },
+        .{
+            "{\"sampler\":0,\"target\":[]}",
+            sampler,
+            "animations[0].channels[0].target: an object is expected; left out",
+        },
+        .{ "7", sampler, "animations[0].channels[0]: an object is expected; left out" },
+        .{
+            "{\"sampler\":0,\"target\":{\"extensions\":{\"KHR_animation_pointer\":" ++
+                "{\"pointer\":1}}}}",
+            sampler,
+            "animations[0].channels[0].target.extensions.KHR_animation_pointer.pointer: " ++
+                "a string is expected; left out",
+        },
+        .{
+            "{\"sampler\":1,\"target\":{\"node\":1,\"path\":\"scale\"}}",
+            sampler ++ ",{\"input\":2,\"output\":99}",
+            "animations[0].samplers[1].output: 99 of 11; left out",
+        },
+        .{
+            "{\"sampler\":1,\"target\":{\"node\":1,\"path\":\"scale\"}}",
+            sampler ++ ",{\"input\":2}",
+            "animations[0].samplers[1]: 'output' is missing; left out",
+        },
+    };
+    inline for (cases) |case| {
+        errdefer std.debug.print("expected: {s}\n", .{case[2]});
+        var said: Diagnostic = .{};
+        var scene = try read(gpa, "{\"channels\":[" ++ case[0] ++ "," ++ good ++
+            "],\"samplers\":[" ++ case[1] ++ "]}", &said);
+        defer scene.deinit();
+        scene.check();
+        try testing.expectEqual(1, said.warning_count);
+        try testing.expectEqualStrings(case[2], said.warnings[0].text());
+        try testing.expectEqual(1, scene.animations.len);
+        try testing.expectEqual(1, scene.animations[0].channels.len);
+        try testing.expectEqual(1, scene.file.counts.?.animations);
+    }
+}
+
+test "key frames in a file that is missing" {
+    const text = try makeText(comptime animation(node("1", "scale"), times, "11", "LINEAR"));
+    defer gpa.free(text);
+    const buffers = "\"bufferViews\":[";
+    const at = std.mem.find(u8, text, buffers).? - "],\n".len;
+    const parts = [_][]const u8{
+        text[0..at],
+        ",{\"bufferView\":10,\"componentType\":5126,\"count\":2,\"type\":\"VEC3\"}",
+        text[at .. text.len - "]}".len],
+        ",{\"byteLength\":24,\"uri\":\"lost.bin\"}]}",
+    };
+    const with_buffer = try std.mem.concat(gpa, u8, &parts);
+    defer gpa.free(with_buffer);
+    const view = "{\"buffer\":0,\"byteOffset\":216,\"byteLength\":8}";
+    const lost = view ++ ",{\"buffer\":1,\"byteLength\":24}";
+    const with_view = try texts.replace(with_buffer, view, lost);
+    defer gpa.free(with_view);
+    var said: Diagnostic = .{};
+    var scene = try raylane.parse.parseBytes(gpa, testing.io, with_view, .cwd(), .{}, &said);
+    defer scene.deinit();
+    try testing.expectEqualStrings(
+        "animation 0, channel 0: sampler 0: buffer 1: 'lost.bin' does not exist, left out",
+        said.warnings[0].text(),
+    );
+    try testing.expectEqual(1, scene.triangleCount());
 }
 
 test "all that an animation shows is framed, whatever moment is seen" {

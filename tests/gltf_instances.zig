@@ -5,7 +5,7 @@
 
 const std = @import("std");
 const raylane = @import("raylane");
-const texts = @import("gltf_textures.zig");
+const texts = @import("gltf_text.zig");
 const AffineD = raylane.math.AffineD;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Replacement = texts.Replacement;
@@ -50,16 +50,8 @@ fn makeBuffer() [144]u8 {
 }
 
 fn read(replacements: []const Replacement, said: *Diagnostic) !raylane.scene.Scene {
-    const bytes = makeBuffer();
-    const encoder = std.base64.standard.Encoder;
-    var digits: [encoder.calcSize(bytes.len)]u8 = undefined;
-    var text = try texts.replace(document, "$DATA", encoder.encode(&digits, &bytes));
+    const text = try texts.make(document, &makeBuffer(), replacements);
     defer gpa.free(text);
-    for (replacements) |pair| {
-        const changed = try texts.replace(text, pair[0], pair[1]);
-        gpa.free(text);
-        text = changed;
-    }
     const scene = try raylane.parse.parseBytes(gpa, testing.io, text, .cwd(), .{}, said);
     scene.check();
     return scene;

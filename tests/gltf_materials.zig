@@ -5,12 +5,11 @@
 
 const std = @import("std");
 const raylane = @import("raylane");
-const gltf_textures = @import("gltf_textures.zig");
+const texts = @import("gltf_text.zig");
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Material = raylane.scene.Material;
 const Scene = raylane.scene.Scene;
 const TextureView = raylane.scene.TextureView;
-const replace = gltf_textures.replace;
 const testing = std.testing;
 const gpa = testing.allocator;
 
@@ -62,12 +61,11 @@ fn makeText(parts: Parts) ![]const u8 {
     defer arena_state.deinit();
     const arena = arena_state.allocator();
     var bytes: [144]u8 = undefined;
-    gltf_textures.putFloats(bytes[0..], &.{ 0, 0, 0, 1, 0, 0, 0, 1, 0 });
-    gltf_textures.putFloats(bytes[36..], &.{ 0, 0, 1, 0, 0, 1, 0, 0, 1 });
-    gltf_textures.putFloats(bytes[72..], &.{ 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1 });
-    gltf_textures.putFloats(bytes[120..], &.{ 0, 0, 1, 0, 0, 1 });
+    texts.putFloats(bytes[0..], &.{ 0, 0, 0, 1, 0, 0, 0, 1, 0 });
+    texts.putFloats(bytes[36..], &.{ 0, 0, 1, 0, 0, 1, 0, 0, 1 });
+    texts.putFloats(bytes[72..], &.{ 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1 });
+    texts.putFloats(bytes[120..], &.{ 0, 0, 1, 0, 0, 1 });
     const encoder = std.base64.standard.Encoder;
-    var digits: [encoder.calcSize(bytes.len)]u8 = undefined;
     var textures: std.Io.Writer.Allocating = .init(arena);
     var images: std.Io.Writer.Allocating = .init(arena);
     for (0..texture_count) |index| {
@@ -80,21 +78,13 @@ fn makeText(parts: Parts) ![]const u8 {
     var primitive: std.Io.Writer.Allocating = .init(arena);
     const attributes = .{ parts.attributes, parts.primitive };
     try primitive.writer.print("\"attributes\":{{{s}}},{s}", attributes);
-    var text: []const u8 = try gpa.dupe(u8, document);
-    errdefer gpa.free(text);
-    for ([_]gltf_textures.Replacement{
-        .{ "$DATA", encoder.encode(&digits, &bytes) },
+    return texts.make(document, &bytes, &.{
         .{ "$MATERIALS", parts.materials },
         .{ "$PRIMITIVE", primitive.written() },
         .{ "$TEXTURES", textures.written() },
         .{ "$IMAGES", images.written() },
         .{ "$MORE", parts.more },
-    }) |pair| {
-        const changed = try replace(text, pair[0], pair[1]);
-        gpa.free(text);
-        text = changed;
-    }
-    return text;
+    });
 }
 
 /// The material as the file's only extension has it.

@@ -7,7 +7,7 @@
 const std = @import("std");
 const raylane = @import("raylane");
 const fixture = @import("fixture.zig");
-const texts = @import("gltf_textures.zig");
+const texts = @import("gltf_text.zig");
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Replacement = texts.Replacement;
 const Vec3 = raylane.math.Vec3;
@@ -97,25 +97,11 @@ fn read(
     replacements: []const Replacement,
     said: *Diagnostic,
 ) !raylane.scene.Scene {
-    const text = try makeText(buffer, replacements);
+    const text = try texts.make(document, buffer, replacements);
     defer gpa.free(text);
     const scene = try raylane.parse.parseBytes(gpa, testing.io, text, .cwd(), .{}, said);
     scene.check();
     return scene;
-}
-
-/// The caller frees it.
-fn makeText(buffer: *const Buffer, replacements: []const Replacement) ![]const u8 {
-    const encoder = std.base64.standard.Encoder;
-    var digits: [encoder.calcSize(@sizeOf(Buffer))]u8 = undefined;
-    var text = try texts.replace(document, "$DATA", encoder.encode(&digits, buffer));
-    errdefer gpa.free(text);
-    for (replacements) |pair| {
-        const changed = try texts.replace(text, pair[0], pair[1]);
-        gpa.free(text);
-        text = changed;
-    }
-    return text;
 }
 
 /// Where the vertices are; the world is the caller's.
@@ -392,7 +378,7 @@ test "what no drawn node asks for is not read" {
 
 test "memory that runs out is an error that leaks nothing" {
     const buffer = makeBuffer();
-    const text = try makeText(&buffer, &.{ targets, meshWeights("[0.5,1,2]") });
+    const text = try texts.make(document, &buffer, &.{ targets, meshWeights("[0.5,1,2]") });
     defer gpa.free(text);
     const one = struct {
         fn one(failing: std.mem.Allocator, bytes: []const u8) !void {

@@ -6,7 +6,9 @@
 
 const std = @import("std");
 const raylane = @import("raylane");
+const texts = @import("gltf_text.zig");
 const Diagnostic = raylane.diagnostic.Diagnostic;
+const Replacement = texts.Replacement;
 const Scene = raylane.scene.Scene;
 const parse = raylane.parse;
 const testing = std.testing;
@@ -58,10 +60,10 @@ const document =
 /// The document's buffer, as floats and bytes in the order of its views.
 fn makeBuffer() [188]u8 {
     var bytes: [188]u8 = @splat(0);
-    putFloats(bytes[0..], &.{ 0, 0, 0, 1, 0, 0, 0, 1, 0 }); // Positions.
-    putFloats(bytes[36..], &.{ 0, 0, 1, 0, 0, 1, 0, 0, 1 }); // Normals.
-    putFloats(bytes[72..], &.{ 1, 0, 0, 1, 1, 0, 0, -1, 0, 1, 0, 0.5 }); // Tangents.
-    putFloats(bytes[120..], &.{ 0, 0, -2, 3.5, 0.25, 0.75 });
+    texts.putFloats(bytes[0..], &.{ 0, 0, 0, 1, 0, 0, 0, 1, 0 }); // Positions.
+    texts.putFloats(bytes[36..], &.{ 0, 0, 1, 0, 0, 1, 0, 0, 1 }); // Normals.
+    texts.putFloats(bytes[72..], &.{ 1, 0, 0, 1, 1, 0, 0, -1, 0, 1, 0, 0.5 }); // Tangents.
+    texts.putFloats(bytes[120..], &.{ 0, 0, -2, 3.5, 0.25, 0.75 });
     bytes[144..156].* = .{ 0, 255, 0xee, 0xee, 51, 102, 0xee, 0xee, 255, 0, 0xee, 0xee };
     const shorts = [6]u16{ 0, 65535, 13107, 26214, 65535, 0 };
     const quantized = [6]i16{ 0, 1, -2, 300, 5, -32768 };
@@ -73,38 +75,9 @@ fn makeBuffer() [188]u8 {
     return bytes;
 }
 
-/// Writes floats as a file has them.
-pub fn putFloats(bytes: []u8, values: []const f32) void {
-    for (values, 0..) |value, index| {
-        std.mem.writeInt(u32, bytes[4 * index ..][0..4], @bitCast(value), .little);
-    }
-}
-
-/// What stands in a document, and what is to stand there.
-pub const Replacement = struct { []const u8, []const u8 };
-
 /// The document with each first occurrence replaced. The caller frees it.
 fn makeText(replacements: []const Replacement) ![]u8 {
-    const buffer = makeBuffer();
-    const encoder = std.base64.standard.Encoder;
-    var digits: [encoder.calcSize(buffer.len)]u8 = undefined;
-    var text = try replace(document, "$DATA", encoder.encode(&digits, &buffer));
-    errdefer gpa.free(text);
-    for (replacements) |pair| {
-        const changed = try replace(text, pair[0], pair[1]);
-        gpa.free(text);
-        text = changed;
-    }
-    return text;
-}
-
-/// `text` with the first `old` replaced, which has to be there. The caller frees it.
-pub fn replace(text: []const u8, old: []const u8, new: []const u8) ![]u8 {
-    const index = std.mem.find(u8, text, old) orelse {
-        std.debug.print("{s} is not there\n", .{old});
-        return error.TestUnexpectedResult;
-    };
-    return std.mem.concat(gpa, u8, &.{ text[0..index], new, text[index + old.len ..] });
+    return texts.make(document, &makeBuffer(), replacements);
 }
 
 /// A folder with the files that the document names.

@@ -88,21 +88,22 @@ fn expectSame(flat: *const World, shared: *const World) !void {
     try std.testing.expectEqual(a.padding, b.padding);
     try std.testing.expectEqual(flat.facts.degenerate_count, shared.facts.degenerate_count);
     try std.testing.expectEqual(flat.view, shared.view);
+    var cursor: raylane.world.Cursor = .init(b);
     for (0..a.triangles.len) |index| {
         const number: u32 = @intCast(index);
         const one = a.face(number);
         const other = b.face(number);
-        const triangle = b.triangleAt(number);
+        const triangle = cursor.triangleAt(number);
         try std.testing.expectEqual(one.material, other.material);
         try std.testing.expectEqual(one.material, triangle.material);
         for (0..3) |corner| {
             const at = one.position(a, corner);
             try std.testing.expectEqual(at, other.position(b, corner));
-            try std.testing.expectEqual(at, b.positionAt(triangle.corner[corner]));
+            try std.testing.expectEqual(at, cursor.positionAt(triangle.corner[corner]));
             try std.testing.expectEqual(one.normal(a, corner), other.normal(b, corner));
             const color = one.color(a, corner);
             try std.testing.expectEqual(color, other.color(b, corner));
-            try std.testing.expectEqual(color, b.colorAt(triangle.corner[corner]));
+            try std.testing.expectEqual(color, cursor.colorAt(triangle.corner[corner]));
         }
     }
 }

@@ -23,10 +23,12 @@ test {
     _ = @import("gltf_quantization.zig");
     _ = @import("gltf_textures.zig");
     _ = @import("instances.zig");
+    _ = @import("light_sampling.zig");
     _ = @import("malformed.zig");
     _ = @import("meshes.zig");
     _ = @import("offset.zig");
     _ = @import("output.zig");
+    _ = @import("path.zig");
     _ = @import("pbrt.zig");
     _ = @import("pbrt_forgiven.zig");
     _ = @import("pbrt_textures.zig");

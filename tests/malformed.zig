@@ -6,6 +6,7 @@
 
 const std = @import("std");
 const raylane = @import("raylane");
+const texts = @import("gltf_text.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const Scene = raylane.scene.Scene;
@@ -68,41 +69,27 @@ pub fn makeBuffer() [buffer_bytes]u8 {
     var bytes: [buffer_bytes]u8 = @splat(0);
     const corners = [4][2]f32{ .{ 0, 0 }, .{ 1, 0 }, .{ 1, 1 }, .{ 0, 1 } };
     for (corners, 0..) |corner, index| {
-        putFloats(bytes[12 * index ..], &.{ corner[0], corner[1], 0 });
-        putFloats(bytes[48 + 12 * index ..], &.{ 0, 0, 1 });
+        texts.putFloats(bytes[12 * index ..], &.{ corner[0], corner[1], 0 });
+        texts.putFloats(bytes[48 + 12 * index ..], &.{ 0, 0, 1 });
         @memset(bytes[108 + 4 * index ..][0..4], 255);
-        putFloats(bytes[140 + 8 * index ..], &corner);
+        texts.putFloats(bytes[140 + 8 * index ..], &corner);
         bytes[172 + 4 * index] = @intCast(index % 2);
     }
     for ([6]u16{ 0, 1, 2, 0, 2, 3 }, 0..) |corner, index| {
         std.mem.writeInt(u16, bytes[96 + 2 * index ..][0..2], corner, .little);
     }
     bytes[124] = 2;
-    putFloats(bytes[128..], &.{ 2, 2, 0 });
+    texts.putFloats(bytes[128..], &.{ 2, 2, 0 });
     for (0..2) |matrix| for (0..4) |axis| {
-        putFloats(bytes[188 + 64 * matrix + 20 * axis ..], &.{1});
+        texts.putFloats(bytes[188 + 64 * matrix + 20 * axis ..], &.{1});
     };
     return bytes;
-}
-
-pub fn putFloats(bytes: []u8, values: []const f32) void {
-    for (values, 0..) |value, index| {
-        std.mem.writeInt(u32, bytes[4 * index ..][0..4], @bitCast(value), .little);
-    }
-}
-
-/// The document with its buffer inside. The caller frees it.
-pub fn makeText(buffer: []const u8) ![]u8 {
-    const encoder = std.base64.standard.Encoder;
-    const digits = try gpa.alloc(u8, encoder.calcSize(buffer.len));
-    defer gpa.free(digits);
-    return replace(document, "$DATA", encoder.encode(digits, buffer));
 }
 
 /// The document as GLB. The caller frees it.
 pub fn makeBinary(buffer: []const u8) ![]u8 {
     const uri = ",\"uri\":\"data:application/octet-stream;base64,$DATA\"";
-    const text = try replace(document, uri, "");
+    const text = try texts.replace(document, uri, "");
     defer gpa.free(text);
     const text_bytes = std.mem.alignForward(usize, text.len, 4);
     const glb = try gpa.alloc(u8, 12 + 8 + text_bytes + 8 + buffer.len);
@@ -120,12 +107,6 @@ pub fn makeBinary(buffer: []const u8) ![]u8 {
     return glb;
 }
 
-/// `text` with the first `old` replaced, which has to be there. The caller frees it.
-pub fn replace(text: []const u8, old: []const u8, new: []const u8) ![]u8 {
-    const index = std.mem.find(u8, text, old) orelse return error.TestUnexpectedResult;
-    return std.mem.concat(gpa, u8, &.{ text[0..index], new, text[index + old.len ..] });
-}
-
 /// Parses and throws away, with everything that a scene promises checked.
 fn tryParse(allocator: Allocator, bytes: []const u8, said: *Diagnostic) parse.Error!void {
     var scene = try parse.parseBytes(allocator, io, bytes, .cwd(), .{}, said);
@@ -135,7 +116,7 @@ fn tryParse(allocator: Allocator, bytes: []const u8, said: *Diagnostic) parse.Er
 
 test "the document is right, as text and as GLB" {
     const buffer = makeBuffer();
-    const text = try makeText(&buffer);
+    const text = try texts.make(document, &buffer, &.{});
     defer gpa.free(text);
     const glb = try makeBinary(&buffer);
     defer gpa.free(glb);
@@ -170,10 +151,10 @@ const Change = struct { []const u8, []const u8, Expected };
 
 fn expectChanges(changes: []const Change) !void {
     const buffer = makeBuffer();
-    const text = try makeText(&buffer);
+    const text = try texts.make(document, &buffer, &.{});
     defer gpa.free(text);
     for (changes) |change| {
-        const changed = try replace(text, change[0], change[1]);
+        const changed = try texts.replace(text, change[0], change[1]);
         defer gpa.free(changed);
         errdefer std.debug.print("{s} -> {s}\n", .{ change[0], change[1] });
         try expectOutcome(changed, change[2]);
@@ -624,11 +605,11 @@ test "indices of points and lines" {
         bytes[96] = 0;
         var expected: []const u8 = "";
         for ([_][]const u8{ "\"count\":6", "\"count\":5" }) |count| {
-            const whole = try makeText(&bytes);
+            const whole = try texts.make(document, &bytes, &.{});
             defer gpa.free(whole);
-            const other = try replace(whole, "\"mode\":4", mode);
+            const other = try texts.replace(whole, "\"mode\":4", mode);
             defer gpa.free(other);
-            const text = try replace(other, "\"count\":6", count);
+            const text = try texts.replace(other, "\"count\":6", count);
             defer gpa.free(text);
             var said: Diagnostic = .{};
             try tryParse(gpa, text, &said);
@@ -641,9 +622,9 @@ test "indices of points and lines" {
         }
         try std.testing.expectEqual(number == 1, expected.len > 0);
         bytes[96] = 4;
-        const whole = try makeText(&bytes);
+        const whole = try texts.make(document, &bytes, &.{});
         defer gpa.free(whole);
-        const text = try replace(whole, "\"mode\":4", mode);
+        const text = try texts.replace(whole, "\"mode\":4", mode);
         defer gpa.free(text);
         var said: Diagnostic = .{};
         try std.testing.expectError(error.InvalidInput, tryParse(gpa, text, &said));
@@ -707,7 +688,7 @@ test "a GLB cut anywhere is an error" {
 
 test "no changed byte crashes or leaks" {
     const buffer = makeBuffer();
-    const text = try makeText(&buffer);
+    const text = try texts.make(document, &buffer, &.{});
     defer gpa.free(text);
     const glb = try makeBinary(&buffer);
     defer gpa.free(glb);
@@ -733,7 +714,7 @@ test "no changed byte crashes or leaks" {
 
 test "every allocation may fail" {
     const buffer = makeBuffer();
-    const text = try makeText(&buffer);
+    const text = try texts.make(document, &buffer, &.{});
     defer gpa.free(text);
     var fail_index: usize = 0;
     while (true) : (fail_index += 1) {
@@ -789,7 +770,7 @@ test "buffers beside the scene, inside its folder and outside" {
         .{ "no\\u0020such", false, "buffer 0: 'no such' does not exist" },
     };
     for (cases) |case| {
-        const text = try replace(document, uri, case[0]);
+        const text = try texts.replace(document, uri, case[0]);
         defer gpa.free(text);
         var said: Diagnostic = .{};
         const settings: raylane.settings.Load = .{ .allow_outside = case[1] };

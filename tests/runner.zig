@@ -1,6 +1,7 @@
 //! The `main` of every test program: runs its tests one by one and tells on stderr how each went.
 //!
-//! In: the tests compiled into the program. Out: lines `::start NAME`, then `::pass`, `::skip` or
+//! In: the tests compiled into the program; of these, where there is an argument, those whose name
+//! begins with it. Out: lines `::start NAME`, then `::pass`, `::skip` or
 //! `::fail REASON`, and `::end` after the last; what a test prints, or a crash, stands in between.
 //! `launch.zig` keeps the stream and `summary.zig` reads it; it is readable by eye too. A test
 //! fails that returns an error, leaks from `std.testing.allocator`, logs an error or hangs.
@@ -19,7 +20,11 @@ var logged_error_count: usize = 0;
 
 /// Runs the tests; the exit code is 0 whatever their results.
 pub fn main(init: std.process.Init.Minimal) void {
+    var arguments = init.args.iterate();
+    _ = arguments.skip();
+    const wanted = arguments.next() orelse "";
     for (builtin.test_functions) |test_function| {
+        if (!std.mem.startsWith(u8, test_function.name, wanted)) continue;
         std.debug.print("::start {s}\n", .{test_function.name});
         const result = runOne(init, test_function.func);
         // A test's own output may not end its line.

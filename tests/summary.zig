@@ -159,7 +159,7 @@ fn hostCount(suites: []const Suite, name: []const u8) usize {
     return 1;
 }
 
-/// Paths below `folder`, without it, of the Zig files that have test blocks.
+/// Paths of the Zig files in `folder` that have test blocks.
 fn filesWithTests(arena: Allocator, io: Io, folder: []const u8) ![]const []const u8 {
     var paths: std.ArrayList([]const u8) = .empty;
     const directory = try Io.Dir.cwd().openDir(io, folder, .{ .iterate = true });
@@ -171,7 +171,7 @@ fn filesWithTests(arena: Allocator, io: Io, folder: []const u8) ![]const []const
         const source = try entry.dir.readFileAlloc(io, entry.basename, arena, .limited(1 << 20));
         if (!std.mem.startsWith(u8, source, "test ") and
             std.mem.find(u8, source, "\ntest ") == null) continue;
-        try paths.append(arena, try arena.dupe(u8, entry.path));
+        try paths.append(arena, try std.fs.path.join(arena, &.{ folder, entry.path }));
     }
     return paths.items;
 }

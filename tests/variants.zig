@@ -159,15 +159,15 @@ test "colours of the display are the same by every variant, and apart from radia
         try std.testing.expectEqual(first orelse film.hash(), film.hash());
         first = film.hash();
         // What is painted is apart; in the mirror it is radiance.
-        const painted = film.display.?.at(17, 2).*;
+        const painted = film.imageOf(.display).?.at(17, 2).*;
         try std.testing.expectEqual([4]f32{ 1, 0.5, 0, 1 }, painted);
         try std.testing.expectEqual([4]f32{ 0, 0, 0, 1 }, film.image.at(17, 2).*);
-        try std.testing.expectEqual([4]f32{ 0, 0, 0, 0 }, film.display.?.at(3, 2).*);
+        try std.testing.expectEqual([4]f32{ 0, 0, 0, 0 }, film.imageOf(.display).?.at(3, 2).*);
         try std.testing.expect(film.image.at(3, 2)[1] > 0.5);
         // The veil is before both: a quarter of it, and of what is behind the rest.
-        const veiled = film.display.?.at(11, 7).*;
+        const veiled = film.imageOf(.display).?.at(11, 7).*;
         try std.testing.expectEqual([4]f32{ 0.8, 0.475, 0.2, 1 }, veiled);
-        const before_mirror = film.display.?.at(9, 7).*;
+        const before_mirror = film.imageOf(.display).?.at(9, 7).*;
         try std.testing.expectEqual([4]f32{ 0.05, 0.1, 0.2, 0.25 }, before_mirror);
     }
 }

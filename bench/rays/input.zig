@@ -153,7 +153,8 @@ fn lightOf(world: *const World) Vec3 {
     return world.view.camera.origin;
 }
 
-fn diagonal(world: *const World) f32 {
+/// Of the box around all triangles, in metres.
+pub fn diagonal(world: *const World) f32 {
     var lower: Vec3 = @splat(std.math.inf(f32));
     var upper: Vec3 = @splat(-std.math.inf(f32));
     for (world.geometry.triangles) |triangle| {

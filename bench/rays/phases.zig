@@ -101,7 +101,7 @@ pub inline fn ticks() u64 {
 }
 
 /// Tells a watching emulator that what follows has this tag; elsewhere an error nobody looks at.
-inline fn mark(tag: u32) void {
+pub inline fn mark(tag: u32) void {
     switch (builtin.cpu.arch) {
         .x86_64 => _ = asm volatile ("syscall"
             : [result] "={rax}" (-> usize),

@@ -43,6 +43,7 @@ pub const Settings = struct {
     height: u32,
     samples: u32,
     depth: u32,
+    integrator: []const u8 = "whitted",
     threads: usize,
     bvh: []const u8,
     time_limit_s: u32,
@@ -83,6 +84,20 @@ pub const Scene = struct {
     rounds: usize,
     ended_by: End,
     variants: []const Variant,
+    /// By variant and depth, where an integrator was asked for.
+    bounces: []const Bounce = &.{},
+};
+
+/// Frames of one variant with at most `depth` bounces; a sample a round.
+pub const Bounce = struct {
+    variant: []const u8,
+    depth: u32,
+    /// Rays that look for surfaces, and shadow rays, which frames of one bounce less have not.
+    closest: u64,
+    shadow: u64,
+    frame_ms: []const f64,
+    /// Less what the machine takes at rest; empty where energy is not measured.
+    frame_j: []const f64,
 };
 
 /// One variant in one scene; a sample a round.

@@ -20,6 +20,7 @@ pub const Settings = struct {
     load: settings_file.Load,
     tree_quality: settings_file.TreeQuality,
     view: settings_file.View,
+    integrator: settings_file.Integrator,
     sample_count: u32,
     depth: u32,
 };
@@ -85,8 +86,15 @@ pub const Stages = struct {
         return .{ .trace_ns = session.times.trace_ns, .rays = session.traced.rays };
     }
 
-    /// Tests of boxes and triangles, by a pass that is not timed.
+    /// Bounces at most, from now on.
+    pub fn setDepth(stages: *Stages, depth: u32) void {
+        stages.settings.depth = depth;
+    }
+
+    /// Tests of boxes and triangles, by a pass that is not timed; those of Whitted's integrator,
+    /// which alone counts them.
     pub fn count(stages: *Stages, variant: usize) Error!statistics.TestCounts {
+        if (stages.settings.integrator != .whitted) return .{};
         const compiled = variant_file.compiled;
         for (compiled, stages.counts) |other, counted| {
             if (other.traversal != compiled[variant].traversal) continue;
@@ -100,6 +108,7 @@ pub const Stages = struct {
 
     fn renderSettings(stages: *const Stages, variant: usize) settings_file.Render {
         return .{
+            .integrator = stages.settings.integrator,
             .variant = variant,
             .sample_count = stages.settings.sample_count,
             .depth = stages.settings.depth,

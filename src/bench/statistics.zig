@@ -51,6 +51,16 @@ pub fn ratio(numerator: []const f64, denominator: []const f64) ?Estimate {
     return estimate(buffer[0..count]);
 }
 
+/// The mean of `from[i] - less[i]`, of `from` where there is no `less`; null without a sample.
+pub fn difference(from: []const f64, less: []const f64) ?Estimate {
+    if (from.len == 0) return null;
+    var buffer: [round_count_max]f64 = undefined;
+    assert(from.len <= round_count_max and (less.len == 0 or less.len == from.len));
+    @memcpy(buffer[0..from.len], from);
+    for (buffer[0..less.len], less) |*sample, part| sample.* -= part;
+    return estimate(buffer[0..from.len]);
+}
+
 /// The mean of `work / samples[i]`, a rate.
 pub fn rate(work: f64, samples: []const f64) ?Estimate {
     var buffer: [round_count_max]f64 = undefined;

@@ -24,6 +24,7 @@ pub fn write(results: *const Results, writer: *Writer) Error!void {
         try writeRays(scene, writer);
         try writeTests(scene, writer);
         try writeEnergy(scene, writer);
+        try writeBounces(scene, writer);
     }
     try writeScaling(results, writer);
     try writeSummary(results, writer);
@@ -37,9 +38,11 @@ fn writeHead(results: *const Results, writer: *Writer) Error!void {
         results.build.cpu,      results.build.architecture, results.build.zig,
         results.build.optimize,
     });
-    const format = "{d} x {d}, {d} a pixel, depth {d}, {d} threads of {d} processors, {d:.0} s\n";
-    try writer.print(format, .{
-        settings.width,   settings.height,                 settings.samples,   settings.depth,
+    try writer.print("{d} x {d}, {d} a pixel, {s}, depth {d}, ", .{
+        settings.width,      settings.height, settings.samples,
+        settings.integrator, settings.depth,
+    });
+    try writer.print("{d} threads of {d} processors, {d:.0} s\n", .{
         settings.threads, results.machine.processor_count, results.duration_s,
     });
     try writer.print(
@@ -96,6 +99,7 @@ fn writeRays(scene: *const Scene, writer: *Writer) Error!void {
 
 /// As in the thesis every lane counts, idle ones too.
 fn writeTests(scene: *const Scene, writer: *Writer) Error!void {
+    if (scene.variants[0].tests.box_issued == 0) return; // Not counted.
     try writer.writeAll("\nTests a second, idle lanes with them (C.1 to C.4); boxes for each " ++
         "triangle (C.8)\n");
     try heads(writer, &.{ "triangles M/s", "ratio", "boxes M/s", "ratio", "box/tri." });
@@ -145,6 +149,42 @@ fn writeEnergy(scene: *const Scene, writer: *Writer) Error!void {
         try cell(writer, statistics.rate(rays, joules.trace_j));
         try writer.writeByte('\n');
     }
+}
+
+/// Frames of one depth less those of one bounce less, round by round.
+fn writeBounces(scene: *const Scene, writer: *Writer) Error!void {
+    if (scene.bounces.len == 0) return;
+    try writer.writeAll("\nWhat each bounce costs, shading with it: frames of a depth less those " ++
+        "of one bounce less\n");
+    try writer.print("{s:<24}{s:>8}{s:>12}{s:>12}", .{ "variant", "bounce", "rays", "shadow" });
+    for ([_][]const u8{ "ms", "M rays/s", "mJ", "k rays/J" }) |head| {
+        try writer.print("{s:>20}", .{head});
+    }
+    try writer.writeByte('\n');
+    for (scene.bounces, 0..) |*bounce, index| {
+        const before: ?*const results_file.Bounce =
+            if (bounce.depth == 0) null else &scene.bounces[index - 1];
+        try writer.print("{s:<24}{d:>8}{d:>12}{d:>12}", .{
+            bounce.variant, bounce.depth, bounce.closest, bounce.shadow,
+        });
+        const rays = float(bounce.closest + bounce.shadow) * 1e-3;
+        const times = statistics.difference(bounce.frame_ms, if (before) |b| b.frame_ms else &.{});
+        const joules = statistics.difference(bounce.frame_j, if (before) |b| b.frame_j else &.{});
+        try cell(writer, times);
+        try cell(writer, rateOf(rays, times));
+        try cell(writer, scaled(joules, 1e3, 1));
+        try cell(writer, rateOf(rays, joules));
+        try writer.writeByte('\n');
+    }
+}
+
+/// `work` for each of what was estimated, with an interval of the same share of it; null where it
+/// is not known to be more than nothing.
+fn rateOf(work: f64, maybe: ?Estimate) ?Estimate {
+    const estimate = maybe orelse return null;
+    if (!(estimate.mean > 0) or estimate.relative() >= 1) return null;
+    const rate = work / estimate.mean;
+    return .{ .mean = rate, .half_width = rate * estimate.relative() };
 }
 
 fn writeScaling(results: *const Results, writer: *Writer) Error!void {

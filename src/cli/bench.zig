@@ -26,6 +26,8 @@ pub const Bench = struct {
     sample_count: u32 = settings.thesis.sample_count,
     depth: u32 = settings.thesis.depth,
     tree_quality: settings.TreeQuality = .default,
+    /// Null: as in the thesis.
+    integrator: ?settings.Integrator = null,
     /// Parts of names with commas between them: a variant is measured whose name has one of them.
     /// Null: all.
     variants: ?[]const u8 = null,
@@ -70,6 +72,12 @@ const sections: []const Section = &.{
         },
         .{ .usage = "-t, --threads N", .help = "threads (default: as many as CPUs)" },
         .{ .usage = "--bvh QUALITY", .help = arguments_file.namesOf(settings.TreeQuality) },
+        .{
+            .usage = "--integrator NAME",
+            .help = arguments_file.namesOf(settings.Integrator) ++ ", and what each\n" ++
+                "bounce costs; with all the light of a scene, not that\n" ++
+                "of its lamps alone (default: whitted, without these)",
+        },
         .{
             .usage = "--variants PARTS",
             .help = "only variants whose names contain one of these, for\n" ++
@@ -158,6 +166,7 @@ fn set(reader: *const Reader, bench: *Bench, given: Reader.Given) cli.Error!void
         .threads => bench.thread_count = try reader.number(given, settings.thread_count),
         .spp => bench.sample_count = try reader.number(given, settings.sample_count),
         .depth => bench.depth = try reader.number(given, settings.depth),
+        .integrator => bench.integrator = try reader.choice(given, settings.Integrator),
         .bvh => bench.tree_quality = try reader.choice(given, settings.TreeQuality),
         .variants => {
             if (!isList(given.value)) return reader.bad(given, "parts of names, with commas");
@@ -182,14 +191,11 @@ fn isList(value: []const u8) bool {
     return true;
 }
 
+const common = @import("testing.zig");
 const testing = std.testing;
 
 fn expectUsage(needle: []const u8, arguments: []const [:0]const u8) !void {
-    var diagnostic: Diagnostic = .{};
-    try testing.expectError(error.UsageInvalid, parse(arguments, &diagnostic));
-    errdefer std.debug.print("{s}\n", .{diagnostic.message.text()});
-    try testing.expect(std.mem.find(u8, diagnostic.message.text(), needle) != null);
-    try testing.expectStringEndsWith(diagnostic.message.text(), "(see raylane bench --help)");
+    return common.expectUsage("bench", parse, needle, arguments);
 }
 
 test "what is not said is as in the thesis" {
@@ -205,10 +211,12 @@ test "what is not said is as in the thesis" {
 test "scenes, flags and filters" {
     var diagnostic: Diagnostic = .{};
     const bench = try parse(&.{
-        "a.glb",      "-r8x4",  "--variants=scalar-single,packet-8",
-        "-t2",        "b.glb",  "--energy-command=echo 1W",
-        "--rounds=5", "--json", "-",
+        "a.glb",             "-r8x4",  "--variants=scalar-single,packet-8",
+        "-t2",               "b.glb",  "--energy-command=echo 1W",
+        "--rounds=5",        "--json", "-",
+        "--integrator=path",
     }, &diagnostic);
+    try testing.expectEqual(.path, bench.integrator.?);
     try testing.expectEqualStrings("b.glb", bench.scenes[1]);
     try testing.expectEqual(2, bench.scene_count);
     try testing.expectEqual([2]u32{ 8, 4 }, bench.resolution);
@@ -221,6 +229,7 @@ test "scenes, flags and filters" {
 test "mistakes name the option" {
     try expectUsage("'--rounds'", &.{"--rounds=1"});
     try expectUsage("'--time-limit'", &.{"--time-limit=0"});
+    try expectUsage("'--integrator'", &.{"--integrator=bdpt"});
     try expectUsage("'--variants'", &.{"--variants=a,,b"});
     try expectUsage("did you mean '--energy-root'", &.{ "--energy-rot", "x" });
     try expectUsage("needs a value", &.{"--json"});
@@ -229,6 +238,5 @@ test "mistakes name the option" {
 }
 
 test "the help fits a screen" {
-    var lines = std.mem.splitScalar(u8, help, '\n');
-    while (lines.next()) |line| try testing.expect(line.len <= 80);
+    _ = try common.expectFits(help);
 }

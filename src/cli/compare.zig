@@ -125,6 +125,7 @@ fn set(reader: *const Reader, compare: *Compare, given: Reader.Given) cli.Error!
     }
 }
 
+const common = @import("testing.zig");
 const testing = std.testing;
 
 test "images, thresholds and the rest" {
@@ -153,15 +154,9 @@ test "mistakes name the option" {
         .{ "'--threshold'", &.{ "a", "b", "--threshold=flip=x" } },
         .{ "'--output'", &.{ "a", "b", "-o", "d.jpg" } },
         .{ "'--exposure'", &.{ "a", "b", "--exposure=auto" } },
-    }) |case| {
-        var diagnostic: Diagnostic = .{};
-        try testing.expectError(error.UsageInvalid, parse(case[1], &diagnostic));
-        errdefer std.debug.print("{s}\n", .{diagnostic.message.text()});
-        try testing.expect(std.mem.find(u8, diagnostic.message.text(), case[0]) != null);
-    }
+    }) |case| try common.expectUsage("compare", parse, case[0], case[1]);
 }
 
 test "the help fits a screen" {
-    var lines = std.mem.splitScalar(u8, help, '\n');
-    while (lines.next()) |line| try testing.expect(line.len <= 80);
+    _ = try common.expectFits(help);
 }

@@ -27,8 +27,7 @@ const sections: []const Section = &.{
         .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
         .{
             .usage = "--format-in FORMAT",
-            .help = "how to read the scene where its contents do not tell:\n" ++
-                arguments_file.namesOf(settings.SceneFormat),
+            .help = arguments_file.namesOf(settings.SceneFormat) ++ ", whatever it holds",
         },
         .{
             .usage = "--allow-outside",
@@ -94,6 +93,7 @@ fn set(reader: *const Reader, info: *Info, given: Reader.Given) cli.Error!void {
     }
 }
 
+const common = @import("testing.zig");
 const testing = std.testing;
 
 test "a scene and how to look at it" {
@@ -109,22 +109,16 @@ test "a scene and how to look at it" {
 
 test "mistakes name the option" {
     for ([_]struct { []const u8, []const [:0]const u8 }{
-        .{ "no scene given (see raylane info --help)", &.{"--json"} },
+        .{ "no scene given", &.{"--json"} },
         .{ "one scene at a time", &.{ "a", "b" } },
         .{ "empty", &.{""} },
         .{ "'--up-axis'", &.{"--up-axis=x"} },
         .{ "'--scene'", &.{"--scene="} },
         .{ "'--format-in'", &.{"--format-in=fbx"} },
         .{ "did you mean '--json'?", &.{"--jsn"} },
-    }) |case| {
-        var diagnostic: Diagnostic = .{};
-        try testing.expectError(error.UsageInvalid, parse(case[1], &diagnostic));
-        errdefer std.debug.print("{s}\n", .{diagnostic.message.text()});
-        try testing.expect(std.mem.find(u8, diagnostic.message.text(), case[0]) != null);
-    }
+    }) |case| try common.expectUsage("info", parse, case[0], case[1]);
 }
 
 test "the help fits a screen" {
-    var lines = std.mem.splitScalar(u8, help, '\n');
-    while (lines.next()) |line| try testing.expect(line.len <= 80);
+    _ = try common.expectFits(help);
 }

@@ -48,7 +48,7 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
 }
 
 /// What people call a format.
-pub fn formatName(format: scene_data.File.Format) []const u8 {
+fn formatName(format: scene_data.File.Format) []const u8 {
     return switch (format) {
         .builtin => "built in",
         .gltf => "glTF",

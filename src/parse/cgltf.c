@@ -184,8 +184,8 @@ const unsigned short rl_cgltf_layout[] = {
             accessors, accessors_count, buffer_views, buffer_views_count, buffers,
             buffers_count, images, images_count, textures, textures_count, samplers,
             samplers_count, skins, skins_count, cameras, cameras_count, lights, lights_count,
-            nodes, nodes_count, scenes, scenes_count, scene, animations, animations_count, variants,
-            variants_count, extras, data_extensions_count, data_extensions, extensions_used,
+            nodes, nodes_count, scenes, scenes_count, scene, animations, variants, variants_count,
+            extras, data_extensions_count, data_extensions, extensions_used,
             extensions_used_count, extensions_required, extensions_required_count),
 };
 const size_t rl_cgltf_layout_count = sizeof(rl_cgltf_layout) / sizeof(*rl_cgltf_layout);

@@ -129,7 +129,7 @@ pub fn recognize(bytes: []const u8, name: []const u8) Recognized {
     if (isArchive(bytes)) return .{ .foreign = archive(bytes) };
     if (isBinaryStl(bytes)) return .{ .format = .stl };
     if (is3ds(bytes)) return .{ .foreign = "a 3DS file" ++ convert };
-    const text = withoutMark(bytes);
+    const text = bytes[markBytes(bytes)..];
     for (signatures) |signature| {
         const start = if (signature.offset == 0) text else bytes;
         if (start.len < signature.offset) continue;
@@ -178,8 +178,11 @@ fn archive(bytes: []const u8) []const u8 {
     return "a zip archive" ++ unpack;
 }
 
-fn withoutMark(bytes: []const u8) []const u8 {
-    return std.mem.cutPrefix(u8, bytes, "\xef\xbb\xbf") orelse bytes;
+/// Length of the byte order mark that editors of Windows put before a text (RFC 3629, section 6);
+/// 0: there is none.
+pub fn markBytes(text: []const u8) usize {
+    const mark = "\xef\xbb\xbf";
+    return if (std.mem.startsWith(u8, text, mark)) mark.len else 0;
 }
 
 /// What the beginning of a text says; null: nothing.
@@ -235,7 +238,7 @@ const pbrt_words =
 /// Whether the bytes are an STL text; binary ones may begin with "solid" as well.
 pub fn isTextStl(bytes: []const u8) bool {
     return !isBinaryStl(bytes) and
-        isAsciiStl(std.mem.trimStart(u8, withoutMark(bytes), " \t\r\n"));
+        isAsciiStl(std.mem.trimStart(u8, bytes[markBytes(bytes)..], " \t\r\n"));
 }
 
 fn isAsciiStl(text: []const u8) bool {
@@ -255,7 +258,7 @@ fn ofMarkup(text: []const u8) []const u8 {
 }
 
 /// The format that a name's extension stands for.
-pub fn ofName(name: []const u8) ?Format {
+fn ofName(name: []const u8) ?Format {
     const plain = if (std.ascii.endsWithIgnoreCase(name, ".gz")) name[0 .. name.len - 3] else name;
     const extension = std.fs.path.extension(plain);
     if (extension.len == 0) return null;

@@ -35,7 +35,6 @@ pub const Error = Source.Error || error{ SceneUnknown, MaterialVariantUnknown };
 /// Reads a file that is in memory; what it names comes from `resources`.
 pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) Error!Scene {
     const gpa = resources.gpa;
-    diagnostic.strict = resources.settings.strict;
     const parts = try container.open(bytes, diagnostic);
     var text: Text = try .open(gpa, parts.json, diagnostic);
     defer text.deinit();
@@ -71,7 +70,7 @@ pub fn read(resources: *Resources, bytes: []const u8, diagnostic: *Diagnostic) E
     for (buffers.owned.items) |owned| input_bytes += owned.len;
     source.buffers = buffers.list;
     source.decoded_bytes_left = limits.decodedBytesMax(input_bytes);
-    var animations: Animations = try .read(&source, text.bytes);
+    var animations: Animations = try .read(&source, text.animated());
     defer animations.deinit();
     try fill(&source, resources, &animations);
     try accessors.checkRest(&source);
@@ -87,7 +86,7 @@ fn fill(source: *Source, resources: *Resources, animations: *Animations) Error!v
     const settings = &resources.settings;
     const shown = try nodes.choose(source, settings.scene);
     if (shown) |one| try source.need(.scenes, Source.indexOf(source.data.scenes, one));
-    try description.read(source, shown);
+    try description.read(source, shown, animations.list.len);
     const variant = try variants.choose(source, settings.material_variant);
     const origins = try nodes.collect(source, shown);
     defer source.gpa.free(origins);

@@ -81,8 +81,8 @@ pub const Array = struct {
     item: *const Rule,
     /// The counted list that it is.
     list: ?u8 = null,
-    /// What stands for an element that is left out.
-    substitute: []const u8 = "{}",
+    /// What stands for an element that is left out; null: what holds the list is, not the element.
+    substitute: ?[]const u8 = null,
 };
 
 /// An object, at most 64 of whose keys are known.
@@ -99,6 +99,16 @@ pub const Field = struct {
     required: bool = false,
     /// Whether it is left out where it breaks its rule, for nobody looks at it.
     is_spare: bool = false,
+    /// Whether it and the others of its object that are so exclude each other.
+    is_alternative: bool = false,
+
+    /// Whether what breaks its rule is left out, and the object stays: what nobody looks at, what
+    /// is null, and what should be a counted list, whose elements others miss or do not.
+    fn mayGo(field: *const Field, is_null: bool) bool {
+        if (field.is_spare) return true;
+        const is_list = field.rule == .array and field.rule.array.list != null;
+        return !field.required and (is_null or is_list);
+    }
 };
 
 /// Lengths of the counted lists.
@@ -240,7 +250,7 @@ const Frame = struct {
     value_start: usize = 0,
     /// Where it begins itself.
     start: usize = 0,
-    substitute: []const u8 = "",
+    substitute: ?[]const u8 = null,
     /// Of the references in it.
     role: Reference.Role = .plain,
 };
@@ -321,6 +331,11 @@ const Scanner = struct {
                 frame.count += 1;
                 return scanner.wrong("stands twice", .{});
             }
+            if (field.is_alternative) for (frame.object.fields, 0..) |*other, at| {
+                const is_seen = frame.seen >> @intCast(at) & 1 != 0;
+                if (other.is_alternative and is_seen)
+                    return scanner.wrong("stands beside '{s}'", .{other.name});
+            };
             frame.seen |= bit;
             frame.field = field;
             return &field.rule;
@@ -538,8 +553,8 @@ const Scanner = struct {
         try lenience.replaceNumbers(frame.start, scanner.offset, graph.members.items);
     }
 
-    /// Goes on behind what breaks a rule: a field that nobody looks at or that is null, or else the
-    /// whole element of a counted list. `err` itself where it can only be refused.
+    /// Goes on behind what breaks a rule: a field that may go, or the whole element of a list that
+    /// has a substitute for it. `err` itself where it can only be refused.
     fn recover(scanner: *Scanner, err: Error) Error!void {
         const lenience = scanner.lenience orelse return err;
         if (err != error.InvalidInput or scanner.is_fatal) return err;
@@ -549,18 +564,21 @@ const Scanner = struct {
             if (frame.is_object) {
                 const field = frame.field orelse continue;
                 const is_null = std.mem.startsWith(u8, scanner.text[start..], "null");
-                if (!field.is_spare and (field.required or !is_null)) continue;
+                if (!field.mayGo(is_null)) continue;
                 scanner.said.forgive("{s}; left out", .{scanner.diagnostic.message.text()});
                 try lenience.hideKey(frame.key_start);
                 try scanner.skipValue(start);
                 return;
             }
-            const list = frame.list orelse continue;
+            const substitute = frame.substitute orelse continue;
             if (lenience.broken.count() == Lenience.broken_count_max) return err;
             try scanner.skipValue(start);
             const reason = scanner.diagnostic.message.text();
-            try lenience.leaveOut(list, @intCast(frame.count - 1), .{ .reason = reason });
-            return lenience.replaceElement(start, scanner.offset, frame.substitute);
+            if (frame.list) |list|
+                try lenience.leaveOut(list, @intCast(frame.count - 1), .{ .reason = reason })
+            else
+                scanner.said.forgive("{s}; left out", .{reason});
+            return lenience.replaceElement(start, scanner.offset, substitute);
         }
         return err;
     }

@@ -12,6 +12,7 @@ const Polygon = @import("polygon.zig");
 const Reader = @import("obj/reader.zig");
 const Resources = @import("resource.zig");
 const Words = @import("obj/words.zig");
+const markBytes = @import("format.zig").markBytes;
 
 /// Reads a text that is in memory; what it names comes from `resources`. `path` is that of the
 /// text, beside which a library may be that it names wrongly.
@@ -25,7 +26,7 @@ pub fn read(
     const joined = try Words.joined(gpa, bytes);
     defer if (joined) |copy| gpa.free(copy);
     const whole = joined orelse bytes;
-    const text = Resources.withoutMark(whole);
+    const text = whole[markBytes(whole)..];
     var reader: Reader = .{ .gpa = gpa, .words = .{ .text = text }, .diagnostic = diagnostic };
     defer reader.deinit();
     try reader.run();

@@ -36,6 +36,8 @@ pub const Mesh = struct {
     colors: ?[][4]f32 = null,
     /// Some alpha is below 1.
     has_alpha: bool = false,
+    /// All was 0 in the file, which programs write that mean nothing by it, and is 1 here.
+    is_alpha_dropped: bool = false,
     triangles: [][3]u32 = &.{},
     segments: [][2]u32 = &.{},
     /// All vertices, where nothing connects them.
@@ -77,7 +79,12 @@ const Type = enum {
     }
 };
 
-const type_names: std.StaticStringMap(Type) = .initComptime(.{
+/// Names in any case: of properties, some programs write them in capitals.
+fn Names(comptime Value: type) type {
+    return std.StaticStringMapWithEql(Value, std.static_string_map.eqlAsciiIgnoreCase);
+}
+
+const type_names: Names(Type) = .initComptime(.{
     .{ "char", .int8 },       .{ "uchar", .uint8 },    .{ "short", .int16 },
     .{ "ushort", .uint16 },   .{ "int", .int32 },      .{ "uint", .uint32 },
     .{ "float", .float32 },   .{ "double", .float64 }, .{ "int8", .int8 },
@@ -113,17 +120,21 @@ const Role = enum {
     const first_color = @backingInt(Role.red);
 };
 
-/// Other names of scalars.
-const scalar_names: std.StaticStringMap(Role) = .initComptime(.{
-    .{ "s", .u },             .{ "t", .v },               .{ "texture_u", .u },
-    .{ "texture_v", .v },     .{ "texture_s", .u },       .{ "texture_t", .v },
+/// Names of scalars.
+const scalar_names: Names(Role) = .initComptime(.{
+    .{ "x", .x },             .{ "y", .y },               .{ "z", .z },
+    .{ "nx", .nx },           .{ "ny", .ny },             .{ "nz", .nz },
+    .{ "u", .u },             .{ "v", .v },               .{ "s", .u },
+    .{ "t", .v },             .{ "texture_u", .u },       .{ "texture_v", .v },
+    .{ "texture_s", .u },     .{ "texture_t", .v },       .{ "red", .red },
+    .{ "green", .green },     .{ "blue", .blue },         .{ "alpha", .alpha },
     .{ "diffuse_red", .red }, .{ "diffuse_blue", .blue }, .{ "diffuse_green", .green },
     .{ "r", .red },           .{ "g", .green },           .{ "b", .blue },
-    .{ "a", .alpha },
+    .{ "a", .alpha },         .{ "vertex1", .vertex1 },   .{ "vertex2", .vertex2 },
 });
 
 /// Names of lists.
-const list_names: std.StaticStringMap(Role) = .initComptime(.{
+const list_names: Names(Role) = .initComptime(.{
     .{ "vertex_indices", .indices },
     .{ "vertex_index", .indices },
     .{ "texcoord", .corner_texcoords },
@@ -144,6 +155,11 @@ const Element = struct {
     first_property: usize,
     property_count: usize,
 };
+
+const element_names: Names(Element.Kind) = .initComptime(.{
+    .{ "vertex", .vertex },       .{ "face", .face }, .{ "edge", .edge },
+    .{ "tristrips", .tristrips },
+});
 
 const Format = enum { ascii, binary_little_endian, binary_big_endian };
 
@@ -252,7 +268,7 @@ const Reader = struct {
         const count = std.fmt.parseInt(u32, words.next() orelse "", 10) catch
             return reader.fail("the number of {f} is none", .{quote(name)});
         reader.elements[reader.element_count] = .{
-            .kind = std.meta.stringToEnum(Element.Kind, name) orelse .other,
+            .kind = element_names.get(name) orelse .other,
             .count = count,
             .first_property = reader.property_count,
             .property_count = 0,
@@ -275,17 +291,11 @@ const Reader = struct {
         const role: Role = if (length_type != null)
             list_names.get(name) orelse .other
         else
-            scalarOf(name);
+            scalar_names.get(name) orelse .other;
         reader.properties[reader.property_count] =
             .{ .role = role, .type = type_, .length_type = length_type };
         reader.property_count += 1;
         reader.elements[reader.element_count - 1].property_count += 1;
-    }
-
-    fn scalarOf(name: []const u8) Role {
-        const role = std.meta.stringToEnum(Role, name) orelse
-            return scalar_names.get(name) orelse .other;
-        return if (@backingInt(role) < Role.scalar_count) role else .other;
     }
 
     fn typeOf(reader: *Reader, name: []const u8) Error!Type {
@@ -661,12 +671,16 @@ const Reader = struct {
     fn linearize(reader: *Reader, colors: [][4]f32) void {
         // Floats of 0 to 1, unless there are larger ones: those are codes.
         const scale: f32 = if (reader.color_max > 1) 255 else 1;
+        const is_seen = for (colors) |color| {
+            if (color[3] > 0) break true;
+        } else false;
+        reader.mesh.is_alpha_dropped = !is_seen and colors.len > 0;
         for (colors) |*color| {
             for (color[0..3]) |*channel| {
                 const fraction = std.math.clamp(channel.* / scale, 0, 1);
                 channel.* = math.flushDenormal(@floatCast(math.srgb.linear(fraction)));
             }
-            const alpha = std.math.clamp(color[3], 0, 1);
+            const alpha = if (is_seen) std.math.clamp(color[3], 0, 1) else 1;
             color[3] = math.flushDenormal(alpha);
             if (alpha < 1) reader.mesh.has_alpha = true;
         }

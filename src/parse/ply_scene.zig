@@ -13,6 +13,7 @@ const Message = @import("../diagnostic.zig").Message;
 const NamedImages = @import("named_images.zig");
 const Resources = @import("resource.zig");
 const scene = @import("../scene.zig");
+const markBytes = @import("format.zig").markBytes;
 
 /// Reads a file that is in memory; what it names comes from `resources`.
 pub fn read(
@@ -25,7 +26,7 @@ pub fn read(
     errdefer builder.deinit();
     builder.scene.file.format = .ply;
     var reason: Message = .{};
-    const text = Resources.withoutMark(bytes);
+    const text = bytes[markBytes(bytes)..];
     const mesh = ply.read(gpa, builder.arena(), text, .{}, &reason) catch |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidPly => return diagnostic.invalid("{s}", .{reason.text()}),
@@ -38,6 +39,7 @@ pub fn read(
         "{d} normals or coordinates of textures that are not finite are dropped",
         .{mesh.dropped_count},
     );
+    if (mesh.is_alpha_dropped) diagnostic.warn("alpha is 0 everywhere: taken as opaque", .{});
     // Upwards in files, downwards in scenes.
     if (mesh.texcoords) |texcoords| for (texcoords) |*texcoord| {
         texcoord[1] = 1 - texcoord[1];

@@ -23,6 +23,7 @@ const Io = std.Io;
 const Reason = diagnostic_data.Message;
 const Settings = @import("../settings.zig").Load;
 const format = @import("format.zig");
+const gzip = @import("../decode.zig").gzip;
 const standard_input = @import("../settings.zig").standard_input;
 const stream = @import("stream.zig");
 const assert = std.debug.assert;
@@ -49,6 +50,8 @@ folder: Io.Dir,
 settings: Settings,
 /// Bytes of all files so far.
 bytes_read: u64 = 0,
+/// Entries of folders that may still be looked at for names in another letter case.
+entries_left: u32 = 1 << 18,
 
 /// A scene file and what it takes to read those that it names.
 pub const Scene = struct {
@@ -114,6 +117,58 @@ pub fn readOptional(
         => error.Unreadable,
         else => |other| other,
     };
+}
+
+/// How a path really reads that no file has, where one differs from it in the case of letters (of
+/// ASCII) alone, of several the least by bytes. Null: there is none, or it may not be looked for.
+/// From `arena`.
+pub fn inAnyCase(
+    resources: *Resources,
+    arena: Allocator,
+    path: []const u8,
+) Allocator.Error!?[]const u8 {
+    if (!resources.settings.allow_outside and leavesFolder(path)) return null;
+    var real: std.ArrayList(u8) = .empty;
+    var parts = std.mem.splitScalar(u8, path, '/');
+    while (parts.next()) |part| {
+        const is_name = part.len > 0 and !std.mem.eql(u8, part, ".") and
+            !std.mem.eql(u8, part, "..");
+        const name = if (is_name)
+            try resources.entryInAnyCase(arena, real.items, part) orelse return null
+        else
+            part;
+        try real.appendSlice(arena, name);
+        if (parts.peek() != null) try real.append(arena, '/');
+    }
+    return real.items;
+}
+
+/// The entry of a folder, "" being the scene's, with this name; null: there is none.
+fn entryInAnyCase(
+    resources: *Resources,
+    arena: Allocator,
+    folder: []const u8,
+    name: []const u8,
+) Allocator.Error!?[]const u8 {
+    const io = resources.io;
+    var listed = resources.folder.openDir(
+        io,
+        if (folder.len > 0) folder else ".",
+        .{ .iterate = true },
+    ) catch return null;
+    defer listed.close(io);
+    var entries = listed.iterate();
+    var least: ?[]const u8 = null;
+    while (entries.next(io) catch return null) |entry| {
+        if (resources.entries_left == 0) return null;
+        resources.entries_left -= 1;
+        if (!std.ascii.eqlIgnoreCase(entry.name, name)) continue;
+        const is_same = std.mem.eql(u8, entry.name, name);
+        const is_less = if (least) |other| std.mem.lessThan(u8, entry.name, other) else true;
+        if (is_same or is_less) least = try arena.dupe(u8, entry.name);
+        if (is_same) break;
+    }
+    return least;
 }
 
 const LoadError = Error || error{ NotRegular, IsFolder, Overwritten };
@@ -228,10 +283,17 @@ fn loadFile(
     return .{ .bytes = bytes, .identity = identity };
 }
 
-/// A text without the byte order mark that editors of Windows put before it (RFC 3629, section 6).
-pub fn withoutMark(text: [:0]const u8) [:0]const u8 {
-    const mark = "\xef\xbb\xbf";
-    return if (std.mem.startsWith(u8, text, mark)) text[mark.len..] else text;
+/// What a gzip file holds, `limit` bytes at most; it counts as read. The caller frees it. Otherwise
+/// as `gzip.inflate`.
+pub fn inflate(
+    resources: *Resources,
+    file: []const u8,
+    limit: u64,
+    reason: *Reason,
+) gzip.Error![:0]u8 {
+    const bytes = try gzip.inflate(resources.gpa, file, @min(limit, file_bytes_max), reason);
+    resources.bytes_read += bytes.len;
+    return bytes;
 }
 
 /// Of one file, as far as memory reaches.

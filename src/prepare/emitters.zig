@@ -51,7 +51,7 @@ const open_share_min = 0.25;
 const texel_count = 4;
 
 /// Triangles of a material in a row, dropped ones between them.
-const Run = struct { first: usize, end: usize, is_two_sided: bool };
+pub const Run = struct { first: usize, end: usize, is_two_sided: bool };
 
 /// All pieces, in the order of triangles; the caller frees them.
 pub fn find(
@@ -66,12 +66,8 @@ pub fn find(
         .materials = materials,
         .textures = textures,
     };
-    defer finder.runs.deinit(gpa);
-    errdefer finder.pieces.deinit(gpa);
-    const glows = for (materials.all) |*material| {
-        if (emits(material)) break true;
-    } else false;
-    if (glows) {
+    defer finder.deinit();
+    if (finder.glows()) {
         const total = try finder.measure();
         if (total > 0 and std.math.isFinite(total)) for (finder.runs.items) |run| {
             for (geometry.triangles[run.first..run.end]) |*triangle| {
@@ -83,11 +79,8 @@ pub fn find(
     return finder.pieces.toOwnedSlice(gpa);
 }
 
-fn emits(material: *const world.Material) bool {
-    return material.unlit == 0 and math.vec3.maxComponent(material.emissive) > 0;
-}
-
-const Finder = struct {
+/// What emits in a world.
+pub const Finder = struct {
     gpa: Allocator,
     geometry: *const world.Geometry,
     materials: *const world.Materials,
@@ -95,8 +88,26 @@ const Finder = struct {
     runs: std.ArrayList(Run) = .empty,
     pieces: std.ArrayList(Piece) = .empty,
 
+    /// Frees everything.
+    pub fn deinit(finder: *Finder) void {
+        finder.runs.deinit(finder.gpa);
+        finder.pieces.deinit(finder.gpa);
+    }
+
+    /// Whether any material emits.
+    pub fn glows(finder: *const Finder) bool {
+        for (finder.materials.all) |*material| {
+            if (emits(material)) return true;
+        }
+        return false;
+    }
+
+    fn emits(material: *const world.Material) bool {
+        return material.unlit == 0 and math.vec3.maxComponent(material.emissive) > 0;
+    }
+
     /// Finds the runs; returns what all triangles emit to one side, in lumens.
-    fn measure(finder: *Finder) error{OutOfMemory}!f64 {
+    pub fn measure(finder: *Finder) error{OutOfMemory}!f64 {
         const triangles = finder.geometry.triangles;
         var total: f64 = 0;
         var first: usize = 0;
@@ -135,7 +146,8 @@ const Finder = struct {
         return total;
     }
 
-    fn cornersOf(finder: *const Finder, triangle: *const world.Triangle) [3]Vec3d {
+    /// In double precision.
+    pub fn cornersOf(finder: *const Finder, triangle: *const world.Triangle) [3]Vec3d {
         var corners: [3]Vec3d = undefined;
         for (&corners, triangle.corner) |*corner, vertex| {
             const position = finder.geometry.positions[vertex];
@@ -145,7 +157,7 @@ const Finder = struct {
     }
 
     /// Lumens for each square metre of a part of a triangle, by barycentrics of its corners.
-    fn emitted(
+    pub fn emitted(
         finder: *const Finder,
         triangle: *const world.Triangle,
         part: *const [3][2]f64,
@@ -217,7 +229,7 @@ const Finder = struct {
 };
 
 /// Barycentrics of the second and third corner, of all corners of a whole triangle.
-const whole = [3][2]f64{ .{ 0, 0 }, .{ 1, 0 }, .{ 0, 1 } };
+pub const whole = [3][2]f64{ .{ 0, 0 }, .{ 1, 0 }, .{ 0, 1 } };
 
 /// One of the congruent parts of a triangle whose edges are cut into so many steps.
 fn partOf(step_count: usize, row: usize, column: usize) [3][2]f64 {
@@ -235,7 +247,7 @@ fn placeOf(corners: *const [3]Vec3d, weights: [2]f64) Vec3d {
 }
 
 /// The normal of a triangle, twice as long as its area is large.
-fn facingOf(corners: *const [3]Vec3d) Vec3d {
+pub fn facingOf(corners: *const [3]Vec3d) Vec3d {
     return vec3d.cross(
         vec3d.sub(corners[1], corners[0]),
         vec3d.sub(corners[2], corners[0]),

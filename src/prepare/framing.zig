@@ -13,6 +13,7 @@ const math = @import("../math.zig");
 const scene = @import("../scene.zig");
 const world = @import("../world.zig");
 const assert = std.debug.assert;
+const Cursor = world.Cursor;
 const vec3 = math.vec3;
 const Vec3 = math.Vec3;
 const Vec3d = math.Vec3d;
@@ -191,8 +192,11 @@ pub const Subject = struct {
             subject.markShown();
         }
         if (subject.used.findFirstSet() == null) return subject;
+        errdefer subject.deinit(gpa);
         const bounds = subject.measure();
-        subject.basis = chooseBasis(&subject.shown, bounds);
+        const samples: Samples = try .init(gpa, &subject.shown);
+        defer samples.deinit(gpa);
+        subject.basis = chooseBasis(&samples, bounds);
         return subject;
     }
 
@@ -204,27 +208,30 @@ pub const Subject = struct {
 
     fn markShown(subject: *Subject) void {
         const shown = &subject.shown;
+        var cursor: Cursor = .init(shown.geometry);
         shown.surface_count = 0;
         for (0..shown.geometry.surfaceCount()) |number| {
-            const triangle = shown.geometry.triangleAt(@intCast(number));
+            const triangle = cursor.triangleAt(@intCast(number));
             shown.surface_count += @intFromBool(!triangle.isDropped());
-            if (shown.holds(&triangle)) mark(&subject.used, &triangle);
+            if (shown.holds(&cursor, &triangle)) mark(&subject.used, &triangle);
         }
         subject.markSpheres(&subject.used);
     }
 
     fn markSpheres(subject: *const Subject, vertices: *std.DynamicBitSetUnmanaged) void {
+        var cursor: Cursor = .init(subject.shown.geometry);
         for (subject.shown.geometry.spheres) |*sphere| {
-            if (subject.shown.holdsSphere(sphere)) vertices.set(sphere.center);
+            if (subject.shown.holdsSphere(&cursor, sphere)) vertices.set(sphere.center);
         }
     }
 
     /// Sets middle and size by the vertices' box, which is returned.
     fn measure(subject: *Subject) math.Box3 {
         var bounds: math.Box3 = .empty;
+        var cursor: Cursor = .init(subject.shown.geometry);
         var vertices = subject.used.iterator(.{});
         while (vertices.next()) |vertex| {
-            bounds = bounds.include(subject.shown.geometry.positionAt(@intCast(vertex)));
+            bounds = bounds.include(cursor.positionAt(@intCast(vertex)));
         }
         subject.size = 0;
         for (&subject.center, bounds.lower, bounds.upper) |*middle, lower, upper| {
@@ -288,13 +295,14 @@ pub const Subject = struct {
     ) bool {
         const before = facing.count();
         const shown = &subject.shown;
+        var cursor: Cursor = .init(shown.geometry);
         subject.markSpheres(facing);
         for (0..shown.geometry.surfaceCount()) |number| {
-            const triangle = shown.geometry.triangleAt(@intCast(number));
-            if (!shown.holds(&triangle)) continue;
+            const triangle = cursor.triangleAt(@intCast(number));
+            if (!shown.holds(&cursor, &triangle)) continue;
             if (!shown.materials[triangle.material].double_sided) {
-                const normal = areaNormal(shown.geometry, &triangle);
-                const corner = shown.geometry.positionAt(triangle.corner[0]);
+                const normal = areaNormal(&cursor, &triangle);
+                const corner = cursor.positionAt(triangle.corner[0]);
                 const toward = vec3d.neg(relativeTo(eye, corner));
                 const lengths = vec3d.length(normal) * vec3d.length(toward);
                 if (vec3d.dot(normal, toward) < facing_sine_min * lengths) continue;
@@ -371,9 +379,10 @@ pub const Subject = struct {
         const to_end = if (sphere_radius > 0) end_distance * subject.size / narrow else 0;
         var radius: f64 = if (subject.is_point) point_distance else 1e-6;
         radius *= subject.size;
+        var cursor: Cursor = .init(subject.shown.geometry);
         var vertices = subject.used.iterator(.{});
         while (vertices.next()) |vertex| {
-            const p = relativeTo(target, subject.shown.geometry.positionAt(@intCast(vertex)));
+            const p = relativeTo(target, cursor.positionAt(@intCast(vertex)));
             const r = @sqrt(p[0] * p[0] + p[2] * p[2]);
             const nearer = toward * p[1] * sin;
             const over = p[1] * cos / slope[1];
@@ -388,9 +397,10 @@ pub const Subject = struct {
     /// Distance from `target` to what is farthest from it.
     pub fn farthest(subject: *const Subject, target: Vec3d) f64 {
         var distance: f64 = 0;
+        var cursor: Cursor = .init(subject.shown.geometry);
         var vertices = subject.used.iterator(.{});
         while (vertices.next()) |vertex| {
-            const p = relativeTo(target, subject.shown.geometry.positionAt(@intCast(vertex)));
+            const p = relativeTo(target, cursor.positionAt(@intCast(vertex)));
             distance = larger(distance, vec3d.length(p));
         }
         return (distance + subject.shown.geometry.sphere_radius) * (1 + margin);
@@ -407,9 +417,10 @@ pub const Subject = struct {
         const count = chosen.count();
         const points = try gpa.alloc(Vec3d, @max(count, 1));
         points[0] = .{ 0, 0, 0 };
+        var cursor: Cursor = .init(subject.shown.geometry);
         var vertices = chosen.iterator(.{});
         for (points[0..count]) |*point| {
-            const position = subject.shown.geometry.positionAt(@intCast(vertices.next().?));
+            const position = cursor.positionAt(@intCast(vertices.next().?));
             var relative = relativeTo(subject.center, position);
             for (&relative) |*component| component.* /= subject.size;
             point.* = .{
@@ -449,22 +460,27 @@ const Shown = struct {
     surface_count: usize = 0,
 
     /// Whether alpha leaves something of the triangle.
-    fn holds(shown: *const Shown, triangle: *const world.Triangle) bool {
+    fn holds(shown: *const Shown, cursor: *Cursor, triangle: *const world.Triangle) bool {
         return !triangle.isDropped() and
-            shown.holdsVertices(&triangle.corner, triangle.material);
+            shown.holdsVertices(cursor, &triangle.corner, triangle.material);
     }
 
-    fn holdsSphere(shown: *const Shown, sphere: *const world.Sphere) bool {
+    fn holdsSphere(shown: *const Shown, cursor: *Cursor, sphere: *const world.Sphere) bool {
         return sphere.material != world.none and
-            shown.holdsVertices(&.{sphere.center}, sphere.material);
+            shown.holdsVertices(cursor, &.{sphere.center}, sphere.material);
     }
 
-    fn holdsVertices(shown: *const Shown, vertices: []const u32, material_index: u32) bool {
+    fn holdsVertices(
+        shown: *const Shown,
+        cursor: *Cursor,
+        vertices: []const u32,
+        material_index: u32,
+    ) bool {
         const material = &shown.materials[material_index];
         if (shown.all or material.alpha_mode == .@"opaque") return true;
         var alpha: f32 = 0;
         if (!shown.geometry.hasColors()) alpha = 1 else for (vertices) |vertex| {
-            const color = shown.geometry.colorAt(vertex);
+            const color = cursor.colorAt(vertex);
             alpha = if (color[3] > alpha) color[3] else alpha;
         }
         alpha *= material.base_color[3];
@@ -473,26 +489,26 @@ const Shown = struct {
 };
 
 /// Twice the area of a triangle along its normal, towards its front.
-fn areaNormal(geometry: *const world.Geometry, triangle: *const world.Triangle) Vec3d {
-    const a = geometry.positionAt(triangle.corner[0]);
-    const b = geometry.positionAt(triangle.corner[1]);
-    const c = geometry.positionAt(triangle.corner[2]);
+fn areaNormal(cursor: *Cursor, triangle: *const world.Triangle) Vec3d {
+    const a = cursor.positionAt(triangle.corner[0]);
+    const b = cursor.positionAt(triangle.corner[1]);
+    const c = cursor.positionAt(triangle.corner[2]);
     const middle: Vec3d = .{ a[0], a[1], a[2] };
     return vec3d.cross(relativeTo(middle, b), relativeTo(middle, c));
 }
 
 /// The axes to look along.
-fn chooseBasis(shown: *const Shown, bounds: math.Box3) Basis {
-    if (shown.surface_count == 0) return strokeBasis(bounds);
-    if (flatFront(shown, bounds)) |front| return .look(vec3d.neg(front), .{ 0, 1, 0 });
-    const axis = boardAxis(shown, bounds) orelse
-        return .ofDirection(chooseDirection(shown, &directions));
-    if (axis == 1) return .ofDirection(chooseDirection(shown, directions[2..]));
+fn chooseBasis(samples: *const Samples, bounds: math.Box3) Basis {
+    if (samples.shown.surface_count == 0) return strokeBasis(bounds);
+    if (flatFront(samples, bounds)) |front| return .look(vec3d.neg(front), .{ 0, 1, 0 });
+    const axis = boardAxis(samples, bounds) orelse
+        return .ofDirection(chooseDirection(samples, &directions));
+    if (axis == 1) return .ofDirection(chooseDirection(samples, directions[2..]));
     var turned = board_directions;
     if (axis == 0) for (&turned) |*direction| {
         direction.azimuth_degrees += 90;
     };
-    return .ofDirection(chooseDirection(shown, &turned));
+    return .ofDirection(chooseDirection(samples, &turned));
 }
 
 /// The axes to look along at points and lines alone: straight at those that lie in a plane across
@@ -513,21 +529,22 @@ fn strokeBasis(bounds: math.Box3) Basis {
 
 /// The direction that the front of a flat model looks to, null for others. Where both sides show as
 /// much, it is the one towards the positive end of the axis it is nearest to.
-fn flatFront(shown: *const Shown, bounds: math.Box3) ?Vec3d {
+fn flatFront(samples: *const Samples, bounds: math.Box3) ?Vec3d {
     var sum: Vec3d = .{ 0, 0, 0 };
     var fronts: Vec3d = .{ 0, 0, 0 };
     var all: f64 = 0;
-    var samples: Samples = .{ .shown = shown };
-    while (samples.next()) |triangle| {
-        const normal = areaNormal(shown.geometry, &triangle);
+    var cursor: Cursor = .init(samples.shown.geometry);
+    for (samples.triangles) |*triangle| {
+        const normal = areaNormal(&cursor, triangle);
         const sign: f64 = if (vec3d.dot(normal, sum) < 0) -1 else 1;
         sum = vec3d.add(sum, vec3d.scale(normal, sign));
         all += vec3d.length(normal);
-        if (!shown.materials[triangle.material].double_sided) fronts = vec3d.add(fronts, normal);
+        const is_double_sided = samples.shown.materials[triangle.material].double_sided;
+        if (!is_double_sided) fronts = vec3d.add(fronts, normal);
     }
     const axis = vec3d.normalize(sum) orelse return null;
     if (vec3d.length(sum) < flat.area_min * all) return null;
-    if (depthAlong(axis, shown, bounds) > flat.depth_max) return null;
+    if (depthAlong(axis, samples, bounds) > flat.depth_max) return null;
     const front = vec3d.dot(fronts, axis);
     if (@abs(front) > 1e-3 * all) return if (front > 0) axis else vec3d.neg(axis);
     var largest: usize = 0;
@@ -538,12 +555,12 @@ fn flatFront(shown: *const Shown, bounds: math.Box3) ?Vec3d {
 }
 
 /// Extent of the samples along an axis as a share of the longest side of the box.
-fn depthAlong(axis: Vec3d, shown: *const Shown, bounds: math.Box3) f64 {
+fn depthAlong(axis: Vec3d, samples: *const Samples, bounds: math.Box3) f64 {
     var least: f64 = std.math.inf(f64);
     var most: f64 = -std.math.inf(f64);
-    var samples: Samples = .{ .shown = shown };
-    while (samples.next()) |triangle| for (triangle.corner) |vertex| {
-        const position = shown.geometry.positionAt(vertex);
+    var cursor: Cursor = .init(samples.shown.geometry);
+    for (samples.triangles) |*triangle| for (triangle.corner) |vertex| {
+        const position = cursor.positionAt(vertex);
         const at = vec3d.dot(axis, .{ position[0], position[1], position[2] });
         least = if (at < least) at else least;
         most = larger(most, at);
@@ -556,41 +573,46 @@ fn depthAlong(axis: Vec3d, shown: *const Shown, bounds: math.Box3) f64 {
 /// Triangles that can be seen, evenly spread over all.
 const Samples = struct {
     shown: *const Shown,
-    index: usize = 0,
-    /// Triangles to pass by that are not dropped.
-    ahead: usize = 0,
+    triangles: []const world.Triangle,
 
-    fn next(samples: *Samples) ?world.Triangle {
-        const geometry = samples.shown.geometry;
-        const count = geometry.surfaceCount();
-        const stride = samples.shown.surface_count / sample_count_max + 1;
-        while (samples.index < count) {
-            const triangle = geometry.triangleAt(@intCast(samples.index));
-            samples.index += 1;
+    fn init(gpa: std.mem.Allocator, shown: *const Shown) error{OutOfMemory}!Samples {
+        const stride = shown.surface_count / sample_count_max + 1;
+        const count_max = @divCeil(shown.surface_count, stride);
+        var triangles: std.ArrayList(world.Triangle) = try .initCapacity(gpa, count_max);
+        errdefer triangles.deinit(gpa);
+        var cursor: Cursor = .init(shown.geometry);
+        // Triangles to pass by that are not dropped.
+        var ahead: usize = 0;
+        for (0..shown.geometry.surfaceCount()) |number| {
+            const triangle = cursor.triangleAt(@intCast(number));
             if (triangle.isDropped()) continue;
-            if (samples.ahead > 0) {
-                samples.ahead -= 1;
+            if (ahead > 0) {
+                ahead -= 1;
                 continue;
             }
-            samples.ahead = stride - 1;
-            if (samples.shown.holds(&triangle)) return triangle;
+            ahead = stride - 1;
+            if (shown.holds(&cursor, &triangle)) triangles.appendAssumeCapacity(triangle);
         }
-        return null;
+        return .{ .shown = shown, .triangles = try triangles.toOwnedSlice(gpa) };
+    }
+
+    fn deinit(samples: *const Samples, gpa: std.mem.Allocator) void {
+        gpa.free(samples.triangles);
     }
 };
 
 /// The axis that a board faces; null for other models. By how the area is spread, so that
 /// a few things before or behind the board do not count much.
-fn boardAxis(shown: *const Shown, bounds: math.Box3) ?usize {
+fn boardAxis(samples: *const Samples, bounds: math.Box3) ?usize {
     const middle: Vec3d = .{ bounds.lower[0], bounds.lower[1], bounds.lower[2] };
     var all: f64 = 0;
     var sum: Vec3d = .{ 0, 0, 0 };
     var squares: Vec3d = .{ 0, 0, 0 };
-    var samples: Samples = .{ .shown = shown };
-    while (samples.next()) |triangle| {
-        const area = vec3d.length(areaNormal(shown.geometry, &triangle)) / 3;
+    var cursor: Cursor = .init(samples.shown.geometry);
+    for (samples.triangles) |*triangle| {
+        const area = vec3d.length(areaNormal(&cursor, triangle)) / 3;
         for (triangle.corner) |vertex| {
-            const at = relativeTo(middle, shown.geometry.positionAt(vertex));
+            const at = relativeTo(middle, cursor.positionAt(vertex));
             sum = vec3d.add(sum, vec3d.scale(at, area));
             squares = vec3d.add(squares, vec3d.scale(vec3d.mul(at, at), area));
             all += area;
@@ -610,16 +632,16 @@ fn boardAxis(shown: *const Shown, bounds: math.Box3) ?usize {
 
 /// The first direction that shows enough: the area of fronts (and backs, where they are
 /// seen too) projected along it. What stands in front of what is not looked at.
-fn chooseDirection(shown: *const Shown, choices: []const Direction) Direction {
+fn chooseDirection(samples: *const Samples, choices: []const Direction) Direction {
     var toward: [directions.len]Vec3d = undefined;
     for (choices, toward[0..choices.len]) |direction, *to| {
         to.* = vec3d.neg(Basis.ofDirection(direction).forward);
     }
     var visible: [directions.len]f64 = @splat(0);
-    var samples: Samples = .{ .shown = shown };
-    while (samples.next()) |triangle| {
-        const normal = areaNormal(shown.geometry, &triangle);
-        const back: f64 = if (shown.materials[triangle.material].double_sided) -1 else 0;
+    var cursor: Cursor = .init(samples.shown.geometry);
+    for (samples.triangles) |*triangle| {
+        const normal = areaNormal(&cursor, triangle);
+        const back: f64 = if (samples.shown.materials[triangle.material].double_sided) -1 else 0;
         for (toward[0..choices.len], visible[0..choices.len]) |to, *sum| {
             const projected = vec3d.dot(normal, to);
             sum.* += if (projected > 0) projected else projected * back;

@@ -124,16 +124,18 @@ fn occluders(
     lookups: []const world.Lookup,
     geometry: *const world.Geometry,
 ) error{OutOfMemory}![]const u32 {
+    const stops = try arena.alloc(bool, materials.len);
+    for (stops, materials) |*to, *material| {
+        to.* = material.stopsLight(lookups[material.first_lookup..][0..material.lookup_count]);
+    }
     const count = geometry.triangleCount();
     const words = try arena.alloc(u32, @divCeil(count, 32));
     @memset(words, 0);
+    var cursor: world.Cursor = .init(geometry);
     for (0..count) |number| {
-        const face = geometry.face(@intCast(number));
-        if (face.material == world.none) continue;
-        const material = &materials[face.material];
-        const own = lookups[material.first_lookup..][0..material.lookup_count];
-        const stops = material.stopsLight(own);
-        words[number / 32] |= @as(u32, @intFromBool(stops)) << @intCast(number % 32);
+        const triangle = cursor.triangleAt(@intCast(number));
+        if (triangle.isDropped() or !stops[triangle.material]) continue;
+        words[number / 32] |= @as(u32, 1) << @intCast(number % 32);
     }
     return words;
 }

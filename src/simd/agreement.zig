@@ -262,17 +262,22 @@ fn checkIntegers(comptime L: type) anyerror!void {
     while (first < pair_count) : (first += L.count) {
         const a, const b = operands(L.I32, i32, first);
         const found = [_][L.count]i32{
-            a.add(b).toArray(),       a.sub(b).toArray(),
-            a.min(b).toArray(),       a.max(b).toArray(),
-            a.bitAnd(b).toArray(),    a.bitOr(b).toArray(),
-            a.shiftLeft(7).toArray(), a.shiftLeft(31).toArray(),
-            a.shiftLeft(0).toArray(),
+            a.add(b).toArray(),         a.sub(b).toArray(),
+            a.min(b).toArray(),         a.max(b).toArray(),
+            a.bitAnd(b).toArray(),      a.bitOr(b).toArray(),
+            a.shiftLeft(7).toArray(),   a.shiftLeft(31).toArray(),
+            a.shiftLeft(0).toArray(),   a.bitXor(b).toArray(),
+            a.mul(b).toArray(),         a.shiftRight(7).toArray(),
+            a.shiftRight(31).toArray(), a.shiftRight(0).toArray(),
         };
         for (0..L.count) |lane| {
             const x, const y = .{ a.lane(lane), b.lane(lane) };
+            const bits: u32 = @bitCast(x);
+            const right = [_]i32{ @bitCast(bits >> 7), @bitCast(bits >> 31), x };
             const wanted = [_]i32{
-                x +% y, x -% y, @min(x, y), @max(x, y), x & y, x | y, x << 7, x << 31, x,
-            };
+                x +% y, x -% y, @min(x, y), @max(x, y), x & y, x | y, x << 7, x << 31, x, x ^ y,
+                x *% y,
+            } ++ right;
             for (wanted, found, 0..) |w, f, operation| {
                 if (w != f[lane]) return disagree(L, "integer", .{ operation, x, y }, f[lane]);
             }

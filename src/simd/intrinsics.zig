@@ -217,9 +217,24 @@ pub fn I32x(comptime lanes: comptime_int) type {
             return .{ .v = rl_i32x4_or(a.v, b.v) };
         }
 
+        /// Bits set in one of them.
+        pub inline fn bitXor(a: Self, b: Self) Self {
+            return .{ .v = rl_i32x4_xor(a.v, b.v) };
+        }
+
+        /// a * b, wrapping.
+        pub inline fn mul(a: Self, b: Self) Self {
+            return .{ .v = rl_i32x4_mul(a.v, b.v) };
+        }
+
         /// Shifted left by `amount` bits, zeros from the right.
         pub inline fn shiftLeft(a: Self, comptime amount: u5) Self {
             return .{ .v = rl_i32x4_shift_left(a.v, amount) };
+        }
+
+        /// Shifted right by `amount` bits, zeros from the left.
+        pub inline fn shiftRight(a: Self, comptime amount: u5) Self {
+            return .{ .v = rl_i32x4_shift_right(a.v, amount) };
         }
 
         /// a == b.
@@ -359,7 +374,10 @@ extern fn rl_i32x4_min(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_max(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_and(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_or(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
+extern fn rl_i32x4_xor(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
+extern fn rl_i32x4_mul(a: IntegerQuad, b: IntegerQuad) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_shift_left(a: IntegerQuad, amount: u32) callconv(.c) IntegerQuad;
+extern fn rl_i32x4_shift_right(a: IntegerQuad, amount: u32) callconv(.c) IntegerQuad;
 extern fn rl_i32x4_eq(a: IntegerQuad, b: IntegerQuad) callconv(.c) WordQuad;
 extern fn rl_i32x4_lt(a: IntegerQuad, b: IntegerQuad) callconv(.c) WordQuad;
 extern fn rl_i32x4_le(a: IntegerQuad, b: IntegerQuad) callconv(.c) WordQuad;

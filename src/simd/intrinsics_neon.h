@@ -69,9 +69,16 @@ rl_i32x4 rl_i32x4_min(rl_i32x4 a, rl_i32x4 b) { return vminq_s32(a, b); }
 rl_i32x4 rl_i32x4_max(rl_i32x4 a, rl_i32x4 b) { return vmaxq_s32(a, b); }
 rl_i32x4 rl_i32x4_and(rl_i32x4 a, rl_i32x4 b) { return vandq_s32(a, b); }
 rl_i32x4 rl_i32x4_or(rl_i32x4 a, rl_i32x4 b) { return vorrq_s32(a, b); }
+rl_i32x4 rl_i32x4_xor(rl_i32x4 a, rl_i32x4 b) { return veorq_s32(a, b); }
+rl_i32x4 rl_i32x4_mul(rl_i32x4 a, rl_i32x4 b) { return vmulq_s32(a, b); }
 
 rl_i32x4 rl_i32x4_shift_left(rl_i32x4 a, uint32_t amount) {
     return vshlq_s32(a, vdupq_n_s32((int32_t)amount));
+}
+
+rl_i32x4 rl_i32x4_shift_right(rl_i32x4 a, uint32_t amount) {
+    const uint32x4_t bits = vreinterpretq_u32_s32(a);
+    return vreinterpretq_s32_u32(vshlq_u32(bits, vdupq_n_s32(-(int32_t)amount)));
 }
 
 rl_u32x4 rl_i32x4_eq(rl_i32x4 a, rl_i32x4 b) { return vceqq_s32(a, b); }

@@ -66,6 +66,7 @@ rl_i32x4 rl_i32x4_add(rl_i32x4 a, rl_i32x4 b) { return I32(_mm_add_epi32(INT(a),
 rl_i32x4 rl_i32x4_sub(rl_i32x4 a, rl_i32x4 b) { return I32(_mm_sub_epi32(INT(a), INT(b))); }
 rl_i32x4 rl_i32x4_and(rl_i32x4 a, rl_i32x4 b) { return I32(_mm_and_si128(INT(a), INT(b))); }
 rl_i32x4 rl_i32x4_or(rl_i32x4 a, rl_i32x4 b) { return I32(_mm_or_si128(INT(a), INT(b))); }
+rl_i32x4 rl_i32x4_xor(rl_i32x4 a, rl_i32x4 b) { return I32(_mm_xor_si128(INT(a), INT(b))); }
 
 rl_u32x4 rl_i32x4_eq(rl_i32x4 a, rl_i32x4 b) { return U32(_mm_cmpeq_epi32(INT(a), INT(b))); }
 rl_u32x4 rl_i32x4_lt(rl_i32x4 a, rl_i32x4 b) { return U32(_mm_cmplt_epi32(INT(a), INT(b))); }
@@ -91,8 +92,23 @@ rl_i32x4 rl_i32x4_max(rl_i32x4 a, rl_i32x4 b) {
 #endif
 }
 
+rl_i32x4 rl_i32x4_mul(rl_i32x4 a, rl_i32x4 b) {
+#ifdef __SSE4_1__
+    return I32(_mm_mullo_epi32(INT(a), INT(b)));
+#else
+    const __m128i even = _mm_mul_epu32(INT(a), INT(b));
+    const __m128i odd = _mm_mul_epu32(_mm_srli_epi64(INT(a), 32), _mm_srli_epi64(INT(b), 32));
+    const int pairs = _MM_SHUFFLE(0, 0, 2, 0);
+    return I32(_mm_unpacklo_epi32(_mm_shuffle_epi32(even, pairs), _mm_shuffle_epi32(odd, pairs)));
+#endif
+}
+
 rl_i32x4 rl_i32x4_shift_left(rl_i32x4 a, uint32_t amount) {
     return I32(_mm_slli_epi32(INT(a), (int)amount));
+}
+
+rl_i32x4 rl_i32x4_shift_right(rl_i32x4 a, uint32_t amount) {
+    return I32(_mm_srli_epi32(INT(a), (int)amount));
 }
 
 rl_f32x4 rl_i32x4_to_f32(rl_i32x4 a) { return _mm_cvtepi32_ps(INT(a)); }

@@ -290,10 +290,31 @@ pub fn I32x(comptime lanes: comptime_int) type {
             return result;
         }
 
+        /// Bits set in one of them.
+        pub inline fn bitXor(a: Self, b: Self) Self {
+            var result: Self = undefined;
+            for (&result.v, a.v, b.v) |*r, x, y| r.* = x ^ y;
+            return result;
+        }
+
+        /// a * b, wrapping.
+        pub inline fn mul(a: Self, b: Self) Self {
+            var result: Self = undefined;
+            for (&result.v, a.v, b.v) |*r, x, y| r.* = x *% y;
+            return result;
+        }
+
         /// Shifted left by `amount` bits, zeros from the right.
         pub inline fn shiftLeft(a: Self, comptime amount: u5) Self {
             var result: Self = undefined;
             for (&result.v, a.v) |*r, x| r.* = x << amount;
+            return result;
+        }
+
+        /// Shifted right by `amount` bits, zeros from the left.
+        pub inline fn shiftRight(a: Self, comptime amount: u5) Self {
+            var result: Self = undefined;
+            for (&result.v, a.v) |*r, x| r.* = @bitCast(@as(u32, @bitCast(x)) >> amount);
             return result;
         }
 

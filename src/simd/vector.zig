@@ -261,9 +261,24 @@ pub fn I32x(comptime lanes: comptime_int) type {
             return .{ .v = a.v | b.v };
         }
 
+        /// Bits set in one of them.
+        pub inline fn bitXor(a: Self, b: Self) Self {
+            return .{ .v = a.v ^ b.v };
+        }
+
+        /// a * b, wrapping.
+        pub inline fn mul(a: Self, b: Self) Self {
+            return .{ .v = a.v *% b.v };
+        }
+
         /// Shifted left by `amount` bits, zeros from the right.
         pub inline fn shiftLeft(a: Self, comptime amount: u5) Self {
             return .{ .v = a.v << @splat(amount) };
+        }
+
+        /// Shifted right by `amount` bits, zeros from the left.
+        pub inline fn shiftRight(a: Self, comptime amount: u5) Self {
+            return .{ .v = @bitCast(@as(Unsigned, @bitCast(a.v)) >> @splat(amount)) };
         }
 
         /// a == b.

@@ -85,6 +85,14 @@ pub fn Node(comptime width: comptime_int) type {
             return box;
         }
 
+        /// Sets it.
+        pub fn setChildBox(node: *Self, index: usize, box: Box3) void {
+            for (0..3) |axis| {
+                node.bounds[0][axis][index] = box.lower[axis];
+                node.bounds[1][axis][index] = box.upper[axis];
+            }
+        }
+
         comptime {
             assert(@sizeOf(Self) == 32 * width);
             assert(@alignOf(Self) == cache_line_bytes);
@@ -268,24 +276,6 @@ pub const Geometry = struct {
     pub inline fn face(geometry: *const Geometry, primitive: u32) Face {
         if (geometry.shared.runs.len == 0) return .of(&geometry.triangles[primitive]);
         return geometry.shared.face(geometry, primitive);
-    }
-
-    /// A triangle by its number, with corners for `positionAt` and `colorAt`.
-    pub fn triangleAt(geometry: *const Geometry, primitive: u32) Triangle {
-        if (geometry.shared.runs.len == 0) return geometry.triangles[primitive];
-        return geometry.shared.triangleAt(geometry, primitive);
-    }
-
-    /// A vertex by its number.
-    pub fn positionAt(geometry: *const Geometry, vertex: u32) Vec3 {
-        if (geometry.shared.runs.len == 0) return geometry.positions[vertex];
-        return geometry.shared.positionAt(geometry, vertex);
-    }
-
-    /// The colour of a vertex by its number; asserts that some have one.
-    pub fn colorAt(geometry: *const Geometry, vertex: u32) [4]f32 {
-        if (geometry.shared.runs.len == 0) return geometry.colors[vertex];
-        return geometry.shared.colorAt(geometry, vertex);
     }
 
     /// Without anything to hit, and without a tree.

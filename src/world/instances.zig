@@ -102,11 +102,6 @@ pub const Shared = struct {
     has_colors: bool = false,
     has_tangents: bool = false,
 
-    /// The run of a triangle.
-    pub fn runOf(shared: *const Shared, primitive: u32) *const Run {
-        return shared.find("primitive_first", primitive);
-    }
-
     /// The number of a flattened triangle by its place in `Geometry.triangles`.
     pub fn numberOf(shared: *const Shared, triangle: u32) u32 {
         const search: FlatSearch = .{ .shared = shared, .triangle = triangle };
@@ -135,19 +130,28 @@ pub const Shared = struct {
         }
     };
 
-    fn find(shared: *const Shared, comptime field: []const u8, number: u32) *const Run {
+    fn find(shared: *const Shared, comptime field: []const u8, number: u32) usize {
         var low: usize = 0;
         var high = shared.runs.len;
         while (high - low > 1) {
             const middle = low + (high - low) / 2;
             if (@field(shared.runs[middle], field) <= number) low = middle else high = middle;
         }
-        return &shared.runs[low];
+        return low;
     }
 
     /// See `Geometry.face`.
     pub fn face(shared: *const Shared, geometry: *const Geometry, primitive: u32) Face {
-        const run = shared.runOf(primitive);
+        const run = &shared.runs[shared.find("primitive_first", primitive)];
+        return shared.faceIn(geometry, run, primitive);
+    }
+
+    fn faceIn(
+        shared: *const Shared,
+        geometry: *const Geometry,
+        run: *const Run,
+        primitive: u32,
+    ) Face {
         const local = primitive - run.primitive_first;
         if (run.instance == none) return .of(&geometry.triangles[run.triangle_first + local]);
         const instance = &shared.instances[run.instance];
@@ -161,33 +165,81 @@ pub const Shared = struct {
         if (instance.placement.mirrored) std.mem.swap(u32, &result.corner[1], &result.corner[2]);
         return result;
     }
+};
 
-    /// See `Geometry.triangleAt`.
-    pub fn triangleAt(shared: *const Shared, geometry: *const Geometry, primitive: u32) Triangle {
-        const run = shared.runOf(primitive);
-        const found = shared.face(geometry, primitive);
-        var corner = found.corner;
+/// Triangles and vertices by their numbers, for those who look at many that follow each other: the
+/// run of the last one is remembered.
+pub const Cursor = struct {
+    geometry: *const Geometry,
+    run: Run = .{
+        .primitive_first = 0,
+        .vertex_first = 0,
+        .instance = none,
+        .triangle_first = 0,
+        .position_first = 0,
+    },
+    /// What is in the run: where all is flattened, everything.
+    primitive_count: u32 = std.math.maxInt(u32),
+    vertex_count: u32 = std.math.maxInt(u32),
+
+    /// At the first triangle.
+    pub fn init(geometry: *const Geometry) Cursor {
+        var cursor: Cursor = .{ .geometry = geometry };
+        if (geometry.shared.runs.len > 0) cursor.enter(0);
+        return cursor;
+    }
+
+    fn enter(cursor: *Cursor, index: usize) void {
+        const shared = &cursor.geometry.shared;
+        const runs = shared.runs;
+        const is_last = index + 1 == runs.len;
+        cursor.run = runs[index];
+        const primitive_end =
+            if (is_last) shared.primitive_count else runs[index + 1].primitive_first;
+        const vertex_end = if (is_last) shared.vertex_count else runs[index + 1].vertex_first;
+        cursor.primitive_count = primitive_end - cursor.run.primitive_first;
+        cursor.vertex_count = vertex_end - cursor.run.vertex_first;
+    }
+
+    /// A triangle, with corners for `positionAt` and `colorAt`.
+    pub fn triangleAt(cursor: *Cursor, primitive: u32) Triangle {
+        const shared = &cursor.geometry.shared;
+        if (primitive -% cursor.run.primitive_first >= cursor.primitive_count)
+            cursor.enter(shared.find("primitive_first", primitive));
+        const run = &cursor.run;
+        const face = shared.faceIn(cursor.geometry, run, primitive);
+        var corner = face.corner;
         // Wraps where the vertices start earlier in the array; the sum is right again.
         for (&corner) |*vertex| vertex.* +%= run.vertex_first -% run.position_first;
-        return .{ .corner = corner, .material = found.material };
+        return .{ .corner = corner, .material = face.material };
     }
 
-    /// See `Geometry.positionAt`.
-    pub fn positionAt(shared: *const Shared, geometry: *const Geometry, vertex: u32) Vec3 {
-        const run = shared.find("vertex_first", vertex);
-        const local = vertex - run.vertex_first;
+    /// Where a vertex is.
+    pub fn positionAt(cursor: *Cursor, vertex: u32) Vec3 {
+        const local = cursor.localOf(vertex);
+        const run = &cursor.run;
+        const geometry = cursor.geometry;
         if (run.instance == none) return geometry.positions[run.position_first + local];
-        const instance = &shared.instances[run.instance];
-        return instance.placement.placePoint(shared.meshes[instance.mesh].positions[local]);
+        const instance = &geometry.shared.instances[run.instance];
+        const mesh = &geometry.shared.meshes[instance.mesh];
+        return instance.placement.placePoint(mesh.positions[local]);
     }
 
-    /// See `Geometry.colorAt`.
-    pub fn colorAt(shared: *const Shared, geometry: *const Geometry, vertex: u32) [4]f32 {
-        const run = shared.find("vertex_first", vertex);
-        const local = vertex - run.vertex_first;
+    /// The colour of a vertex, white where it has none.
+    pub fn colorAt(cursor: *Cursor, vertex: u32) [4]f32 {
+        const local = cursor.localOf(vertex);
+        const run = &cursor.run;
+        const geometry = cursor.geometry;
         if (run.instance == none) return orElse(geometry.colors, run.position_first + local, white);
-        const mesh = &shared.meshes[shared.instances[run.instance].mesh];
+        const mesh = &geometry.shared.meshes[geometry.shared.instances[run.instance].mesh];
         return orElse(mesh.colors, local, white);
+    }
+
+    /// The number of a vertex in its run.
+    fn localOf(cursor: *Cursor, vertex: u32) u32 {
+        if (vertex -% cursor.run.vertex_first >= cursor.vertex_count)
+            cursor.enter(cursor.geometry.shared.find("vertex_first", vertex));
+        return vertex - cursor.run.vertex_first;
     }
 };
 
@@ -391,10 +443,7 @@ pub fn MappedCluster(comptime width: comptime_int) type {
                     boxes[index] = boxes[index].join(box);
                     const is_there = child != Child.missing;
                     const grown = if (is_there) box.grow(padding.marginOfBox(box)) else box;
-                    for (0..3) |axis| {
-                        node.bounds[0][axis][slot] = grown.lower[axis];
-                        node.bounds[1][axis][slot] = grown.upper[axis];
-                    }
+                    node.setChildBox(slot, grown);
                 }
             }
         }

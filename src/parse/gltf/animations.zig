@@ -46,7 +46,7 @@ cameras: std.ArrayList(u32) = .empty,
 const Text = struct {
     name: []const u8 = "",
     channels: []const struct {
-        sampler: u32,
+        sampler: u64,
         target: struct {
             node: ?u32 = null,
             path: []const u8 = "",
@@ -59,6 +59,8 @@ const Text = struct {
         input: u32,
         output: u32,
         interpolation: []const u8 = "LINEAR",
+        /// It has been said why.
+        left_out: bool = false,
     } = &.{},
 
     const Target = @FieldType(std.meta.Elem(@FieldType(Text, "channels")), "target");
@@ -86,12 +88,11 @@ const Place = struct {
     }
 };
 
-/// Reads the channels of a JSON text that has been checked.
-pub fn read(source: *Source, text: []const u8) Error!Animations {
+/// Reads the channels of a JSON text that has been checked; null: it has none.
+pub fn read(source: *Source, with_animations: ?[]const u8) Error!Animations {
     var animations: Animations = .{ .source = source, .scratch = .init(source.gpa) };
     errdefer animations.deinit();
-    const data = source.data;
-    if (data.animations_count == 0) return animations;
+    const text = with_animations orelse return animations;
     const Document = struct { animations: []const Text = &.{} };
     const parsed = try extension_text.parse(Document, animations.scratch.allocator(), text);
     const document = parsed orelse {
@@ -99,7 +100,7 @@ pub fn read(source: *Source, text: []const u8) Error!Animations {
         return animations;
     };
     animations.list = document.animations;
-    animations.moves_material = try source.gpa.alloc(bool, data.materials_count);
+    animations.moves_material = try source.gpa.alloc(bool, source.data.materials_count);
     @memset(animations.moves_material, false);
     var unknown: Unknown = .{};
     for (animations.list, 0..) |*animation, index| {
@@ -146,7 +147,9 @@ fn readChannel(animations: *Animations, place: Place, unknown: *Unknown) Error!v
         "{f}: there is no sampler {d}, left out",
         .{ place, channel.sampler },
     );
-    const sampler = try animations.readSampler(place, channel.sampler, width) orelse return;
+    const index: u32 = @intCast(channel.sampler);
+    if (text.samplers[index].left_out) return;
+    const sampler = try animations.readSampler(place, index, width) orelse return;
     try animations.channels.append(source.gpa, .{
         .animation = @intCast(place.animation),
         .sampler = sampler,
@@ -325,14 +328,9 @@ fn decodeNew(animations: *Animations, index: u32) Error!Decoded {
     const source = animations.source;
     if (index >= source.data.accessors_count) return .{ .wrong = "names no accessor" };
     if (source.findBroken(.accessors, index)) |broken| return .{ .wrong = broken.reason };
-    const before = source.diagnostic.message;
-    const resolved = gltf_accessors.resolve(source, index) catch |err| switch (err) {
-        error.InvalidInput => {
-            const message = source.diagnostic.message;
-            source.diagnostic.message = before;
-            return .{ .wrong = try animations.scratch.allocator().dupe(u8, message.text()) };
-        },
-        else => |other| return other,
+    const resolved = gltf_accessors.resolve(source, index) catch |err| {
+        const line = try source.takeLine(err);
+        return .{ .wrong = try animations.scratch.allocator().dupe(u8, line.text()) };
     };
     const accessor = resolved orelse return .{ .wrong = "has no data, or only compressed data" };
     const width = accessor.component_count;

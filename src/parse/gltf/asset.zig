@@ -7,7 +7,6 @@
 const std = @import("std");
 const c = @import("../cgltf.zig");
 const diagnostic = @import("../../diagnostic.zig");
-const draco = @import("../../decode.zig").draco;
 const extensions = @import("extensions.zig");
 const Source = @import("source.zig");
 const Error = Source.Error;
@@ -32,18 +31,14 @@ pub fn check(source: *Source) Error!void {
     );
     for (Source.slice(data.extensions_required, data.extensions_required_count)) |raw| {
         const name = std.mem.span(@as([*:0]const u8, raw));
-        const is_accepted = if (extensions.find(name)) |known| known.mayBeRequired() else false;
-        const lacks_draco = !draco.is_held and std.mem.eql(u8, name, "KHR_draco_mesh_compression");
-        if (is_accepted and !lacks_draco) continue;
+        var lack: []const u8 = "is not supported (see --force)";
+        if (extensions.find(name)) |known| {
+            if (known.mayBeRequired()) continue;
+            if (known.lack == .other_meshes) lack = known.remark;
+        }
         source.builder.scene.file.needs_force = true;
         if (source.force) continue;
-        return if (lacks_draco) source.fail(
-            "the required extension {f} needs a build with Draco (-Ddraco)",
-            .{diagnostic.quote(name)},
-        ) else source.fail(
-            "the required extension {f} is not supported (see --force)",
-            .{diagnostic.quote(name)},
-        );
+        return source.fail("the required extension {f} {s}", .{ diagnostic.quote(name), lack });
     }
     if (!source.builder.scene.file.needs_force) source.force = false;
     const required = Source.slice(data.extensions_required, data.extensions_required_count);

@@ -6,6 +6,7 @@
 const std = @import("std");
 const limits = @import("limits.zig");
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
+const markBytes = @import("../format.zig").markBytes;
 
 /// The parts of a file.
 pub const Container = struct {
@@ -144,10 +145,10 @@ fn isChunk(bytes: []const u8, offset: usize) bool {
 
 /// Leaves out a byte order mark, which JSON forbids but files have.
 fn skipMark(json: []const u8, diagnostic: *Diagnostic) []const u8 {
-    const mark = "\xef\xbb\xbf";
-    if (!std.mem.startsWith(u8, json, mark)) return json;
+    const mark_bytes = markBytes(json);
+    if (mark_bytes == 0) return json;
     diagnostic.forgive("the JSON text begins with a byte order mark, ignored", .{});
-    return json[mark.len..];
+    return json[mark_bytes..];
 }
 
 /// Leaves out zero bytes where the specification wants spaces.
@@ -263,7 +264,7 @@ test "padding that is missing or not counted, and bytes behind the last chunk" {
             if (case.binary) |binary| {
                 try std.testing.expectEqualStrings(binary, container.binary.?);
             }
-            try std.testing.expectEqual(strict, diagnostic.refused);
+            try std.testing.expectEqual(strict, diagnostic.refusal != null);
             try std.testing.expectEqual(!strict, diagnostic.warning_count > 0);
         }
     }

@@ -11,7 +11,12 @@ const Source = @import("source.zig");
 const Error = error{OutOfMemory};
 
 /// Completes the description of the file whose scene `shown` is read; null: all of its nodes are.
-pub fn read(source: *const Source, shown: ?*const c.cgltf_scene) Error!void {
+/// Of animations cgltf may not know.
+pub fn read(
+    source: *const Source,
+    shown: ?*const c.cgltf_scene,
+    animation_count: usize,
+) Error!void {
     const data = source.data;
     const scenes = try source.arena.alloc([]const u8, data.scenes_count);
     for (scenes, Source.slice(data.scenes, data.scenes_count)) |*name, *one| {
@@ -33,7 +38,7 @@ pub fn read(source: *const Source, shown: ?*const c.cgltf_scene) Error!void {
             .textures = data.textures_count,
             .images = data.images_count,
             .skins = data.skins_count,
-            .animations = data.animations_count,
+            .animations = animation_count,
             .cameras = data.cameras_count,
             .lights = data.lights_count,
         },

@@ -102,7 +102,6 @@ const Decoder = struct {
 
     fn attribute(decoder: Decoder, index: u32, id: u32) Error!void {
         const source = decoder.source;
-        try source.need(.accessors, index);
         var accessor = try gltf_accessors.describe(source, index);
         accessor.count = try decoder.checkCount(index, decoder.mesh.vertexCount(), "vertices");
         const bytes = try decoder.keep(index, accessor) orelse return;

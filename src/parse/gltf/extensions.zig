@@ -4,6 +4,7 @@
 //! docs/formats.md has the same rows. What is not in it is unknown: it may change anything.
 
 const std = @import("std");
+const draco = @import("../../decode.zig").draco;
 
 /// What becomes of what an extension says.
 pub const Treatment = enum {
@@ -23,7 +24,8 @@ pub const Lack = enum {
     /// Other forms of images, without which there are textures that have none; these are warned of
     /// one by one.
     images,
-    /// Another form of meshes, which are there as well unless it is required.
+    /// Another form of meshes, which are there as well unless it is required; the remark says what
+    /// would read it.
     other_meshes,
     shapes,
 };
@@ -88,7 +90,10 @@ pub const all: []const Extension = &.{
     ignored("KHR_accessor_float64", .shapes, "accessors of doubles"),
     rendered("KHR_animation_pointer", "what docs/animation.md lists"),
     ignored("KHR_audio_emitter", .nothing, "sound"),
-    rendered("KHR_draco_mesh_compression", "by builds with Draco (-Ddraco)"),
+    if (draco.is_held)
+        rendered("KHR_draco_mesh_compression", draco_remark)
+    else
+        ignored("KHR_draco_mesh_compression", .other_meshes, draco_remark),
     ignored("KHR_gaussian_splatting", .looks, "splats are points"),
     ignored("KHR_implicit_shapes", .nothing, "shapes of colliders"),
     ignored("KHR_interactivity", .nothing, "behaviour"),
@@ -141,6 +146,8 @@ pub const all: []const Extension = &.{
     ignored("VRMC_vrm", .nothing, "data"),
 };
 
+const draco_remark = "needs a build with Draco (-Ddraco)";
+
 fn rendered(name: []const u8, remark: []const u8) Extension {
     return .{ .name = name, .treatment = .rendered, .remark = remark };
 }
@@ -174,8 +181,10 @@ test "docs/formats.md has every row" {
     defer gpa.free(text);
     var buffer: [256]u8 = undefined;
     for (all) |*extension| {
+        // What some builds lack is there as others have it.
+        const treatment = if (extension.lack == .other_meshes) .rendered else extension.treatment;
         const row = try std.mem.print(&buffer, "\n| {s} | {t} | {s} |\n", .{
-            extension.name, extension.treatment, extension.remark,
+            extension.name, treatment, extension.remark,
         });
         errdefer std.debug.print("missing:{s}", .{row});
         try std.testing.expect(std.mem.find(u8, text, row) != null);
@@ -190,5 +199,8 @@ test "what is missing decides whether an extension may be required" {
     try std.testing.expect(find("EXT_lights_ies").?.isMissed());
     try std.testing.expect(find("MSFT_texture_dds").?.mayBeRequired());
     try std.testing.expect(!find("KHR_accessor_float64").?.mayBeRequired());
+    const compression = find("KHR_draco_mesh_compression").?;
+    try std.testing.expectEqual(draco.is_held, compression.mayBeRequired());
+    try std.testing.expect(!compression.isMissed());
     try std.testing.expectEqual(null, find("KHR_materials_io"));
 }

@@ -36,7 +36,10 @@ pub fn place(source: *Source, origin: u32, node_index: u32, part_count: u64) Err
     }
     var used: Used = .initFill(null);
     const count = try find(source, origin, &used) orelse {
-        source.warn("node {d}: EXT_mesh_gpu_instancing without attributes: drawn once", .{origin});
+        source.forgive(
+            "node {d}: EXT_mesh_gpu_instancing without attributes: drawn once",
+            .{origin},
+        );
         return itself;
     };
     const builder = source.builder;
@@ -116,7 +119,7 @@ fn addNodes(source: *Source, origin: u32, parent: u32, used: *const Used, count:
         );
         _ = try source.builder.addNode(parent, local);
     }
-    if (odd_count > 0 and !is_rounded) source.warn(
+    if (odd_count > 0 and !is_rounded) source.forgive(
         "node {d}: {d} rotations of EXT_mesh_gpu_instancing are no unit quaternions, made such",
         .{ origin, odd_count },
     );

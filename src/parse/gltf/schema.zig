@@ -99,20 +99,25 @@ const accessor: Rule = named(&.{
 });
 
 const animation: Rule = named(&.{
-    optional("channels", many(&object(&.{
+    // One without a target moves nothing.
+    optional("channels", manyOr("{\"sampler\":0}", &object(&.{
         required("sampler", .whole),
         optional("target", object(&.{
             optional("node", reference(.nodes)),
             optional("path", .string),
-            optional("extensions", extensions(&.{})),
+            optional("extensions", extensions(&.{
+                optional("KHR_animation_pointer", object(&.{optional("pointer", .string)})),
+            })),
         })),
         optional("extensions", extensions(&.{})),
     }))),
-    optional("samplers", many(&object(&.{
+    // What animations.zig takes for one that is left out.
+    optional("samplers", manyOr("{\"input\":0,\"output\":0,\"left_out\":true}", &object(&.{
         required("input", reference(.accessors)),
         required("output", reference(.accessors)),
         optional("interpolation", .string),
         optional("extensions", extensions(&.{})),
+        optional("left_out", .boolean),
     }))),
 });
 
@@ -146,13 +151,13 @@ const meshopt: Rule = object(&.{
 
 const camera: Rule = named(&.{
     optional("type", .string),
-    optional("perspective", object(&.{
+    alternative("perspective", object(&.{
         optional("aspectRatio", .number),
         required("yfov", .number),
         spare("zfar", .number),
         spare("znear", .number),
     })),
-    optional("orthographic", object(&.{
+    alternative("orthographic", object(&.{
         required("xmag", .number),
         required("ymag", .number),
         spare("zfar", .number),
@@ -380,6 +385,11 @@ fn spare(comptime name: []const u8, comptime rule: Rule) Field {
     return .{ .name = name, .rule = rule, .is_spare = true };
 }
 
+/// One of those that exclude each other.
+fn alternative(comptime name: []const u8, comptime rule: Rule) Field {
+    return .{ .name = name, .rule = rule, .is_alternative = true };
+}
+
 fn required(comptime name: []const u8, comptime rule: Rule) Field {
     return .{ .name = name, .rule = rule, .required = true };
 }
@@ -414,8 +424,13 @@ fn many(comptime item: *const Rule) Rule {
     return .{ .array = .{ .item = item } };
 }
 
+/// The same, but what breaks its rule is replaced by a text.
+fn manyOr(comptime substitute: []const u8, comptime item: *const Rule) Rule {
+    return .{ .array = .{ .item = item, .substitute = substitute } };
+}
+
 fn list(comptime counted: List, comptime item: *const Rule) Rule {
-    return .{ .array = .{ .item = item, .list = @backingInt(counted) } };
+    return .{ .array = .{ .item = item, .list = @backingInt(counted), .substitute = "{}" } };
 }
 
 fn reference(comptime counted: List) Rule {

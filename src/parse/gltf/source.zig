@@ -9,7 +9,9 @@ const draco_meshes = @import("draco_meshes.zig");
 const json = @import("../json.zig");
 const schema = @import("schema.zig");
 const scene = @import("../../scene.zig");
-const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
+const diagnostic_data = @import("../../diagnostic.zig");
+const Diagnostic = diagnostic_data.Diagnostic;
+const Message = diagnostic_data.Message;
 const Allocator = std.mem.Allocator;
 const Lenience = @import("../json/lenience.zig");
 const assert = std.debug.assert;
@@ -100,12 +102,16 @@ pub fn findBroken(source: *const Source, list: schema.List, index: usize) ?Lenie
 }
 
 /// Makes an error of what is not drawn, or must not stop the rest, a warning.
-pub fn excuse(source: *const Source, err: Error) Error!void {
-    if (err == error.OutOfMemory) return err;
-    const diagnostic = source.diagnostic;
-    const said = diagnostic.message;
-    if (!diagnostic.refused) diagnostic.message.set("", .{});
-    source.forgiveUnneeded(said.text());
+pub fn excuse(source: *const Source, err: Error) error{OutOfMemory}!void {
+    const line = try source.takeLine(err);
+    source.forgiveUnneeded(line.text());
+}
+
+/// The line of an error that is no reason to give up.
+pub fn takeLine(source: *const Source, err: Error) error{OutOfMemory}!Message {
+    if (err == error.OutOfMemory) return error.OutOfMemory;
+    defer source.diagnostic.message = .{};
+    return source.diagnostic.message;
 }
 
 /// Says what is wrong with what is not drawn.

@@ -22,6 +22,8 @@ gpa: Allocator,
 bytes: []const u8,
 /// `bytes`, where they are not the file's.
 owned: ?[]u8 = null,
+/// The same without animations, where cgltf refuses these: they have a reader of their own.
+unanimated: ?[]u8 = null,
 checked: json.Checked = undefined,
 /// Elements of the schema's lists that are left out.
 lenience: Lenience,
@@ -48,6 +50,7 @@ pub fn open(gpa: Allocator, raw: []const u8, diagnostic: *Diagnostic) Error!Text
 /// Frees what is not the file's.
 pub fn deinit(text: *Text) void {
     if (text.owned) |owned| text.gpa.free(owned);
+    if (text.unanimated) |other| text.gpa.free(other);
     text.lenience.deinit();
     text.* = undefined;
 }
@@ -79,29 +82,28 @@ fn scan(text: *Text, graph: ?*Graph, said: *Diagnostic) Error!void {
 
 /// Has cgltf parse the text. The document must not outlive it.
 pub fn parse(text: *Text, diagnostic: *Diagnostic) Error!Document {
-    if (try text.tryParse(diagnostic)) |document| return document;
-    const is_strict = diagnostic.strict;
-    if (!is_strict) {
+    if (try tryParse(text.gpa, text.bytes, diagnostic)) |document| return document;
+    if (!diagnostic.strict) {
         try text.mendReferences(diagnostic);
-        if (try text.tryParse(diagnostic)) |document| return document;
+        if (try tryParse(text.gpa, text.bytes, diagnostic)) |document| return document;
     }
     // cgltf does not say why, so look for the reasons that the table leaves.
     const lengths = text.checked.lengths;
     const rule = &schema.document;
     try json.checkReferences(text.gpa, text.bytes, rule, lengths, "node", diagnostic);
-    if (!is_strict) {
-        try text.dropAnimations(diagnostic);
-        if (try text.tryParse(diagnostic)) |document| return document;
+    text.unanimated = try text.without("animations");
+    if (text.unanimated) |other| {
+        if (try tryParse(text.gpa, other, diagnostic)) |document| return document;
     }
     return diagnostic.invalid(
-        "is not valid glTF: an animation or an extension refers to what is not there",
+        "is not valid glTF: an extension refers to what is not there",
         .{},
     );
 }
 
 /// Null: cgltf refuses it.
-fn tryParse(text: *const Text, diagnostic: *Diagnostic) Error!?Document {
-    return Document.parse(text.gpa, text.bytes) catch |err| switch (err) {
+fn tryParse(gpa: Allocator, bytes: []const u8, diagnostic: *Diagnostic) Error!?Document {
+    return Document.parse(gpa, bytes) catch |err| switch (err) {
         error.OutOfMemory => error.OutOfMemory,
         error.TooLarge => diagnostic.invalid(
             "the document would need much more memory than its size explains",
@@ -120,7 +122,7 @@ fn mendReferences(text: *Text, diagnostic: *Diagnostic) Error!void {
     // Without buffers there is nothing that views could be of, not even those that are left out.
     if (lengths[buffers] == 0 and lengths[buffer_views] > 0) {
         lengths[buffer_views] = 0;
-        try text.hide("bufferViews");
+        text.replace(try text.without("bufferViews"));
     }
     var graph: Graph = try .init(text.gpa, lengths, @backingInt(schema.List.nodes));
     defer graph.deinit();
@@ -131,24 +133,23 @@ fn mendReferences(text: *Text, diagnostic: *Diagnostic) Error!void {
     try text.scan(null, &unheard);
 }
 
-/// All of them, for cgltf refuses one.
-fn dropAnimations(text: *Text, diagnostic: *Diagnostic) Error!void {
-    if (text.checked.lengths[@backingInt(schema.List.animations)] == 0) return;
-    try text.hide("animations");
-    diagnostic.forgive("animations refer to what is not there, left out", .{});
-    var unheard: Diagnostic = .{};
-    try text.scan(null, &unheard);
-}
-
-/// Makes a key of the document one that is not known.
-fn hide(text: *Text, comptime key: []const u8) Error!void {
+/// The text with a key of the document as one that is not known; null: it has none. The caller
+/// frees it.
+fn without(text: *Text, comptime key: []const u8) Error!?[]u8 {
     // Within strings, quotes are escaped.
     const quoted = "\"" ++ key ++ "\"";
     var start: usize = 0;
     while (std.mem.findPos(u8, text.bytes, start, quoted)) |at| : (start = at + 1) {
-        try text.lenience.hideKey(at);
+        const rest = std.mem.trimStart(u8, text.bytes[at + quoted.len ..], " \t\r\n");
+        if (std.mem.startsWith(u8, rest, ":")) try text.lenience.hideKey(at);
     }
-    text.replace(try text.lenience.apply(text.bytes));
+    return text.lenience.apply(text.bytes);
+}
+
+/// The text where it has animations, whatever cgltf sees of them.
+pub fn animated(text: *const Text) ?[]const u8 {
+    const count = text.checked.lengths[@backingInt(schema.List.animations)];
+    return if (count > 0) text.bytes else null;
 }
 
 /// The doubles of the text; the caller frees them.

@@ -29,8 +29,8 @@ uris: std.StringHashMapUnmanaged(?u32) = .empty,
 /// Bytes of buffers that may still be copied: images do not overlap.
 view_bytes_left: u64,
 
-/// Bytes of a buffer.
-const Range = struct { buffer: u32, offset: usize, size: usize };
+/// Bytes of a buffer, or of what has been decompressed.
+const Range = struct { start: usize, size: usize };
 
 /// Nothing is read yet. Free with `deinit`.
 pub fn init(source: *Source, resources: *Resources) Textures {
@@ -210,24 +210,16 @@ pub fn getImage(textures: *Textures, index: u32) Error!?u32 {
 
 fn fromView(textures: *Textures, index: u32, raw: *const c.cgltf_buffer_view) Error!?u32 {
     const source = textures.source;
-    const range: Range = .{
-        .buffer = Source.indexOf(source.data.buffers, raw.buffer),
-        .offset = raw.offset,
-        .size = raw.size,
-    };
-    if (textures.ranges.get(range)) |image| return image;
-    const view_bytes = buffer_views.contents(source, raw) catch |err| switch (err) {
-        error.OutOfMemory => |failure| return failure,
-        error.InvalidInput, error.InputOutput => {
-            const said = source.diagnostic.message;
-            if (!source.diagnostic.refused) source.diagnostic.message.set("", .{});
-            source.forgiveEach("image {d}: {s}, left out", .{ index, said.text() });
-            return null;
-        },
+    const view_bytes = buffer_views.contents(source, raw) catch |err| {
+        const line = try source.takeLine(err);
+        source.forgiveEach("image {d}: {s}, left out", .{ index, line.text() });
+        return null;
     } orelse {
         source.forgiveEach("image {d}: its buffer has no data, left out", .{index});
         return null;
     };
+    const range: Range = .{ .start = @intFromPtr(view_bytes.ptr), .size = view_bytes.len };
+    if (textures.ranges.get(range)) |image| return image;
     if (range.size > textures.view_bytes_left) {
         source.forgiveEach("image {d}: images of the file overlap, left out", .{index});
         return null;

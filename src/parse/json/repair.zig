@@ -12,8 +12,7 @@ const std = @import("std");
 const escapes = @import("escapes.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
-
-const mark = "\xef\xbb\xbf";
+const markBytes = @import("../format.zig").markBytes;
 
 /// The mended copy of a text, a warning for each kind of what was wrong; null: nothing was. The
 /// caller frees it.
@@ -208,7 +207,8 @@ fn notANumber(text: []const u8) ?usize {
 
 /// Bytes of a comment or a byte order mark at the start; null: there is neither.
 fn gapLength(text: []const u8) ?usize {
-    if (std.mem.startsWith(u8, text, mark)) return mark.len;
+    const mark_bytes = markBytes(text);
+    if (mark_bytes > 0) return mark_bytes;
     if (std.mem.startsWith(u8, text, "//"))
         return std.mem.findScalar(u8, text, '\n') orelse text.len;
     if (!std.mem.startsWith(u8, text, "/*")) return null;

@@ -10,6 +10,7 @@ const plain = @import("../plain.zig");
 const scene = @import("../../scene.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
+const FileSearch = @import("../file_search.zig");
 const Library = @import("library.zig");
 const Map = Library.Map;
 const Message = @import("../../diagnostic.zig").Message;
@@ -19,6 +20,7 @@ const Resources = @import("../resource.zig");
 const Vec3 = math.Vec3;
 const Words = @import("words.zig");
 const quote = @import("../../diagnostic.zig").quote;
+const markBytes = @import("../format.zig").markBytes;
 const Materials = @This();
 
 resources: *Resources,
@@ -74,11 +76,11 @@ pub fn load(materials: *Materials, stem: []const u8) Resources.Error!void {
 
 /// False, with the reason, where it cannot be read.
 fn loadOne(materials: *Materials, name: []const u8, reason: *Message) Resources.Error!bool {
-    var paths: [3][]const u8 = undefined;
     const arena = materials.arena;
-    for (try NamedImages.candidates(arena, "", name, &paths), 0..) |path, index| {
+    var search: FileSearch = try .init(materials.resources, arena, "", name);
+    while (try search.next()) |path| {
         var other: Message = .{};
-        const said = if (index == 0) reason else &other;
+        const said = if (search.isFirst()) reason else &other;
         const file = materials.resources.readOptional(arena, path, said) catch |err| switch (err) {
             error.OutOfMemory => |failure| return failure,
             error.Unreadable => continue,
@@ -88,8 +90,12 @@ fn loadOne(materials: *Materials, name: []const u8, reason: *Message) Resources.
                 .{ quote(name), said.text() },
             ),
         };
+        if (search.isOtherCase()) materials.diagnostic.forgiveEach(
+            "material library {f} is {f}",
+            .{ quote(name), quote(path) },
+        );
         const joined = try Words.joined(arena, file.bytes) orelse file.bytes;
-        const text = Resources.withoutMark(joined);
+        const text = joined[markBytes(joined)..];
         try materials.library.read(text, name, std.fs.path.dirname(path) orelse "");
         return true;
     }

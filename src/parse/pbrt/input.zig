@@ -10,14 +10,15 @@
 //! for its strings point into them. A position is a number for a byte of any text.
 
 const std = @import("std");
-const decode = @import("../../decode.zig");
 const diagnostic_file = @import("../../diagnostic.zig");
+const gzip = @import("../../decode.zig").gzip;
 const limits = @import("limits.zig");
 const number = @import("../number.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = diagnostic_file.Diagnostic;
 const Identity = @import("../../identity.zig").Identity;
 const Resources = @import("../resource.zig");
+const markBytes = @import("../format.zig").markBytes;
 const assert = std.debug.assert;
 const printable = diagnostic_file.printable;
 const quote = diagnostic_file.quote;
@@ -96,8 +97,8 @@ pub fn start(input: *Input) Error!void {
         if (std.mem.startsWith(u8, text.bytes, mark))
             return input.fail(text.start, "is in UTF-16, not in UTF-8", .{});
     }
-    if (!std.mem.startsWith(u8, text.bytes, byte_order_mark)) return;
-    text.cursor = byte_order_mark.len;
+    text.cursor = markBytes(text.bytes);
+    if (text.cursor == 0) return;
     try input.forgive(text.start, "mark", "a byte order mark (BOM) is passed over", .{});
 }
 
@@ -368,10 +369,11 @@ pub fn readFile(input: *Input, position: u64, path: []const u8) Error!Resources.
         "the files of the scene are over {d} bytes together",
         .{limits.text_bytes_max},
     );
-    if (!decode.gzip.isGzip(file.bytes)) return file;
+    if (!gzip.isGzip(file.bytes)) return file;
     if (!std.ascii.endsWithIgnoreCase(path, ".gz"))
         try input.forgive(position, "gzip", "{f} is gzip without being called so", .{quote(path)});
-    const plain = input.inflate(file.bytes, &reason) catch |err| switch (err) {
+    const left = limits.text_bytes_max -| input.resources.bytes_read;
+    const plain = input.resources.inflate(file.bytes, left, &reason) catch |err| switch (err) {
         error.OutOfMemory => |failure| return failure,
         error.InvalidGzip => return input.fail(position, "{f} {s}", .{
             quote(path), reason.text(),
@@ -411,31 +413,16 @@ pub fn withoutMark(
     name: []const u8,
     bytes: [:0]const u8,
 ) Error![:0]const u8 {
-    if (!std.mem.startsWith(u8, bytes, byte_order_mark)) return bytes;
+    const mark_bytes = markBytes(bytes);
+    if (mark_bytes == 0) return bytes;
     try input.forgive(
         position,
         "mark",
         "{f}: a byte order mark (BOM) is passed over",
         .{quote(name)},
     );
-    return bytes[byte_order_mark.len..];
+    return bytes[mark_bytes..];
 }
-
-/// What a gzip file holds; it counts as text that is read. The caller frees it.
-pub fn inflate(
-    input: *Input,
-    file: []const u8,
-    reason: *diagnostic_file.Message,
-) decode.gzip.Error![:0]u8 {
-    const left = limits.text_bytes_max -| input.resources.bytes_read;
-    const bytes_max = @min(left, Resources.file_bytes_max);
-    const plain = try decode.gzip.inflate(input.gpa, file, bytes_max, reason);
-    input.resources.bytes_read += plain.len;
-    return plain;
-}
-
-/// What some editors put before a text: RFC 3629, section 6.
-const byte_order_mark = "\xef\xbb\xbf";
 
 test placeOf {
     const text = "a\nbc\n\nd";

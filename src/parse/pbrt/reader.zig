@@ -386,9 +386,7 @@ fn performNamed(reader: *Reader, directive: Directive, name: []const u8) Error!v
                 std.mem.eql(u8, name, "createprobes");
         },
         .Material => reader.graphics.material = try reader.makeMaterial(name),
-        .MakeNamedMaterial => {
-            try reader.makeNamedMaterial(name);
-        },
+        .MakeNamedMaterial => try reader.makeNamedMaterial(name),
         .LightSource => try lights.add(&.{
             .colors = &reader.colors,
             .builder = reader.builder,

@@ -189,10 +189,7 @@ fn Writer(comptime width: u32) type {
         fn setChild(writer: *Self, index: usize, slot: usize, child: Child, box: Box3) void {
             const grown = box.grow(writer.padding.marginOfBox(box));
             const node = &writer.nodes[index];
-            for (0..3) |axis| {
-                node.bounds[0][axis][slot] = grown.lower[axis];
-                node.bounds[1][axis][slot] = grown.upper[axis];
-            }
+            node.setChildBox(slot, grown);
             node.child[slot] = child;
         }
 

@@ -235,10 +235,7 @@ pub fn Refit(comptime width: u32) type {
                     box = split.toBox3(from);
                     box = box.grow(work.input.padding.marginOfBox(box));
                 }
-                for (0..3) |axis| {
-                    node.bounds[0][axis][slot] = box.lower[axis];
-                    node.bounds[1][axis][slot] = box.upper[axis];
-                }
+                node.setChildBox(slot, box);
             }
         };
 

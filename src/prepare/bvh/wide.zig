@@ -482,10 +482,7 @@ fn Collapse(comptime width: u32) type {
             const upper = math.vec3.neg(binary.upper_negated);
             const box: math.Box3 = .{ .lower = binary.lower, .upper = upper };
             const grown = box.grow(collapse.input.padding.marginOfBox(box));
-            for (0..3) |axis| {
-                node.bounds[0][axis][slot] = grown.lower[axis];
-                node.bounds[1][axis][slot] = grown.upper[axis];
-            }
+            node.setChildBox(slot, grown);
             node.child[slot] = .{ .target = target, .pack_count = pack_count };
         }
 

@@ -382,8 +382,7 @@ fn Step(comptime Kernel: type) type {
             if (which.channel) |index| {
                 const iors = transmission
                     .dispersedIors(Rays, material.ior, vertex.layers.dispersion);
-                const stretch = iors[index].div(material.ior);
-                eta = .select(eta.gt(.splat(1)), eta.mul(stretch), eta.div(stretch));
+                eta = transmission.dispersedEta(Rays, eta, material.ior, iors[index]);
                 const bent = transmission.refract(Rays, point.view, point.normal, eta).direction;
                 const through = bent.dot(point.normal_geometric).lt(.zero());
                 direction = .select(through, bent, direction);

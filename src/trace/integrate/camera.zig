@@ -54,12 +54,12 @@ pub inline fn pixels(
 /// Which sample of which pixels.
 pub const Place = struct { rectangle: Rectangle, sample: u32 };
 
-/// Adds a sample of each pixel to a layer of the film: radiance and the share that saw nothing, or
-/// colours of the display and their share.
+/// Adds a sample of each pixel to a layer of the film, four channels each: of radiance the share
+/// that saw nothing, else see `Film.addApart`.
 pub fn expose(
     comptime Kernel: type,
     film: *film_file.Film,
-    comptime layer: film_file.Layer,
+    layer: film_file.Layer,
     place: Place,
     colors: *const [Kernel.group_count]Kernel.Rays.Vec3,
     shares: *const [Kernel.group_count]Kernel.Rays.F32,
@@ -75,11 +75,10 @@ pub fn expose(
             const y = rectangle.y0 + rectangle.step * Kernel.pixelY(group, lane);
             if (x >= rectangle.x1 or y >= rectangle.y1) continue;
             const value = .{ red[lane], green[lane], blue[lane], fourth[lane] };
-            switch (layer) {
-                .color => film.add(x, y, place.sample, value),
-                .display => film.addDisplay(x, y, place.sample, value),
-                .alpha => comptime unreachable,
-            }
+            if (layer == .color)
+                film.add(x, y, place.sample, value)
+            else
+                film.addApart(layer, x, y, place.sample, value);
         }
     }
 }

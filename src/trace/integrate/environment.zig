@@ -58,6 +58,7 @@ pub fn addEscaped(
     const gone = ray.active.bitAnd(missed);
     if (gone.none()) return;
     var throughput: Vec3 = .select(gone, path.throughput[group], .splat(.{ 0, 0, 0 }));
+    if (sample.features.kept) sample.features.addEscaped(group, path, throughput);
     if (path.depth == 0) throughput = throughput.scale(floor_light);
     addSurroundings(Kernel, around, path, group, gone, throughput, sample);
 }

@@ -58,6 +58,7 @@ fn Lighting(comptime Kernel: type) type {
 
         const Self = @This();
         const Tree = InstantRadiosity(Kernel);
+        const ones: [group_count]Rays.F32 = @splat(.splat(1));
 
         pub const stride = interleave.side;
         pub const Shared = SharedOf(Kernel);
@@ -138,7 +139,9 @@ fn Lighting(comptime Kernel: type) type {
             const light = &lighting.light;
             put(layers, layers.guide, rectangle, sample, &lighting.normal, &lighting.distance);
             inline for (.{ "bounced", "albedo" }) |name| {
-                put(layers, @field(layers, name), rectangle, sample, &@field(light, name), null);
+                const one = comptime std.mem.eql(u8, name, "albedo");
+                const count: ?*const [group_count]Rays.F32 = if (one) &ones else null;
+                put(layers, @field(layers, name), rectangle, sample, &@field(light, name), count);
             }
             if (layers.open.len > 0) inline for (.{ "arriving", "shining", "open" }) |name| {
                 put(layers, @field(layers, name), rectangle, sample, &@field(light, name), null);
@@ -238,7 +241,7 @@ fn SharedOf(comptime Kernel: type) type {
             try shared.placeStarts();
             const view = frame.view;
             const has_sky = shared.sky.len > 0;
-            shared.layers = try .init(gpa, view, samples, has_sky, lights.is_interleaved);
+            shared.layers = try .init(gpa, view, has_sky, lights.is_interleaved);
             return shared;
         }
 

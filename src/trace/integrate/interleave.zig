@@ -39,7 +39,6 @@ pub const Sets = struct {
         return .{
             .set_count = @min(sample_count, set_count_max),
             .part_size = @divCeil(light_count, part_count),
-            .sample_count = sample_count,
             .is_interleaved = is_interleaved,
         };
     }
@@ -81,11 +80,11 @@ pub const Sets = struct {
 pub const Layers = struct {
     width: u32,
     height: u32,
-    sample_count: u32,
     is_interleaved: bool,
     /// Geometric normal of what is seen first, and how far away it is.
     guide: []Pixel,
-    /// Light of virtual lights, and the albedo that it was multiplied by.
+    /// Light of virtual lights, and the albedo that it was multiplied by; fourth, how many samples
+    /// there are.
     bounced: []Pixel,
     albedo: []Pixel,
     /// The sky's light that arrives by its lights and all of it by these; none without a map.
@@ -103,7 +102,6 @@ pub const Layers = struct {
     pub fn init(
         gpa: Allocator,
         view: *const world_file.View,
-        sample_count: u32,
         has_sky: bool,
         is_interleaved: bool,
     ) error{OutOfMemory}!Layers {
@@ -147,12 +145,12 @@ pub const Layers = struct {
         view: *const world_file.View,
         y: u32,
     ) u64 {
-        const scale: Pixel = @splat(1 / @as(f32, @floatFromInt(layers.sample_count)));
         var non_finite_count: u64 = 0;
         for (0..layers.width) |x| {
             const light = layers.lightOf(view, @intCast(x), y);
             const pixel = film.image.at(@intCast(x), y);
-            const added = light * scale;
+            const count = layers.albedo[@as(usize, y) * layers.width + x][3];
+            const added = light / @as(Pixel, @splat(count));
             const sum = added[0] + added[1] + added[2];
             if (!std.math.isFinite(sum)) {
                 pixel.* = .{ 0, 0, 0, 1 };
@@ -273,10 +271,11 @@ const Place = struct {
     const off_max = 2.5;
 
     fn of(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Place {
-        const sums = layers.guide[@as(usize, y) * layers.width + x];
+        const at = @as(usize, y) * layers.width + x;
+        const sums = layers.guide[at];
         const sum: Vec3 = .{ sums[0], sums[1], sums[2] };
         const size = vec3.length(sum);
-        const count: f32 = @floatFromInt(layers.sample_count);
+        const count = layers.albedo[at][3];
         const distance = sums[3] / count;
         const camera = &view.camera;
         const across = (2 * @as(f32, @floatFromInt(x)) + 1) / @as(f32, @floatFromInt(view.width)) - 1;

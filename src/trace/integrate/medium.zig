@@ -259,7 +259,7 @@ pub fn Medium(comptime Kernel: type) type {
                 const passage = &visibility.passages[group];
                 const way = bundle.groups[group].line.direction;
                 const through: Vec3 = if (passage.is_started)
-                    passage.left(visibility_file.shadowEnd(light), way)
+                    passage.left(@splat(visibility_file.shadowEnd(light)), way)
                 else
                     .splat(.{ 1, 1, 1 });
                 const scattered = octaves(Rays, point, arrival.to_light, share, through);

@@ -11,6 +11,7 @@ const world_file = @import("../../world.zig");
 const math = @import("../../math.zig");
 const bundle_file = @import("../traverse/bundle.zig");
 const multi_hit = @import("../traverse/multi_hit.zig");
+const ray_file = @import("../traverse/ray.zig");
 const boundaries_file = @import("boundaries.zig");
 const exponential = @import("../shade/exponential.zig");
 const f90_per_f0 = @import("../shade/bsdf.zig").f90_per_f0;
@@ -82,9 +83,13 @@ pub fn Passage(comptime Kernel: type) type {
             passage.is_started = true;
         }
 
-        /// The share of light that volumes leave, of rays that end at `t` if that is finite.
-        pub noinline fn left(passage: *Self, t: f32, direction: Vec3) Vec3 {
-            if (t < std.math.inf(f32)) for (0..Kernel.ray_count) |lane| passage.advance(lane, t);
+        /// The share of light that volumes leave, of rays that end at these `t` if they are finite.
+        pub noinline fn left(
+            passage: *Self,
+            ends: [Kernel.ray_count]f32,
+            direction: Vec3,
+        ) Vec3 {
+            for (ends, 0..) |t, lane| if (t < std.math.inf(f32)) passage.advance(lane, t);
             const length = direction.length().neg();
             return .{
                 .x = exponential
@@ -151,17 +156,17 @@ pub fn Passage(comptime Kernel: type) type {
     };
 }
 
-/// Takes away what volumes absorb of light that ends at `t` on the way of rays.
+/// Takes away what volumes absorb of light on the way of rays that end at limits.
 pub noinline fn absorb(
     comptime Kernel: type,
     passages: *[Kernel.group_count]Passage(Kernel),
     bundle: *const bundle_file.Bundle(Kernel),
-    t: f32,
+    limits: *const [Kernel.group_count]ray_file.Hit(Kernel.Rays),
     transmittances: *[Kernel.group_count]Kernel.Rays.Vec3,
 ) void {
-    for (passages, &bundle.groups, transmittances) |*passage, *ray, *value| {
+    for (passages, &bundle.groups, limits, transmittances) |*passage, *ray, *limit, *value| {
         if (!passage.is_started) continue;
-        value.* = value.mul(passage.left(t, ray.line.direction));
+        value.* = value.mul(passage.left(limit.t.toArray(), ray.line.direction));
     }
 }
 

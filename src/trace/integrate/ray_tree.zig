@@ -23,6 +23,7 @@ const bounces_file = @import("bounces.zig");
 const camera = @import("camera.zig");
 const direct = @import("direct.zig");
 const environment_light = @import("environment.zig");
+const features_file = @import("features.zig");
 const floor = @import("floor.zig");
 const medium_file = @import("medium.zig");
 const path_file = @import("path.zig");
@@ -219,7 +220,23 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
                 tree.bounces.reflected[group],
                 tree.isEnd(),
             ));
+            if (tree.sample.features.kept) tree.addFeatures(group, vertex);
             tree.sample.addSurface(group, vertex, glow, tree.path.depth);
+        }
+
+        /// Adds what denoisers are guided by.
+        noinline fn addFeatures(tree: *Self, group: usize, vertex: *const Vertex) void {
+            const path = &tree.path;
+            const features = &tree.sample.features;
+            const none: Rays.Vec3 = .splat(.{ 0, 0, 0 });
+            const mirror = &vertex.bsdf.mirror;
+            const smooth = vertex.point.material.roughness
+                .le(.splat(features_file.smooth_roughness_max));
+            const reflected = smooth.bitAnd(tree.bounces.reflected[group]);
+            var traced: Rays.Vec3 = .select(reflected, mirror.reflected, none);
+            if (!tree.isEnd()) traced = traced.add(.select(smooth, mirror.transmitted, none));
+            features.addVertex(group, path, vertex, traced);
+            if (path.depth == 0) features.addDepth(group, tree.frame.view, vertex);
         }
 
         /// Adds what volumes scatter that rays go through.

@@ -1,11 +1,12 @@
 //! The sample under way of a bundle's pixels: sums of what their primary rays see.
 //!
 //! In: light, already weighed by the throughput of its path. Out: the sums on the film. Colours of
-//! the display, which unlit surfaces that are seen directly have, are kept apart where the film
-//! has a layer for them.
+//! the display, which unlit surfaces that are seen directly have, and what guides denoisers, are
+//! kept apart where the film has layers for them.
 
 const film_file = @import("../../film.zig");
 const camera = @import("camera.zig");
+const features_file = @import("features.zig");
 const path_file = @import("path.zig");
 const Film = film_file.Film;
 const Rectangle = film_file.Rectangle;
@@ -29,6 +30,8 @@ pub fn Sample(comptime Kernel: type) type {
         /// What the primary ray sees of such colours, and its share of them.
         displayed: [group_count]Vec3,
         display_share: [group_count]F32,
+        /// For layers of what is seen.
+        features: features_file.Features(Kernel),
 
         const Self = @This();
 
@@ -39,6 +42,7 @@ pub fn Sample(comptime Kernel: type) type {
             sample.keeps_display = layers.contains(.display);
             sample.radiance = @splat(none);
             sample.escaped = @splat(.zero());
+            sample.features.start(layers);
             if (!sample.keeps_display) return;
             sample.displayed = @splat(none);
             sample.display_share = @splat(.zero());
@@ -84,6 +88,7 @@ pub fn Sample(comptime Kernel: type) type {
         pub fn expose(sample: *const Self, film: *Film, rectangle: Rectangle) void {
             const place: camera.Place = .{ .rectangle = rectangle, .sample = sample.number };
             camera.expose(Kernel, film, .color, place, &sample.radiance, &sample.escaped);
+            if (sample.features.kept) sample.features.expose(film, place);
             if (!sample.keeps_display) return;
             const share = &sample.display_share;
             camera.expose(Kernel, film, .display, place, &sample.displayed, share);

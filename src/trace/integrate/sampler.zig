@@ -1,13 +1,19 @@
 //! Filter importance sampling (Ernst, Stamminger and Greiner 2006): where the samples of a pixel
 //! are.
 //!
-//! In: the number of samples. Out: the place of each, the same for every pixel, variant and
-//! integrator. Points in a lattice are spread as the reconstruction filter weighs: a sample
-//! then counts in full in its own pixel and in no other, though it may lie beyond the pixel's edge.
-//! The filter is the 4-term window of Blackman and Harris (Harris 1978), which is nowhere negative.
+//! In: the number of samples. Out: the place of each, the same for every pixel and variant. Points
+//! of a lattice, or of a sequence where the number is not known before, are spread as the
+//! reconstruction filter weighs: a sample then counts in full in its own pixel and in no other,
+//! though it may lie beyond the pixel's edge. The filter is the 4-term window of Blackman and
+//! Harris (Harris 1978), which is nowhere negative.
+//!
+//! Places of a sequence are those of all pixels as well: primary rays stay beams, and edges have
+//! no noise. What is left of their error is the same along an edge, as a lattice's is.
 
 const std = @import("std");
 const elementary = @import("../../math.zig").elementary;
+const simd = @import("../../simd.zig");
+const Sobol = @import("sobol.zig").Sobol;
 const assert = std.debug.assert;
 
 /// Half the filter's width, in pixels.
@@ -28,6 +34,33 @@ pub fn place(offsets: []Offset) void {
         .x = strataPlace(column, offsets.len),
         .y = strataPlace(rowOf(column, offsets.len, step), offsets.len),
     };
+}
+
+/// The places of a sequence's first samples, whatever their number; any number of them is spread
+/// evenly. The first is the middle.
+pub fn placeInSequence(offsets: []Offset) void {
+    const middle = 1 << 23;
+    var shift: [2]u32 = undefined;
+    for (offsets, 0..) |*offset, number| {
+        const zero: Lanes.I32 = .zero();
+        const sobol: Sobol(Lanes) = .init(zero, zero, .splat(@intCast(number)));
+        var at: [2]u32 = undefined;
+        for (&at, sobol.pair(.splat(position_dimension))) |*to, from| {
+            to.* = @intFromFloat(from.lane(0) * 0x1p24);
+        }
+        if (number == 0) shift = .{ at[0] ^ middle, at[1] ^ middle };
+        offset.* = .{ .x = placeOf(at[0] ^ shift[0]), .y = placeOf(at[1] ^ shift[1]) };
+    }
+}
+
+/// The dimension of `Sobol` that is places in pixels.
+pub const position_dimension = 0;
+
+const Lanes = simd.Lanes(.scalar, 1);
+
+/// Where the filter has so many of 2^24 shares before it; 0 is within the first one.
+fn placeOf(share_count: u32) f32 {
+    return @floatCast(0.5 + warp(@max(0.5, @as(f64, @floatFromInt(share_count))) * 0x1p-24));
 }
 
 /// Where the middle of one of so many equal shares of the filter is.
@@ -107,6 +140,26 @@ test "one sample is in the middle, more are their own image in it and fill rows 
     }
 }
 
+test "a sequence begins in the middle, and goes on whatever the number" {
+    var few: [3]Offset = undefined;
+    var more: [16]Offset = undefined;
+    placeInSequence(&few);
+    placeInSequence(&more);
+    try std.testing.expectEqual(Offset{ .x = 0.5, .y = 0.5 }, few[0]);
+    try std.testing.expectEqualSlices(Offset, &few, more[0..few.len]);
+    for ([_]usize{ 4, 16 }) |count| {
+        var filled: [2][16]bool = @splat(@splat(false));
+        for (more[0..count]) |offset| for ([_]f32{ offset.x, offset.y }, &filled) |at, *strata| {
+            const fraction = share((@as(f64, at) - 0.5) / filter_radius);
+            const stratum = (fraction + 1e-6) * @as(f64, @floatFromInt(count));
+            strata[@intFromFloat(stratum)] = true;
+        };
+        for (filled) |strata| for (strata[0..count]) |is_filled| {
+            try std.testing.expect(is_filled);
+        };
+    }
+}
+
 test "4 and 8 points fill every box of each way to cut the square" {
     for ([_]usize{ 4, 8 }) |count| {
         var columns: usize = 1;
@@ -130,10 +183,10 @@ test "many samples have the filter's own mean and spread, and none is beyond its
         variance += coefficient * 2 / (turn * turn);
     }
     variance *= filter_radius * filter_radius;
-    for ([_]usize{ 256, 1000, 4096 }) |count| {
+    for ([_]usize{ 256, 1000, 4096, 256 }, [_]bool{ false, false, false, true }) |count, grows| {
         const offsets = try std.testing.allocator.alloc(Offset, count);
         defer std.testing.allocator.free(offsets);
-        place(offsets);
+        if (grows) placeInSequence(offsets) else place(offsets);
         var mean: [2]f64 = @splat(0);
         var square: [2]f64 = @splat(0);
         for (offsets) |offset| for ([_]f32{ offset.x, offset.y }, 0..) |at, axis| {

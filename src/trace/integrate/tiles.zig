@@ -5,6 +5,10 @@
 //! are added in order all the same: a thread that comes to a tile whose last pass is under way
 //! leaves this one to whoever is at it, who does both. So nobody waits, and no lock is taken.
 //!
+//! Where a `Course` says what comes next, passes are in rounds: after each, all threads have ended
+//! and all pixels that get more samples have as many. What is added is the same either way. With
+//! `Settings.noise` blocks end one by one, by passes of their own alone (adaptive.zig).
+//!
 //! An integrator is a type I with
 //!
 //!     width, height, counts_tests               pixels of a bundle; whether tests are counted
@@ -21,6 +25,7 @@ const choices = @import("../../settings.zig");
 const world_file = @import("../../world.zig");
 const statistics = @import("../../statistics.zig");
 const parallel = @import("../../parallel.zig");
+const adaptive = @import("adaptive.zig");
 const film_file = @import("../../film.zig");
 const sampler = @import("sampler.zig");
 const assert = std.debug.assert;
@@ -34,7 +39,8 @@ pub const Settings = struct {
     pool: *parallel.Pool,
     integrator: choices.Integrator = .whitted,
     lights: choices.Lights = .{},
-    /// Samples a pixel, at least 1.
+    /// Samples a pixel, at least 1; those of integrators that are open may not depend on it, which
+    /// find `open_sample_count` here.
     sample_count: u32 = choices.sample_count.default,
     /// Where these are in each pixel: `render` fills it in.
     offsets: []const sampler.Offset = &.{},
@@ -46,12 +52,62 @@ pub const Settings = struct {
     progress: std.Progress.Node = .none,
     /// Looked at between tiles: set, it ends the work.
     cancel: ?*const std.atomic.Value(bool) = null,
+    /// Looked at between tiles: set, it ends the work as soon as every pixel has a sample, and the
+    /// picture is what there is.
+    stop: ?*const std.atomic.Value(bool) = null,
+    /// Blocks with less of it get no more samples. Asserts that the integrator is open.
+    noise: ?adaptive.Noise = null,
+    /// Null: all samples in one round.
+    course: ?Course = null,
     /// The integrator's `Shared`: `render` fills it in.
     shared: ?*anyopaque = null,
 
     fn isCancelled(settings: *const Settings) bool {
         return if (settings.cancel) |cancel| cancel.load(.monotonic) else false;
     }
+
+    fn isStopped(settings: *const Settings) bool {
+        return if (settings.stop) |stop| stop.load(.monotonic) else false;
+    }
+};
+
+/// What integrators that are open take their number of samples to be, where details depend on it.
+pub const open_sample_count = 16;
+
+/// What decides, between rounds, how the work goes on.
+pub const Course = struct {
+    context: *anyopaque,
+    /// Called while nobody traces. Returns how many samples pixels are to have after the next
+    /// round; the work ends where they have as many.
+    next: *const fn (context: *anyopaque, standing: *const Standing) u32,
+};
+
+/// Where the work stands between rounds.
+pub const Standing = struct {
+    /// Of all pixels that get more.
+    samples_done: u32,
+    job: *const Job,
+
+    /// Makes another film, of the same size and layers, what the picture is so far.
+    pub fn copyTo(standing: *const Standing, film: *Film) parallel.Error!void {
+        const job = standing.job;
+        const copy: Copy = .{ .job = job, .film = film };
+        try job.settings.pool.forEach(job.tiles.count, &copy, Copy.tile);
+        const shared = job.integrator.shared orelse return;
+        _ = job.doSteps(shared.steps_before, shared.step_count, film);
+    }
+
+    const Copy = struct {
+        job: *const Job,
+        film: *Film,
+
+        fn tile(copy: *const Copy, number: usize, _: usize) void {
+            var parts = copy.job.partsOf(@intCast(number));
+            while (parts.next()) |part| {
+                copy.job.film.copyFinished(copy.film, part.rectangle, part.sample_count);
+            }
+        }
+    };
 };
 
 /// What an integrator's passes took.
@@ -67,6 +123,12 @@ pub const Statistics = struct {
     tests: ?statistics.TestCounts = null,
     /// Pixels that came out as not a number and were made black.
     non_finite_count: u64 = 0,
+    /// Of the pixels that have the most.
+    sample_count: u32 = 0,
+    /// Of all pixels.
+    sample_sum: u64 = 0,
+    /// The work was stopped before its end.
+    is_partial: bool = false,
 };
 
 /// `Canceled`: the film is not finished.
@@ -146,6 +208,8 @@ pub const Integrator = extern struct {
 ///     init(gpa, frame, settings), deinit(gpa)
 ///     pieces(step)                              how many
 ///     work(integrator, step, piece, film)       returns how many pixels it made black
+///
+/// The steps after the tiles do nothing but change the film, which may be a copy.
 const Shared = extern struct {
     init: *const fn (*const Allocator, *const Frame, *const Settings) callconv(.c) ?*anyopaque,
     deinit: *const fn (shared: *anyopaque, gpa: *const Allocator) callconv(.c) void,
@@ -209,39 +273,55 @@ pub fn render(
 ) Error!Statistics {
     const offsets = try gpa.alloc(sampler.Offset, chosen.sample_count);
     defer gpa.free(offsets);
-    sampler.place(offsets);
-    var filled_in = chosen.*;
-    filled_in.offsets = offsets;
-    filled_in.tile_size = @divCeil(chosen.tile_size, integrator.tile_step) * integrator.tile_step;
+    var with_tiles = chosen.*;
+    with_tiles.tile_size = @divCeil(chosen.tile_size, integrator.tile_step) * integrator.tile_step;
+    const settings = &with_tiles;
+    var shown = settings.*;
+    shown.offsets = offsets;
+    if (settings.integrator.isOpen()) {
+        sampler.placeInSequence(offsets);
+        shown.sample_count = open_sample_count;
+    } else sampler.place(offsets);
     if (integrator.shared) |shared|
-        filled_in.shared = shared.init(&gpa, frame, &filled_in) orelse return error.OutOfMemory;
-    defer if (integrator.shared) |shared| shared.deinit(filled_in.shared.?, &gpa);
-    const settings = &filled_in;
-    var tiles: Tiles = .init(film.image.width, film.image.height, settings);
+        shown.shared = shared.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
+    defer if (integrator.shared) |shared| shared.deinit(shown.shared.?, &gpa);
+    const image = &film.image;
+    var blocks: ?adaptive.Blocks = null;
+    defer if (blocks) |*all| all.deinit(gpa);
+    if (settings.noise) |noise| {
+        assert(settings.integrator.isOpen());
+        blocks = try .init(gpa, image.width, image.height, noise);
+    }
+    var tiles: Tiles = .init(image.width, image.height, settings);
     tiles.states = try gpa.alloc(Tiles.State, tiles.count);
     defer gpa.free(tiles.states);
     @memset(tiles.states, .{});
     var by_thread: [parallel.thread_count_max]*anyopaque = undefined;
     var job: Job = .{
         .settings = settings,
+        .shared = shown.shared,
         .tiles = &tiles,
+        .blocks = if (blocks) |*all| all else null,
         .film = film,
         .integrator = integrator,
         .by_thread = by_thread[0..0],
     };
     defer for (job.by_thread) |one| integrator.deinit(one, &gpa);
     while (job.by_thread.len < settings.pool.threadsFor(tiles.count)) {
-        by_thread[job.by_thread.len] = integrator.init(&gpa, frame, settings) orelse {
+        by_thread[job.by_thread.len] = integrator.init(&gpa, frame, &shown) orelse {
             if (job.by_thread.len == 0) return error.OutOfMemory;
             break;
         };
         job.by_thread = by_thread[0 .. job.by_thread.len + 1];
     }
-    if (integrator.shared) |shared| job.doSteps(0, shared.steps_before);
-    settings.pool.share(job.by_thread.len, &job, Job.work);
-    if (integrator.shared) |shared| job.doSteps(shared.steps_before, shared.step_count);
+    if (integrator.shared) |shared| _ = job.doSteps(0, shared.steps_before, film);
+    const is_whole = job.run();
     if (settings.isCancelled()) return error.Canceled;
-    var total: Statistics = .{ .non_finite_count = tiles.non_finite_count.load(.monotonic) };
+    var total = try settings.pool
+        .reduce(Statistics, .{}, Job.add, tiles.count, &job, Job.finishTile);
+    total.is_partial = !is_whole;
+    if (integrator.shared) |shared|
+        total.non_finite_count += job.doSteps(shared.steps_before, shared.step_count, film);
     var tests: statistics.TestCounts = .{};
     for (job.by_thread) |one| {
         var counts: Counts = undefined;
@@ -257,51 +337,85 @@ pub fn render(
 const Job = struct {
     settings: *const Settings,
     tiles: *Tiles,
+    blocks: ?*adaptive.Blocks,
     film: *Film,
     integrator: *const Integrator,
+    /// See `Settings.shared`.
+    shared: ?*anyopaque,
     by_thread: []const *anyopaque,
-    /// Of what the threads share: the step under way, its pieces, and the next of these.
-    step: u32 = 0,
-    piece_count: u32 = 0,
-    next_piece: std.atomic.Value(u32) = .init(0),
 
-    /// Work that is shared, from one step to before another.
-    fn doSteps(job: *Job, first: u32, end: u32) void {
+    /// Work that is shared, from one step to before another. Returns how many pixels were made
+    /// black.
+    fn doSteps(job: *const Job, first: u32, end: u32, film: *Film) u64 {
+        var steps: Steps = .{ .job = job, .film = film };
         for (first..end) |step| {
-            job.step = @intCast(step);
-            job.piece_count = job.integrator.shared.?.pieces(job.settings.shared.?, job.step);
-            job.next_piece.store(0, .monotonic);
-            const thread_count = @min(job.by_thread.len, job.piece_count);
-            if (thread_count > 0) job.settings.pool.share(thread_count, job, doPieces);
+            steps.step = @intCast(step);
+            steps.piece_count = job.integrator.shared.?.pieces(job.shared.?, steps.step);
+            steps.next.store(0, .monotonic);
+            const thread_count = @min(job.by_thread.len, steps.piece_count);
+            if (thread_count > 0) job.settings.pool.share(thread_count, &steps, Steps.work);
         }
+        return steps.non_finite_count.load(.monotonic);
     }
 
-    fn doPieces(job: *Job, thread_index: usize) void {
-        const shared = job.integrator.shared.?;
-        while (!job.settings.isCancelled()) {
-            const piece = job.next_piece.fetchAdd(1, .monotonic);
-            if (piece >= job.piece_count) return;
-            const one = job.by_thread[thread_index];
-            const non_finite =
-                shared.work(job.settings.shared.?, one, job.step, piece, job.film);
-            job.countNonFinite(non_finite);
+    const Steps = struct {
+        job: *const Job,
+        film: *Film,
+        /// Under way.
+        step: u32 = 0,
+        piece_count: u32 = 0,
+        next: std.atomic.Value(u32) = .init(0),
+        non_finite_count: std.atomic.Value(usize) = .init(0),
+
+        fn work(steps: *Steps, thread_index: usize) void {
+            const job = steps.job;
+            const shared = job.integrator.shared.?;
+            while (!job.settings.isCancelled()) {
+                const piece = steps.next.fetchAdd(1, .monotonic);
+                if (piece >= steps.piece_count) return;
+                const one = job.by_thread[thread_index];
+                const count = shared.work(job.shared.?, one, steps.step, piece, steps.film);
+                if (count > 0) _ = steps.non_finite_count.fetchAdd(@intCast(count), .monotonic);
+            }
         }
+    };
+
+    /// All rounds; false: the work was ended before.
+    fn run(job: *Job) bool {
+        const settings = job.settings;
+        const tiles = job.tiles;
+        var done: u32 = 0;
+        while (done < settings.sample_count) : (done = tiles.samples_due) {
+            if (done > 0 and job.isEnded()) return false;
+            const until = if (settings.course) |course|
+                course.next(course.context, &.{ .samples_done = done, .job = job })
+            else
+                settings.sample_count;
+            if (until <= done) return true;
+            tiles.begin(done, @min(until, settings.sample_count));
+            settings.pool.share(job.by_thread.len, job, work);
+            if (job.isEnded()) for (tiles.states) |*state| {
+                if (state.samples_done < tiles.samples_due) return false;
+            };
+            if (job.blocks) |blocks| if (blocks.active_count.load(.monotonic) == 0) return true;
+        }
+        return true;
     }
 
-    fn countNonFinite(job: *Job, count: u64) void {
-        if (count == 0) return;
-        _ = job.tiles.non_finite_count.fetchAdd(@intCast(count), .monotonic);
+    fn isEnded(job: *const Job) bool {
+        if (job.settings.isCancelled()) return true;
+        return job.settings.isStopped() and job.tiles.isEachTaken();
     }
 
     fn work(job: *Job, thread_index: usize) void {
-        while (!job.settings.isCancelled()) {
+        while (!job.isEnded()) {
             const number = job.tiles.take() orelse return;
             const state = &job.tiles.states[number];
             if (state.due.fetchAdd(1, .acquire) > 0) continue;
             while (true) {
                 job.passTile(job.by_thread[thread_index], number);
                 job.settings.progress.completeOne();
-                if (job.settings.isCancelled()) return;
+                if (job.isEnded()) return;
                 if (state.due.fetchSub(1, .acq_rel) == 1) break;
             }
         }
@@ -311,18 +425,77 @@ const Job = struct {
     fn passTile(job: *Job, integrator: *anyopaque, number: u32) void {
         const state = &job.tiles.states[number];
         const tile = job.tiles.rectangleOf(number);
-        const sample_count = passSamples(state.samples_done, job.settings.sample_count);
-        job.integrator.pass(integrator, &tile, state.samples_done, sample_count, job.film);
-        state.samples_done += sample_count;
-        if (state.samples_done < job.settings.sample_count) return;
-        job.countNonFinite(job.film.finish(tile, job.settings.sample_count));
+        const done = state.samples_done;
+        const sample_count = passSamples(done, job.tiles.samples_due);
+        if (job.blocks) |blocks| {
+            var all = blocks.of(tile);
+            while (all.nextActive()) |active| {
+                job.integrator.pass(integrator, &active, done, sample_count, job.film);
+            }
+            blocks.judge(tile, job.film, done + sample_count);
+        } else job.integrator.pass(integrator, &tile, done, sample_count, job.film);
+        state.samples_done = done + sample_count;
+    }
+
+    /// A tile in parts whose pixels have the same number of samples.
+    fn partsOf(job: *const Job, number: u32) Parts {
+        const tile = job.tiles.rectangleOf(number);
+        const sample_count = job.tiles.states[number].samples_done;
+        const blocks = job.blocks orelse
+            return .{ .whole = .{ .rectangle = tile, .sample_count = sample_count } };
+        return .{ .blocks = blocks.of(tile) };
+    }
+
+    const Part = struct { rectangle: Rectangle, sample_count: u32 };
+
+    const Parts = union(enum) {
+        whole: ?Part,
+        blocks: adaptive.Blocks.Iterator,
+
+        fn next(parts: *Parts) ?Part {
+            switch (parts.*) {
+                .whole => |*whole| {
+                    defer whole.* = null;
+                    return whole.*;
+                },
+                .blocks => |*blocks| {
+                    const block = blocks.next() orelse return null;
+                    return .{
+                        .rectangle = block.rectangle,
+                        .sample_count = block.state.sample_count,
+                    };
+                },
+            }
+        }
+    };
+
+    fn add(sum: *Statistics, other: *const Statistics) void {
+        sum.non_finite_count += other.non_finite_count;
+        sum.sample_count = @max(sum.sample_count, other.sample_count);
+        sum.sample_sum += other.sample_sum;
+    }
+
+    /// Makes means of sums.
+    fn finishTile(job: *Job, number: usize, sum: *Statistics) void {
+        var parts = job.partsOf(@intCast(number));
+        while (parts.next()) |part| {
+            const rectangle = part.rectangle;
+            sum.non_finite_count += job.film.finish(rectangle, part.sample_count);
+            sum.sample_count = @max(sum.sample_count, part.sample_count);
+            const pixel_count = (rectangle.x1 - rectangle.x0) * (rectangle.y1 - rectangle.y0);
+            sum.sample_sum += @as(u64, pixel_count) * part.sample_count;
+        }
     }
 };
 
 /// Samples of a tile's next pass: as many as it has, lest each ray finds the cache cold; and few
-/// enough that the work ends soon after it is told to.
-fn passSamples(samples_done: u32, sample_count: u32) u32 {
-    return @min(sample_count - samples_done, @min(@max(samples_done, 1), 64));
+/// enough that the work ends soon after it is told to. Every power of two is the end of one,
+/// wherever rounds begin.
+fn passSamples(samples_done: u32, samples_due: u32) u32 {
+    if (samples_done == 0) return 1;
+    const power = std.math.log2_int(u32, samples_done) + 1;
+    const rest = (@as(u64, 1) << power) - samples_done;
+    return @min(samples_due - samples_done, @min(@as(u32, @intCast(rest)), 64));
 }
 
 /// The picture in tiles, each as often as there are passes.
@@ -333,8 +506,11 @@ const Tiles = struct {
     size: u32,
     columns: u32,
     count: u32,
-    pass_count: u32,
-    non_finite_count: std.atomic.Value(usize) = .init(0),
+    /// Of the round.
+    pass_count: u32 = 0,
+    is_first_round: bool = true,
+    /// Of a pixel, at the end of the round.
+    samples_due: u32 = 0,
     /// By tile.
     states: []State = &.{},
 
@@ -352,30 +528,40 @@ const Tiles = struct {
 
     /// Asserts that no size is 0. A side of a tile is raised where there would be too many.
     fn init(width: u32, height: u32, settings: *const Settings) Tiles {
-        const sample_count = settings.sample_count;
         var size = settings.tile_size;
-        assert(width > 0 and height > 0 and size > 0 and sample_count > 0);
+        assert(width > 0 and height > 0 and size > 0 and settings.sample_count > 0);
+        if (settings.noise != null) size = std.mem.alignForward(u32, size, adaptive.block_side);
         while (@as(u64, @divCeil(width, size)) * @divCeil(height, size) > count_max / passes_max)
             size *= 2;
         const columns = @divCeil(width, size);
-        const count = columns * @divCeil(height, size);
-        var pass_count: u32 = 0;
-        var done: u32 = 0;
-        while (done < sample_count) : (pass_count += 1) done += passSamples(done, sample_count);
         return .{
             .width = width,
             .height = height,
             .size = size,
             .columns = columns,
-            .count = count,
-            .pass_count = pass_count,
+            .count = columns * @divCeil(height, size),
         };
+    }
+
+    /// Begins a round, in which pixels that have so many samples get more.
+    fn begin(tiles: *Tiles, samples_done: u32, samples_due: u32) void {
+        tiles.next.store(0, .monotonic);
+        tiles.is_first_round = samples_done == 0;
+        tiles.samples_due = samples_due;
+        tiles.pass_count = 0;
+        var done = samples_done;
+        while (done < samples_due) : (tiles.pass_count += 1) done += passSamples(done, samples_due);
     }
 
     /// The number of the next tile that is due, or null where all passes are handed out.
     fn take(tiles: *Tiles) ?u32 {
         const index = tiles.next.fetchAdd(1, .monotonic);
         return if (index < tiles.count * tiles.pass_count) index % tiles.count else null;
+    }
+
+    /// Whether every tile's first pass is done or under way.
+    fn isEachTaken(tiles: *const Tiles) bool {
+        return !tiles.is_first_round or tiles.next.load(.monotonic) >= tiles.count;
     }
 
     fn rectangleOf(tiles: *const Tiles, number: u32) Rectangle {
@@ -398,8 +584,8 @@ test "every pixel is in exactly one tile, and every tile is due once a pass" {
         var tiles: Tiles = .init(case[0], case[1], &.{
             .pool = &pool,
             .tile_size = case[2],
-            .sample_count = 3,
         });
+        tiles.begin(0, 3);
         while (tiles.take()) |number| {
             const tile = tiles.rectangleOf(number);
             for (tile.y0..tile.y1) |y| {
@@ -415,13 +601,23 @@ test "every pixel is in exactly one tile, and every tile is due once a pass" {
 test "huge pictures have a countable number of tiles" {
     var pool: parallel.Pool = .init(1);
     defer pool.deinit();
-    const tiles: Tiles = .init(65536, 65536, &.{
-        .pool = &pool,
-        .tile_size = 1,
-        .sample_count = 4096,
-    });
+    var tiles: Tiles = .init(65536, 65536, &.{ .pool = &pool, .tile_size = 1 });
+    tiles.begin(0, 4096);
     try std.testing.expect(@as(u64, tiles.count) * tiles.pass_count <= Tiles.count_max);
     try std.testing.expect(tiles.pass_count <= Tiles.passes_max);
+}
+
+test "every power of two is the end of a pass, wherever rounds begin" {
+    for (0..300) |begin| {
+        var done: u32 = @intCast(begin);
+        while (done < 1000) {
+            const next = done + passSamples(done, 1000);
+            const power = std.math.ceilPowerOfTwoAssert(u32, done + 1);
+            try std.testing.expect(next <= power);
+            try std.testing.expect(next > done and next <= done + 64);
+            done = next;
+        }
+    }
 }
 
 /// Counts samples, and holds that each pixel gets its own in order.
@@ -431,7 +627,7 @@ const TestIntegrator = struct {
     const counts_tests = false;
     /// Sets the flag after so many bundles.
     var bundles_left: std.atomic.Value(i32) = .init(0);
-    var cancel: std.atomic.Value(bool) = .init(false);
+    var end: std.atomic.Value(bool) = .init(false);
 
     fn init(gpa: Allocator, _: *const Frame, _: *const Settings) error{OutOfMemory}!*@This() {
         return gpa.create(@This());
@@ -446,7 +642,7 @@ const TestIntegrator = struct {
     }
 
     fn pass(_: *@This(), rectangle: Rectangle, first: u32, count: u32, film: *Film) void {
-        if (bundles_left.fetchSub(1, .monotonic) == 1) cancel.store(true, .monotonic);
+        if (bundles_left.fetchSub(1, .monotonic) == 1) end.store(true, .monotonic);
         for (rectangle.y0..rectangle.y1) |y| for (rectangle.x0..rectangle.x1) |x| {
             for (first..first + count) |sample| {
                 // The sum is right in this order alone: it doubles, and then some.
@@ -457,36 +653,143 @@ const TestIntegrator = struct {
             }
         };
     }
+
+    /// What pixels are with so many samples.
+    fn meanOf(sample_count: usize) f32 {
+        var sum: f32 = 0;
+        for (0..sample_count) |sample| sum += sum + @as(f32, @floatFromInt(sample));
+        return sum / @as(f32, @floatFromInt(sample_count));
+    }
+
+    /// Three rounds, then no more.
+    const rounds = struct {
+        const ends = [_]u32{ 3, 4, 7 };
+
+        fn next(context: *anyopaque, standing: *const Standing) u32 {
+            const copy: *Film = @ptrCast(@alignCast(context));
+            if (standing.samples_done > 0) standing.copyTo(copy) catch return 0;
+            for (ends) |round_end| if (standing.samples_done < round_end) return round_end;
+            return 0;
+        }
+    };
 };
 
-test "the samples of each pixel come in order, by however many threads; a flag ends the work" {
+test "the samples of each pixel come in order, by however many threads; flags end the work" {
     const gpa = std.testing.allocator;
-    const sample_count = 9;
-    var expected: f32 = 0;
-    for (0..sample_count) |sample| expected += expected + @as(f32, @floatFromInt(sample));
     const frame: Frame = undefined;
+    const End = enum { done, cancelled, stopped };
     for ([_]usize{ 1, 2, 5 }) |thread_count| for ([_]u32{ 1, 3, 40 }) |tile_size| {
-        for ([_]bool{ false, true }) |is_cancelled| {
+        for (std.enums.values(End)) |end| for ([_]bool{ false, true }) |has_course| {
             var pool: parallel.Pool = .init(thread_count);
             defer pool.deinit();
             var film: Film = try .init(gpa, 21, 17, .init(.{ .color = true }));
             defer film.deinit(gpa);
-            TestIntegrator.bundles_left.store(if (is_cancelled) 3 else -1, .monotonic);
-            TestIntegrator.cancel.store(false, .monotonic);
+            var copy: Film = try .init(gpa, 21, 17, film.layers);
+            defer copy.deinit(gpa);
+            TestIntegrator.bundles_left.store(if (end == .done) -1 else 3, .monotonic);
+            TestIntegrator.end.store(false, .monotonic);
             const result = render(&.of(TestIntegrator), gpa, &frame, &film, &.{
                 .pool = &pool,
-                .sample_count = sample_count,
+                .sample_count = 9,
                 .tile_size = tile_size,
-                .cancel = &TestIntegrator.cancel,
+                .cancel = if (end == .cancelled) &TestIntegrator.end else null,
+                .stop = if (end == .stopped) &TestIntegrator.end else null,
+                .course = if (!has_course) null else .{
+                    .context = &copy,
+                    .next = TestIntegrator.rounds.next,
+                },
             });
-            if (is_cancelled) {
+            if (end == .cancelled) {
                 try std.testing.expectError(error.Canceled, result);
                 continue;
             }
-            _ = try result;
+            const most: u32 = if (has_course) 7 else 9;
+            const total = try result;
+            var sum: u64 = 0;
             for (film.image.pixels) |pixel| {
-                try std.testing.expectEqual(expected / sample_count, pixel[0]);
+                const sample_count = for (1..most + 1) |count| {
+                    if (TestIntegrator.meanOf(count) == pixel[0]) break count;
+                } else return error.SamplesOutOfOrder;
+                if (end == .done) try std.testing.expectEqual(most, sample_count);
+                sum += sample_count;
             }
+            try std.testing.expectEqual(sum, total.sample_sum);
+            try std.testing.expectEqual(end == .stopped, total.is_partial);
+            if (end == .done) try std.testing.expectEqual(most, total.sample_count);
+            if (end == .done and has_course) for (copy.image.pixels) |pixel| {
+                try std.testing.expectEqual(TestIntegrator.meanOf(most), pixel[0]);
+            };
+        };
+    };
+}
+
+/// White noise beside a quiet part.
+const NoisyIntegrator = struct {
+    const width = 8;
+    const height = 8;
+    const counts_tests = false;
+    const quiet_width = 20;
+
+    fn init(
+        gpa: Allocator,
+        _: *const Frame,
+        settings: *const Settings,
+    ) error{OutOfMemory}!*@This() {
+        assert(settings.sample_count == open_sample_count);
+        return gpa.create(@This());
+    }
+
+    fn deinit(integrator: *@This(), gpa: Allocator) void {
+        gpa.destroy(integrator);
+    }
+
+    fn counts(_: *const @This()) Counts {
+        return .{ .rays = .{}, .tests = .{} };
+    }
+
+    fn pass(_: *@This(), rectangle: Rectangle, first: u32, count: u32, film: *Film) void {
+        for (rectangle.y0..rectangle.y1) |y| for (rectangle.x0..rectangle.x1) |x| {
+            for (first..first + count) |sample| {
+                var random: std.Random.SplitMix64 = .init((y * 64 + x) * 4096 + sample);
+                const value: f32 = @floatFromInt(random.next() >> 40);
+                const shown = if (x < quiet_width) 0.25 else value * 0x1p-25;
+                film.add(@intCast(x), @intCast(y), @intCast(sample), @splat(shown));
+            }
+        };
+    }
+
+    fn one(_: *anyopaque, standing: *const Standing) u32 {
+        return standing.samples_done + 13;
+    }
+};
+
+test "quiet blocks get no more samples than they need, whatever tiles, threads and rounds" {
+    const gpa = std.testing.allocator;
+    const frame: Frame = undefined;
+    var hash: ?u64 = null;
+    for ([_]usize{ 1, 3 }) |thread_count| for ([_]u32{ 4, 33 }) |tile_size| {
+        for ([_]bool{ false, true }) |has_course| {
+            var pool: parallel.Pool = .init(thread_count);
+            defer pool.deinit();
+            var film: Film = try .init(gpa, 40, 20, .init(.{ .color = true }));
+            defer film.deinit(gpa);
+            const total = try render(&.of(NoisyIntegrator), gpa, &frame, &film, &.{
+                .pool = &pool,
+                .integrator = .path,
+                .sample_count = 100,
+                .tile_size = tile_size,
+                .noise = .{ .error_max = 0.012, .exposure_scale = 1 },
+                .course = if (!has_course) null else .{
+                    .context = &pool,
+                    .next = NoisyIntegrator.one,
+                },
+            });
+            // In three columns of blocks: some stay until the end.
+            try std.testing.expectEqual(100, total.sample_count);
+            try std.testing.expectEqual(16 * 20 * 16 + 24 * 20 * 100, total.sample_sum);
+            try std.testing.expectEqual(0.25, film.image.at(NoisyIntegrator.quiet_width - 1, 3)[0]);
+            try std.testing.expectEqual(hash orelse film.hash(), film.hash());
+            hash = film.hash();
         }
     };
 }

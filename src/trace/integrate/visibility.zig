@@ -19,7 +19,9 @@ const triangle = @import("../traverse/triangle.zig");
 const interaction_file = @import("../shade/interaction.zig");
 const layers_file = @import("../shade/layers.zig");
 const material_file = @import("../shade/material.zig");
+const sampling = @import("../shade/sampling.zig");
 const texturing = @import("../shade/texturing.zig");
+const transmission = @import("../shade/transmission.zig");
 const Grid = @import("../traverse/beam/grid.zig").Grid;
 const Frame = world_file.Frame;
 const Light = world_file.Light;
@@ -37,6 +39,18 @@ comptime {
     std.debug.assert(transparency_depth_max % multi_hit.hits_max == 0);
 }
 
+/// Stands for the lights of shadow rays that have none in common.
+const no_light: Light = .{
+    .kind = .directional,
+    .from_receiver = true,
+    .position = @splat(0),
+    .direction = @splat(0),
+    .intensity = @splat(0),
+    .range_inv_squared = 0,
+    .cone_scale = 0,
+    .cone_offset = 1,
+};
+
 /// One thread's view of a scene.
 pub fn Visibility(comptime Kernel: type) type {
     const Rays = Kernel.Rays;
@@ -46,7 +60,6 @@ pub fn Visibility(comptime Kernel: type) type {
     const group_count = Kernel.group_count;
     const Bundle = bundle_file.Bundle(Kernel);
     const Coherence = dispatch.Coherence;
-    const Interaction = interaction_file.Interaction(Rays);
 
     return struct {
         frame: *const Frame,
@@ -95,10 +108,34 @@ pub fn Visibility(comptime Kernel: type) type {
             transmittances: *[group_count]Vec3,
         ) void {
             const materials = visibility.frame.materials;
-            if (materials.has_transparency or materials.has_holes)
-                visibility.attenuated(bundle, light, vertices, coherence, transmittances)
-            else
-                visibility.occluded(bundle, light, coherence, transmittances);
+            if (!materials.has_transparency and !materials.has_holes)
+                return visibility.occluded(bundle, light, coherence, transmittances);
+            transmittances.* = @splat(.splat(.{ 1, 1, 1 }));
+            visibility.occlusionPrepass(bundle, light, coherence, transmittances);
+            var limits: [group_count]ray_file.Hit(Rays) = undefined;
+            for (&limits, &bundle.groups) |*limit, *ray|
+                limit.* = shadowLimit(Rays, light, ray.line.direction);
+            visibility.attenuated(bundle, light, &limits, vertices, null, transmittances);
+        }
+
+        /// The same of shadow rays that have no light in common: each has a direction and an end of
+        /// its own, `closest` of the bundle. What scatters light stops it: it goes through what
+        /// alpha leaves open and smooth panes, and in the lanes of `straight` as if straight
+        /// through smooth boundaries of volumes.
+        pub fn transmittanceOfEach(
+            visibility: *Self,
+            bundle: *Bundle,
+            vertices: anytype,
+            straight: *const [group_count]Mask,
+            transmittances: *[group_count]Vec3,
+        ) void {
+            const materials = visibility.frame.materials;
+            if (!materials.has_transparency and !materials.has_holes)
+                return visibility.occluded(bundle, &no_light, .none, transmittances);
+            var limits: [group_count]ray_file.Hit(Rays) = undefined;
+            for (&limits, &bundle.groups) |*limit, *ray| limit.* = ray.closest;
+            transmittances.* = @splat(.splat(.{ 1, 1, 1 }));
+            visibility.attenuated(bundle, &no_light, &limits, vertices, straight, transmittances);
         }
 
         /// Light is stopped by anything: the quick path of scenes where all is opaque.
@@ -123,19 +160,18 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *Self,
             bundle: *Bundle,
             light: *const Light,
+            limits: *const [group_count]ray_file.Hit(Rays),
             vertices: anytype,
-            coherence: Coherence,
+            straight: ?*const [group_count]Mask,
             transmittances: *[group_count]Vec3,
         ) void {
-            transmittances.* = @splat(.splat(.{ 1, 1, 1 }));
-            visibility.occlusionPrepass(bundle, light, coherence, transmittances);
             const frame = visibility.frame;
             const passages = &visibility.passages;
             const transmits = frame.materials.has_transmission;
             if (transmits) for (passages) |*passage| passage.start(frame);
-            visibility.weaken(bundle, light, vertices, transmittances);
+            visibility.weaken(bundle, light, limits, vertices, straight, transmittances);
             if (transmits and frame.materials.volumes.len > 0)
-                passage_file.absorb(Kernel, passages, bundle, shadowEnd(light), transmittances);
+                passage_file.absorb(Kernel, passages, bundle, limits, transmittances);
         }
 
         /// By surfaces.
@@ -143,23 +179,24 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *Self,
             bundle: *Bundle,
             light: *const Light,
+            limits: *const [group_count]ray_file.Hit(Rays),
             vertices: anytype,
+            straight: ?*const [group_count]Mask,
             transmittances: *[group_count]Vec3,
         ) void {
             const none: Vec3 = .splat(.{ 0, 0, 0 });
             var weakened_counts: [group_count]F32 = @splat(.zero());
             for (0..transparency_depth_max / multi_hit.hits_max) |_| {
-                for (&bundle.groups) |*ray|
-                    ray.closest = shadowLimit(Rays, light, ray.line.direction);
+                for (&bundle.groups, limits) |*ray, limit| ray.closest = limit;
                 visibility.hits.trace(bundle, &visibility.tests);
                 var any_left = false;
                 for (&bundle.groups, transmittances, 0..) |*ray, *value, group| {
                     if (ray.active.none()) continue;
-                    const point = &vertices[group].point;
                     visibility.attenuate(
                         ray,
                         light,
-                        point,
+                        vertices[group].point.cone_width,
+                        if (straight) |lanes| lanes[group] else null,
                         group,
                         value,
                         &weakened_counts[group],
@@ -203,7 +240,8 @@ pub fn Visibility(comptime Kernel: type) type {
             visibility: *Self,
             ray: *ray_file.Ray(Rays),
             light: *const Light,
-            point: *const Interaction,
+            cone_width: F32,
+            straight: ?Mask,
             group: usize,
             value: *Vec3,
             weakened_count: *F32,
@@ -214,7 +252,8 @@ pub fn Visibility(comptime Kernel: type) type {
             value.* = .select(stopped.bitAnd(ray.active), none, value.*);
             ray.active = ray.active.andNot(stopped);
             const passage = &visibility.passages[group];
-            const transmits = visibility.frame.materials.has_transmission;
+            const frame = visibility.frame;
+            const transmits = frame.materials.has_transmission;
             if (transmits)
                 passage.take(&visibility.hits, group, ray.line.direction, ray.active);
             for (0..multi_hit.hits_max) |index| {
@@ -223,7 +262,9 @@ pub fn Visibility(comptime Kernel: type) type {
                 if (ray.active.none()) return;
                 ray.tnear = next;
                 const passing: F32 = if (transmits) .fromArray(passage.passing[index]) else one;
-                var through = visibility.attenuationAt(ray, light, point, next, passing);
+                var through = attenuationAt(Rays, frame, ray, light, cone_width, next, passing);
+                if (straight) |lanes| through
+                    .sharpen(clearLanes(Rays, frame, next.primitive, ray.active, lanes));
                 if (transmits) through.hide(.fromBits(passage.hidden[index]));
                 value.* = .select(ray.active, value.mul(through.share), value.*);
                 weakened_count.* =
@@ -235,54 +276,101 @@ pub fn Visibility(comptime Kernel: type) type {
                 ray.active = ray.active.andNot(ended).andNot(dark);
             }
         }
-
-        /// What active rays lose at the triangles that they hit.
-        fn attenuationAt(
-            visibility: *const Self,
-            ray: *const ray_file.Ray(Rays),
-            light: *const Light,
-            point: *const Interaction,
-            hit: ray_file.Hit(Rays),
-            passing: F32,
-        ) material_file.Attenuation(Rays) {
-            const Corners = interaction_file.Corners(Rays);
-            const frame = visibility.frame;
-            const geometry = frame.geometry;
-            const all = frame.materials.all;
-            // Without vertex colours and textures it is the material's alone.
-            if (!geometry.hasColors() and !frame.hasTextures()) {
-                const numbers = Corners.materialsOf(geometry, hit.primitive, ray.active);
-                return .of(&.of(all, numbers, ray.active), .white, passing);
-            }
-            const corners: Corners = .of(geometry, hit.primitive, ray.active);
-            const weights = triangle.edgeFunctionsOf(Rays, corners.position, ray.line);
-            const barycentrics = weights.barycentrics();
-            const materials: material_file.Materials(Rays) =
-                .of(all, corners.material, ray.active);
-            const color = corners.colorAt(geometry, barycentrics);
-            if (!frame.hasTextures()) return .of(&materials, color, passing);
-            // As wide as what the shadow falls on is seen; a cone with its apex in the light.
-            const share: F32 = if (light.kind == .directional)
-                .splat(1)
-            else if (light.from_receiver)
-                F32.splat(1).sub(hit.t)
-            else
-                hit.t;
-            const place: texturing.Place(Rays) = .{
-                .asked = ray.active,
-                .primitive = hit.primitive,
-                .barycentrics = barycentrics,
-                .axes = .ofCorners(
-                    corners.position,
-                    ray.line.direction.normalize(),
-                    point.cone_width.mul(share),
-                ),
-            };
-            const colored = texturing.colored(Rays, frame, &materials, &place, color);
-            const clear = texturing.transmission(Rays, frame, &materials, &place);
-            return .of(&materials, colored, passing.mul(clear));
-        }
     };
+}
+
+/// Of lanes asked for, those whose triangles light goes straight through, or in those of `straight`
+/// as if.
+fn clearLanes(
+    comptime Rays: type,
+    frame: *const Frame,
+    primitives: Rays.I32,
+    asked: Rays.Mask,
+    straight: Rays.Mask,
+) Rays.Mask {
+    if (!frame.materials.has_transmission) return .splat(false);
+    const numbers = primitives.toArray();
+    const bent = straight.bits();
+    var clear: u32 = 0;
+    var bits = asked.bits();
+    while (bits != 0) : (bits &= bits - 1) {
+        const lane = @ctz(bits);
+        const is_straight = bent >> @intCast(lane) & 1 != 0;
+        const is_clear = switch (clarityOf(frame, @intCast(numbers[lane]))) {
+            .scattering => false,
+            .bending => is_straight,
+            .pane => true,
+        };
+        clear |= @as(u32, @intFromBool(is_clear)) << @intCast(lane);
+    }
+    return .fromBits(clear);
+}
+
+/// What a surface does to light that comes through: not in one direction, in another, or straight.
+pub const Clarity = enum { scattering, bending, pane };
+
+/// That of a triangle, whatever its textures say.
+pub fn clarityOf(frame: *const Frame, primitive: u32) Clarity {
+    const material = &frame.materials.all[frame.geometry.face(primitive).material];
+    if (!material.transmits()) return .scattering;
+    const Single = ray_file.Single;
+    const alpha: Single.F32 = .splat(material.roughness * material.roughness);
+    const ior: Single.F32 = .splat(material.ior);
+    const is_thin = material.volume == 0;
+    const width = if (is_thin)
+        transmission.thinAlpha(Single, alpha, ior)
+    else
+        transmission.equalAlpha(Single, alpha, ior);
+    if (width.lane(0) > sampling.sharp_alpha_least) return .scattering;
+    return if (is_thin) .pane else .bending;
+}
+
+/// What active rays lose at the triangles that they hit.
+fn attenuationAt(
+    comptime Rays: type,
+    frame: *const Frame,
+    ray: *const ray_file.Ray(Rays),
+    light: *const Light,
+    cone_width: Rays.F32,
+    hit: ray_file.Hit(Rays),
+    passing: Rays.F32,
+) material_file.Attenuation(Rays) {
+    const F32 = Rays.F32;
+    const Corners = interaction_file.Corners(Rays);
+    const geometry = frame.geometry;
+    const all = frame.materials.all;
+    // Without vertex colours and textures it is the material's alone.
+    if (!geometry.hasColors() and !frame.hasTextures()) {
+        const numbers = Corners.materialsOf(geometry, hit.primitive, ray.active);
+        return .of(&.of(all, numbers, ray.active), .white, passing);
+    }
+    const corners: Corners = .of(geometry, hit.primitive, ray.active);
+    const weights = triangle.edgeFunctionsOf(Rays, corners.position, ray.line);
+    const barycentrics = weights.barycentrics();
+    const materials: material_file.Materials(Rays) =
+        .of(all, corners.material, ray.active);
+    const color = corners.colorAt(geometry, barycentrics);
+    if (!frame.hasTextures()) return .of(&materials, color, passing);
+    // As wide as what the shadow falls on is seen; a cone with its apex in the light.
+    const share: F32 = if (light.kind == .directional)
+        .splat(1)
+    else if (light.from_receiver)
+        F32.splat(1).sub(hit.t)
+    else
+        hit.t;
+    const place: texturing.Place(Rays) = .{
+        .asked = ray.active,
+        .primitive = hit.primitive,
+        .barycentrics = barycentrics,
+        .axes = .ofCorners(
+            corners.position,
+            ray.line.direction.normalize(),
+            cone_width.mul(share),
+        ),
+    };
+    const colored = texturing.colored(Rays, frame, &materials, &place, color);
+    const clear = texturing.transmission(Rays, frame, &materials, &place);
+    return .of(&materials, colored, passing.mul(clear));
 }
 
 /// The points that the rays of a group of a `PathState` see. Asserts that some active ray hit

@@ -1,7 +1,7 @@
 //! The BSDF of glTF's metallic-roughness model in lanes: GGX over Lambert, energy preserved, Snell.
 //!
 //! In: points on surfaces. Out: what they make of light from a direction, shares for light from
-//! everywhere, directions to sample, and what goes on by reflection and refraction. Formulas: glTF
+//! everywhere, and what goes on by reflection and refraction. Formulas: glTF
 //! 2.0, appendix B (`microfacet.zig`; Burley 2012 for roughness squared, Schlick 1994 for Fresnel),
 //! with f0 mixed by the metallic factor. Light that microfacets send to each other comes out as a
 //! second lobe, and the diffuse one gets what the specular one leaves, both in the reciprocal form
@@ -52,7 +52,7 @@ pub fn Bsdf(comptime Lanes: type) type {
         f0: Vec3,
         /// Reflectance at grazing incidence.
         f90: F32,
-        /// GGX's alpha, for highlights.
+        /// GGX's alpha, for highlights; the surface's own after `sampling.sharpen`.
         alpha: F32,
         /// Cosine between normal and view, > 0.
         cos_view: F32,
@@ -258,22 +258,21 @@ pub fn Bsdf(comptime Lanes: type) type {
             to_light: Vec3,
             passing: Vec3,
         ) Vec3 {
-            const cosine = point.normal.dot(to_light).neg().max(.zero());
-            const diffuse = bsdf.back_albedo.scale(cosine.mul(inverse_pi));
+            const diffuse = bsdf.evalBack(point, to_light);
             const boundary = transmission_file.boundaryOf(Lanes, point, bsdf.alpha, point.eta);
             const density = boundary.pdf(to_light);
             const pane = F32.select(point.material.volume, .zero(), density);
             return diffuse.add(passing.scale(pane));
         }
 
-        /// See `sampling.sample`.
-        pub fn sample(bsdf: *const Self, point: *const Interaction(Lanes), numbers: [3]F32) Vec3 {
-            return sampling.sample(Lanes, bsdf, point, numbers);
-        }
-
-        /// See `sampling.pdf`.
-        pub fn pdf(bsdf: *const Self, point: *const Interaction(Lanes), to_light: Vec3) F32 {
-            return sampling.pdf(Lanes, bsdf, point, to_light);
+        /// `eval` of light from behind that leaves diffusely.
+        pub inline fn evalBack(
+            bsdf: *const Self,
+            point: *const Interaction(Lanes),
+            to_light: Vec3,
+        ) Vec3 {
+            const cosine = point.normal.dot(to_light).neg().max(.zero());
+            return bsdf.back_albedo.scale(cosine.mul(inverse_pi));
         }
     };
 }
@@ -457,16 +456,14 @@ fn integrate(point: *const Interaction(Single)) struct { diffuse: f64, specular:
     return .{ .diffuse = diffuse, .specular = specular };
 }
 
-/// Density of mirror images about visible normals: `pdf` of a surface that is nothing else.
+/// Density of mirror images about visible normals.
 fn visibleDensity(
     bsdf: *const Bsdf(Single),
     point: *const Interaction(Single),
     way: Single.Vec3,
 ) f32 {
-    var specular = bsdf.*;
-    specular.diffuse_albedo = .splat(.{ 0, 0, 0 });
-    specular.specular_albedo = .splat(.{ 1, 1, 1 });
-    return specular.pdf(point, way).lane(0);
+    const half = point.view.add(way).normalize();
+    return sampling.baseOf(Single, point, bsdf).pdf(half).lane(0);
 }
 
 const cosines = [_]f32{ 0.003, 0.03, 0.1, 0.3, 0.55, 0.8, 1 };
@@ -530,97 +527,6 @@ test "reciprocity: light and view change places" {
         const back = Bsdf(Single).of(&point).eval(&point, view).scale(light.y);
         for (there.lane(0), back.lane(0)) |a, b| try std.testing.expectApproxEqRel(a, b, 1e-3);
     }
-}
-
-test "samples: their density is pdf by chi-squared, their mean weight the albedo" {
-    for ([_][3]f32{ .{ 0, 0.5, 0.4 }, .{ 0.7, 0.8, 0.15 }, .{ 1, 0.3, 0.8 } }) |case| {
-        var point = testPoint(viewAt(case[2]).lane(0));
-        setRough(&point, case[0], case[1]);
-        // Off the axes, so that the frame of tangents is in it.
-        point.normal = Single.Vec3.splat(.{ 0.36, 0.48, -0.8 });
-        point.view = turn(point.view);
-        point.normal_geometric = point.normal;
-        try expectSampled(&point);
-    }
-}
-
-/// To a frame whose second axis is the normal of the test above.
-fn turn(vector: Single.Vec3) Single.Vec3 {
-    const axes = [3]Single.Vec3{
-        .splat(.{ 0.8, -0.6, 0 }),
-        .splat(.{ 0.36, 0.48, -0.8 }),
-        .splat(.{ 0.48, 0.64, 0.6 }),
-    };
-    return axes[0].scale(vector.x).add(axes[1].scale(vector.y)).add(axes[2].scale(vector.z));
-}
-
-fn expectSampled(point: *const Interaction(Single)) !void {
-    const rings = 12;
-    const sectors = 8;
-    const bsdf: Bsdf(Single) = .of(point);
-    var random = std.Random.DefaultPrng.init(3);
-    const numbers = random.random();
-    var counts: [rings * sectors]f64 = @splat(0);
-    var weight: f64 = 0;
-    const sample_count = 40_000;
-    for (0..sample_count) |_| {
-        const triple: [3]Single.F32 = .{
-            .splat(numbers.float(f32)), .splat(numbers.float(f32)), .splat(numbers.float(f32)),
-        };
-        const way = bsdf.sample(point, triple);
-        const height = point.normal.dot(way).lane(0);
-        const across = microfacet.tangents(Single, point.normal);
-        const angle = std.math.atan2(way.dot(across[1]).lane(0), way.dot(across[0]).lane(0));
-        const ring: usize = @intFromFloat(std.math.clamp((height + 1) / 2 * rings, 0, rings - 1));
-        const turns = (angle / std.math.pi + 1) / 2;
-        const sector: usize = @intFromFloat(std.math.clamp(turns * sectors, 0, sectors - 1));
-        counts[ring * sectors + sector] += 1;
-        const density = bsdf.pdf(point, way).lane(0);
-        try std.testing.expect(density > 0);
-        weight += bsdf.eval(point, way).x.lane(0) / density / sample_count;
-    }
-    const albedo = bsdf.specular_albedo.x.lane(0) + bsdf.diffuse_albedo.x.lane(0);
-    try std.testing.expectApproxEqRel(albedo, weight, 0.02);
-    var chi_squared: f64 = 0;
-    var whole: f64 = 0;
-    var freedom: f64 = 0;
-    for (counts, 0..) |count, cell| {
-        const share = cellShare(&bsdf, point, cell / sectors, cell % sectors, rings, sectors);
-        whole += share;
-        const expected = share * sample_count;
-        if (expected < 5) continue;
-        chi_squared += (count - expected) * (count - expected) / expected;
-        freedom += 1;
-    }
-    try std.testing.expectApproxEqAbs(1, whole, 5e-3);
-    // Five standard deviations of chi-squared.
-    try std.testing.expect(chi_squared < freedom + 5 * @sqrt(2 * freedom));
-}
-
-/// The density integrated over one cell of the sphere.
-fn cellShare(
-    bsdf: *const Bsdf(Single),
-    point: *const Interaction(Single),
-    ring: usize,
-    sector: usize,
-    rings: f64,
-    sectors: f64,
-) f64 {
-    const across = microfacet.tangents(Single, point.normal);
-    const steps = 24;
-    var sum: f64 = 0;
-    for (0..steps) |i| for (0..steps) |j| {
-        const up = @as(f64, @floatFromInt(ring)) + (@as(f64, @floatFromInt(i)) + 0.5) / steps;
-        const along = @as(f64, @floatFromInt(sector)) + (@as(f64, @floatFromInt(j)) + 0.5) / steps;
-        const height = up / rings * 2 - 1;
-        const angle = (along / sectors * 2 - 1) * std.math.pi;
-        const radius = @sqrt(1 - height * height);
-        const way = across[0].scale(.splat(@floatCast(radius * @cos(angle))))
-            .add(across[1].scale(.splat(@floatCast(radius * @sin(angle)))))
-            .add(point.normal.scale(.splat(@floatCast(height))));
-        sum += bsdf.pdf(point, way).lane(0);
-    };
-    return sum / (steps * steps) * 4 * std.math.pi / (rings * sectors);
 }
 
 test "no energy is made: reflected, transmitted and diffuse shares sum to 1 at most" {

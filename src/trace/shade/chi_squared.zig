@@ -20,7 +20,8 @@ const quantile = 3.09;
 
 /// Fails unless `lobe.sample(numbers: [3]f32) [3]f32`, unit vectors in a frame whose z the cells'
 /// circles of equal height are about, has the density `lobe.pdf(direction: [3]f32) f32` per
-/// steradian. Narrow lobes, of less than a tenth of a radian, are beyond the cells.
+/// steradian; if it is optional, as often as it is not null. Narrow lobes, of less than a tenth of
+/// a radian, are beyond the cells.
 pub fn expectDistributed(lobe: anytype) !void {
     const result: Result = .of(lobe);
     errdefer std.debug.print("{}\n", .{result});
@@ -39,7 +40,8 @@ const Result = struct {
         for (0..sample_count) |_| {
             var numbers: [3]f32 = undefined;
             for (&numbers) |*number| number.* = random.random().float(f32);
-            observed[cellOf(lobe.sample(numbers))] += 1;
+            const found: ?[3]f32 = lobe.sample(numbers);
+            if (found) |direction| observed[cellOf(direction)] += 1;
         }
         var result: Result = .{};
         for (integrate(lobe), observed) |expected, count| {
@@ -53,7 +55,7 @@ const Result = struct {
         if (result.few_expected >= expected_least) {
             result.add(result.few_expected, result.few_observed);
         }
-        // The density's integral is 1, so one cell is what the others leave.
+        // The density's integral is known, so one cell is what the others leave.
         result.freedom -= 1;
         return result;
     }

@@ -78,19 +78,20 @@ fn scaled(
 }
 
 /// Where in the octahedral square directions are, 0..1 each; not a number where these are none.
-fn Places(comptime Lanes: type) type {
+pub fn Places(comptime Lanes: type) type {
     return struct {
         u: [Lanes.count]f32,
         v: [Lanes.count]f32,
 
-        inline fn of(places: *const @This(), lane: usize) [2]f32 {
+        /// In one lane.
+        pub inline fn of(places: *const @This(), lane: usize) [2]f32 {
             return .{ places.u[lane], places.v[lane] };
         }
     };
 }
 
-/// See `math/octahedral.zig`.
-inline fn placesOf(
+/// Of directions of any length, see `math/octahedral.zig`.
+pub inline fn placesOf(
     comptime Lanes: type,
     environment: *const Environment,
     direction: Lanes.Vec3,

@@ -146,6 +146,9 @@ pub fn Attenuation(comptime Lanes: type) type {
         share: Lanes.Vec3,
         /// Lanes where the surface is there at all: not in holes.
         weakens: Lanes.Mask,
+        /// Of the share, what alpha leaves open, and what goes through in the base colour.
+        open: Lanes.F32,
+        clear: Lanes.Vec3,
 
         /// Past what alpha leaves open, and in the base colour through what transmits, by a share
         /// that textures and reflection leave of it.
@@ -169,7 +172,17 @@ pub fn Attenuation(comptime Lanes: type) type {
             return .{
                 .share = through.scale(stopped).add(.{ .x = rest, .y = rest, .z = rest }),
                 .weakens = stopped.gt(.zero()),
+                .open = rest,
+                .clear = base.scale(clear.mul(stopped)),
             };
+        }
+
+        /// Only what is not scattered comes out: what alpha leaves open and, in these lanes, what
+        /// goes through.
+        pub inline fn sharpen(attenuation: *@This(), lanes: Lanes.Mask) void {
+            const open = attenuation.open;
+            const clear: Lanes.Vec3 = .select(lanes, attenuation.clear, .splat(.{ 0, 0, 0 }));
+            attenuation.share = clear.add(.{ .x = open, .y = open, .z = open });
         }
 
         /// Surfaces in these lanes are not there.

@@ -8,6 +8,7 @@ const bsdf_file = @import("bsdf.zig");
 const albedo_file = @import("albedo.zig");
 const anisotropy = @import("anisotropy.zig");
 const microfacet = @import("microfacet.zig");
+const sampling = @import("sampling.zig");
 const Interaction = @import("interaction.zig").Interaction;
 const Layers = @import("layers.zig").Layers;
 
@@ -22,6 +23,8 @@ pub fn Stretch(comptime Lanes: type) type {
         tangent: Vec3,
         bitangent: Vec3,
         alphas: [2]F32,
+        /// Least alpha of the lobe that lights and samples see.
+        alpha_least: f32,
         /// The view in the frame of tangents and normal.
         view: Vec3,
 
@@ -30,6 +33,8 @@ pub fn Stretch(comptime Lanes: type) type {
         /// That of points.
         pub fn of(point: *const Interaction(Lanes), layers: *const Layers(Lanes)) Self {
             var stretch: Self = undefined;
+            stretch.alpha_least =
+                bsdf_file.highlight_roughness_least * bsdf_file.highlight_roughness_least;
             stretch.lanes = layers.present.bitAnd(layers.anisotropy.gt(.zero()));
             if (stretch.lanes.none()) return stretch;
             stretch.tangent = layers.tangent;
@@ -52,11 +57,9 @@ pub fn Stretch(comptime Lanes: type) type {
             };
         }
 
-        /// Alphas of what lights without size and samples see.
+        /// Alphas of what lights and samples see.
         pub inline fn highlights(stretch: *const Self) [2]F32 {
-            const least: F32 = .splat(
-                bsdf_file.highlight_roughness_least * bsdf_file.highlight_roughness_least,
-            );
+            const least: F32 = .splat(stretch.alpha_least);
             return .{ stretch.alphas[0].max(least), stretch.alphas[1].max(least) };
         }
 
@@ -84,6 +87,13 @@ pub fn Stretch(comptime Lanes: type) type {
             const seen = stretch.view.z.add(anisotropy.smith(Lanes, stretch.view, alphas));
             const found = anisotropy.distribution(Lanes, local, alphas).div(seen.add(seen));
             return .select(local.z.gt(.zero()), found, .zero());
+        }
+
+        /// Mirror image of the view for a point of the disc, with the density `visible`.
+        pub fn sample(stretch: *const Self, point: *const Interaction(Lanes), disc: [2]F32) Vec3 {
+            const image = sampling.imageOf(Lanes, stretch.view, stretch.highlights(), disc);
+            const across = [2]Vec3{ stretch.tangent, stretch.bitangent };
+            return sampling.turn(Lanes, across, point.normal, image);
         }
 
         /// `anisotropy.effectiveAlpha` in the lanes that have a stretched lobe, else this one.

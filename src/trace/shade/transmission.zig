@@ -68,6 +68,18 @@ pub inline fn dispersedIors(
     return .{ ior.sub(half_spread).max(one), ior, ior.add(half_spread) };
 }
 
+/// `eta` of a boundary for light of one channel, whose index this is: the boundary's is `ior`, the
+/// green channel's. `eta` as for `refract`.
+pub inline fn dispersedEta(
+    comptime Lanes: type,
+    eta: Lanes.F32,
+    ior: Lanes.F32,
+    channel_ior: Lanes.F32,
+) Lanes.F32 {
+    const stretch = channel_ior.div(ior);
+    return .select(eta.gt(.splat(1)), eta.mul(stretch), eta.div(stretch));
+}
+
 /// GGX's alpha of a thin wall's lobe, for that of its surface. Two faces bend light by (ior - 1)
 /// times what their slopes differ by, so the width of the lobe goes with that: nothing for an index
 /// of 1, which has no boundary, and for the default of 1.5 the width of the reflection, which the
@@ -96,7 +108,7 @@ pub inline fn equalAlpha(
 /// A direction that light comes from.
 pub fn Direction(comptime Lanes: type) type {
     return struct {
-        /// Unit vector; behind the boundary by the triangle's normal.
+        /// Unit vector; behind the boundary by the triangle's normal, or in front if reflected.
         to_light: Lanes.Vec3,
         /// Lanes where the microfacet sends light on to others, by total reflection or to its own
         /// side: scattered by the cosine instead, which `pdf` does not have in it.
@@ -124,9 +136,25 @@ pub fn RoughBoundary(comptime Lanes: type) type {
         const Vec3 = Lanes.Vec3;
         const Mask = Lanes.Mask;
 
-        /// Directions for two numbers in 0..1, distributed as `pdf` says but for what is scattered.
-        /// If each brings the share of light that the boundary lets through in all, energy is kept.
-        pub fn sample(boundary: *const Self, numbers: [2]F32) Direction(Lanes) {
+        /// A microfacet that the view sees.
+        pub const Facet = struct {
+            /// Two axes across the normal, the third.
+            across: [2]Vec3,
+            /// Unit vectors in this frame: the view and the microfacet's normal.
+            view: Vec3,
+            half: Vec3,
+            /// Where on the disc it is.
+            disc: [2]F32,
+
+            /// The direction in which the microfacet reflects the view, in the frame.
+            pub inline fn mirrored(of: *const Facet) Vec3 {
+                const twice = of.view.dot(of.half).mul(.splat(2));
+                return of.half.scale(twice).sub(of.view);
+            }
+        };
+
+        /// One of those that the view sees, for two numbers in 0..1.
+        pub inline fn facet(boundary: *const Self, numbers: [2]F32) Facet {
             const across = microfacet.tangents(Lanes, boundary.normal);
             const local: Vec3 = .{
                 .x = across[0].dot(boundary.view),
@@ -136,23 +164,46 @@ pub fn RoughBoundary(comptime Lanes: type) type {
             const view = local.normalize();
             const disc = microfacet.disc(Lanes, numbers);
             const half = microfacet.visibleNormal(Lanes, view, boundary.alpha, disc);
-            const bent = refract(Lanes, view, half, boundary.eta);
-            const twice = view.dot(half).mul(.splat(2));
-            const mirrored = half.scale(twice).sub(view);
+            return .{ .across = across, .view = view, .half = half, .disc = disc };
+        }
+
+        /// Directions for two numbers in 0..1, distributed as `pdf` says but for what is scattered.
+        /// If each brings the share of light that the boundary lets through in all, energy is kept.
+        pub fn sample(boundary: *const Self, numbers: [2]F32) Direction(Lanes) {
+            return boundary.pass(&boundary.facet(numbers));
+        }
+
+        /// `sample` through one microfacet.
+        pub inline fn pass(boundary: *const Self, of: *const Facet) Direction(Lanes) {
+            const bent = refract(Lanes, of.view, of.half, boundary.eta);
+            const mirrored = of.mirrored();
             const through: Vec3 = .{ .x = mirrored.x, .y = mirrored.y, .z = mirrored.z.neg() };
             const chosen: Vec3 = .select(boundary.thin, through, bent.direction);
-            const direction = turn(across, boundary.normal, chosen).normalize();
+            const direction = turn(of.across, boundary.normal, chosen).normalize();
             const scattered = bent.total.andNot(boundary.thin)
                 .bitOr(chosen.z.ge(.zero()))
                 .bitOr(boundary.normal_geometric.dot(direction).ge(.zero()));
             return .{
-                .to_light = .select(scattered, boundary.scatter(disc), direction),
+                .to_light = .select(scattered, boundary.scatter(of.disc), direction),
+                .scattered = scattered,
+            };
+        }
+
+        /// A microfacet's mirror image of the view. What goes to the other side is scattered in
+        /// front of the triangle.
+        pub inline fn reflect(boundary: *const Self, of: *const Facet) Direction(Lanes) {
+            const image = of.mirrored();
+            const direction = turn(of.across, boundary.normal, image).normalize();
+            const scattered = image.z.le(.zero())
+                .bitOr(boundary.normal_geometric.dot(direction).le(.zero()));
+            return .{
+                .to_light = .select(scattered, boundary.scatter(of.disc).neg(), direction),
                 .scattered = scattered,
             };
         }
 
         /// Behind the triangle by the cosine, for a point of the unit disc.
-        inline fn scatter(boundary: *const Self, disc: [2]F32) Vec3 {
+        pub inline fn scatter(boundary: *const Self, disc: [2]F32) Vec3 {
             const normal = boundary.normal_geometric;
             const squared = disc[0].mul(disc[0]).add(disc[1].mul(disc[1]));
             const height = F32.splat(1).sub(squared).max(.splat(cosine_least)).sqrt();
@@ -165,7 +216,7 @@ pub fn RoughBoundary(comptime Lanes: type) type {
                 .add(normal.scale(local.z));
         }
 
-        inline fn cosView(boundary: *const Self) F32 {
+        pub inline fn cosView(boundary: *const Self) F32 {
             return boundary.normal.dot(boundary.view).max(.splat(cosine_least)).min(.splat(1));
         }
 
