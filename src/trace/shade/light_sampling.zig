@@ -4,9 +4,10 @@
 //! and the density. What light comes from is chosen by estimates of its irradiance at the receiver:
 //! the mean of the environment, all directional lights, the most that the tree's lights may give
 //! (`light_tree.zig`); each that is there has a sixteenth of the whole besides, so that none that
-//! is estimated low becomes rare. Environments are sampled by radiance (`environment_sampling.zig`),
-//! triangles evenly by area. For multiple importance sampling (Veach and Guibas 1995) the densities
-//! are there for directions from elsewhere as well, the same to the bit.
+//! is estimated low becomes rare. Environments are sampled by radiance
+//! (`environment_sampling.zig`), triangles evenly by area. For multiple importance sampling (Veach
+//! and Guibas 1995) the densities are there for directions from elsewhere as well, the same to the
+//! bit.
 
 const std = @import("std");
 const simd = @import("../../simd.zig");
