@@ -20,18 +20,34 @@ pub fn sharpen(
     point: *const Interaction(Lanes),
     bsdf: *bsdf_file.Bsdf(Lanes),
 ) void {
-    bsdf.alpha = alphaOf(Lanes, point.material.roughness);
-    bsdf.smith_view = microfacet.smith(Lanes, bsdf.cos_view, bsdf.alpha.mul(bsdf.alpha));
-    if (!bsdf.layered) return;
-    bsdf.stretch.alpha_least = sharp_alpha_least;
-    const coating = &bsdf.coating;
-    coating.alpha = alphaOf(Lanes, coating.roughness);
-    const squared = coating.alpha.mul(coating.alpha);
-    coating.smith_view = microfacet.smith(Lanes, coating.cos_view, squared);
+    setRoughness(Lanes, point, bsdf, sharp_alpha_least);
 }
 
-inline fn alphaOf(comptime Lanes: type, roughness: Lanes.F32) Lanes.F32 {
-    return roughness.mul(roughness).max(.splat(sharp_alpha_least));
+/// Gives them that of highlights again.
+pub fn widen(
+    comptime Lanes: type,
+    point: *const Interaction(Lanes),
+    bsdf: *bsdf_file.Bsdf(Lanes),
+) void {
+    const least = bsdf_file.highlight_roughness_least;
+    setRoughness(Lanes, point, bsdf, least * least);
+}
+
+inline fn setRoughness(
+    comptime Lanes: type,
+    point: *const Interaction(Lanes),
+    bsdf: *bsdf_file.Bsdf(Lanes),
+    least: f32,
+) void {
+    const rough = point.material.roughness;
+    bsdf.alpha = rough.mul(rough).max(.splat(least));
+    bsdf.smith_view = microfacet.smith(Lanes, bsdf.cos_view, bsdf.alpha.mul(bsdf.alpha));
+    if (!bsdf.layered) return;
+    bsdf.stretch.alpha_least = least;
+    const coating = &bsdf.coating;
+    coating.alpha = coating.roughness.mul(coating.roughness).max(.splat(least));
+    const squared = coating.alpha.mul(coating.alpha);
+    coating.smith_view = microfacet.smith(Lanes, coating.cos_view, squared);
 }
 
 /// Lanes whose lobe of this roughness is one direction.
