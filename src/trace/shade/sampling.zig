@@ -134,6 +134,18 @@ pub inline fn imageOf(
     return half.scale(twice).sub(view);
 }
 
+/// Direction of the hemisphere for a point of the disc, uniform as that is: Lambert's equal-area
+/// projection.
+pub inline fn evenOf(comptime Lanes: type, disc: [2]Lanes.F32) Lanes.Vec3 {
+    const squared = disc[0].mul(disc[0]).add(disc[1].mul(disc[1])).min(.splat(1));
+    const wide = Lanes.F32.splat(2).sub(squared).sqrt();
+    return .{
+        .x = disc[0].mul(wide),
+        .y = disc[1].mul(wide),
+        .z = Lanes.F32.splat(1).sub(squared),
+    };
+}
+
 /// Out of the frame, as a unit vector.
 pub inline fn turn(
     comptime Lanes: type,

@@ -278,13 +278,7 @@ pub fn Scatter(comptime Lanes: type) type {
             chosen.put(sharp, bsdf_file.mirrored(Lanes, point, coating.normal));
             const coat = coating.albedo;
             chosen.putAlone(sharp, .{ .x = coat, .y = coat, .z = coat }, shares.coat);
-            // Lambert's equal-area projection of the hemisphere.
-            const wide = F32.splat(2).sub(squared).sqrt();
-            const even: Vec3 = .{
-                .x = disc[0].mul(wide),
-                .y = disc[1].mul(wide),
-                .z = F32.splat(1).sub(squared),
-            };
+            const even = sampling.evenOf(Lanes, disc);
             const on_fibres = number.ge(to_coat).bitAnd(number.lt(to_sheen));
             chosen.put(on_fibres, sampling.turn(Lanes, across, point.normal, even));
             const below: Vec3 = .{
