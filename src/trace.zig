@@ -20,7 +20,7 @@ pub const link = @import("trace/link.zig");
 /// Whitted's ray tracing, by one kernel.
 pub const Whitted = @import("trace/integrate/whitted.zig").Whitted;
 /// Instant radiosity, by one kernel.
-pub const Lights = Whitted;
+pub const Lights = @import("trace/integrate/instant_radiosity.zig").InstantRadiosity;
 /// Path tracing, by one kernel.
 pub const PathTracer = @import("trace/integrate/path_tracer.zig").PathTracer;
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
