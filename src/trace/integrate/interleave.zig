@@ -108,7 +108,6 @@ pub const Layers = struct {
         var layers: Layers = .{
             .width = view.width,
             .height = view.height,
-            .sample_count = sample_count,
             .is_interleaved = is_interleaved,
             .guide = &.{},
             .bounced = &.{},
