@@ -5,12 +5,12 @@ Usage: bench/light.py [-o FILE.md] [--json FILE] [--scenes LIST] [--size N] [--s
                       [--machines LIST] [--programs DIR] [--raylane PROGRAM] [--only PART...]
 
 Builds bench/light.zig for AArch64 (Cortex-A72) and x86-64 (v3: AVX2), counts its instructions under
-qemu, and for this machine, whose time it takes; and a raylane with all variants, for `lights` and
-`path`. A table stands between `<!-- light.py: NAME -->` and `<!-- end -->`; what is around them
-stays. --programs takes programs MACHINE/bin/light that were built before, of the machines aarch64,
-x86_64 and native; --raylane a raylane. --only: of `rays` (how rays are best traced), `frames` (what
-frames of the integrators cost by bounce) and `error` (time to equal error). --json keeps what was
-measured, and what of it is not measured anew is read from there.
+qemu, and takes the time on x86-64, which this machine has to be; and a raylane with all variants,
+for `lights` and `path`. A table stands between `<!-- light.py: NAME -->` and `<!-- end -->`; what
+is around them stays. --programs takes programs MACHINE/bin/light that were built before, of the
+machines aarch64 and x86_64; --raylane a raylane. --only: of `rays` (how rays are best traced),
+`frames` (what frames of the integrators cost by bounce) and `error` (time to equal error). --json
+keeps what was measured, and what of it is not measured anew is read from there.
 
 Needs what bench/count needs.
 """
@@ -33,8 +33,9 @@ SCENES = "builtin:cornell,builtin:atrium,builtin:nave,builtin:handles"
 MACHINES = {
     "aarch64": ["-Dtarget=aarch64-linux", "-Dcpu=cortex_a72"],
     "x86_64": ["-Dtarget=x86_64-linux", "-Dcpu=x86_64_v3"],
-    "native": [],
 }
+# Besides those: the program for x86-64, timed.
+TIMED = "timed"
 # Columns: what they are called, and the methods by lanes.
 COLUMNS = [("scalar single", "scalar-single-4"), ("vector single", "vector-single-{}"),
            ("packets 2x2", "vector-packet2x2-4"), ("streams", "vector-stream-{}"),
@@ -86,13 +87,13 @@ def measure_rays(count, options, result):
     """Adds by machine and scene {"set depth order": {method: cost}} and {order: cost of sorting}
     to `result`."""
     for machine in options.machines.split(","):
-        program = build(options, machine)
+        program = build(options, "x86_64" if machine == TIMED else machine)
         result[machine] = []
         for scene in options.scenes.split(","):
             print(f"light: {machine}, {scene}", file=sys.stderr)
             arguments = [scene, "--size", options.size, "--stride", options.stride, "--depth",
                          options.depth]
-            if machine == "native":
+            if machine == TIMED:
                 done = subprocess.run([program, *map(str, arguments), "--json"], check=True,
                                       text=True, stdout=subprocess.PIPE)
                 report, tags = json.loads(done.stdout), None
@@ -182,7 +183,7 @@ def shared_table(machines):
         return f"{value:.0f} ({values[SINGLE] / value:.2f})"
     lines = table_of(rows, "AArch64, instructions", 4, machines["aarch64"], form)
     lines += [""] + table_of(rows, "x86-64, 8 lanes, instructions", 8, machines["x86_64"], form)
-    lines += [""] + table_of(rows, "x86-64, M rays/s", 8, machines["native"],
+    lines += [""] + table_of(rows, "x86-64, M rays/s", 8, machines[TIMED],
                              lambda value, _: f"{1e3 / value:.2f}")
     return lines
 
@@ -193,7 +194,7 @@ def sorting_table(machines, options):
              "x86-64, time: 4096 at a time", "all"]
     lines = [row(heads), "|---|" + "---:|" * (len(heads) - 1)]
     orders = ["sorted_4096", "sorted_all"]
-    places = [("aarch64", 4), ("x86_64", 8), ("native", 8)]
+    places = [("aarch64", 4), ("x86_64", 8), (TIMED, 8)]
     for name, key in sets_of(options):
         if key.startswith("primary"):
             continue
@@ -216,7 +217,7 @@ def sorting_table(machines, options):
 def rays_tables(machines, options):
     return {"instructions-aarch64": instructions_table(machines["aarch64"], options, 4),
             "instructions-x86_64": instructions_table(machines["x86_64"], options, 8),
-            "rates": rates_table(machines["native"], options),
+            "rates": rates_table(machines[TIMED], options),
             "shared": shared_table(machines), "sorting": sorting_table(machines, options)}
 
 
@@ -332,7 +333,7 @@ def parse():
     parser.add_argument("--size", default=960)
     parser.add_argument("--stride", default=7)
     parser.add_argument("--depth", default=3)
-    parser.add_argument("--machines", default=",".join(MACHINES))
+    parser.add_argument("--machines", default=",".join([*MACHINES, TIMED]))
     parser.add_argument("--programs")
     parser.add_argument("--raylane")
     parser.add_argument("--only", nargs="*", choices=PARTS, default=PARTS)
@@ -359,7 +360,7 @@ def main():
     if options.json:
         options.json.write_text(json.dumps(found, indent=1) + "\n")
     tables = {}
-    if set(found.get("rays", {})) == set(MACHINES):
+    if set(found.get("rays", {})) == {*MACHINES, TIMED}:
         tables.update(rays_tables(found["rays"], options))
     if "frames" in found:
         tables["frames"] = frames_table(found["frames"])

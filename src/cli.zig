@@ -84,6 +84,10 @@ pub const Options = struct {
     view: settings.View = .{},
     render: settings.Render = .{},
     write: settings.Write = .{},
+    /// Name of a file for the picture while it is traced.
+    progress_image: ?[]const u8 = null,
+    /// A signal that ends tracing has what there is written.
+    partial: bool = false,
     /// Null: not asked for.
     stats: ?Stats = null,
     count_tests: bool = false,
@@ -258,6 +262,26 @@ const sections: []const Section = &.{
             }),
         },
         .{
+            .usage = "--noise E",
+            .help = comptimePrint("path: no more samples where pixels have a standard\n" ++
+                "error below E, white being 1; --spp is then the\n" ++
+                "most (default: {d})", .{settings.noise_sample_count}),
+        },
+        .{
+            .usage = "--time-budget S",
+            .help = "as many samples, --spp at most, as fit into S seconds\n" ++
+                "of tracing; says the --spp with the same picture",
+        },
+        .{
+            .usage = "--progress-image FILE",
+            .help = "the picture so far, every two seconds, as a whole,\nencoded as the output is",
+        },
+        .{
+            .usage = "--partial",
+            .help = "INT (Ctrl-C) or TERM during tracing ends it, and the\n" ++
+                "picture so far is written; once more ends all",
+        },
+        .{
             .usage = "--depth N",
             .help = comptimePrint("reflections and refractions in a row, {s}\n" ++
                 "(default: {d}; path, all bounces of light: {d})", .{
@@ -343,7 +367,7 @@ pub const help: []const u8 = "raylane " ++ version ++
 ++ arguments_file.helpOf(sections) ++
     \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
-    \\supported, 128 + N ended by signal N.
+    \\supported, 128 + N ended by signal N (with --partial, the picture may be there).
     \\
 ;
 
@@ -409,6 +433,7 @@ const Parser = struct {
         if (parser.has_time and animation.which == .default) animation.which = .{ .index = 0 };
         try parser.checkViewpoint();
         try parser.settleFormat();
+        try parser.checkSampling();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
         return .{ .render = parser.options };
@@ -448,6 +473,7 @@ const Parser = struct {
             },
             .threads => options.thread_count = try reader.number(given, settings.thread_count),
             .spp => options.render.sample_count = try reader.number(given, settings.sample_count),
+            .noise, .time_budget, .progress_image, .partial => try parser.setSampling(given),
             .depth => options.render.depth = try reader.number(given, settings.depth),
             .tile_size => options.render.tile_size = tileSizeOf(given.value) orelse
                 return reader.bad(given, comptimePrint("{s}, a multiple of {d}", .{
@@ -480,7 +506,8 @@ const Parser = struct {
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
             .count_tests => options.count_tests = true,
-            .point_size => options.view.point_size = pointSizeOf(given.value) orelse
+            .point_size => options.view.point_size =
+                numberWithin(given.value, settings.point_size) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
                     settings.point_size.min, settings.point_size.max,
                 })),
@@ -506,6 +533,39 @@ const Parser = struct {
         options.view.emitters = false;
         options.write.exposure = settings.thesis.exposure;
         options.write.tone_mapping = settings.thesis.tone_mapping;
+    }
+
+    fn setSampling(parser: *Parser, given: Reader.Given) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .noise => {
+                const error_max = numberWithin(given.value, settings.noise_error) orelse
+                    return reader.bad(given, comptimePrint("{d} to {d}", .{
+                        settings.noise_error.min, settings.noise_error.max,
+                    }));
+                options.render.noise = .{ .error_max = error_max };
+            },
+            .time_budget => options.render.time_budget_s =
+                numberWithin(given.value, settings.time_budget_s) orelse
+                return reader.bad(given, comptimePrint("{d} to {d} seconds", .{
+                    settings.time_budget_s.min, settings.time_budget_s.max,
+                })),
+            .progress_image => {
+                if (isStdout(given.value)) return reader.bad(given, "a file name");
+                options.progress_image = try reader.text(given, "a file name");
+            },
+            .partial => options.partial = true,
+            else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    fn checkSampling(parser: *Parser) Error!void {
+        const render = &parser.options.render;
+        const noise = if (render.noise) |*noise| noise else return;
+        noise.exposure = parser.options.write.exposure;
+        if (!render.integrator.isOpen())
+            return parser.reader.fail("'--noise' is for '--integrator path'", .{});
     }
 
     fn setLoad(parser: *Parser, given: Reader.Given) Error!void {
@@ -560,7 +620,7 @@ const Parser = struct {
                 return reader.bad(given, "X,Y,Z other than 0,0,0"),
             .orbit => viewpoint.orbit = orbitOf(given.value) orelse
                 return reader.bad(given, "THETA,PHI[,RADIUS], PHI 0 to 180, RADIUS above 0"),
-            .fov => viewpoint.fov_degrees = fovOf(given.value) orelse
+            .fov => viewpoint.fov_degrees = numberWithin(given.value, settings.fov_degrees) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} degrees", .{
                     settings.fov_degrees.min, settings.fov_degrees.max,
                 })),
@@ -674,10 +734,10 @@ fn bytesOf(text: []const u8) ?u64 {
     return std.math.shlExact(u64, count, shift) catch null;
 }
 
-fn pointSizeOf(text: []const u8) ?f32 {
-    const pixels = numberOf(text) orelse return null;
-    const is_allowed = pixels >= settings.point_size.min and pixels <= settings.point_size.max;
-    return if (is_allowed) pixels else null;
+/// A number from `range.min` to `range.max`.
+fn numberWithin(text: []const u8, range: anytype) ?f32 {
+    const number = numberOf(text) orelse return null;
+    return if (number >= range.min and number <= range.max) number else null;
 }
 
 /// A finite decimal number; a denormal one is zero, as everywhere in the renderer.
@@ -736,12 +796,6 @@ fn orbitOf(text: []const u8) ?settings.Orbit {
     return switch (orbit.radius) {
         inline else => |value| if (value > 0) orbit else null,
     };
-}
-
-fn fovOf(text: []const u8) ?f32 {
-    const degrees = numberOf(text) orelse return null;
-    const range = settings.fov_degrees;
-    return if (degrees >= range.min and degrees <= range.max) degrees else null;
 }
 
 fn tileSizeOf(text: []const u8) ?u32 {
@@ -910,6 +964,8 @@ test "numbers keep to their ranges" {
             .bad = &.{ "0", "257", "-1", "+1", "1.0", "1_0", "x", " 1", "99999999999999999999" },
         },
         .{ .flag = "--spp", .good = &.{ "1", "4096" }, .bad = &.{ "0", "4097", "" } },
+        .{ .flag = "--time-budget", .good = &.{ "0.5", "3600" }, .bad = &.{ "0", "-1", "1s", "" } },
+        .{ .flag = "--progress-image", .good = &.{"p.png"}, .bad = &.{ "", "-", "/dev/stdout" } },
         .{ .flag = "--depth", .good = &.{ "0", "32" }, .bad = &.{ "33", "-1" } },
         .{ .flag = "--tile-size", .good = &.{ "4", "36", "512" }, .bad = &.{ "0", "2", "516" } },
         .{
@@ -1165,17 +1221,30 @@ test outputName {
     try std.testing.expectEqualStrings("a.pfm", pfm);
 }
 
+test "noise is told of path tracing alone, as the picture is exposed" {
+    const options = try optionsForTest(&.{
+        "--noise=0.01", "--exposure=2", "--integrator=path", "--partial",
+    });
+    try std.testing.expectEqual(0.01, options.render.noise.?.error_max);
+    try std.testing.expectEqual(2, options.render.noise.?.exposure.ev);
+    try std.testing.expect(options.partial and options.progress_image == null);
+    try expectUsage("'--integrator path'", &.{ "--noise=0.01", "s" });
+    for ([_][:0]const u8{ "0", "-1", "2", "nan", "" }) |text| {
+        try std.testing.expectEqual(null, numberWithin(text, settings.noise_error));
+    }
+}
+
 test "points and lines are as wide as they may be" {
     try std.testing.expectEqual(1.5, (try optionsForTest(&.{})).view.point_size);
     const wide = try optionsForTest(&.{"--point-size=4.25"});
     try std.testing.expectEqual(4.25, wide.view.point_size);
     for ([_][:0]const u8{ "0", "-1", "101", "nan", "" }) |text| {
-        try std.testing.expectEqual(null, pointSizeOf(text));
+        try std.testing.expectEqual(null, numberWithin(text, settings.point_size));
     }
 }
 
 test "the help fits a screen and says what flags take and may be" {
-    try std.testing.expect(try @import("cli/testing.zig").expectFits(help) <= 100);
+    try std.testing.expect(try @import("cli/testing.zig").expectFits(help) <= 120);
     for ([_][]const u8{
         "\n  -o, --output FILE        name ending in",
         "\n                           4 to 1024 (default: 32)\n",

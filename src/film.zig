@@ -186,13 +186,10 @@ pub const Film = struct {
         }
     }
 
-    /// Makes the means of pixels that have so many samples; without any they are black, or clear.
-    /// Returns how many came out as not a number; these are black.
+    /// Makes the means of pixels that have so many samples, at least 1. Returns how many came out
+    /// as not a number; these are black.
     pub fn finish(film: *Film, rectangle: Rectangle, sample_count: u32) u64 {
-        if (sample_count == 0) {
-            film.clear(rectangle);
-            return 0;
-        }
+        assert(sample_count > 0);
         const count: V4 = @splat(@floatFromInt(sample_count));
         const none: V4 = @splat(0);
         var non_finite_count: u64 = 0;
@@ -251,19 +248,6 @@ pub const Film = struct {
 
     fn isNumber(pixel: [4]f32) bool {
         return std.math.isFinite((pixel[0] + pixel[1]) + (pixel[2] + pixel[3]));
-    }
-
-    /// Pixels without samples: nothing is there.
-    fn clear(film: *Film, rectangle: Rectangle) void {
-        const nothing: [4]f32 = .{ 0, 0, 0, if (film.layers.contains(.alpha)) 0 else 1 };
-        for (rectangle.y0..rectangle.y1) |y| {
-            const start = y * film.image.width;
-            const from, const to = .{ start + rectangle.x0, start + rectangle.x1 };
-            @memset(film.image.pixels[from..to], nothing);
-            for (&film.apart.values) |*apart| {
-                if (apart.*) |*image| @memset(image.pixels[from..to], @splat(0));
-            }
-        }
     }
 
     /// Makes pixels of another film, of the same size and layers or less of them, what these are

@@ -28,6 +28,8 @@ const ExitCode = enum(u8) {
     invalid = 3,
     /// Images that must be the same are not.
     differ = 4,
+    /// 128 and the number of the signal that asked for a picture before it was finished.
+    _,
 };
 
 pub fn main(init: std.process.Init) u8 {
@@ -409,12 +411,14 @@ fn renderAndReport(
     if (!options.quiet) sayDropped(io, options.scene, diagnostic);
     const report = outcome catch |err| {
         const file = if (err == error.OutputFailed)
-            job.outputTitle()
+            job.failed_output orelse job.outputTitle()
         else
             placeOf(diagnostic, options.scene);
         return fail(account, io, file, err, diagnostic);
     };
-    return job.printReport(&report);
+    const exit_code = job.printReport(&report);
+    if (exit_code != .ok or !report.is_partial) return exit_code;
+    return @fromBackingInt(@intCast(128 + signals.stop.signal.load(.monotonic)));
 }
 
 /// The way of one scene through the session.
@@ -424,6 +428,8 @@ const Job = struct {
     output_name: []const u8,
     diagnostic: *Diagnostic,
     session: Session,
+    /// Where the picture could not be written, if it is not the output.
+    failed_output: ?[]const u8 = null,
     /// Warnings that the user has seen.
     warning_count: usize = 0,
 
@@ -439,6 +445,10 @@ const Job = struct {
         // Before the work, so that a place that cannot be written is an error in the first second.
         var target = try job.openTarget();
         defer target.abandon();
+        var progress_image = try job.openProgressImage();
+        defer if (progress_image) |*image| image.close();
+        session.progress_image = if (progress_image) |*image| image else null;
+        session.stop = &signals.stop.is_asked;
         var load = options.load;
         load.output = target.replaces;
         try session.load(options.scene, load);
@@ -454,9 +464,11 @@ const Job = struct {
         job.sayVariants(session.scene.?.material_variants);
         job.sayAnimations();
         session.dropScene();
+        signals.stop.is_awaited.store(options.partial, .release);
         job.sayFacts(&session.world.?);
         session.checkWrite(options.write) catch return error.OutputFailed;
         try session.render(options.render);
+        signals.stop.is_awaited.store(false, .release);
         session.write(&target, options.write) catch |err| return switch (err) {
             error.OutOfMemory, error.Canceled => |other| other,
             error.InputOutput => error.OutputFailed,
@@ -479,6 +491,17 @@ const Job = struct {
         const temporaries = &signals.temporary_files;
         return Target.openFile(job.io, temporaries, job.output_name, job.diagnostic) catch
             error.OutputFailed;
+    }
+
+    fn openProgressImage(job: *Job) error{OutputFailed}!?raylane.session.ProgressImage {
+        const path = job.options.progress_image orelse return null;
+        const temporaries = &signals.temporary_files;
+        const choices = job.options.write;
+        return raylane.session.ProgressImage
+            .open(job.io, temporaries, path, choices, job.diagnostic) catch {
+            job.failed_output = path;
+            return error.OutputFailed;
+        };
     }
 
     /// Says the warnings that have not been said yet.

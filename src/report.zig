@@ -21,8 +21,14 @@ pub const Report = struct {
     triangle_count: u64,
     width: u32,
     height: u32,
-    /// Samples a pixel.
+    /// Samples a pixel, of those that have the most.
     sample_count: u32,
+    /// Of all pixels.
+    sample_mean: f64,
+    /// The work was stopped before its end.
+    is_partial: bool = false,
+    /// The time chose how many samples: so many give the same picture again.
+    is_timed: bool = false,
     /// Most bounces.
     depth: u32,
     thread_count: usize,
@@ -57,6 +63,12 @@ pub const Report = struct {
         sah_cost: f64,
         bytes: u64,
     };
+
+    /// Samples with which all else being equal the picture is the same; null: it is either known,
+    /// or none does.
+    fn again(report: *const Report) ?u32 {
+        return if (report.is_timed and !report.is_partial) report.sample_count else null;
+    }
 
     fn rayCount(report: *const Report) u64 {
         return report.rays.primary + report.rays.shadow + report.rays.secondary;
@@ -94,14 +106,19 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
     try writer.print("scene        {f}, {d} triangles\n", .{
         printable(report.scene), report.triangle_count,
     });
-    try writer.print("image        {f}, {d} x {d}, {d} {s} a pixel, depth {d}\n", .{
+    try writer.print("image        {f}, {d} x {d}, {d} {s} a pixel", .{
         printable(report.output),
         report.width,
         report.height,
         report.sample_count,
         if (report.sample_count == 1) "sample" else "samples",
-        report.depth,
     });
+    if (report.sample_mean != float(report.sample_count))
+        try writer.print(" at most, {d:.1} on average", .{report.sample_mean});
+    try writer.print(", depth {d}{s}\n", .{
+        report.depth, if (report.is_partial) ", not finished" else "",
+    });
+    if (report.again()) |count| try writer.print("again        --spp {d}\n", .{count});
     if (report.appearance) |appearance| try writer.print("exposure     {d} EV{s}, {t}\n", .{
         appearance.exposure_ev,
         if (appearance.is_automatic) " (automatic)" else "",
@@ -183,6 +200,9 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
         .width = report.width,
         .height = report.height,
         .samples = report.sample_count,
+        .samples_mean = report.sample_mean,
+        .partial = report.is_partial,
+        .spp_again = report.again(),
         .depth = report.depth,
         .threads = report.thread_count,
         .variant = Text{ .bytes = report.variant },
@@ -265,6 +285,7 @@ const report_for_test: Report = .{
     .width = 1024,
     .height = 768,
     .sample_count = 1,
+    .sample_mean = 1,
     .depth = 6,
     .thread_count = 4,
     .variant = "vector-beam-4",
@@ -346,6 +367,9 @@ test "the JSON has every key and nothing else" {
         width: u32,
         height: u32,
         samples: u32,
+        samples_mean: f64,
+        partial: bool,
+        spp_again: ?u32,
         depth: u32,
         threads: u32,
         variant: []const u8,

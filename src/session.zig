@@ -20,6 +20,7 @@ const trace = @import("trace.zig");
 const variant = @import("variant.zig");
 const Environment = @import("session/environment.zig").Environment;
 const emission = @import("session/emission.zig");
+const course_file = @import("session/course.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
 const Film = film_file.Film;
@@ -32,6 +33,9 @@ const World = @import("world.zig").World;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
 const assert = std.debug.assert;
+
+/// A picture of work under way.
+pub const ProgressImage = @import("session/progress_image.zig").ProgressImage;
 
 /// Why there is no scene.
 pub const LoadError = parse.Error;
@@ -84,6 +88,10 @@ pub const Session = struct {
     pool: parallel.Pool,
     /// Told of every finished tile.
     progress: std.Progress.Node = .none,
+    /// Where pictures are shown on which `render` is at work; the caller's.
+    progress_image: ?*ProgressImage = null,
+    /// Set, it ends what `render` traces when every pixel has a sample.
+    stop: ?*const std.atomic.Value(bool) = null,
     /// Of the latest call of each stage.
     times: statistics.StageTimes = .{},
     /// When `load` began.
@@ -374,18 +382,85 @@ pub const Session = struct {
         var lights = try session.makeLightSampler(choices.integrator, &frame);
         defer if (lights) |*made| made.deinit();
         if (lights) |*made| frame.light_sampler = &made.sampler;
-        session.traced = try trace.trace(
-            session.gpa,
-            choices.variant,
-            &frame,
-            film,
-            session.traceSettings(choices),
-        );
+        try session.traceInRounds(&frame, film, choices);
         session.times.trace_ns = session.since(start);
         if (session.traced.non_finite_count > 0) session.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
+    }
+
+    fn traceInRounds(
+        session: *Session,
+        frame: *const Frame,
+        film: *Film,
+        choices: settings.Render,
+    ) trace.Error!void {
+        var chosen = session.traceSettings(choices);
+        chosen.stop = session.stop;
+        if (choices.noise) |noise| chosen.noise = .{
+            .error_max = noise.error_max,
+            .exposure_scale = output.exposureScale(try session.exposureOf(noise.exposure)),
+        };
+        var course: course_file.Course = .{
+            .io = session.io,
+            .start = Io.Clock.awake.now(session.io),
+        };
+        if (choices.time_budget_s) |budget_s| {
+            const budget_ns: u64 = @intFromFloat(@as(f64, budget_s) * std.time.ns_per_s);
+            if (choices.integrator.isOpen()) {
+                course.budget_ns = budget_ns;
+            } else if (try session.traceOne(frame, film, &chosen, budget_ns)) return;
+        }
+        if (session.progress_image) |image| {
+            // Now, for what is metered is traced with other lights.
+            _ = try session.appearanceOf(image.choices);
+            try image.size(session.gpa, film);
+            course.viewer = .{ .context = session, .show = showProgress };
+            course.interval_ns = image.interval_ns;
+            course.due_ns = image.interval_ns;
+        }
+        defer if (session.progress_image) |image| image.dropFilm(session.gpa);
+        if (course.budget_ns != null or course.viewer != null) chosen.course = course.asked();
+        try session.traceFilm(frame, film, chosen);
+    }
+
+    fn traceFilm(
+        session: *Session,
+        frame: *const Frame,
+        film: *Film,
+        chosen: trace.Settings,
+    ) trace.Error!void {
+        const variant_index = session.rendered.variant;
+        session.traced = try trace.trace(session.gpa, variant_index, frame, film, chosen);
+    }
+
+    /// Traces a picture of one sample, to find how many fit into the time, and chooses so many;
+    /// true: no more than the one.
+    fn traceOne(
+        session: *Session,
+        frame: *const Frame,
+        film: *Film,
+        chosen: *trace.Settings,
+        budget_ns: u64,
+    ) trace.Error!bool {
+        const start = Io.Clock.awake.now(session.io);
+        var one = chosen.*;
+        one.sample_count = 1;
+        try session.traceFilm(frame, film, one);
+        const sample_ns = session.since(start);
+        const count = course_file.fitting(budget_ns -| sample_ns, sample_ns);
+        chosen.sample_count = @intCast(@min(chosen.sample_count, count));
+        return chosen.sample_count <= 1 or session.traced.is_partial;
+    }
+
+    fn showProgress(context: *anyopaque, standing: *const trace.Standing) void {
+        const session: *Session = @ptrCast(@alignCast(context));
+        const image = session.progress_image.?;
+        standing.copyTo(&image.film.?) catch return;
+        const appearance = session.appearanceOf(image.choices) catch return;
+        const chosen = session.outputSettings(image.choices, appearance);
+        image.write(session.gpa, chosen, session.diagnostic);
     }
 
     /// The list of an integrator that chooses lights at random; null for others.
@@ -401,12 +476,14 @@ pub const Session = struct {
 
     /// Traces the same picture again to count intersection tests, without timing.
     pub fn countTests(session: *Session, choices: settings.Render) Error!statistics.TestCounts {
+        var chosen = session.traceSettings(choices);
+        chosen.sample_count = session.traced.sample_count;
         const counted = try trace.traceCounting(
             session.gpa,
             choices.variant,
             &session.world.?.frame(),
             &session.film.?,
-            session.traceSettings(choices),
+            chosen,
         );
         session.traced.tests = counted.tests;
         return counted.tests.?;
@@ -432,28 +509,42 @@ pub const Session = struct {
         choices: settings.Write,
     ) output.Error!void {
         defer target.abandon();
-        session.appearance = if (output.isLinear(choices.format)) null else .{
-            .exposure_ev = try session.exposureOf(choices.exposure),
-            .is_automatic = session.isMetered(choices.exposure),
-            .tone_mapping = choices.tone_mapping,
-        };
+        session.appearance = try session.appearanceOf(choices);
         const start = Io.Clock.awake.now(session.io);
         const film = &session.film.?;
         const tally = try output.write(session.gpa, .{
             .image = &film.image,
             .display = film.imageOf(.display),
-        }, .{
+        }, session.outputSettings(choices, session.appearance), target, session.diagnostic);
+        session.times.output_ns = session.since(start);
+        session.times.total_ns = session.since(session.start);
+        session.hint(tally);
+    }
+
+    /// Null: the format keeps radiance as it is.
+    fn appearanceOf(session: *Session, choices: settings.Write) trace.Error!?Report.Appearance {
+        if (output.isLinear(choices.format)) return null;
+        return .{
+            .exposure_ev = try session.exposureOf(choices.exposure),
+            .is_automatic = session.isMetered(choices.exposure),
+            .tone_mapping = choices.tone_mapping,
+        };
+    }
+
+    fn outputSettings(
+        session: *Session,
+        choices: settings.Write,
+        appearance: ?Report.Appearance,
+    ) output.Settings {
+        return .{
             .format = choices.format,
-            .exposure_ev = if (session.appearance) |appearance| appearance.exposure_ev else 0,
+            .exposure_ev = if (appearance) |chosen| chosen.exposure_ev else 0,
             .tone_mapping = choices.tone_mapping,
             .transparent = session.seen.background == .transparent,
             .background = session.behind(),
             .jpeg_quality = @intCast(choices.jpeg_quality),
             .pool = &session.pool,
-        }, target, session.diagnostic);
-        session.times.output_ns = session.since(start);
-        session.times.total_ns = session.since(session.start);
-        session.hint(tally);
+        };
     }
 
     fn isMetered(session: *const Session, exposure: settings.Exposure) bool {
@@ -628,7 +719,11 @@ pub const Session = struct {
                 session.world.?.facts.stroke_triangle_count,
             .width = image.width,
             .height = image.height,
-            .sample_count = session.sampleCount(choices),
+            .sample_count = session.traced.sample_count,
+            .sample_mean = float(session.traced.sample_sum) /
+                float(@as(u64, image.width) * image.height),
+            .is_partial = session.traced.is_partial,
+            .is_timed = choices.time_budget_s != null,
             .depth = session.depthOf(choices),
             .thread_count = session.pool.thread_count,
             .variant = variant.names[choices.variant],
@@ -652,8 +747,11 @@ pub const Session = struct {
     }
 
     fn sampleCount(session: *const Session, choices: settings.Render) u32 {
+        if (choices.sample_count) |count| return count;
+        if (choices.noise != null) return settings.noise_sample_count;
+        if (choices.time_budget_s != null) return settings.sample_count.max;
         const seen = &session.world.?.view;
-        return choices.sample_count orelse session.facts.sample_count orelse
+        return session.facts.sample_count orelse
             settings.samplesFor(choices.integrator, seen.width, seen.height);
     }
 
@@ -727,6 +825,10 @@ pub const Session = struct {
         return @intCast(start.untilNow(session.io, .awake).toNanoseconds());
     }
 };
+
+fn float(count: u64) f64 {
+    return @floatFromInt(count);
+}
 
 /// Threads where nobody says how many.
 pub fn processorCount() usize {
@@ -845,4 +947,110 @@ test "every stage ends when it is cancelled, and no file is left" {
     try testing.expectError(error.Canceled, session.view(.{ .resolution = .{ 4, 4 } }));
     var entries = folder.dir.iterate();
     try testing.expectEqual(null, try entries.next(io));
+}
+
+/// A session and a folder for its pictures.
+const TestFolder = struct {
+    folder: testing.TmpDir,
+    path: []const u8,
+    temporaries: output.TemporaryFiles = .{},
+    diagnostic: Diagnostic = .{},
+
+    fn init() !TestFolder {
+        const folder = testing.tmpDir(.{ .iterate = true });
+        var buffer: [std.fs.max_path_bytes]u8 = undefined;
+        const length = try folder.dir.realPath(testing.io, &buffer);
+        return .{ .folder = folder, .path = try testing.allocator.dupe(u8, buffer[0..length]) };
+    }
+
+    fn deinit(self: *TestFolder) void {
+        testing.allocator.free(self.path);
+        self.folder.cleanup();
+    }
+
+    /// The caller frees it.
+    fn pathOf(self: *const TestFolder, name: []const u8) ![]const u8 {
+        return std.fs.path.join(testing.allocator, &.{ self.path, name });
+    }
+
+    /// The caller frees it.
+    fn read(self: *const TestFolder, name: []const u8) ![]const u8 {
+        const limit: Io.Limit = .limited(1 << 20);
+        return self.folder.dir.readFileAlloc(testing.io, name, testing.allocator, limit);
+    }
+};
+
+test "a time budget's picture is that of as many samples, and one that is stopped has some" {
+    var diagnostic: Diagnostic = .{};
+    var session: Session = .init(testing.allocator, testing.io, 2, &diagnostic);
+    defer session.deinit();
+    try openForTest(&session);
+    try session.view(.{ .resolution = .{ 12, 8 } });
+    var stop: std.atomic.Value(bool) = .init(true);
+    for ([_]settings.Integrator{ .whitted, .path }) |integrator| {
+        try session.render(.{
+            .integrator = integrator,
+            .sample_count = 5,
+            .time_budget_s = 0.05,
+        });
+        const timed = session.report(.{ .time_budget_s = 0.05 });
+        try testing.expect(timed.sample_count >= 1 and timed.sample_count <= 5);
+        try session.render(.{ .integrator = integrator, .sample_count = timed.sample_count });
+        try testing.expectEqual(timed.image_hash, session.film.?.hash());
+
+        session.stop = &stop;
+        defer session.stop = null;
+        try session.render(.{ .integrator = integrator, .sample_count = 64 });
+        const stopped = session.report(.{});
+        try testing.expect(stopped.is_partial and stopped.sample_count == 1);
+        try testing.expectEqual(1, stopped.sample_mean);
+    }
+    const stopped_hash = session.film.?.hash();
+    try session.render(.{ .integrator = .path, .sample_count = 1 });
+    try testing.expectEqual(stopped_hash, session.film.?.hash());
+}
+
+test "a picture of work under way is the one of the samples so far, in a whole file" {
+    const gpa = testing.allocator;
+    var folder: TestFolder = try .init();
+    defer folder.deinit();
+    var session: Session = .init(gpa, testing.io, 2, &folder.diagnostic);
+    defer session.deinit();
+    try openForTest(&session);
+    try session.view(.{ .resolution = .{ 12, 8 } });
+    const choices: settings.Write = .{ .format = .ppm, .exposure = .auto };
+    const shown_path = try folder.pathOf("shown.ppm");
+    defer gpa.free(shown_path);
+    var image: ProgressImage = try .open(
+        testing.io,
+        &folder.temporaries,
+        shown_path,
+        choices,
+        &folder.diagnostic,
+    );
+    defer image.close();
+    image.interval_ns = 0;
+    session.progress_image = &image;
+    try session.render(.{ .integrator = .path, .sample_count = 3 });
+    const whole_hash = session.film.?.hash();
+    session.progress_image = null;
+    try session.render(.{ .integrator = .path, .sample_count = 3 });
+    try testing.expectEqual(whole_hash, session.film.?.hash());
+
+    // It was shown for the last time before the last round, of the third sample.
+    try session.render(.{ .integrator = .path, .sample_count = 2 });
+    const path = try folder.pathOf("two.ppm");
+    defer gpa.free(path);
+    var target: output.Target =
+        try .openFile(testing.io, &folder.temporaries, path, &folder.diagnostic);
+    try session.write(&target, choices);
+    const wanted = try folder.read("two.ppm");
+    defer gpa.free(wanted);
+    const shown = try folder.read("shown.ppm");
+    defer gpa.free(shown);
+    try testing.expectEqualSlices(u8, wanted, shown);
+    var entries = folder.folder.dir.iterate();
+    var count: usize = 0;
+    while (try entries.next(testing.io)) |_| count += 1;
+    try testing.expectEqual(2, count);
 }

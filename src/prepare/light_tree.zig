@@ -28,6 +28,8 @@ pub const Bounds = struct {
     /// In candela, > 0 and finite as f32.
     intensity: f64,
     back: f64,
+    /// In metres; infinite without a range.
+    reach: f64 = std.math.inf(f64),
 
     fn center(bounds: *const Bounds, axis: usize) f64 {
         return 0.5 * (@as(f64, bounds.box.lower[axis]) + bounds.box.upper[axis]);
@@ -134,7 +136,6 @@ const Builder = struct {
                 const leaf = builder.order[range.first];
                 child.* = leaf | Node.leaf_bit;
                 builder.leaves[leaf].path = path;
-                builder.leaves[leaf].depth = pending.depth + 1;
             } else {
                 child.* = @intCast(builder.nodes.items.len);
                 try builder.add(.{ .range = range, .depth = pending.depth + 1, .path = path });
@@ -244,6 +245,7 @@ const Builder = struct {
         var sum: Vec3d = .{ 0, 0, 0 };
         var intensity: f64 = 0;
         var back: f64 = 0;
+        var reach: f64 = 0;
         var cos_emission: f64 = 1;
         const order = builder.order[range.first..range.end];
         for (order) |number| {
@@ -252,6 +254,7 @@ const Builder = struct {
             sum = vec3d.add(sum, bounds.axis);
             intensity += bounds.intensity;
             back = @max(back, bounds.back);
+            reach = @max(reach, bounds.reach);
             cos_emission = @min(cos_emission, bounds.cos_emission);
         }
         const middle = vec3d.normalize(sum);
@@ -271,6 +274,7 @@ const Builder = struct {
         node.cos_emission[slot] = @floatCast(cos_emission);
         node.intensity[slot] = @floatCast(@min(intensity, std.math.floatMax(f32)));
         node.back[slot] = @floatCast(back);
+        node.reach[slot] = @floatCast(reach);
     }
 };
 

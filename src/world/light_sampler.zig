@@ -41,7 +41,9 @@ pub const LightNode = struct {
     cos_emission: [light_tree_width]f32,
     /// The sum of the largest intensities, in candela of luminance; 0: there is no child.
     intensity: [light_tree_width]f32,
-    /// Share of that behind: 0 where all lights are one-sided.
+    /// In metres, how far light goes at most.
+    reach: [light_tree_width]f32,
+    /// Share of the intensity behind: 0 where all lights are one-sided.
     back: [light_tree_width]f32,
     /// Number of a node or of a leaf, see `leaf_bit`.
     child: [light_tree_width]u32,
@@ -58,6 +60,7 @@ pub const LightNode = struct {
         .sin_spread = @splat(0),
         .cos_emission = @splat(0),
         .intensity = @splat(0),
+        .reach = @splat(0),
         .back = @splat(0),
         .child = @splat(0),
     };
@@ -67,8 +70,6 @@ pub const LightNode = struct {
 pub const LightLeaf = struct {
     /// The children on the way to it from the root, two bits each, the first the lowest.
     path: u64,
-    /// How many these are.
-    depth: u8,
     /// A triangle that emits, else a light of `Frame.lights`.
     is_emitter: bool,
     /// Of emitters: seen from behind as well.

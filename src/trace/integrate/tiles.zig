@@ -49,7 +49,8 @@ pub const Settings = struct {
     progress: std.Progress.Node = .none,
     /// Looked at between tiles: set, it ends the work.
     cancel: ?*const std.atomic.Value(bool) = null,
-    /// Looked at between tiles: set, it ends the work, and the picture is what there is.
+    /// Looked at between tiles: set, it ends the work as soon as every pixel has a sample, and the
+    /// picture is what there is.
     stop: ?*const std.atomic.Value(bool) = null,
     /// Blocks with less of it get no more samples. Asserts that the integrator is open.
     noise: ?adaptive.Noise = null,
@@ -60,8 +61,7 @@ pub const Settings = struct {
         return if (settings.cancel) |cancel| cancel.load(.monotonic) else false;
     }
 
-    fn isEnded(settings: *const Settings) bool {
-        if (settings.isCancelled()) return true;
+    fn isStopped(settings: *const Settings) bool {
         return if (settings.stop) |stop| stop.load(.monotonic) else false;
     }
 };
@@ -265,7 +265,7 @@ const Job = struct {
         const tiles = job.tiles;
         var done: u32 = 0;
         while (done < settings.sample_count) : (done = tiles.samples_due) {
-            if (settings.isEnded()) return false;
+            if (done > 0 and job.isEnded()) return false;
             const until = if (settings.course) |course|
                 course.next(course.context, &.{ .samples_done = done, .job = job })
             else
@@ -273,7 +273,7 @@ const Job = struct {
             if (until <= done) return true;
             tiles.begin(done, @min(until, settings.sample_count));
             settings.pool.share(job.by_thread.len, job, work);
-            if (settings.isEnded()) for (tiles.states) |*state| {
+            if (job.isEnded()) for (tiles.states) |*state| {
                 if (state.samples_done < tiles.samples_due) return false;
             };
             if (job.blocks) |blocks| if (blocks.active_count.load(.monotonic) == 0) return true;
@@ -281,15 +281,20 @@ const Job = struct {
         return true;
     }
 
+    fn isEnded(job: *const Job) bool {
+        if (job.settings.isCancelled()) return true;
+        return job.settings.isStopped() and job.tiles.isEachTaken();
+    }
+
     fn work(job: *Job, thread_index: usize) void {
-        while (!job.settings.isEnded()) {
+        while (!job.isEnded()) {
             const number = job.tiles.take() orelse return;
             const state = &job.tiles.states[number];
             if (state.due.fetchAdd(1, .acquire) > 0) continue;
             while (true) {
                 job.passTile(job.by_thread[thread_index], number);
                 job.settings.progress.completeOne();
-                if (job.settings.isEnded()) return;
+                if (job.isEnded()) return;
                 if (state.due.fetchSub(1, .acq_rel) == 1) break;
             }
         }
@@ -382,6 +387,7 @@ const Tiles = struct {
     count: u32,
     /// Of the round.
     pass_count: u32 = 0,
+    is_first_round: bool = true,
     /// Of a pixel, at the end of the round.
     samples_due: u32 = 0,
     /// By tile.
@@ -419,6 +425,7 @@ const Tiles = struct {
     /// Begins a round, in which pixels that have so many samples get more.
     fn begin(tiles: *Tiles, samples_done: u32, samples_due: u32) void {
         tiles.next.store(0, .monotonic);
+        tiles.is_first_round = samples_done == 0;
         tiles.samples_due = samples_due;
         tiles.pass_count = 0;
         var done = samples_done;
@@ -429,6 +436,11 @@ const Tiles = struct {
     fn take(tiles: *Tiles) ?u32 {
         const index = tiles.next.fetchAdd(1, .monotonic);
         return if (index < tiles.count * tiles.pass_count) index % tiles.count else null;
+    }
+
+    /// Whether every tile's first pass is done or under way.
+    fn isEachTaken(tiles: *const Tiles) bool {
+        return !tiles.is_first_round or tiles.next.load(.monotonic) >= tiles.count;
     }
 
     fn rectangleOf(tiles: *const Tiles, number: u32) Rectangle {
@@ -525,7 +537,7 @@ const TestIntegrator = struct {
     fn meanOf(sample_count: usize) f32 {
         var sum: f32 = 0;
         for (0..sample_count) |sample| sum += sum + @as(f32, @floatFromInt(sample));
-        return if (sample_count == 0) 0 else sum / @as(f32, @floatFromInt(sample_count));
+        return sum / @as(f32, @floatFromInt(sample_count));
     }
 
     /// Three rounds, then no more.
@@ -534,7 +546,7 @@ const TestIntegrator = struct {
 
         fn next(context: *anyopaque, standing: *const Standing) u32 {
             const copy: *Film = @ptrCast(@alignCast(context));
-            standing.copyTo(copy) catch return 0;
+            if (standing.samples_done > 0) standing.copyTo(copy) catch return 0;
             for (ends) |round_end| if (standing.samples_done < round_end) return round_end;
             return 0;
         }
@@ -574,14 +586,13 @@ test "the samples of each pixel come in order, by however many threads; flags en
             const total = try result;
             var sum: u64 = 0;
             for (film.image.pixels) |pixel| {
-                const sample_count = for (0..most + 1) |count| {
+                const sample_count = for (1..most + 1) |count| {
                     if (TestIntegrator.meanOf(count) == pixel[0]) break count;
                 } else return error.SamplesOutOfOrder;
                 if (end == .done) try std.testing.expectEqual(most, sample_count);
                 sum += sample_count;
             }
-            // One sample is 0 as no sample is.
-            if (end == .done) try std.testing.expectEqual(sum, total.sample_sum);
+            try std.testing.expectEqual(sum, total.sample_sum);
             try std.testing.expectEqual(end == .stopped, total.is_partial);
             if (end == .done) try std.testing.expectEqual(most, total.sample_count);
             if (end == .done and has_course) for (copy.image.pixels) |pixel| {

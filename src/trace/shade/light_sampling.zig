@@ -75,19 +75,23 @@ fn Shares(comptime Lanes: type) type {
         environment: F32,
         directional: F32,
         tree: F32,
+        /// Those of the tree, in lanes asked for; undefined without one.
+        roots: [Lanes.count]light_tree.Parts,
 
-        fn of(
+        fn find(
+            shares: *@This(),
             sampler: *const LightSampler,
             receiver: *const Receiver(Lanes),
             asked: Lanes.Mask,
-        ) @This() {
+        ) void {
             var near: [Lanes.count]f32 = @splat(0);
             if (sampler.tree.nodes.len > 0) {
                 var rest = asked.bits();
                 while (rest != 0) : (rest &= rest - 1) {
                     const lane = @ctz(rest);
-                    near[lane] = light_tree
-                        .irradianceOf(Lanes, &sampler.tree, &receiver.at(lane));
+                    const root = &shares.roots[lane];
+                    root.* = light_tree.partsOf(Lanes, &sampler.tree, &receiver.at(lane));
+                    near[lane] = light_tree.sumOf(root);
                 }
             }
             const tree: F32 = .fromArray(near);
@@ -99,11 +103,9 @@ fn Shares(comptime Lanes: type) type {
             };
             const sum = weights[0].add(weights[1]).add(weights[2]);
             const bounded = F32.select(sum.gt(.zero()), sum, .splat(1));
-            return .{
-                .environment = weights[0].div(bounded),
-                .directional = weights[1].div(bounded),
-                .tree = weights[2].div(bounded),
-            };
+            shares.environment = weights[0].div(bounded);
+            shares.directional = weights[1].div(bounded);
+            shares.tree = weights[2].div(bounded);
         }
 
         inline fn atLeast(estimate: F32, least: F32) F32 {
@@ -124,7 +126,8 @@ pub noinline fn sample(
     const F32 = Lanes.F32;
     const zero: F32 = .zero();
     const sampler = frame.light_sampler.?;
-    const shares: Shares(Lanes) = .of(sampler, receiver, asked);
+    var shares: Shares(Lanes) = undefined;
+    shares.find(sampler, receiver, asked);
     const number = numbers[0];
     const after_environment = number.sub(shares.environment);
     const is_around = number.lt(shares.environment).bitAnd(asked);
@@ -151,7 +154,7 @@ pub noinline fn sample(
     }
     if (is_near.any()) {
         const rest = within(Lanes, after_environment.sub(shares.directional), shares.tree);
-        chosen.takeFromTree(&sampler.tree, receiver, rest, shares.tree, is_near);
+        chosen.takeFromTree(&sampler.tree, receiver, &shares, rest, is_near);
     }
     if (chosen.has_light) addLights(Lanes, frame, receiver, &chosen, &result);
     if (chosen.has_emitter) {
@@ -214,19 +217,21 @@ fn Chosen(comptime Lanes: type) type {
             chosen: *@This(),
             tree: *const world_file.LightTree,
             receiver: *const Receiver(Lanes),
+            shares: *const Shares(Lanes),
             numbers: Lanes.F32,
-            share: Lanes.F32,
             asked: Lanes.Mask,
         ) void {
             const from = numbers.toArray();
-            const shares = share.toArray();
+            const share = shares.tree.toArray();
             var rest = asked.bits();
             while (rest != 0) : (rest &= rest - 1) {
                 const lane = @ctz(rest);
-                const choice = light_tree.choose(Lanes, tree, &receiver.at(lane), from[lane]);
+                const root = &shares.roots[lane];
+                const choice = light_tree
+                    .choose(Lanes, tree, &receiver.at(lane), root, from[lane]);
                 const number = choice.leaf orelse continue;
                 const leaf = &tree.leaves[number];
-                chosen.probability[lane] = shares[lane] * choice.probability;
+                chosen.probability[lane] = share[lane] * choice.probability;
                 if (leaf.is_emitter) {
                     chosen.emitter[lane] = @intCast(number);
                     chosen.has_emitter = true;
@@ -305,7 +310,8 @@ pub noinline fn pdfOfEnvironment(
     direction: Lanes.Vec3,
     asked: Lanes.Mask,
 ) Lanes.F32 {
-    const shares: Shares(Lanes) = .of(frame.light_sampler.?, receiver, asked);
+    var shares: Shares(Lanes) = undefined;
+    shares.find(frame.light_sampler.?, receiver, asked);
     const density = densityOfEnvironment(Lanes, frame, direction, asked);
     return .select(asked, shares.environment.mul(density), .zero());
 }
@@ -479,8 +485,8 @@ pub noinline fn pdfOfEmitter(
 ) Lanes.F32 {
     const tree = &frame.light_sampler.?.tree;
     const numbers = primitive.toArray();
+    var leaves: [Lanes.count]*const world_file.LightLeaf = undefined;
     var triangles: Triangles(Lanes) = .none;
-    var probabilities: [Lanes.count]f32 = @splat(0);
     var found: u32 = 0;
     var rest = asked.bits();
     while (rest != 0) : (rest &= rest - 1) {
@@ -488,13 +494,20 @@ pub noinline fn pdfOfEmitter(
         const leaf = tree.leafOf(@intCast(numbers[lane])) orelse continue;
         if (leaf.is_hidden) continue;
         found |= @as(u32, 1) << @intCast(lane);
-        probabilities[lane] = light_tree
-            .probabilityOf(Lanes, tree, &receiver.at(lane), leaf);
+        leaves[lane] = leaf;
         triangles.putCorners(frame, leaf.number, lane);
     }
     if (found == 0) return .zero();
     const lanes: Lanes.Mask = .fromBits(found);
-    const shares: Shares(Lanes) = .of(frame.light_sampler.?, receiver, lanes);
+    var shares: Shares(Lanes) = undefined;
+    shares.find(frame.light_sampler.?, receiver, lanes);
+    var probabilities: [Lanes.count]f32 = @splat(0);
+    while (found != 0) : (found &= found - 1) {
+        const lane = @ctz(found);
+        const root = &shares.roots[lane];
+        probabilities[lane] = light_tree
+            .probabilityOf(Lanes, tree, &receiver.at(lane), root, leaves[lane]);
+    }
     const corners = triangles.cornersInLanes();
     const doubled = corners[1].sub(corners[0]).cross(corners[2].sub(corners[0]));
     const density = densityOfArea(Lanes, doubled, distance, to_light);

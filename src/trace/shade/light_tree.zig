@@ -39,20 +39,38 @@ fn Children(comptime Lanes: type) type {
     return simd.Lanes(Lanes.backend, width);
 }
 
-/// Chooses a light. `Lanes` tells the backend.
+/// Of the root's children, what each may light a receiver with at most; see `importances`.
+pub const Parts = [width]f32;
+
+/// Those of a receiver, 0 without lights. `Lanes` tells the backend.
+pub noinline fn partsOf(
+    comptime Lanes: type,
+    tree: *const LightTree,
+    receiver: *const Receiver,
+) Parts {
+    if (tree.nodes.len == 0) return @splat(0);
+    return importances(Lanes, &tree.nodes[0], receiver);
+}
+
+/// Their sum, in lux of luminance.
+pub inline fn sumOf(parts: *const Parts) f32 {
+    return ((parts[0] + parts[1]) + parts[2]) + parts[3];
+}
+
+/// Chooses a light. `root` is `partsOf` the receiver.
 pub noinline fn choose(
     comptime Lanes: type,
     tree: *const LightTree,
     receiver: *const Receiver,
+    root: *const Parts,
     number: f32,
 ) Choice {
-    if (tree.nodes.len == 0) return .none;
     var rest = number;
     var probability: f32 = 1;
-    var node = &tree.nodes[0];
+    var parts = root.*;
+    var node: *const LightNode = if (tree.nodes.len > 0) &tree.nodes[0] else return .none;
     while (true) {
-        const parts = importances(Lanes, node, receiver);
-        const total = sumOf(parts);
+        const total = sumOf(&parts);
         if (!(total > 0)) return .none;
         var target = rest * total;
         var chosen: usize = 0;
@@ -71,6 +89,7 @@ pub noinline fn choose(
         if (child & LightNode.leaf_bit != 0)
             return .{ .leaf = child ^ LightNode.leaf_bit, .probability = probability };
         node = &tree.nodes[child];
+        parts = importances(Lanes, node, receiver);
     }
 }
 
@@ -79,45 +98,34 @@ pub noinline fn probabilityOf(
     comptime Lanes: type,
     tree: *const LightTree,
     receiver: *const Receiver,
+    root: *const Parts,
     leaf: *const world_file.LightLeaf,
 ) f32 {
     var path = leaf.path;
     var probability: f32 = 1;
+    var parts = root.*;
     var node = &tree.nodes[0];
-    for (0..leaf.depth) |_| {
-        const parts = importances(Lanes, node, receiver);
-        const total = sumOf(parts);
+    while (true) {
+        const total = sumOf(&parts);
         if (!(total > 0)) return 0;
         const index: usize = @intCast(path % width);
         path /= width;
         probability *= parts[index] / total;
         const child = node.child[index];
-        if (child & LightNode.leaf_bit == 0) node = &tree.nodes[child];
+        if (child & LightNode.leaf_bit != 0) return probability;
+        node = &tree.nodes[child];
+        parts = importances(Lanes, node, receiver);
     }
-    return probability;
 }
 
-/// The most that all lights together may light a receiver with, in lux of luminance.
-pub noinline fn irradianceOf(
-    comptime Lanes: type,
-    tree: *const LightTree,
-    receiver: *const Receiver,
-) f32 {
-    if (tree.nodes.len == 0) return 0;
-    return sumOf(importances(Lanes, &tree.nodes[0], receiver));
-}
-
-inline fn sumOf(parts: [width]f32) f32 {
-    return ((parts[0] + parts[1]) + parts[2]) + parts[3];
-}
-
-/// By child, at least 0. Angles are those of the first reference: what is seen in the cone of axes
-/// and the bounding sphere counts as seen along an axis.
+/// By child, the most that its lights together may light a receiver with, in lux of luminance; at
+/// least 0. Angles are those of the first reference: what is seen in the cone of axes and the
+/// bounding sphere counts as seen along an axis.
 inline fn importances(
     comptime Lanes: type,
     node: *const LightNode,
     receiver: *const Receiver,
-) [width]f32 {
+) Parts {
     const L = Children(Lanes);
     const F32 = L.F32;
     const one: F32 = .splat(1);
@@ -126,7 +134,8 @@ inline fn importances(
     const radius: F32 = .load(&node.radius);
     const radius_squared = radius.mul(radius);
     const squared = way.dot(way).max(.splat(1e-20));
-    const to_light = way.scale(one.div(squared.sqrt()));
+    const distance = squared.sqrt();
+    const to_light = way.scale(one.div(distance));
     const is_within = squared.le(radius_squared);
     const sin_bound_squared = F32.select(is_within, zero, radius_squared.div(squared));
     const bound: Angle(L) = .{
@@ -140,7 +149,8 @@ inline fn importances(
     const off_axis: Angle(L) = .of(cosine);
     const spread: Angle(L) = .{ .cos = .load(&node.cos_spread), .sin = .load(&node.sin_spread) };
     const least = off_axis.less(spread).less(bound);
-    const emits = least.cos.gt(.load(&node.cos_emission));
+    const reaches = distance.sub(radius).lt(.load(&node.reach));
+    const emits = least.cos.gt(.load(&node.cos_emission)).bitAnd(reaches);
     const side = F32.select(shows_back.bitAnd(signed.lt(zero)), back, one);
     const intensity = F32.load(&node.intensity).mul(side);
     var result = intensity.mul(least.cos).div(squared.max(radius_squared));

@@ -4,14 +4,17 @@
 //! In: points, their BSDF, numbers in 0..1. Out: directions, densities, shares of light. Rough ones
 //! have the lobes of `transmission.zig` (Walter et al. 2007): directions about microfacets that the
 //! view sees bring all the light that a lobe sends on, so that energy is kept. From outside and
-//! through panes it is the share that the BSDF has for the view. Inside a denser volume reflection
-//! is here as well, and where all of the base transmits each microfacet has its own Fresnel factor
-//! and total reflection. What microfacets send to the wrong side is scattered by the cosine on the
-//! right one, in a lobe that lights cannot be weighed with. Radiance is that over the square of the
+//! through panes it is the share that the BSDF has for the view; what microfacets of panes send to
+//! each other comes through by the cosine. Inside a denser volume reflection is here as well, and
+//! where all of the base transmits each microfacet has its own Fresnel factor and total reflection;
+//! what goes to the wrong side there is scattered by the cosine on the right one, in a lobe that
+//! lights are not weighed with. Radiance is that over the square of the
 //! index: it keeps its value from one side to the other. Light that is dispersed follows one
 //! channel, chosen by what it is worth (KHR_materials_dispersion).
 //! Everything is + - * / sqrt in a fixed order.
 
+const std = @import("std");
+const albedo_file = @import("albedo.zig");
 const bsdf_file = @import("bsdf.zig");
 const energy = @import("energy.zig");
 const microfacet = @import("microfacet.zig");
@@ -43,6 +46,8 @@ pub fn Passing(comptime Lanes: type) type {
         /// Share of what microfacets let in that comes through.
         clear: Vec3,
         below: F32,
+        /// Share of what comes through rough panes that more than one microfacet scatters.
+        lost: F32,
         /// Fresnel's reflectance: `Bsdf.f0` and `f90`, and of the dielectric alone.
         f0: Vec3,
         f90: F32,
@@ -85,6 +90,9 @@ pub fn Passing(comptime Lanes: type) type {
             passing.boundary = transmission.boundaryOf(Lanes, point, alpha, point.eta);
             passing.boundary.alpha =
                 passing.boundary.alpha.max(.splat(sampling.sharp_alpha_least));
+            const directional = albedo_file.Albedo(Lanes).of(passing.boundary.alpha)
+                .at(passing.boundary.cosView());
+            passing.lost = .select(passing.boundary.thin, directional.missing, .zero());
             passing.straight = bsdf.mirror.refraction;
             passing.reflected = .select(passing.inside, bsdf.mirror.reflected, none);
             const back = passing.reflected.dot(worth);
@@ -176,13 +184,17 @@ pub fn Passing(comptime Lanes: type) type {
             const bent_through = boundary.pass(&facet);
             const back = boundary.reflect(&facet);
             const rough: Vec3 = .select(reflects, back.to_light, bent_through.to_light);
+            const thin = boundary.thin.andNot(passing.sharp);
+            const again = thin.bitAnd(numbers[2].lt(passing.lost));
             const scattered = reflects.bitAnd(back.scattered)
-                .bitOr(bent_through.scattered.andNot(reflects));
+                .bitOr(bent_through.scattered.andNot(reflects)).andNot(again);
             const mirrored = seen.reflected.scale(one.div(seen.chance.max(least)));
+            weight = .select(reflects, mirrored, weight);
+            const spread: Vec3 = .select(again, boundary.scatter(facet.disc), rough);
             return .{
-                .to_light = .select(passing.sharp, straight.normalize(), rough),
+                .to_light = .select(passing.sharp, straight.normalize(), spread),
                 .alone = passing.sharp.bitOr(scattered),
-                .weight = .select(reflects, mirrored, weight),
+                .weight = .select(thin, none, weight),
             };
         }
 
@@ -240,7 +252,19 @@ pub fn Passing(comptime Lanes: type) type {
             const cosine = boundary.view.dot(bending).abs().div(squares.sqrt());
             const facet = passing.facetAt(cosine);
             const left = F32.splat(1).sub(facet.chance);
-            return .{ .value = facet.transmitted.scale(density), .pdf = left.mul(density) };
+            const seen: Seen = .{
+                .value = facet.transmitted.scale(density),
+                .pdf = left.mul(density),
+            };
+            if (boundary.thin.none()) return seen;
+            const along = boundary.normal_geometric.dot(to_light).neg().max(.zero());
+            const spread = along.mul(.splat(1.0 / std.math.pi)).mul(passing.lost);
+            const once = density.mul(F32.splat(1).sub(passing.lost));
+            const value = facet.transmitted.scale(boundary.eval(to_light).add(spread));
+            return .{
+                .value = .select(boundary.thin, value, seen.value),
+                .pdf = .select(boundary.thin, once.add(spread), seen.pdf),
+            };
         }
 
         inline fn maxOf(color: Vec3) F32 {

@@ -71,11 +71,13 @@ pub fn Facets(comptime Lanes: type) type {
         /// Density of `mirrored` by the half vector of view and light, per steradian on the whole
         /// sphere.
         pub inline fn pdf(facets: *const @This(), half: Vec3) F32 {
-            const cos_half = facets.normal.dot(half).min(.splat(1));
+            const along = facets.normal.dot(half);
+            // As `Bsdf.evalLobes` has it, which is asked for the same direction.
+            const cos_half = along.max(.zero()).min(.splat(1));
             const a = facets.alpha.mul(facets.alpha);
             const seen = facets.cos_view.add(facets.smith_view);
             const density = microfacet.distribution(Lanes, cos_half, a).div(seen.add(seen));
-            return .select(cos_half.gt(.zero()), density, .zero());
+            return .select(along.gt(.zero()), density, .zero());
         }
     };
 }

@@ -203,7 +203,7 @@ pub fn RoughBoundary(comptime Lanes: type) type {
         }
 
         /// Behind the triangle by the cosine, for a point of the unit disc.
-        inline fn scatter(boundary: *const Self, disc: [2]F32) Vec3 {
+        pub inline fn scatter(boundary: *const Self, disc: [2]F32) Vec3 {
             const normal = boundary.normal_geometric;
             const squared = disc[0].mul(disc[0]).add(disc[1].mul(disc[1]));
             const height = F32.splat(1).sub(squared).max(.splat(cosine_least)).sqrt();
@@ -216,7 +216,7 @@ pub fn RoughBoundary(comptime Lanes: type) type {
                 .add(normal.scale(local.z));
         }
 
-        inline fn cosView(boundary: *const Self) F32 {
+        pub inline fn cosView(boundary: *const Self) F32 {
             return boundary.normal.dot(boundary.view).max(.splat(cosine_least)).min(.splat(1));
         }
 
