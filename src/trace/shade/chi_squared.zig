@@ -12,7 +12,7 @@ const height_count = 20;
 const azimuth_count = 16;
 const sample_count = 20_000;
 /// Points a side of a cell that the density is integrated over.
-const point_count = 5;
+const point_count = 8;
 /// Fewer expected make a cell's share of chi-squared no longer chi-squared.
 const expected_least = 5;
 /// Of the normal distribution, which exceeds it once in a thousand times.
