@@ -327,6 +327,23 @@ const sections: []const Section = &.{
             .usage = "--integrator NAME",
             .help = namesOf(settings.Integrator) ++ " (default: whitted)",
         },
+        .{
+            .usage = "--virtual-lights N",
+            .help = "of '--integrator lights' a sample, " ++
+                settings.virtual_light_count.text() ++ "\n" ++
+                comptimePrint("(default: {d})", .{settings.virtual_light_count.default}),
+        },
+        .{
+            .usage = "--sky-lights N",
+            .help = "the same that stand for the environment, " ++
+                settings.sky_light_count.text() ++ "\n" ++
+                comptimePrint("(default: {d})", .{settings.sky_light_count.default}),
+        },
+        .{
+            .usage = "--all-lights",
+            .help = "every pixel has all of a sample's lights, not a\n" ++
+                "ninth of them and its neighbours' by a filter",
+        },
         .{ .usage = "--denoise", .help = "filter the noise out" },
         .{ .usage = "--variant NAME", .help = "how rays are traced; the image is always the same" },
         .{
@@ -513,6 +530,11 @@ const Parser = struct {
             .variant => options.render.variant = try parser.variantOf(given.value),
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
+            .virtual_lights => options.render.lights.virtual_count =
+                try reader.number(given, settings.virtual_light_count),
+            .sky_lights => options.render.lights.sky_count =
+                try reader.number(given, settings.sky_light_count),
+            .all_lights => options.render.lights.is_interleaved = false,
             .count_tests => options.count_tests = true,
             .point_size => options.view.point_size =
                 numberWithin(given.value, settings.point_size) orelse
@@ -1027,6 +1049,8 @@ test "numbers keep to their ranges" {
         .{ .flag = "--stats", .good = &.{ "text", "json", "none" }, .bad = &.{ "JSON", "" } },
         .{ .flag = "--bvh", .good = &.{ "fast", "default", "high" }, .bad = &.{ "High", "" } },
         .{ .flag = "--instances", .good = &.{ "auto", "share", "flatten" }, .bad = &.{"all"} },
+        .{ .flag = "--virtual-lights", .good = &.{ "0", "64", "1024" }, .bad = &.{ "-1", "1025" } },
+        .{ .flag = "--sky-lights", .good = &.{ "1", "32", "1024" }, .bad = &.{ "0", "1025" } },
         .{ .flag = "--integrator", .good = &.{ "whitted", "lights", "path" }, .bad = &.{"bdpt"} },
         .{
             .flag = "--format",

@@ -789,6 +789,7 @@ pub const Session = struct {
         return .{
             .pool = &session.pool,
             .integrator = choices.integrator,
+            .lights = choices.lights,
             .sample_count = session.sampleCount(choices),
             .depth_max = session.depthOf(choices),
             .tile_size = choices.tile_size,

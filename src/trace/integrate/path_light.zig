@@ -45,10 +45,11 @@ pub noinline fn addLight(
     const there = lanes.bitAnd(light.pdf.gt(.zero()));
     if (there.none()) return;
     const found = step.scattering.eval(light.to_light);
+    const value = step.scattering.evalPoint(light.to_light, light.is_delta, found.value);
     const weight = heuristic(Rays, light.pdf, found.pdf);
     const share = F32.select(light.is_delta, .splat(1), weight)
         .div(light.pdf.max(.splat(std.math.floatMin(f32))));
-    const worth = step.throughput.mul(found.value).mul(light.radiance).scale(share);
+    const worth = step.throughput.mul(value).mul(light.radiance).scale(share);
     const largest = worth.x.max(worth.y).max(worth.z);
     const lit = there.bitAnd(largest.gt(.zero()))
         .bitAnd(largest.lt(.splat(std.math.inf(f32))));
