@@ -94,8 +94,8 @@ def measure_rays(count, options, result):
             arguments = [scene, "--size", options.size, "--stride", options.stride, "--depth",
                          options.depth]
             if machine == TIMED:
-                done = subprocess.run([program, *map(str, arguments), "--json"], check=True,
-                                      text=True, stdout=subprocess.PIPE)
+                done = subprocess.run([program, *map(str, arguments), "--reps", "11", "--json"],
+                                      check=True, text=True, stdout=subprocess.PIPE)
                 report, tags = json.loads(done.stdout), None
             else:
                 report, tags, _ = count.count(program, arguments)

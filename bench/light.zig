@@ -231,22 +231,21 @@ const Bench = struct {
     ) !SortReport {
         const tag: u32 = @intCast(1 + number);
         var report: SortReport = .{ .order = window[0], .rays = 0, .tag = tag, .ns_per_ray = null };
-        var ticks: u64 = 0;
-        const clock: TickClock = .start(bench.io);
+        var time_ns: u64 = 0;
         for (0..recorded_count) |index| {
             var set = sets.items[index];
             if (set.common != .nothing) continue;
-            const start = phases.ticks();
+            const start_ns = methods.processorTime();
             if (bench.options.count) phases.mark(tag);
             set.bundles = try sort.sorted(bench.arena, set.bundles, window[1]);
             if (bench.options.count) phases.mark(0);
-            ticks += phases.ticks() - start;
+            time_ns += methods.processorTime() - start_ns;
             set.order = window[0];
             report.rays += set.rayCount();
             try sets.append(bench.arena, set);
         }
         if (bench.options.count) return report;
-        var samples = [_]f64{clock.nanoseconds(bench.io, ticks) / float(report.rays)};
+        var samples = [_]f64{float(time_ns) / float(report.rays)};
         report.ns_per_ray = .of(&samples);
         return report;
     }
@@ -263,10 +262,9 @@ const Bench = struct {
                     if (methods.all[index].way == .beam and set.common == .nothing) continue;
                     const mode: phases.Mode =
                         if (bench.options.count) .{ .tags = tagOf(number, index) } else .clock;
-                    const clock: TickClock = .start(bench.io);
                     const world = &bench.worlds[widthIndex(index)];
                     cost.* = methods.run_fns[index](world, set, mode);
-                    of[repetition] = clock.nanoseconds(bench.io, cost.*.?.ticks);
+                    of[repetition] = float(cost.*.?.time_ns);
                 }
             }
             report.* = try bench.reportOf(set, number, &costs, &samples);
@@ -331,23 +329,6 @@ fn closestHit(world: *const World, course: *const rays.Course) ?rays.Hit {
         return null;
     return .{ .primitive = @intCast(ray.closest.primitive.lane(0)), .t = ray.closest.t.lane(0) };
 }
-
-/// Says how long the processor's ticks are.
-const TickClock = struct {
-    start_time: Io.Timestamp,
-    start_ticks: u64,
-
-    fn start(io: Io) TickClock {
-        return .{ .start_time = Io.Clock.awake.now(io), .start_ticks = phases.ticks() };
-    }
-
-    /// So many of those since the start.
-    fn nanoseconds(clock: TickClock, io: Io, ticks: u64) f64 {
-        const all: f64 = float(phases.ticks() - clock.start_ticks);
-        const time_ns: f64 = @floatFromInt(clock.start_time.untilNow(io, .awake).toNanoseconds());
-        return time_ns * float(ticks) / all;
-    }
-};
 
 fn float(count: u64) f64 {
     return @floatFromInt(count);

@@ -246,7 +246,15 @@ pub const Bench = struct {
         const title = try bench.arena.print("{f}", .{printable(name)});
         const progress = bench.progress.start(title, 0);
         defer progress.end();
-        var stages: Stages = .init(bench.gpa, bench.io, bench.stagesOf(name), settings.thread_count, bench.diagnostic, bench.meter, progress);
+        var stages: Stages = .init(
+            bench.gpa,
+            bench.io,
+            bench.stagesOf(name),
+            settings.thread_count,
+            bench.diagnostic,
+            bench.meter,
+            progress,
+        );
         defer stages.deinit();
         var rounds = try Rounds.measure(bench.arena, &stages, .{
             .variants = bench.order,

@@ -102,6 +102,18 @@ pub const Format = enum {
     exr,
 };
 
+/// What is known of pixels besides their colours, for other programs: channels of an OpenEXR file.
+pub const Layer = enum {
+    /// Share of white light that what is seen sends to the camera.
+    albedo,
+    /// Its unit normal in the world's axes.
+    normal,
+    /// Distance from the camera's plane in metres.
+    depth,
+    /// Variance of the mean of the pixel's samples, before it is denoised.
+    variance,
+};
+
 /// Care taken over the tree of the scene: time to build it against time to trace rays through it.
 /// The picture is the same in any case.
 pub const TreeQuality = enum {
@@ -413,6 +425,10 @@ pub const Render = struct {
     /// Null: the scene's, or by `depthFor`.
     depth: ?u32 = null,
     tile_size: u32 = tile_size.default,
+    /// Filter the noise out, where there are two samples a pixel at least.
+    denoise: bool = false,
+    /// Kept beside the picture.
+    layers: std.EnumSet(Layer) = .empty,
 };
 
 /// How a picture is encoded.

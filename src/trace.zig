@@ -56,6 +56,9 @@ pub const beam = struct {
     pub const shadow_plane = @import("trace/traverse/beam/shadow_plane.zig");
     pub const shadow_receivers = @import("trace/traverse/beam/shadow_receivers.zig");
 };
+/// What single lights bring to points, and those points.
+pub const light = @import("trace/shade/light.zig");
+pub const interaction = @import("trace/shade/interaction.zig");
 /// The light list in lanes, and the tree of it.
 pub const light_sampling = @import("trace/shade/light_sampling.zig");
 pub const light_tree = @import("trace/shade/light_tree.zig");
@@ -176,7 +179,7 @@ test {
     _ = @import("trace/shade/cosine.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/iridescence.zig");
-    _ = @import("trace/shade/light.zig");
+    _ = light;
     _ = light_sampling;
     _ = @import("trace/shade/environment_sampling.zig");
     _ = @import("trace/shade/offset.zig");

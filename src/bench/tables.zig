@@ -154,8 +154,8 @@ fn writeEnergy(scene: *const Scene, writer: *Writer) Error!void {
 /// Frames of one depth less those of one bounce less, round by round.
 fn writeBounces(scene: *const Scene, writer: *Writer) Error!void {
     if (scene.bounces.len == 0) return;
-    try writer.writeAll("\nWhat each bounce costs, shading with it: frames of a depth less those " ++
-        "of one bounce less\n");
+    try writer.writeAll("\nWhat each bounce costs, shading with it: frames of a depth less " ++
+        "those of one bounce less\n");
     try writer.print("{s:<24}{s:>8}{s:>12}{s:>12}", .{ "variant", "bounce", "rays", "shadow" });
     for ([_][]const u8{ "ms", "M rays/s", "mJ", "k rays/J" }) |head| {
         try writer.print("{s:>20}", .{head});
