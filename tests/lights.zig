@@ -42,7 +42,8 @@ test "every variant, whatever threads and tiles, has the same picture by virtual
     const white = fixture.matte(.{ 0.8, 0.8, 0.8 });
     try builder.addQuad(white, .{ 0, -1, 0 }, .{ 1, 0, 0 }, .{ 0, 0, -1 });
     try builder.addQuad(white, .{ 0, 0, -1 }, .{ 1, 0, 0 }, .{ 0, 1, 0 });
-    try builder.addQuad(fixture.matte(.{ 0.8, 0.1, 0.1 }), .{ -1, 0, 0 }, .{ 0, 0, -1 }, .{ 0, 1, 0 });
+    const red = fixture.matte(.{ 0.8, 0.1, 0.1 });
+    try builder.addQuad(red, .{ -1, 0, 0 }, .{ 0, 0, -1 }, .{ 0, 1, 0 });
     var metal = fixture.matte(.{ 0.9, 0.8, 0.5 });
     metal.metallic = 1;
     metal.roughness = 0.4;

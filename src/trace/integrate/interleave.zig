@@ -70,7 +70,13 @@ pub const Sets = struct {
     }
 
     /// Those of a sample of pixels in this part.
-    pub fn of(sets: *const Sets, comptime T: type, all: []const T, sample: u32, part: usize) []const T {
+    pub fn of(
+        sets: *const Sets,
+        comptime T: type,
+        all: []const T,
+        sample: u32,
+        part: usize,
+    ) []const T {
         if (all.len == 0) return all;
         const first = sample % sets.set_count * part_count;
         if (!sets.is_interleaved)
@@ -179,7 +185,8 @@ pub const Layers = struct {
     inline fn quotient(part: Pixel, whole: Pixel, unknown: f32) Pixel {
         const known = whole > @as(Pixel, @splat(1e-20));
         const one: Pixel = @splat(1);
-        return @select(f32, known, part / @select(f32, known, whole, one), @as(Pixel, @splat(unknown)));
+        const otherwise: Pixel = @splat(unknown);
+        return @select(f32, known, part / @select(f32, known, whole, one), otherwise);
     }
 
     const Sums = struct {
@@ -299,9 +306,10 @@ const Place = struct {
         const count = layers.albedo[at][3];
         const distance = sums[3] / count;
         const camera = &view.camera;
-        const across = (2 * @as(f32, @floatFromInt(x)) + 1) / @as(f32, @floatFromInt(view.width)) - 1;
-        const upward =
-            1 - (2 * @as(f32, @floatFromInt(y)) + 1) / @as(f32, @floatFromInt(view.height));
+        const columns: f32 = @floatFromInt(view.width);
+        const rows: f32 = @floatFromInt(view.height);
+        const across = (2 * @as(f32, @floatFromInt(x)) + 1) / columns - 1;
+        const upward = 1 - (2 * @as(f32, @floatFromInt(y)) + 1) / rows;
         const sideways =
             vec3.add(vec3.scale(camera.right, across), vec3.scale(camera.up, upward));
         const way = if (camera.orthographic)
@@ -309,7 +317,7 @@ const Place = struct {
         else
             vec3.add(camera.forward, sideways);
         const ahead = vec3.scale(way, distance / vec3.length(way));
-        const width = 2 * vec3.length(camera.right) / @as(f32, @floatFromInt(view.width));
+        const width = 2 * vec3.length(camera.right) / columns;
         return .{
             .position = if (camera.orthographic) vec3.add(sideways, ahead) else ahead,
             .normal = if (size > 0) vec3.scale(sum, 1 / size) else sum,
