@@ -207,10 +207,10 @@ fn SharedOf(comptime Kernel: type) type {
         const Tree = InstantRadiosity(Kernel);
         const Paths = light_paths.LightPaths(Kernel, Tree);
         const Importance = light_importance.LightImportance(Kernel, Tree);
-        const Step = enum { see, trace, gather, weigh, sum, finish, choose, filter };
+        const Step = enum { see, trace, gather, weigh, sum, finish, choose, place, filter };
 
-        pub const steps_before: u32 = @backingInt(Step.filter);
-        pub const step_count: u32 = steps_before + 1;
+        pub const steps_before: u32 = @backingInt(Step.place);
+        pub const step_count: u32 = steps_before + 2;
 
         pub fn init(
             gpa: std.mem.Allocator,
@@ -311,12 +311,12 @@ fn SharedOf(comptime Kernel: type) type {
 
         pub fn pieces(shared: *const Self, number: u32) u32 {
             const step: Step = @fromBackingInt(@intCast(number));
-            if (step != .filter and shared.path_count == 0) return 0;
+            if (number < steps_before and shared.path_count == 0) return 0;
             return switch (step) {
                 .see, .gather, .sum, .choose => 1,
                 .trace => @divCeil(shared.path_count, light_paths.piece_paths),
                 .weigh, .finish => shared.weighedPieces(),
-                .filter => @divCeil(shared.layers.height, band_rows),
+                .place, .filter => @divCeil(shared.layers.height, band_rows),
             };
         }
 
@@ -343,6 +343,7 @@ fn SharedOf(comptime Kernel: type) type {
                     if (virtual_lights.choose(shared.found, &shared.sets, geometry, shared.room))
                         shared.lights = shared.room;
                 },
+                .place => shared.place(piece),
                 .filter => return shared.filter(piece, film),
             }
             return 0;
@@ -389,6 +390,13 @@ fn SharedOf(comptime Kernel: type) type {
                 for (shared.piece_gains[0..shared.weighedPieces()]) |*gains| sum.* += gains[index];
             }
             light_importance.invertGains(all);
+        }
+
+        fn place(shared: *Self, band: u32) void {
+            const first = band * band_rows;
+            for (first..@min(first + band_rows, shared.layers.height)) |y| {
+                shared.layers.placeRow(shared.frame.view, @intCast(y));
+            }
         }
 
         fn filter(shared: *Self, band: u32, film: *Film) u64 {
