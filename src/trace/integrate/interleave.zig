@@ -42,7 +42,6 @@ pub const Sets = struct {
             .set_count = @min(sample_count, set_count_max),
             .sample_count = sample_count,
             .part_size = @divCeil(light_count, part_count),
-            .sample_count = sample_count,
             .is_interleaved = is_interleaved,
         };
     }
