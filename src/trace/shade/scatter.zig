@@ -5,10 +5,10 @@
 //! times cosine with the density that a sample has there. A lobe is chosen by its share of the
 //! albedo for the view, weighed by what the channels of the path are worth; the specular lobes give
 //! mirror images about visible normals (`sampling.zig`), fibres the whole hemisphere, light in the
-//! surface and what is scattered more than once the cosine, what comes through `passing.zig`. One
-//! density stands for all lobes that have one: the mean of theirs by share (the balance heuristic
-//! of Veach and Guibas 1995). Lobes narrower than `sampling.sharp_alpha_least` are directions. So a
-//! white surface weighs 1 in the mean. Everything is + - * / sqrt in a fixed order.
+//! surface the cosine, what comes through `passing.zig`. One density stands for all lobes that have
+//! one: the mean of theirs by share (the balance heuristic of Veach and Guibas 1995). Lobes narrower
+//! than `sampling.sharp_alpha_least` are directions. So a white surface weighs 1 in the mean.
+//! Everything is + - * / sqrt in a fixed order.
 
 const std = @import("std");
 const simd = @import("../../simd.zig");
@@ -623,7 +623,8 @@ test "weight times density is the BSDF times cosine, and no weight is far from t
             }
         }
         const channels: f32 = if (change.dispersion > 0) 3 else 1;
-        try std.testing.expect(worst < 2 * channels);
+        // Of rough metals what is scattered again makes up for more than half.
+        try std.testing.expect(worst < 3 * channels);
     }
     for (seen) |count| try std.testing.expect(count > 100);
 }
@@ -775,9 +776,9 @@ test "paths end at unlit and at black surfaces" {
     }
 }
 
-test "reciprocity: light and view change places on opaque surfaces, smooth ones as well" {
+test "reciprocity, but for what is scattered more than once: light and view change places" {
     var surface: Surface(Single) = undefined;
-    for ([_]f32{ 0.06, 0.3, 1 }) |roughness| for (0..8) |index| {
+    for ([_]f32{ 0.06, 0.3, 1 }, [_]f32{ 0.01, 0.05, 0.4 }) |roughness, again| for (0..8) |index| {
         const change: Change = .{ .roughness = roughness, .metallic = 0.5 };
         surface.become(.{change});
         const found = surface.draw(numbersOf(index));
@@ -794,7 +795,7 @@ test "reciprocity: light and view change places on opaque surfaces, smooth ones 
         surface.scatter
             .become(&surface.point, bsdf, &surface.layers, .splat(true), .splat(.{ 1, 1, 1 }));
         const back = surface.eval(view.lane(0)).value.x.lane(0) / cosines[0];
-        try std.testing.expectApproxEqRel(there, back, 0.01);
+        try std.testing.expectApproxEqRel(there, back, again);
     };
 }
 
@@ -844,7 +845,8 @@ test "light without size has the highlights of narrow lobes that other integrato
         else
             fresh.become(&surface.point);
         const wanted = fresh.eval(&surface.point, .splat(way)).lane(0);
-        for (wanted, found) |a, b| try std.testing.expectApproxEqRel(a, b, 1e-6);
+        // They have another lobe for what is scattered more than once.
+        for (wanted, found) |a, b| try std.testing.expectApproxEqRel(a, b, 0.02);
         try std.testing.expect(found[0] > 0);
         try std.testing.expectEqual(change.roughness < 0.05, found[0] != seen.x.lane(0));
     }
