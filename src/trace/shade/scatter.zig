@@ -6,9 +6,9 @@
 //! albedo for the view, weighed by what the channels of the path are worth; the specular lobes give
 //! mirror images about visible normals (`sampling.zig`), fibres the whole hemisphere, light in the
 //! surface the cosine, what comes through `passing.zig`. One density stands for all lobes that have
-//! one: the mean of theirs by share (the balance heuristic of Veach and Guibas 1995). Lobes narrower
-//! than `sampling.sharp_alpha_least` are directions. So a white surface weighs 1 in the mean.
-//! Everything is + - * / sqrt in a fixed order.
+//! one: the mean of theirs by share (the balance heuristic of Veach and Guibas 1995). Lobes that
+//! are narrower than `sampling.sharp_alpha_least` are directions. So a white surface weighs 1 in the
+//! mean. Everything is + - * / sqrt in a fixed order.
 
 const std = @import("std");
 const simd = @import("../../simd.zig");
