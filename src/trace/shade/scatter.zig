@@ -7,8 +7,8 @@
 //! mirror images about visible normals (`sampling.zig`), fibres the whole hemisphere, light in the
 //! surface the cosine, what comes through `passing.zig`. One density stands for all lobes that have
 //! one: the mean of theirs by share (the balance heuristic of Veach and Guibas 1995). Lobes that
-//! are narrower than `sampling.sharp_alpha_least` are directions. So a white surface weighs 1 in the
-//! mean. Everything is + - * / sqrt in a fixed order.
+//! are narrower than `sampling.sharp_alpha_least` are directions. So a white surface weighs 1 in
+//! the mean. Everything is + - * / sqrt in a fixed order.
 
 const std = @import("std");
 const simd = @import("../../simd.zig");
