@@ -205,8 +205,8 @@ fn SharedOf(comptime Kernel: type) type {
         const Paths = light_paths.LightPaths(Kernel, Tree);
         const Step = enum { see, trace, gather, weigh, sum, finish, choose, filter };
 
-        pub const steps_before = @backingInt(Step.filter);
-        pub const step_count = steps_before + 1;
+        pub const steps_before: u32 = @backingInt(Step.filter);
+        pub const step_count: u32 = steps_before + 1;
 
         pub fn init(
             gpa: std.mem.Allocator,

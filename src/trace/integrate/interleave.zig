@@ -40,7 +40,6 @@ pub const Sets = struct {
     pub fn init(light_count: u32, sample_count: u32, is_interleaved: bool) Sets {
         return .{
             .set_count = @min(sample_count, set_count_max),
-            .sample_count = sample_count,
             .part_size = @divCeil(light_count, part_count),
             .sample_count = sample_count,
             .is_interleaved = is_interleaved,
