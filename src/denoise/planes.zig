@@ -269,7 +269,8 @@ const Work = struct {
             const depth_reach = depth_slope_reach * depth_slope_reach;
             planes.of.get(.normal_strictness)[to] =
                 1 / (normal_distance * normal_distance + reach * normal);
-            planes.of.get(.depth_strictness)[to] = 1 / (share * share + depth_reach * depth + 1e-12);
+            planes.of.get(.depth_strictness)[to] =
+                1 / (share * share + depth_reach * depth + 1e-12);
             planes.of.get(.albedo_strictness)[to] =
                 1 / (albedo_distance * albedo_distance + reach * albedo);
             work.raw[y * planes.width + x].expected = work.expectedVariance(x, y);
