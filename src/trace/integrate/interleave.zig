@@ -39,6 +39,7 @@ pub const Sets = struct {
         return .{
             .set_count = @min(sample_count, set_count_max),
             .part_size = @divCeil(light_count, part_count),
+            .sample_count = sample_count,
             .is_interleaved = is_interleaved,
         };
     }
