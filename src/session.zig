@@ -394,7 +394,7 @@ pub const Session = struct {
     }
 
     fn denoiseFilm(session: *Session) denoise.Error!void {
-        if (session.sampleCount(session.rendered) < denoise.sample_count_min) return session
+        if (session.traced.sample_count < denoise.sample_count_min) return session
             .diagnostic.warn("it is not denoised: one sample a pixel does not tell its noise", .{});
         const start = Io.Clock.awake.now(session.io);
         try denoise.run(session.gpa, &session.film.?, &session.pool);
