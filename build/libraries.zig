@@ -52,7 +52,7 @@ pub const Library = struct {
     /// Definitions, and what else a library needs the compiler to be told.
     flags: []const []const u8 = &.{},
 
-    /// Compiles the library into `module`.
+    /// Compiles what is C of the library into `module`.
     pub fn addTo(library: Library, module: *Module, headers: LazyPath) void {
         const b = module.owner;
         const flags = std.mem.concat(b.allocator, []const u8, &.{
@@ -68,25 +68,17 @@ pub const Library = struct {
             .language = .c,
         });
         module.addCSourceFiles(.{ .files = library.shims, .flags = flags });
-        if (library.cpp_shim) |shim| {
-            module.addObjectFile(library.cppArchive(shim, module, headers).getEmittedBin());
-        }
     }
 
-    /// C++ is compiled apart: it sees the headers of Zig's C++ library, whose code, which takes two
-    /// minutes to compile, nothing is linked with.
-    fn cppArchive(
+    /// Compiles what is C++ of it into `root`, an empty module: that sees the headers of Zig's C++
+    /// library, whose code, which takes two minutes to compile, nothing is linked with.
+    pub fn addCppTo(
         library: Library,
         shim: []const u8,
-        module: *Module,
+        root: *Module,
         headers: LazyPath,
-    ) *std.Build.Step.Compile {
-        const b = module.owner;
-        const root = b.createModule(.{
-            .target = module.resolved_target,
-            .optimize = module.optimize,
-            .link_libc = true,
-        });
+    ) void {
+        const b = root.owner;
         for ([_][]const u8{ "libcxx/include", "libcxxabi/include" }) |folder| {
             // Before those of the libc, which it includes.
             root.addIncludePath(LazyPath.zig_lib.path(b, folder));
@@ -98,7 +90,6 @@ pub const Library = struct {
             cpp_flags, library.flags,
         }) catch @panic("OOM");
         root.addCSourceFile(.{ .file = b.path(shim), .flags = flags });
-        return b.addLibrary(.{ .linkage = .static, .name = library.name, .root_module = root });
     }
 };
 

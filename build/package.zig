@@ -32,6 +32,8 @@ lit: []const Variant,
 /// A kernel of each: see `addKernels`.
 kernels: []const *Compile,
 intrinsics: *Compile,
+/// The third-party libraries.
+third_party: []const *Compile,
 config: *Module,
 
 /// The choice of variants, from the command line.
@@ -81,6 +83,7 @@ pub fn init(
         .raylane = undefined,
         .config = undefined,
         .intrinsics = undefined,
+        .third_party = undefined,
         .kernels = undefined,
     };
     const config = package.configOf(.{
@@ -91,6 +94,7 @@ pub fn init(
     });
     config.addOption(bool, "has_draco", options.optional.draco); // Not for kernels to know.
     package.config = config.createModule();
+    package.third_party = package.libraryArchives();
     package.raylane = package.withLibrary("src/raylane.zig");
     package.intrinsics = package.intrinsicsObject();
     package.kernels = package.kernelObjects();
@@ -113,8 +117,35 @@ fn withLibrary(package: Package, path: []const u8) *Module {
     const held = libraries.held(package.optional);
     const is_musl = package.target.result.isMuslLibC();
     root.addImport("licenses", libraries.licenses(package.owner, package.headers, held, is_musl));
-    for (held) |each| each.addTo(root, package.headers);
+    for (package.third_party) |each| root.addObjectFile(each.getEmittedBin());
     return root;
+}
+
+/// The third-party libraries that a program holds: an archive of all that is C, for the compiler
+/// would else compile it with each program, and one of each that is C++.
+fn libraryArchives(package: Package) []const *Compile {
+    const arena = package.owner.allocator;
+    var list: std.ArrayList(*Compile) = .empty;
+    const c = package.moduleOfC();
+    for (libraries.held(package.optional)) |library| {
+        library.addTo(c, package.headers);
+        const shim = library.cpp_shim orelse continue;
+        const cpp = package.moduleOfC();
+        library.addCppTo(shim, cpp, package.headers);
+        list.append(arena, package.archive(library.name, cpp)) catch @panic("OOM");
+    }
+    list.append(arena, package.archive("libraries", c)) catch @panic("OOM");
+    return list.items;
+}
+
+fn moduleOfC(package: Package) *Module {
+    return package.owner.createModule(.{
+        .target = package.target,
+        .optimize = package.optimize,
+        .link_libc = true,
+        .strip = if (package.is_stripped) true else null,
+        .omit_frame_pointer = if (package.optimize == .fast) true else null,
+    });
 }
 
 /// What our Zig code has in common wherever it is compiled.
@@ -162,12 +193,7 @@ fn names(package: Package, list: []const Variant) []const []const u8 {
 /// them, and the linker inlines one into the other.
 fn intrinsicsObject(package: Package) *Compile {
     const b = package.owner;
-    const object = package.archive("intrinsics", b.createModule(.{
-        .target = package.target,
-        .optimize = package.optimize,
-        .link_libc = true,
-        .omit_frame_pointer = if (package.optimize == .fast) true else null,
-    }));
+    const object = package.archive("intrinsics", package.moduleOfC());
     object.root_module.addCSourceFile(.{
         .file = b.path("src/simd/intrinsics.c"),
         .flags = own_c_flags,

@@ -144,6 +144,10 @@ const sections: []const Section = &.{
             .help = "env, studio, transparent, a CSS colour (red, #rrggbb)\n" ++
                 "or radiance R,G,B (default: a grey gradient)",
         },
+        .{
+            .usage = "--layers LIST",
+            .help = "of an EXR file: albedo,normal,depth,variance",
+        },
     } },
     .{ .title = "Camera", .options = &.{
         .{ .usage = "--camera WHICH", .help = "name or index of a camera, or auto: all in view" },
@@ -323,6 +327,24 @@ const sections: []const Section = &.{
             .usage = "--integrator NAME",
             .help = namesOf(settings.Integrator) ++ " (default: whitted)",
         },
+        .{
+            .usage = "--virtual-lights N",
+            .help = "of '--integrator lights' a sample, " ++
+                settings.virtual_light_count.text() ++ "\n" ++
+                comptimePrint("(default: {d})", .{settings.virtual_light_count.default}),
+        },
+        .{
+            .usage = "--sky-lights N",
+            .help = "the same that stand for the environment, " ++
+                settings.sky_light_count.text() ++ "\n" ++
+                comptimePrint("(default: {d})", .{settings.sky_light_count.default}),
+        },
+        .{
+            .usage = "--all-lights",
+            .help = "every pixel has all of a sample's lights, not a\n" ++
+                "ninth of them and its neighbours' by a filter",
+        },
+        .{ .usage = "--denoise", .help = "filter the noise out" },
         .{ .usage = "--variant NAME", .help = "how rays are traced; the image is always the same" },
         .{
             .usage = "--list-variants",
@@ -460,6 +482,9 @@ const Parser = struct {
             .output => options.output = try reader.text(given, "a file name or -"),
             .format => parser.format = formatOf(given.value) orelse
                 return reader.bad(given, comptime namesOf(settings.Format)),
+            .denoise => options.render.denoise = true,
+            .layers => options.render.layers = layersOf(given.value) orelse
+                return reader.bad(given, comptime namesOf(settings.Layer)),
             .jpeg_quality => {
                 options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
             },
@@ -505,6 +530,11 @@ const Parser = struct {
             .variant => options.render.variant = try parser.variantOf(given.value),
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
+            .virtual_lights => options.render.lights.virtual_count =
+                try reader.number(given, settings.virtual_light_count),
+            .sky_lights => options.render.lights.sky_count =
+                try reader.number(given, settings.sky_light_count),
+            .all_lights => options.render.lights.is_interleaved = false,
             .count_tests => options.count_tests = true,
             .point_size => options.view.point_size =
                 numberWithin(given.value, settings.point_size) orelse
@@ -689,6 +719,15 @@ const Parser = struct {
 
     /// The format comes from `--format` or the output's extension, which may not disagree.
     fn settleFormat(parser: *Parser) Error!void {
+        try parser.findFormat();
+        const options = &parser.options;
+        if (options.render.layers.count() == 0 or options.write.format == .exr) return;
+        return parser.reader.fail("'--layers' has a place in an exr file, not in a {t} file", .{
+            options.write.format,
+        });
+    }
+
+    fn findFormat(parser: *Parser) Error!void {
         const options = &parser.options;
         options.write.format = parser.format orelse .png;
         const output = options.output orelse {
@@ -732,6 +771,15 @@ fn bytesOf(text: []const u8) ?u64 {
     if (count == 0) return null;
     const shift: u6 = if (unit) |index| @intCast(10 * (index + 1)) else 0;
     return std.math.shlExact(u64, count, shift) catch null;
+}
+
+/// Names with commas between them.
+fn layersOf(text: []const u8) ?std.EnumSet(settings.Layer) {
+    var layers: std.EnumSet(settings.Layer) = .empty;
+    var names = std.mem.splitScalar(u8, text, ',');
+    while (names.next()) |name|
+        layers.insert(std.meta.stringToEnum(settings.Layer, name) orelse return null);
+    return layers;
 }
 
 /// A number from `range.min` to `range.max`.
@@ -1001,6 +1049,8 @@ test "numbers keep to their ranges" {
         .{ .flag = "--stats", .good = &.{ "text", "json", "none" }, .bad = &.{ "JSON", "" } },
         .{ .flag = "--bvh", .good = &.{ "fast", "default", "high" }, .bad = &.{ "High", "" } },
         .{ .flag = "--instances", .good = &.{ "auto", "share", "flatten" }, .bad = &.{"all"} },
+        .{ .flag = "--virtual-lights", .good = &.{ "0", "64", "1024" }, .bad = &.{ "-1", "1025" } },
+        .{ .flag = "--sky-lights", .good = &.{ "1", "32", "1024" }, .bad = &.{ "0", "1025" } },
         .{ .flag = "--integrator", .good = &.{ "whitted", "lights", "path" }, .bad = &.{"bdpt"} },
         .{
             .flag = "--format",
@@ -1193,6 +1243,11 @@ test "the format follows the name, unless said otherwise" {
         try std.testing.expectEqual(case[0], (try optionsForTest(case[1])).write.format);
     }
     try expectUsage("contradicts", &.{ "--format=pfm", "-oa.png", "s" });
+    try expectUsage("not in a png file", &.{ "--layers=depth", "s" });
+    for ([_][:0]const u8{ "--layers=", "--layers=depht", "--layers=depth,", "--layers=a b" }) |bad|
+        try expectUsage("albedo, normal, depth", &.{ bad, "-oa.exr", "s" });
+    const layered = try optionsForTest(&.{ "--layers=depth,albedo,depth", "-oa.exr" });
+    try std.testing.expectEqual(2, layered.render.layers.count());
     try expectUsage("'a.tiff' ends in no image format", &.{ "-oa.tiff", "s" });
 }
 

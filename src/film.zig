@@ -64,8 +64,8 @@ fn firstHalfCount(count: u32) u32 {
     return power / 2 + @min(count - power, power / 2);
 }
 
-/// Pixels x0 <= x < x1, y0 <= y < y1.
-pub const Rectangle = struct { x0: u32, y0: u32, x1: u32, y1: u32 };
+/// Pixels x0 <= x < x1, y0 <= y < y1; of a bundle's every `step`th in either direction.
+pub const Rectangle = struct { x0: u32, y0: u32, x1: u32, y1: u32, step: u32 = 1 };
 
 /// Sums of samples.
 pub const Film = struct {
@@ -311,16 +311,17 @@ test "colours of the display have means and a part in the hash of their own" {
     };
     const all: Rectangle = .{ .x0 = 0, .y0 = 0, .x1 = 2, .y1 = 1 };
     try std.testing.expectEqual(0, film.finish(all, 2));
+    const display = film.imageOf(.display).?;
     try std.testing.expectEqual([4]f32{ 0, 0, 0, 0.25 }, film.image.at(0, 0).*);
-    try std.testing.expectEqual([4]f32{ 0.25, 0.125, 0, 0.25 }, film.imageOf(.display).?.at(0, 0).*);
+    try std.testing.expectEqual([4]f32{ 0.25, 0.125, 0, 0.25 }, display.at(0, 0).*);
     const before = film.hash();
     try std.testing.expect(before != film.image.hash());
-    film.imageOf(.display).?.at(1, 0)[2] = 0.5;
+    display.at(1, 0)[2] = 0.5;
     try std.testing.expect(before != film.hash());
 
     for (0..2) |x| film.addApart(.display, @intCast(x), 0, 0, .{ std.math.nan(f32), 0, 0, 1 });
     try std.testing.expectEqual(2, film.finish(all, 1));
-    try std.testing.expectEqual([4]f32{ 0, 0, 0, 0 }, film.imageOf(.display).?.at(1, 0).*);
+    try std.testing.expectEqual([4]f32{ 0, 0, 0, 0 }, display.at(1, 0).*);
 }
 
 test "halves have as many samples, and whole stretches of them" {

@@ -24,6 +24,8 @@ pub const TargetError = target_file.Error;
 pub const Background = @import("output/background.zig").Background;
 /// What is written: the layers of a film.
 pub const Picture = encode_file.Picture;
+/// What a file may hold besides the picture.
+pub const Further = openexr.Further;
 /// How many pixels look like nothing.
 pub const Tally = encode_file.Tally;
 /// The exposure that suits a picture.
@@ -65,6 +67,8 @@ pub const Settings = struct {
     background: Background = .none,
     /// Within `settings.jpeg_quality`.
     jpeg_quality: u8 = choices.jpeg_quality.default,
+    /// Layers of the picture's size, each once at most; only a file in OpenEXR holds them.
+    further: []const Further = &.{},
     pool: *parallel.Pool,
 };
 
@@ -184,6 +188,7 @@ pub fn write(
                 .height = image.height,
                 .channel_count = channelCount(form),
                 .pixels = pixels,
+                .further = settings.further,
             });
             defer gpa.free(file);
             try target.finish(&.{file}, diagnostic);

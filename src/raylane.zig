@@ -11,6 +11,7 @@ pub const builtin = @import("builtin.zig");
 pub const cli = @import("cli.zig");
 pub const compare = @import("compare.zig");
 pub const decode = @import("decode.zig");
+pub const denoise = @import("denoise.zig");
 pub const diagnostic = @import("diagnostic.zig");
 pub const energy = @import("energy.zig");
 pub const film = @import("film.zig");

@@ -100,6 +100,23 @@ fn statusKibibytes(text: []const u8, comptime name: []const u8) ?isize {
     return std.fmt.parseInt(u31, std.mem.trimStart(u8, digits, " \t"), 10) catch null;
 }
 
+fn writeTimes(times: *const statistics.StageTimes, writer: *Writer) Writer.Error!void {
+    inline for (.{
+        .{ "parse", times.parse_ns },
+        .{ "textures", times.texture_ns },
+        .{ "prepare", times.prepare_ns },
+        .{ "BVH build", times.bvh_build_ns },
+        .{ "trace", times.trace_ns },
+        .{ "denoise", times.denoise_ns },
+        .{ "output", times.output_ns },
+        .{ "total", times.total_ns },
+    }) |row| {
+        const is_left_out = row[1] == 0 and comptime std.mem.eql(u8, row[0], "denoise");
+        if (!is_left_out)
+            try writer.print("{s:<9} {d:>12.3} ms\n", .{ row[0], milliseconds(row[1]) });
+    }
+}
+
 /// Writes the report as lines for people.
 pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
     const times = &report.times;
@@ -129,15 +146,7 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
         report.thread_count,
         if (report.thread_count == 1) "thread" else "threads",
     });
-    inline for (.{
-        .{ "parse", times.parse_ns },
-        .{ "textures", times.texture_ns },
-        .{ "prepare", times.prepare_ns },
-        .{ "BVH build", times.bvh_build_ns },
-        .{ "trace", times.trace_ns },
-        .{ "output", times.output_ns },
-        .{ "total", times.total_ns },
-    }) |row| try writer.print("{s:<9} {d:>12.3} ms\n", .{ row[0], milliseconds(row[1]) });
+    try writeTimes(times, writer);
 
     try writer.print("\nrays         {d}", .{report.rayCount()});
     try writeRate(writer, report.rayCount(), times.trace_ns);
@@ -214,6 +223,7 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
             .prepare = milliseconds(times.prepare_ns),
             .bvh_build = milliseconds(times.bvh_build_ns),
             .trace = milliseconds(times.trace_ns),
+            .denoise = milliseconds(times.denoise_ns),
             .output = milliseconds(times.output_ns),
             .total = milliseconds(times.total_ns),
         },
@@ -381,6 +391,7 @@ test "the JSON has every key and nothing else" {
             prepare: f64,
             bvh_build: f64,
             trace: f64,
+            denoise: f64,
             output: f64,
             total: f64,
         },

@@ -8,6 +8,7 @@
 
 const std = @import("std");
 const builtin_scenes = @import("builtin.zig");
+const denoise = @import("denoise.zig");
 const math = @import("math.zig");
 const output = @import("output.zig");
 const parallel = @import("parallel.zig");
@@ -371,11 +372,12 @@ pub const Session = struct {
 
     /// Traces the picture. Asserts that there is a view, and a tree of the variant's width.
     pub fn render(session: *Session, choices: settings.Render) Error!void {
-        const film = try session.sizedFilm();
+        const film = try session.sizedFilm(choices);
         const start = Io.Clock.awake.now(session.io);
         session.rendered = choices;
         session.appearance = null;
         session.metered = null;
+        session.times.denoise_ns = 0;
         try session.weighEmitters();
         try session.dimStudio();
         var frame = session.world.?.frame();
@@ -388,6 +390,15 @@ pub const Session = struct {
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
+        if (choices.denoise) try session.denoiseFilm();
+    }
+
+    fn denoiseFilm(session: *Session) denoise.Error!void {
+        if (session.sampleCount(session.rendered) < denoise.sample_count_min) return session
+            .diagnostic.warn("it is not denoised: one sample a pixel does not tell its noise", .{});
+        const start = Io.Clock.awake.now(session.io);
+        try denoise.run(session.gpa, &session.film.?, &session.pool);
+        session.times.denoise_ns = session.since(start);
     }
 
     fn traceInRounds(
@@ -512,10 +523,13 @@ pub const Session = struct {
         session.appearance = try session.appearanceOf(choices);
         const start = Io.Clock.awake.now(session.io);
         const film = &session.film.?;
+        var further: [std.enums.values(settings.Layer).len]output.Further = undefined;
+        var chosen = session.outputSettings(choices, session.appearance);
+        chosen.further = session.furtherLayers(&further);
         const tally = try output.write(session.gpa, .{
             .image = &film.image,
             .display = film.imageOf(.display),
-        }, session.outputSettings(choices, session.appearance), target, session.diagnostic);
+        }, chosen, target, session.diagnostic);
         session.times.output_ns = session.since(start);
         session.times.total_ns = session.since(session.start);
         session.hint(tally);
@@ -545,6 +559,17 @@ pub const Session = struct {
             .jpeg_quality = @intCast(choices.jpeg_quality),
             .pool = &session.pool,
         };
+    }
+
+    /// Layers that were asked for, in `room`.
+    fn furtherLayers(session: *const Session, room: []output.Further) []const output.Further {
+        var count: usize = 0;
+        var chosen = session.rendered.layers.iterator();
+        while (chosen.next()) |layer| : (count += 1) room[count] = .{
+            .layer = layer,
+            .image = session.film.?.imageOf(layerOf(layer)).?,
+        };
+        return room[0..count];
     }
 
     fn isMetered(session: *const Session, exposure: settings.Exposure) bool {
@@ -764,6 +789,7 @@ pub const Session = struct {
         return .{
             .pool = &session.pool,
             .integrator = choices.integrator,
+            .lights = choices.lights,
             .sample_count = session.sampleCount(choices),
             .depth_max = session.depthOf(choices),
             .tile_size = choices.tile_size,
@@ -809,9 +835,12 @@ pub const Session = struct {
     }
 
     /// A film of the view's size.
-    fn sizedFilm(session: *Session) error{OutOfMemory}!*Film {
+    fn sizedFilm(session: *Session, choices: settings.Render) error{OutOfMemory}!*Film {
         const view_size = &session.world.?.view;
-        const layers = session.layersOf();
+        var layers = session.layersOf();
+        if (choices.denoise) layers.setUnion(denoise.needed);
+        var further = choices.layers.iterator();
+        while (further.next()) |layer| layers.insert(layerOf(layer));
         if (session.film) |*film| {
             if (film.become(view_size.width, view_size.height, layers)) return film;
             film.deinit(session.gpa);
@@ -825,6 +854,13 @@ pub const Session = struct {
         return @intCast(start.untilNow(session.io, .awake).toNanoseconds());
     }
 };
+
+/// The film's, as users choose them.
+fn layerOf(layer: settings.Layer) film_file.Layer {
+    return switch (layer) {
+        inline else => |same| @field(film_file.Layer, @tagName(same)),
+    };
+}
 
 fn float(count: u64) f64 {
     return @floatFromInt(count);
@@ -934,7 +970,7 @@ test "every stage ends when it is cancelled, and no file is left" {
             cancelled.cancel();
         }
     };
-    const image = &(try session.sizedFilm()).image;
+    const image = &(try session.sizedFilm(.{})).image;
     @memset(image.pixels, @splat(std.math.nan(f32)));
     const first: *const volatile f32 = &image.pixels[0][3];
     const canceller = try std.Thread.spawn(.{}, Canceller.run, .{ &session, first });

@@ -70,6 +70,10 @@ pub const exposure_ev_max = 64;
 pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4 };
 /// And where a floor catches their shadows, unless the user says.
 pub const floor_shadow_count = 16;
+/// See `Lights`.
+pub const virtual_light_count: Range = .{ .min = 0, .max = 1024, .default = 96 };
+/// See `Lights`.
+pub const sky_light_count: Range = .{ .min = 1, .max = 1024, .default = 32 };
 /// What automatic exposure chooses lies between these: far enough down for surfaces in the sun, of
 /// 100,000 lx, and for lamps close by, but not so far up that what is all but black is enlarged.
 pub const exposure_auto_ev_min = -24;
@@ -96,6 +100,18 @@ pub const Format = enum {
     pfm,
     /// OpenEXR: linear, halves, with alpha where the background is transparent.
     exr,
+};
+
+/// What is known of pixels besides their colours, for other programs: channels of an OpenEXR file.
+pub const Layer = enum {
+    /// Share of white light that what is seen sends to the camera.
+    albedo,
+    /// Its unit normal in the world's axes.
+    normal,
+    /// Distance from the camera's plane in metres.
+    depth,
+    /// Variance of the mean of the pixel's samples, before it is denoised.
+    variance,
 };
 
 /// Care taken over the tree of the scene: time to build it against time to trace rays through it.
@@ -382,9 +398,21 @@ pub const Noise = struct {
     exposure: Exposure = .default,
 };
 
+/// Lights of `Integrator.lights` in each sample; samples take turns with sets of them.
+pub const Lights = struct {
+    /// Virtual point lights, within `virtual_light_count`.
+    virtual_count: u32 = virtual_light_count.default,
+    /// Directional lights that stand for the environment, within `sky_light_count`.
+    sky_count: u32 = sky_light_count.default,
+    /// Each pixel of any 3x3 has another ninth of them, and a filter evens that out; else each has
+    /// all.
+    is_interleaved: bool = true,
+};
+
 /// How rays are traced.
 pub const Render = struct {
     integrator: Integrator = .whitted,
+    lights: Lights = .{},
     /// Index into `variant.compiled`.
     variant: usize = 0,
     /// With `noise` or `time_budget_s`, the most. Null: the scene's, or by `samplesFor`; with
@@ -397,6 +425,10 @@ pub const Render = struct {
     /// Null: the scene's, or by `depthFor`.
     depth: ?u32 = null,
     tile_size: u32 = tile_size.default,
+    /// Filter the noise out, where there are two samples a pixel at least.
+    denoise: bool = false,
+    /// Kept beside the picture.
+    layers: std.EnumSet(Layer) = .empty,
 };
 
 /// How a picture is encoded.

@@ -14,6 +14,7 @@ pub const StageTimes = struct {
     prepare_ns: u64 = 0,
     bvh_build_ns: u64 = 0,
     trace_ns: u64 = 0,
+    denoise_ns: u64 = 0,
     output_ns: u64 = 0,
     /// From the first to the last of them, what lies between included.
     total_ns: u64 = 0,

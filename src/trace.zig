@@ -20,7 +20,7 @@ pub const link = @import("trace/link.zig");
 /// Whitted's ray tracing, by one kernel.
 pub const Whitted = @import("trace/integrate/whitted.zig").Whitted;
 /// Instant radiosity, by one kernel.
-pub const Lights = Whitted;
+pub const Lights = @import("trace/integrate/instant_radiosity.zig").InstantRadiosity;
 /// Path tracing, by one kernel.
 pub const PathTracer = @import("trace/integrate/path_tracer.zig").PathTracer;
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
@@ -56,6 +56,9 @@ pub const beam = struct {
     pub const shadow_plane = @import("trace/traverse/beam/shadow_plane.zig");
     pub const shadow_receivers = @import("trace/traverse/beam/shadow_receivers.zig");
 };
+/// What single lights bring to points, and those points.
+pub const light = @import("trace/shade/light.zig");
+pub const interaction = @import("trace/shade/interaction.zig");
 /// The light list in lanes, and the tree of it.
 pub const light_sampling = @import("trace/shade/light_sampling.zig");
 pub const light_tree = @import("trace/shade/light_tree.zig");
@@ -158,6 +161,9 @@ test {
     _ = bundle;
     _ = dispatch;
     _ = @import("trace/integrate/environment_lights.zig");
+    _ = @import("trace/integrate/interleave.zig");
+    _ = @import("trace/integrate/light_emission.zig");
+    _ = @import("trace/integrate/virtual_lights.zig");
     _ = @import("trace/integrate/camera.zig");
     _ = @import("trace/integrate/numbers.zig");
     _ = @import("trace/integrate/path.zig");
@@ -173,7 +179,7 @@ test {
     _ = @import("trace/shade/cosine.zig");
     _ = @import("trace/shade/exponential.zig");
     _ = @import("trace/shade/iridescence.zig");
-    _ = @import("trace/shade/light.zig");
+    _ = light;
     _ = light_sampling;
     _ = @import("trace/shade/environment_sampling.zig");
     _ = @import("trace/shade/offset.zig");

@@ -25,7 +25,7 @@ const directions = [_]Row{
         .part = "session",
         .may_import = &.{
             "builtin", "parse",    "scene",   "prepare", "world",  "trace",
-            "film",    "parallel", "variant", "output",  "report",
+            "film",    "parallel", "variant", "output",  "report", "denoise",
         },
     },
     .{ .part = "kernel", .may_import = &.{ "module:config", "trace", "variant" } },
@@ -48,6 +48,7 @@ const directions = [_]Row{
     .{ .part = "world", .may_import = &.{} },
     .{ .part = "trace", .may_import = &.{ "world", "film", "variant", "simd", "parallel" } },
     .{ .part = "film", .may_import = &.{"image"} },
+    .{ .part = "denoise", .may_import = &.{ "film", "parallel" } },
     .{ .part = "image", .may_import = &.{} },
     .{ .part = "memory_account", .may_import = &.{} },
     .{ .part = "output", .may_import = &.{ "image", "memory_account", "parallel" } },

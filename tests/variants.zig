@@ -127,7 +127,7 @@ test "samples beyond the edges of small pictures are the same by every variant" 
     }
 }
 
-test "colours of the display are the same by every variant, and apart from radiance" {
+test "colours of the display and what is seen are the same by every variant, and apart" {
     var builder: fixture.Builder = try .init();
     var veil = fixture.flat(.{ 0.2, 0.4, 0.8 });
     veil.alpha_mode = .blend;
@@ -150,14 +150,30 @@ test "colours of the display are the same by every variant, and apart from radia
     };
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
     var first: ?u64 = null;
+    var features: ?u64 = null;
     for (raylane.variant.compiled, 0..) |variant, index| {
         var session: raylane.session.Session = .init(gpa, std.testing.io, 1, &diagnostic);
         defer session.deinit();
         try fixture.view(&session, &scene, variant.lanes, options);
-        try session.render(.{ .variant = index, .sample_count = 4 });
+        try session.render(.{ .variant = index, .sample_count = 4, .layers = .full });
         const film = &session.film.?;
         try std.testing.expectEqual(first orelse film.hash(), film.hash());
         first = film.hash();
+        var hash: u64 = 0;
+        for ([_]raylane.film.Layer{ .albedo, .normal, .depth, .variance }) |layer| {
+            hash = hash *% 31 +% film.imageOf(layer).?.hash();
+        }
+        try std.testing.expectEqual(features orelse hash, hash);
+        features = hash;
+        try std.testing.expectApproxEqAbs(3, film.imageOf(.depth).?.at(17, 2)[0], 1e-5);
+        try std.testing.expectEqual(1, film.imageOf(.depth).?.at(17, 2)[3]);
+        const albedo = film.imageOf(.albedo).?;
+        try std.testing.expectEqual([4]f32{ 1, 0.5, 0, 0 }, albedo.at(17, 2).*);
+        // The mirror shows the white wall, which faces the other way.
+        try std.testing.expectApproxEqAbs(1, albedo.at(3, 2)[0], 1e-2);
+        const normals = film.imageOf(.normal).?;
+        try std.testing.expectApproxEqAbs(1, normals.at(17, 2)[2], 1e-5);
+        try std.testing.expectApproxEqAbs(-1, normals.at(3, 2)[2], 1e-2);
         // What is painted is apart; in the mirror it is radiance.
         const painted = film.imageOf(.display).?.at(17, 2).*;
         try std.testing.expectEqual([4]f32{ 1, 0.5, 0, 1 }, painted);

@@ -1,21 +1,31 @@
 /* OpenEXRCore's writer, and the one call of it that we make.
  *
- * In: rows of floats. Out: a file of halves, in pieces with their places to a sink. The library
- * allocates by the hooks; its allocator has no place for a context, so the call in progress is
- * thread-local. When memory runs out it is left by longjmp; what it holds then is freed with the
- * heap behind the hooks.
+ * In: channels of floats. Out: a file of halves and floats, in pieces with their places to a sink.
+ * The library allocates by the hooks; its allocator has no place for a context, so the call in
+ * progress is thread-local. When memory runs out it is left by longjmp; what it holds then is freed
+ * with the heap behind the hooks.
  */
 #include <setjmp.h>
 #include <stdbool.h>
 #include <stdint.h>
+#include <string.h>
 
 #include "../memory_account.h"
 #include "openexr.h"
 
 /* In the order of openexr.zig. */
+typedef struct rl_exr_channel {
+    const char *name;
+    /* Of the first pixel; others follow in rows, so many floats apart. */
+    const float *first;
+    int stride;
+    bool half;
+} rl_exr_channel;
+
+/* In the order of openexr.zig. */
 typedef struct rl_exr_picture {
-    int width, height, channels;
-    const float *pixels;
+    int width, height, channel_count;
+    const rl_exr_channel *channels;
     /* False: no memory. */
     bool (*sink)(void *user, const void *bytes, size_t length, size_t offset);
     void *user;
@@ -52,34 +62,36 @@ static int64_t rl_write(exr_const_context_t context, void *user, const void *byt
 }
 
 static exr_result_t rl_write_header(exr_context_t context, const rl_exr_picture *picture) {
-    /* In the order of the alphabet, as the format wants them. */
-    static const char *const names[] = {"A", "B", "G", "R"};
     exr_result_t result = exr_add_part(context, "", EXR_STORAGE_SCANLINE, NULL);
     if (result == EXR_ERR_SUCCESS)
         result = exr_initialize_required_attr_simple(context, 0, picture->width, picture->height,
                                                      EXR_COMPRESSION_ZIP);
-    for (int name = 4 - picture->channels; name < 4 && result == EXR_ERR_SUCCESS; name++)
-        result = exr_add_channel(context, 0, names[name], EXR_PIXEL_HALF,
+    for (int index = 0; index < picture->channel_count && result == EXR_ERR_SUCCESS; index++) {
+        const rl_exr_channel *channel = &picture->channels[index];
+        result = exr_add_channel(context, 0, channel->name,
+                                 channel->half ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,
                                  EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
+    }
     return result == EXR_ERR_SUCCESS ? exr_write_header(context) : result;
 }
 
-/* Tells the pipeline where its channels, A to R, come from. */
-static void rl_place(exr_encode_pipeline_t *pipeline, const rl_exr_picture *picture,
-                     const float *row) {
-    for (int channel = 0; channel < pipeline->channel_count; channel++) {
-        exr_coding_channel_info_t *info = &pipeline->channels[channel];
-        info->encode_from_ptr = (const uint8_t *)(row + pipeline->channel_count - 1 - channel);
+/* Tells the pipeline where its channels come from, which are in the order of the alphabet. */
+static void rl_place(exr_encode_pipeline_t *pipeline, const rl_exr_picture *picture, int y) {
+    for (int index = 0; index < pipeline->channel_count; index++) {
+        exr_coding_channel_info_t *info = &pipeline->channels[index];
+        const rl_exr_channel *channel = picture->channels;
+        while (strcmp(channel->name, info->channel_name) != 0) channel++;
+        const size_t before = (size_t)y * (size_t)picture->width * (size_t)channel->stride;
+        info->encode_from_ptr = (const uint8_t *)(channel->first + before);
         info->user_data_type = EXR_PIXEL_FLOAT;
         info->user_bytes_per_element = sizeof(float);
-        info->user_pixel_stride = picture->channels * (int)sizeof(float);
+        info->user_pixel_stride = channel->stride * (int)sizeof(float);
         info->user_line_stride = picture->width * info->user_pixel_stride;
     }
 }
 
 static exr_result_t rl_write_chunks(exr_context_t context, exr_encode_pipeline_t *pipeline,
                                     const rl_exr_picture *picture) {
-    const size_t row_values = (size_t)picture->width * (size_t)picture->channels;
     int32_t lines;
     exr_result_t result = exr_get_scanlines_per_chunk(context, 0, &lines);
     for (int y = 0; y < picture->height && result == EXR_ERR_SUCCESS; y += lines) {
@@ -89,7 +101,7 @@ static exr_result_t rl_write_chunks(exr_context_t context, exr_encode_pipeline_t
         result = y == 0 ? exr_encoding_initialize(context, 0, &chunk, pipeline)
                         : exr_encoding_update(context, 0, &chunk, pipeline);
         if (result != EXR_ERR_SUCCESS) return result;
-        rl_place(pipeline, picture, picture->pixels + (size_t)y * row_values);
+        rl_place(pipeline, picture, y);
         if (y == 0) result = exr_encoding_choose_default_routines(context, 0, pipeline);
         if (result == EXR_ERR_SUCCESS) result = exr_encoding_run(context, 0, pipeline);
     }

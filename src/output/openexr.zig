@@ -1,11 +1,13 @@
-//! OpenEXR of halves, scan lines compressed by ZIP, by OpenEXRCore and libdeflate.
+//! OpenEXR of halves and floats, scan lines compressed by ZIP, by OpenEXRCore and libdeflate.
 //!
-//! In: rows from the top, of RGB or RGBA floats within the range of halves. Out: the file, the same
-//! bytes on every target. By one thread.
+//! In: rows from the top, of RGB or RGBA floats within the range of halves, and images of further
+//! layers. Out: the file, the same bytes on every target. By one thread.
 
 const std = @import("std");
 const Allocator = std.mem.Allocator;
+const Image = @import("../image.zig").Image;
 const memory_account = @import("../memory_account.zig");
+const settings = @import("../settings.zig");
 const assert = std.debug.assert;
 
 /// Pixels of a row at most: the library counts the bytes of 16 rows in C's int.
@@ -21,12 +23,32 @@ pub const Picture = struct {
     channel_count: u8,
     /// Floats; colours are multiplied by alpha.
     pixels: []align(4) const u8,
+    /// Of the same size, each layer once at most.
+    further: []const Further = &.{},
 };
+
+/// What a file may hold besides the picture.
+pub const Further = struct { layer: settings.Layer, image: *const Image };
+
+/// Channels of a layer, the first ones of its image; albedos and normals are halves.
+fn namesOf(layer: settings.Layer) []const [*:0]const u8 {
+    return switch (layer) {
+        .albedo => &.{ "albedo.R", "albedo.G", "albedo.B" },
+        .normal => &.{ "N.X", "N.Y", "N.Z" },
+        .depth => &.{"Z"},
+        .variance => &.{ "variance.R", "variance.G", "variance.B" },
+    };
+}
+
+/// A picture's, and all that layers may have.
+const channel_count_max = 4 + 3 * std.enums.values(settings.Layer).len;
 
 /// The file; the caller frees it.
 pub fn encode(gpa: Allocator, picture: Picture) error{OutOfMemory}![]u8 {
     assert(picture.width <= width_max and picture.height <= std.math.maxInt(i32));
     assert(picture.channel_count == 3 or picture.channel_count == 4);
+    var channels: [channel_count_max]Channel = undefined;
+    const channel_count = place(&picture, &channels);
     var heap: memory_account.LibraryHeap = .{ .gpa = gpa };
     defer heap.deinit();
     var file: File = .{ .gpa = gpa };
@@ -35,8 +57,8 @@ pub fn encode(gpa: Allocator, picture: Picture) error{OutOfMemory}![]u8 {
     switch (rl_exr_encode(&hooks, &.{
         .width = @intCast(picture.width),
         .height = @intCast(picture.height),
-        .channels = picture.channel_count,
-        .pixels = @ptrCast(picture.pixels.ptr),
+        .channel_count = channel_count,
+        .channels = &channels,
         .sink = File.put,
         .user = &file,
     })) {
@@ -46,6 +68,35 @@ pub fn encode(gpa: Allocator, picture: Picture) error{OutOfMemory}![]u8 {
         .broken => unreachable,
     }
     return file.bytes.toOwnedSlice(gpa);
+}
+
+/// Fills in the channels. Returns how many they are.
+fn place(picture: *const Picture, channels: *[channel_count_max]Channel) u8 {
+    const pixels: [*]const f32 = @ptrCast(picture.pixels.ptr);
+    const names = [_][*:0]const u8{ "R", "G", "B", "A" };
+    for (names[0..picture.channel_count], channels[0..picture.channel_count], 0..) |name, *to, at| {
+        to.* = .{
+            .name = name,
+            .first = pixels + at,
+            .stride = picture.channel_count,
+            .half = true,
+        };
+    }
+    var count = picture.channel_count;
+    for (picture.further) |*further| {
+        const image = further.image;
+        assert(image.width == picture.width and image.height == picture.height);
+        for (namesOf(further.layer), 0..) |name, at| {
+            channels[count] = .{
+                .name = name,
+                .first = @as([*]const f32, @ptrCast(image.pixels.ptr)) + at,
+                .stride = 4,
+                .half = further.layer == .albedo or further.layer == .normal,
+            };
+            count += 1;
+        }
+    }
+    return count;
 }
 
 /// What has been written so far. The table of the rows' places is filled in at the end.
@@ -66,11 +117,19 @@ const File = struct {
 };
 
 /// In the order of openexr.c.
+const Channel = extern struct {
+    name: [*:0]const u8,
+    first: [*]const f32,
+    stride: c_int,
+    half: bool,
+};
+
+/// In the order of openexr.c.
 const LibraryPicture = extern struct {
     width: c_int,
     height: c_int,
-    channels: c_int,
-    pixels: [*]const f32,
+    channel_count: c_int,
+    channels: [*]const Channel,
     sink: *const fn (?*anyopaque, [*]const u8, usize, usize) callconv(.c) bool,
     user: ?*anyopaque,
 };

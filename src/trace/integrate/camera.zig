@@ -41,11 +41,13 @@ pub inline fn pixels(
     group: usize,
 ) [2]Kernel.Rays.F32 {
     const F32 = Kernel.Rays.F32;
-    const first_column: f32 = @floatFromInt(rectangle.x0 + Kernel.pixelX(group, 0));
-    const first_row: f32 = @floatFromInt(rectangle.y0 + Kernel.pixelY(group, 0));
+    const step = rectangle.step;
+    const first_column: f32 = @floatFromInt(rectangle.x0 + step * Kernel.pixelX(group, 0));
+    const first_row: f32 = @floatFromInt(rectangle.y0 + step * Kernel.pixelY(group, 0));
+    const apart: F32 = .splat(@floatFromInt(step));
     return .{
-        F32.fromArray(Kernel.lane_x).add(.splat(first_column)),
-        F32.fromArray(Kernel.lane_y).add(.splat(first_row)),
+        F32.fromArray(Kernel.lane_x).mul(apart).add(.splat(first_column)),
+        F32.fromArray(Kernel.lane_y).mul(apart).add(.splat(first_row)),
     };
 }
 
@@ -69,8 +71,8 @@ pub fn expose(
         const blue = light.z.toArray();
         const fourth = share.toArray();
         for (0..Kernel.ray_count) |lane| {
-            const x = rectangle.x0 + Kernel.pixelX(group, lane);
-            const y = rectangle.y0 + Kernel.pixelY(group, lane);
+            const x = rectangle.x0 + rectangle.step * Kernel.pixelX(group, lane);
+            const y = rectangle.y0 + rectangle.step * Kernel.pixelY(group, lane);
             if (x >= rectangle.x1 or y >= rectangle.y1) continue;
             const value = .{ red[lane], green[lane], blue[lane], fourth[lane] };
             if (layer == .color)
@@ -140,8 +142,9 @@ pub fn grid(view: *const world_file.View, rectangle: Rectangle, offset: Offset) 
     if (camera.orthographic) return null;
     const width: f32 = @floatFromInt(view.width);
     const height: f32 = @floatFromInt(view.height);
-    const right = vec3.scale(camera.right, 2 / width);
-    const down = vec3.scale(camera.up, -2 / height);
+    const step: f32 = @floatFromInt(rectangle.step);
+    const right = vec3.scale(camera.right, 2 * step / width);
+    const down = vec3.scale(camera.up, -2 * step / height);
     const x = @as(f32, @floatFromInt(rectangle.x0)) + offset.x;
     const y = @as(f32, @floatFromInt(rectangle.y0)) + offset.y;
     const start = generate(ray_file.Single, view, .splat(x), .splat(y));
@@ -158,7 +161,7 @@ pub fn grid(view: *const world_file.View, rectangle: Rectangle, offset: Offset) 
         .right = right,
         .down = down,
         // `generate` rounds x and y 3 times, their products and two sums once; `start` as well,
-        // and steps of up to a tile are as many again.
+        // and steps within the picture are as many again.
         .deviation_ulps = 12 * extent,
     };
 }

@@ -235,14 +235,14 @@ fn addShadow(
 }
 
 /// Points that light from a direction can reach from in front.
-inline fn isFacing(comptime Lanes: type, point: anytype, to_light: Lanes.Vec3) Lanes.Mask {
+pub inline fn isFacing(comptime Lanes: type, point: anytype, to_light: Lanes.Vec3) Lanes.Mask {
     const zero: Lanes.F32 = .zero();
     return point.normal.dot(to_light).gt(zero)
         .bitAnd(point.normal_geometric.dot(to_light).gt(zero));
 }
 
 /// What the points of a group get of the lights.
-fn ReceiverOf(comptime Lanes: type) type {
+pub fn ReceiverOf(comptime Lanes: type) type {
     const F32 = Lanes.F32;
     const Vec3 = Lanes.Vec3;
     return struct {
@@ -288,18 +288,10 @@ fn ReceiverOf(comptime Lanes: type) type {
             vertex: *const path_file.Vertex(Lanes),
             all: []const EnvironmentLight,
         ) void {
+            receiver.start(vertex);
             const point = &vertex.point;
-            receiver.lit = vertex.seen.andNot(point.material.unlit);
-            const alpha = point.material.roughness.mul(point.material.roughness);
-            receiver.lobe = environment_layers
-                .dominant(Lanes, point.normal, bsdf_file.reflect(Lanes, point), alpha);
-            const squared = alpha.mul(alpha).max(.splat(environment_layers.lobe_alpha_squared_min));
-            receiver.alpha_term = squared.sub(.splat(1));
-            receiver.whole = .zero;
-            receiver.hidden = .zero;
             const white: Vec3 = .splat(.{ 1, 1, 1 });
             const none: Vec3 = .splat(.{ 0, 0, 0 });
-            if (vertex.bsdf.layered) receiver.further.start(vertex);
             for (all) |*light| {
                 const facing = isFacing(Lanes, point, .splat(light.to_light));
                 const share: Vec3 = .select(facing, white, none);
@@ -312,6 +304,20 @@ fn ReceiverOf(comptime Lanes: type) type {
                 const back: Vec3 = .select(behind, white, none);
                 further.addLight(&further.whole, vertex, light, share, back);
             }
+        }
+
+        /// Points without light.
+        pub inline fn start(receiver: *Self, vertex: *const path_file.Vertex(Lanes)) void {
+            const point = &vertex.point;
+            receiver.lit = vertex.seen.andNot(point.material.unlit);
+            const alpha = point.material.roughness.mul(point.material.roughness);
+            receiver.lobe = environment_layers
+                .dominant(Lanes, point.normal, bsdf_file.reflect(Lanes, point), alpha);
+            const squared = alpha.mul(alpha).max(.splat(environment_layers.lobe_alpha_squared_min));
+            receiver.alpha_term = squared.sub(.splat(1));
+            receiver.whole = .zero;
+            receiver.hidden = .zero;
+            if (vertex.bsdf.layered) receiver.further.start(vertex);
         }
 
         /// Adds some of what a light gives.
@@ -342,7 +348,7 @@ fn ReceiverOf(comptime Lanes: type) type {
         }
 
         /// Radiance towards the view for the light that arrives.
-        fn scatter(
+        pub fn scatter(
             receiver: *const Self,
             environment: *const world_file.Environment,
             mean: [3]f32,
@@ -382,11 +388,20 @@ fn ReceiverOf(comptime Lanes: type) type {
                     .add(tail.sub(smooth.mul(counted)));
                 sum = sum.add(.select(untraced, seen, .splat(.{ 0, 0, 0 })));
             }
-            if (!is_end) return sum;
-            const refraction = bsdf.mirror.refraction;
-            const through = environment_file
-                .radiance(Lanes, environment, refraction, roughness, .zero(), receiver.lit);
-            return sum.add(bsdf.mirror.transmitted.mul(through));
+            return if (is_end) sum.add(receiver.through(environment, vertex)) else sum;
+        }
+
+        /// The same of what comes through where paths end.
+        pub inline fn through(
+            receiver: *const Self,
+            environment: *const world_file.Environment,
+            vertex: *const path_file.Vertex(Lanes),
+        ) Vec3 {
+            const mirror = &vertex.bsdf.mirror;
+            const roughness = vertex.point.material.roughness;
+            const seen = environment_file
+                .radiance(Lanes, environment, mirror.refraction, roughness, .zero(), receiver.lit);
+            return mirror.transmitted.mul(seen);
         }
 
         /// Radiance of what hides the sky, as a share of the mean, where it is white: it sees the

@@ -66,7 +66,7 @@ pub const EnvironmentLights = struct {
             lights.set_count -= 1;
         }
         for (map.sources[0..lights.source_count], 0..) |*source, index| {
-            lights.buffer[index] = lightOf(environment, source.direction, source.energy, 1);
+            lights.buffer[index] = ofSource(environment, source);
             lights.mean = vec3.add(lights.mean, lights.buffer[index].irradiance);
         }
         const piece_count = lights.set_count * lights.set_size;
@@ -74,12 +74,8 @@ pub const EnvironmentLights = struct {
             const set = piece % lights.set_count;
             const uses = (sample_count - set - 1) / lights.set_count + 1;
             const weight = @as(f32, @floatFromInt(sample_count)) / @as(f32, @floatFromInt(uses));
-            const cut = cutOf(map.parts, piece, piece_count);
-            var direction: Vec3 = .{ 0, 1, 0 };
-            if (vec3.normalize(narrow(cut.moment))) |unit| direction = unit;
             const at = lights.indexOf(set, piece / lights.set_count);
-            lights.buffer[at] = lightOf(environment, direction, narrow(cut.energy), weight);
-            lights.buffer[at].solid_angle = @floatCast(cut.solid_angle);
+            lights.buffer[at] = pieceOf(environment, piece, piece_count, weight);
             lights.mean = vec3.add(lights.mean, lights.buffer[at].irradiance);
         }
         // Over a sphere of 4 pi, not pi.
@@ -109,6 +105,29 @@ pub const EnvironmentLights = struct {
         };
     }
 };
+
+/// One that stands for a small strong source.
+pub fn ofSource(
+    environment: *const Environment,
+    source: *const world_file.EnvironmentSource,
+) EnvironmentLight {
+    return lightOf(environment, source.direction, source.energy, 1);
+}
+
+/// One of so many that have as much luminance each, and all of the map's light but the sources'.
+pub fn pieceOf(
+    environment: *const Environment,
+    piece: usize,
+    count: usize,
+    weight: f32,
+) EnvironmentLight {
+    const cut = cutOf(environment.map.?.parts, piece, count);
+    var direction: Vec3 = .{ 0, 1, 0 };
+    if (vec3.normalize(narrow(cut.moment))) |unit| direction = unit;
+    var light = lightOf(environment, direction, narrow(cut.energy), weight);
+    light.solid_angle = @floatCast(cut.solid_angle);
+    return light;
+}
 
 fn lightOf(
     environment: *const Environment,

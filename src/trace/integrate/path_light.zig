@@ -45,10 +45,11 @@ pub noinline fn addLight(
     const there = lanes.bitAnd(light.pdf.gt(.zero()));
     if (there.none()) return;
     const found = step.scattering.eval(light.to_light);
+    const value = step.scattering.evalPoint(light.to_light, light.is_delta, found.value);
     const weight = heuristic(Rays, light.pdf, found.pdf);
     const share = F32.select(light.is_delta, .splat(1), weight)
         .div(light.pdf.max(.splat(std.math.floatMin(f32))));
-    const worth = step.throughput.mul(found.value).mul(light.radiance).scale(share);
+    const worth = step.throughput.mul(value).mul(light.radiance).scale(share);
     const largest = worth.x.max(worth.y).max(worth.z);
     const lit = there.bitAnd(largest.gt(.zero()))
         .bitAnd(largest.lt(.splat(std.math.inf(f32))));
@@ -189,8 +190,8 @@ pub noinline fn fromSurface(
     if (shines.none()) return none;
     const shared = shines.bitAnd(step.scatter_pdf.gt(.zero()));
     var share: F32 = .splat(1);
-    // Lights that are chosen have no coat.
-    if (bsdf.layered) share = .select(shared, share, bsdf.coating.below_coat);
+    // None of what shines below a coat is chosen.
+    if (bsdf.layered) share = bsdf.coating.below_coat;
     if (step.frame.light_sampler == null or shared.none()) return emissive.scale(share);
     const receiver = step.receiver();
     const way = point.position.sub(receiver.position);
@@ -205,5 +206,5 @@ pub noinline fn fromSurface(
         shared,
     );
     const weight = heuristic(Rays, step.scatter_pdf, other);
-    return emissive.scale(.select(shared, weight, share));
+    return emissive.scale(share.mul(F32.select(shared, weight, .splat(1))));
 }

@@ -15,6 +15,8 @@
 //!     init(gpa, frame, settings), deinit(gpa)   *I, one a thread
 //!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it
 //!     counts()                                  of all its passes, `Counts`
+//!     tile_step                                 tiles' sides are multiples of it; none: of 1
+//!     Shared                                    what all threads' have in common; none, void: nothing
 //!
 //! which is compiled in an object of its own: `Integrator` is what its kernel shows of it.
 
@@ -36,6 +38,7 @@ const Rectangle = film_file.Rectangle;
 pub const Settings = struct {
     pool: *parallel.Pool,
     integrator: choices.Integrator = .whitted,
+    lights: choices.Lights = .{},
     /// Samples a pixel, at least 1; those of integrators that are open may not depend on it, which
     /// find `open_sample_count` here.
     sample_count: u32 = choices.sample_count.default,
@@ -56,6 +59,8 @@ pub const Settings = struct {
     noise: ?adaptive.Noise = null,
     /// Null: all samples in one round.
     course: ?Course = null,
+    /// The integrator's `Shared`: `render` fills it in.
+    shared: ?*anyopaque = null,
 
     fn isCancelled(settings: *const Settings) bool {
         return if (settings.cancel) |cancel| cancel.load(.monotonic) else false;
@@ -87,7 +92,9 @@ pub const Standing = struct {
     pub fn copyTo(standing: *const Standing, film: *Film) parallel.Error!void {
         const job = standing.job;
         const copy: Copy = .{ .job = job, .film = film };
-        return job.settings.pool.forEach(job.tiles.count, &copy, Copy.tile);
+        try job.settings.pool.forEach(job.tiles.count, &copy, Copy.tile);
+        const shared = job.integrator.shared orelse return;
+        _ = job.doSteps(shared.steps_before, shared.step_count, film);
     }
 
     const Copy = struct {
@@ -136,6 +143,8 @@ pub const Integrator = extern struct {
     pass: *const fn (*anyopaque, *const Rectangle, u32, u32, *Film) callconv(.c) void,
     counts: *const fn (integrator: *const anyopaque, counts: *Counts) callconv(.c) void,
     counts_tests: bool,
+    tile_step: u32,
+    shared: ?*const Shared,
 
     /// Of the type I.
     pub fn of(comptime I: type) Integrator {
@@ -185,6 +194,70 @@ pub const Integrator = extern struct {
             .pass = erased.pass,
             .counts = erased.counts,
             .counts_tests = I.counts_tests,
+            .tile_step = if (@hasDecl(I, "tile_step")) I.tile_step else 1,
+            .shared = if (@hasDecl(I, "Shared") and I.Shared != void) &Shared.of(I) else null,
+        };
+    }
+};
+
+/// What the integrators of all threads have in common, behind pointers. Its work comes in steps,
+/// some before the tiles and the rest after them, each of which is cut into pieces that threads
+/// take in any order. A type I.Shared has
+///
+///     steps_before, step_count
+///     init(gpa, frame, settings), deinit(gpa)
+///     pieces(step)                              how many
+///     work(integrator, step, piece, film)       returns how many pixels it made black
+///
+/// The steps after the tiles do nothing but change the film, which may be a copy.
+const Shared = extern struct {
+    init: *const fn (*const Allocator, *const Frame, *const Settings) callconv(.c) ?*anyopaque,
+    deinit: *const fn (shared: *anyopaque, gpa: *const Allocator) callconv(.c) void,
+    pieces: *const fn (shared: *const anyopaque, step: u32) callconv(.c) u32,
+    work: *const fn (*anyopaque, *anyopaque, u32, u32, *Film) callconv(.c) u64,
+    steps_before: u32,
+    step_count: u32,
+
+    fn of(comptime I: type) Shared {
+        const erased = struct {
+            fn init(
+                gpa: *const Allocator,
+                frame: *const Frame,
+                settings: *const Settings,
+            ) callconv(.c) ?*anyopaque {
+                return I.Shared.init(gpa.*, frame, settings) catch null;
+            }
+
+            fn deinit(shared: *anyopaque, gpa: *const Allocator) callconv(.c) void {
+                ofErased(shared).deinit(gpa.*);
+            }
+
+            fn pieces(shared: *const anyopaque, step: u32) callconv(.c) u32 {
+                return ofErased(@constCast(shared)).pieces(step);
+            }
+
+            fn work(
+                shared: *anyopaque,
+                integrator: *anyopaque,
+                step: u32,
+                piece: u32,
+                film: *Film,
+            ) callconv(.c) u64 {
+                const one: *I = @ptrCast(@alignCast(integrator));
+                return ofErased(shared).work(one, step, piece, film);
+            }
+
+            fn ofErased(shared: *anyopaque) *I.Shared {
+                return @ptrCast(@alignCast(shared));
+            }
+        };
+        return .{
+            .init = erased.init,
+            .deinit = erased.deinit,
+            .pieces = erased.pieces,
+            .work = erased.work,
+            .steps_before = I.Shared.steps_before,
+            .step_count = I.Shared.step_count,
         };
     }
 };
@@ -196,16 +269,22 @@ pub fn render(
     gpa: Allocator,
     frame: *const Frame,
     film: *Film,
-    settings: *const Settings,
+    chosen: *const Settings,
 ) Error!Statistics {
-    const offsets = try gpa.alloc(sampler.Offset, settings.sample_count);
+    const offsets = try gpa.alloc(sampler.Offset, chosen.sample_count);
     defer gpa.free(offsets);
+    var with_tiles = chosen.*;
+    with_tiles.tile_size = @divCeil(chosen.tile_size, integrator.tile_step) * integrator.tile_step;
+    const settings = &with_tiles;
     var shown = settings.*;
     shown.offsets = offsets;
     if (settings.integrator.isOpen()) {
         sampler.placeInSequence(offsets);
         shown.sample_count = open_sample_count;
     } else sampler.place(offsets);
+    if (integrator.shared) |shared|
+        shown.shared = shared.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
+    defer if (integrator.shared) |shared| shared.deinit(shown.shared.?, &gpa);
     const image = &film.image;
     var blocks: ?adaptive.Blocks = null;
     defer if (blocks) |*all| all.deinit(gpa);
@@ -220,10 +299,11 @@ pub fn render(
     var by_thread: [parallel.thread_count_max]*anyopaque = undefined;
     var job: Job = .{
         .settings = settings,
+        .shared = shown.shared,
         .tiles = &tiles,
         .blocks = if (blocks) |*all| all else null,
         .film = film,
-        .pass = integrator.pass,
+        .integrator = integrator,
         .by_thread = by_thread[0..0],
     };
     defer for (job.by_thread) |one| integrator.deinit(one, &gpa);
@@ -234,11 +314,14 @@ pub fn render(
         };
         job.by_thread = by_thread[0 .. job.by_thread.len + 1];
     }
+    if (integrator.shared) |shared| _ = job.doSteps(0, shared.steps_before, film);
     const is_whole = job.run();
     if (settings.isCancelled()) return error.Canceled;
     var total = try settings.pool
         .reduce(Statistics, .{}, Job.add, tiles.count, &job, Job.finishTile);
     total.is_partial = !is_whole;
+    if (integrator.shared) |shared|
+        total.non_finite_count += job.doSteps(shared.steps_before, shared.step_count, film);
     var tests: statistics.TestCounts = .{};
     for (job.by_thread) |one| {
         var counts: Counts = undefined;
@@ -256,8 +339,46 @@ const Job = struct {
     tiles: *Tiles,
     blocks: ?*adaptive.Blocks,
     film: *Film,
-    pass: @FieldType(Integrator, "pass"),
+    integrator: *const Integrator,
+    /// See `Settings.shared`.
+    shared: ?*anyopaque,
     by_thread: []const *anyopaque,
+
+    /// Work that is shared, from one step to before another. Returns how many pixels were made
+    /// black.
+    fn doSteps(job: *const Job, first: u32, end: u32, film: *Film) u64 {
+        var steps: Steps = .{ .job = job, .film = film };
+        for (first..end) |step| {
+            steps.step = @intCast(step);
+            steps.piece_count = job.integrator.shared.?.pieces(job.shared.?, steps.step);
+            steps.next.store(0, .monotonic);
+            const thread_count = @min(job.by_thread.len, steps.piece_count);
+            if (thread_count > 0) job.settings.pool.share(thread_count, &steps, Steps.work);
+        }
+        return steps.non_finite_count.load(.monotonic);
+    }
+
+    const Steps = struct {
+        job: *const Job,
+        film: *Film,
+        /// Under way.
+        step: u32 = 0,
+        piece_count: u32 = 0,
+        next: std.atomic.Value(u32) = .init(0),
+        non_finite_count: std.atomic.Value(usize) = .init(0),
+
+        fn work(steps: *Steps, thread_index: usize) void {
+            const job = steps.job;
+            const shared = job.integrator.shared.?;
+            while (!job.settings.isCancelled()) {
+                const piece = steps.next.fetchAdd(1, .monotonic);
+                if (piece >= steps.piece_count) return;
+                const one = job.by_thread[thread_index];
+                const count = shared.work(job.shared.?, one, steps.step, piece, steps.film);
+                if (count > 0) _ = steps.non_finite_count.fetchAdd(@intCast(count), .monotonic);
+            }
+        }
+    };
 
     /// All rounds; false: the work was ended before.
     fn run(job: *Job) bool {
@@ -309,10 +430,10 @@ const Job = struct {
         if (job.blocks) |blocks| {
             var all = blocks.of(tile);
             while (all.nextActive()) |active| {
-                job.pass(integrator, &active, done, sample_count, job.film);
+                job.integrator.pass(integrator, &active, done, sample_count, job.film);
             }
             blocks.judge(tile, job.film, done + sample_count);
-        } else job.pass(integrator, &tile, done, sample_count, job.film);
+        } else job.integrator.pass(integrator, &tile, done, sample_count, job.film);
         state.samples_done = done + sample_count;
     }
 

@@ -3,10 +3,11 @@
 //! In: receivers, numbers in 0..1. Out: a direction, what arrives along it with nothing in the way,
 //! and the density. What light comes from is chosen by estimates of its irradiance at the receiver:
 //! the mean of the environment, all directional lights, the most that the tree's lights may give
-//! (`light_tree.zig`); each that is there has a tenth of the whole besides, so that none that is
-//! estimated low becomes rare. Environments are sampled by radiance (`environment_sampling.zig`),
-//! triangles evenly by area. For multiple importance sampling (Veach and Guibas 1995) the densities
-//! are there for directions from elsewhere as well, the same to the bit.
+//! (`light_tree.zig`); each that is there has a sixteenth of the whole besides, so that none that
+//! is estimated low becomes rare. Environments are sampled by radiance
+//! (`environment_sampling.zig`), triangles evenly by area. For multiple importance sampling (Veach
+//! and Guibas 1995) the densities are there for directions from elsewhere as well, the same to the
+//! bit.
 
 const std = @import("std");
 const simd = @import("../../simd.zig");
@@ -26,7 +27,7 @@ const Unique = @import("unique.zig").Unique;
 pub const no_primitive: i32 = -1;
 
 /// Of the estimates' sum, what each kind of light that is there counts besides.
-const share_least = 0.1;
+const share_least = 1.0 / 16.0;
 /// The largest number below 1.
 const below_one = 0x1.fffffep-1;
 

@@ -20,18 +20,34 @@ pub fn sharpen(
     point: *const Interaction(Lanes),
     bsdf: *bsdf_file.Bsdf(Lanes),
 ) void {
-    bsdf.alpha = alphaOf(Lanes, point.material.roughness);
-    bsdf.smith_view = microfacet.smith(Lanes, bsdf.cos_view, bsdf.alpha.mul(bsdf.alpha));
-    if (!bsdf.layered) return;
-    bsdf.stretch.alpha_least = sharp_alpha_least;
-    const coating = &bsdf.coating;
-    coating.alpha = alphaOf(Lanes, coating.roughness);
-    const squared = coating.alpha.mul(coating.alpha);
-    coating.smith_view = microfacet.smith(Lanes, coating.cos_view, squared);
+    setRoughness(Lanes, point, bsdf, sharp_alpha_least);
 }
 
-inline fn alphaOf(comptime Lanes: type, roughness: Lanes.F32) Lanes.F32 {
-    return roughness.mul(roughness).max(.splat(sharp_alpha_least));
+/// Gives them that of highlights again.
+pub fn widen(
+    comptime Lanes: type,
+    point: *const Interaction(Lanes),
+    bsdf: *bsdf_file.Bsdf(Lanes),
+) void {
+    const least = bsdf_file.highlight_roughness_least;
+    setRoughness(Lanes, point, bsdf, least * least);
+}
+
+inline fn setRoughness(
+    comptime Lanes: type,
+    point: *const Interaction(Lanes),
+    bsdf: *bsdf_file.Bsdf(Lanes),
+    least: f32,
+) void {
+    const rough = point.material.roughness;
+    bsdf.alpha = rough.mul(rough).max(.splat(least));
+    bsdf.smith_view = microfacet.smith(Lanes, bsdf.cos_view, bsdf.alpha.mul(bsdf.alpha));
+    if (!bsdf.layered) return;
+    bsdf.stretch.alpha_least = least;
+    const coating = &bsdf.coating;
+    coating.alpha = coating.roughness.mul(coating.roughness).max(.splat(least));
+    const squared = coating.alpha.mul(coating.alpha);
+    coating.smith_view = microfacet.smith(Lanes, coating.cos_view, squared);
 }
 
 /// Lanes whose lobe of this roughness is one direction.
@@ -116,6 +132,18 @@ pub inline fn imageOf(
     const half = microfacet.visibleNormalOf(Lanes, view, alphas, disc);
     const twice = view.dot(half).mul(.splat(2));
     return half.scale(twice).sub(view);
+}
+
+/// Direction of the hemisphere for a point of the disc, uniform as that is: Lambert's equal-area
+/// projection.
+pub inline fn evenOf(comptime Lanes: type, disc: [2]Lanes.F32) Lanes.Vec3 {
+    const squared = disc[0].mul(disc[0]).add(disc[1].mul(disc[1])).min(.splat(1));
+    const wide = Lanes.F32.splat(2).sub(squared).sqrt();
+    return .{
+        .x = disc[0].mul(wide),
+        .y = disc[1].mul(wide),
+        .z = Lanes.F32.splat(1).sub(squared),
+    };
 }
 
 /// Out of the frame, as a unit vector.

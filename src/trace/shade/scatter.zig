@@ -103,6 +103,28 @@ fn Shares(comptime Lanes: type) type {
     };
 }
 
+/// A direction, a lobe at a time.
+fn Chosen(comptime Lanes: type) type {
+    const Vec3 = Lanes.Vec3;
+    const Mask = Lanes.Mask;
+    return struct {
+        to_light: Vec3,
+        /// Lanes in no lobe that `Scatter.eval` has, and what they are worth.
+        alone: Mask,
+        weight: Vec3,
+
+        inline fn put(chosen: *@This(), lanes: Mask, to_light: Vec3) void {
+            chosen.to_light = .select(lanes, to_light, chosen.to_light);
+        }
+
+        inline fn putAlone(chosen: *@This(), lanes: Mask, weight: Vec3, odds: Lanes.F32) void {
+            const inverse = Lanes.F32.splat(1).div(odds.max(.splat(1e-12)));
+            chosen.alone = chosen.alone.bitOr(lanes);
+            chosen.weight = .select(lanes, weight.scale(inverse), chosen.weight);
+        }
+    };
+}
+
 /// Surfaces at points.
 pub fn Scatter(comptime Lanes: type) type {
     const F32 = Lanes.F32;
@@ -116,6 +138,10 @@ pub fn Scatter(comptime Lanes: type) type {
         /// Lanes whose specular lobe, and whose coat's, is a direction.
         sharp: Mask,
         coat_sharp: Mask,
+        /// Lanes with a lobe narrower than highlights of light without size are, and what was taken
+        /// out of the BSDF.
+        narrow: Mask,
+        taken: struct { f0: Vec3, f90: F32, multiple: Vec3, coat_weight: F32 },
         passing: Passing(Lanes),
         shares: Shares(Lanes),
 
@@ -144,9 +170,18 @@ pub fn Scatter(comptime Lanes: type) type {
             const passing = &scatter.passing;
             passing.become(point, bsdf, layers, worth);
             scatter.sharp = sampling.isSharp(Lanes, material.roughness);
+            const least: F32 = .splat(bsdf_file.highlight_roughness_least);
+            scatter.narrow = material.roughness.lt(least);
+            scatter.taken.f0 = bsdf.f0;
+            scatter.taken.f90 = bsdf.f90;
+            scatter.taken.multiple = bsdf.multiple;
             if (bsdf.layered) {
                 scatter.sharp = scatter.sharp.andNot(bsdf.stretch.lanes);
                 const coating = &bsdf.coating;
+                const has_coat = coating.weight.gt(.zero());
+                scatter.narrow = scatter.narrow
+                    .bitOr(has_coat.bitAnd(coating.roughness.lt(least)));
+                scatter.taken.coat_weight = coating.weight;
                 scatter.coat_sharp = sampling.isSharp(Lanes, coating.roughness);
                 coating.weight = .select(scatter.coat_sharp, .zero(), coating.weight);
             }
@@ -166,7 +201,7 @@ pub fn Scatter(comptime Lanes: type) type {
         /// becomes of light at a boundary.
         pub noinline fn sample(scatter: *const Self, numbers: [4]F32) Sample(Lanes) {
             const point = scatter.point;
-            var chosen: Chosen = .{
+            var chosen: Chosen(Lanes) = .{
                 .to_light = undefined,
                 .alone = .splat(false),
                 .weight = none,
@@ -195,25 +230,8 @@ pub fn Scatter(comptime Lanes: type) type {
             };
         }
 
-        const Chosen = struct {
-            to_light: Vec3,
-            /// Lanes in no lobe that `eval` has, and what they are worth.
-            alone: Mask,
-            weight: Vec3,
-
-            inline fn put(chosen: *Chosen, lanes: Mask, to_light: Vec3) void {
-                chosen.to_light = .select(lanes, to_light, chosen.to_light);
-            }
-
-            inline fn putAlone(chosen: *Chosen, lanes: Mask, weight: Vec3, odds: F32) void {
-                const inverse = F32.splat(1).div(odds.max(.splat(1e-12)));
-                chosen.alone = chosen.alone.bitOr(lanes);
-                chosen.weight = .select(lanes, weight.scale(inverse), chosen.weight);
-            }
-        };
-
         /// The specular lobe, else the cosine's.
-        fn sampleBase(scatter: *const Self, numbers: [4]F32, chosen: *Chosen) void {
+        fn sampleBase(scatter: *const Self, numbers: [4]F32, chosen: *Chosen(Lanes)) void {
             const point = scatter.point;
             const bsdf = scatter.bsdf;
             const disc = microfacet.disc(Lanes, .{ numbers[1], numbers[2] });
@@ -239,7 +257,7 @@ pub fn Scatter(comptime Lanes: type) type {
         noinline fn sampleLayers(
             scatter: *const Self,
             numbers: [4]F32,
-            chosen: *Chosen,
+            chosen: *Chosen(Lanes),
         ) void {
             const point = scatter.point;
             const coating = &scatter.bsdf.coating;
@@ -260,13 +278,7 @@ pub fn Scatter(comptime Lanes: type) type {
             chosen.put(sharp, bsdf_file.mirrored(Lanes, point, coating.normal));
             const coat = coating.albedo;
             chosen.putAlone(sharp, .{ .x = coat, .y = coat, .z = coat }, shares.coat);
-            // Lambert's equal-area projection of the hemisphere.
-            const wide = F32.splat(2).sub(squared).sqrt();
-            const even: Vec3 = .{
-                .x = disc[0].mul(wide),
-                .y = disc[1].mul(wide),
-                .z = F32.splat(1).sub(squared),
-            };
+            const even = sampling.evenOf(Lanes, disc);
             const on_fibres = number.ge(to_coat).bitAnd(number.lt(to_sheen));
             chosen.put(on_fibres, sampling.turn(Lanes, across, point.normal, even));
             const below: Vec3 = .{
@@ -278,7 +290,7 @@ pub fn Scatter(comptime Lanes: type) type {
             chosen.put(is_behind, sampling.turn(Lanes, across, point.normal, below));
         }
 
-        fn sampleThrough(scatter: *const Self, numbers: [4]F32, chosen: *Chosen) void {
+        fn sampleThrough(scatter: *const Self, numbers: [4]F32, chosen: *Chosen(Lanes)) void {
             const shares = &scatter.shares;
             const from = shares.specular.add(shares.coat).add(shares.sheen).add(shares.behind);
             const lanes = numbers[0].ge(from).bitAnd(numbers[0].lt(from.add(shares.through)));
@@ -315,6 +327,30 @@ pub fn Scatter(comptime Lanes: type) type {
             seen.value = seen.value.add(through.value);
             seen.pdf = seen.pdf.add(through.pdf.mul(shares.through));
             return seen;
+        }
+
+        /// The value of `eval` in `lanes` where light has no size: no sample meets it, and narrow
+        /// lobes show it as highlights as wide as they are for other integrators
+        /// (`bsdf.highlight_roughness_least`). Elsewhere `value`.
+        pub noinline fn evalPoint(
+            scatter: *const Self,
+            to_light: Vec3,
+            lanes: Mask,
+            value: Vec3,
+        ) Vec3 {
+            const point = scatter.point;
+            const front = point.normal_geometric.dot(to_light).gt(.zero());
+            const narrow = lanes.bitAnd(scatter.narrow).bitAnd(front);
+            if (narrow.none()) return value;
+            const taken = &scatter.taken;
+            var wide = scatter.bsdf.*;
+            wide.f0 = .select(scatter.sharp, taken.f0, wide.f0);
+            wide.f90 = .select(scatter.sharp, taken.f90, wide.f90);
+            wide.multiple = .select(scatter.sharp, taken.multiple, wide.multiple);
+            if (wide.layered) wide.coating.weight = taken.coat_weight;
+            sampling.widen(Lanes, point, &wide);
+            const lobes = wide.evalLobes(point, to_light);
+            return .select(narrow, lobes.diffuse.add(lobes.specular), value);
         }
 
         fn addLayers(
@@ -595,15 +631,14 @@ const Distributed = struct {
 test "samples have their density, by chi-squared" {
     const some = [_]Change{
         .{
-            .metallic = 0.5,
-            .roughness = 0.6,
+            .metallic = 0.3,
             .sheen = 1,
             .anisotropy = 0.6,
             .coat = 1,
+            .transmission = 0.5,
             .diffuse_transmission = 0.5,
         },
-        .{ .roughness = 0.7, .transmission = 1, .eta = 1.5, .cosine = 0.6, .is_layered = false },
-        .{ .roughness = 0.8, .transmission = 0.8, .eta = 1.0 / 1.5, .dispersion = 5, .sheen = 1 },
+        .{ .transmission = 1, .eta = 1.5, .cosine = 0.6, .dispersion = 5, .sheen = 0.5 },
     };
     var surface: Surface(Single) = undefined;
     for (some) |change| {
@@ -769,5 +804,31 @@ test "every lane has the bits that its surface has alone" {
                 try std.testing.expectEqual(one.crosses.lane(0), all.crosses.lane(lane));
             }
         }
+    }
+}
+
+test "light without size has the highlights of narrow lobes that other integrators give it" {
+    var surface: Surface(Single) = undefined;
+    const way = [3]f32{ 0.6, 0.0, -0.8 };
+    for ([_]Change{
+        .{ .roughness = 0, .metallic = 1, .is_layered = false },
+        .{ .roughness = 0.04, .coat = 1, .coat_roughness = 0 },
+        .{ .roughness = 0.3, .anisotropy = 0.5 },
+    }) |change| {
+        surface.become(.{change});
+        const seen = surface.eval(way).value;
+        const none = surface.scatter.evalPoint(.splat(way), .splat(false), seen).lane(0);
+        try std.testing.expectEqual(seen.lane(0), none);
+        const found = surface.scatter.evalPoint(.splat(way), .splat(true), seen).lane(0);
+        var fresh: Bsdf(Single) = undefined;
+        fresh.albedo = .unknown;
+        if (change.is_layered)
+            fresh.becomeLayered(&surface.point, &surface.layers)
+        else
+            fresh.become(&surface.point);
+        const wanted = fresh.eval(&surface.point, .splat(way)).lane(0);
+        for (wanted, found) |a, b| try std.testing.expectApproxEqRel(a, b, 1e-6);
+        try std.testing.expect(found[0] > 0);
+        try std.testing.expectEqual(change.roughness < 0.05, found[0] != seen.x.lane(0));
     }
 }

@@ -1,0 +1,396 @@
+//! Instant radiosity in beams (Keller 1997; Wald et al. 2002, "Interactive Global Illumination using
+//! Fast Ray Tracing"): all light that has bounced diffusely comes from virtual point lights.
+//!
+//! In: the frame, a bundle's place in the picture. Out: samples on the film, see `ray_tree.zig`.
+//! Before the picture light paths are traced and virtual lights chosen (`light_paths.zig`,
+//! `virtual_lights.zig`); the sky is as many directional lights as all samples have. Each pixel of
+//! any 3x3 has a ninth of a sample's, and after the picture gets what its neighbours found
+//! (`interleave.zig`). So that shadow rays still are beams, a bundle's pixels are every third. The
+//! lights are the same for all pixels, so there is no noise, and nothing depends on threads. The
+//! scene's own lights, mirrors and glass are as Whitted has them.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const dispatch = @import("../traverse/dispatch.zig");
+const environment_file = @import("environment.zig");
+const environment_lights = @import("environment_lights.zig");
+const emission = @import("light_emission.zig");
+const interleave = @import("interleave.zig");
+const interleaved_light = @import("interleaved_light.zig");
+const light_paths = @import("light_paths.zig");
+const tiles = @import("tiles.zig");
+const virtual_lights = @import("virtual_lights.zig");
+const Candidate = virtual_lights.Candidate;
+const EnvironmentLight = environment_lights.EnvironmentLight;
+const EnvironmentLights = environment_lights.EnvironmentLights;
+const Film = @import("../../film.zig").Film;
+const Frame = world_file.Frame;
+const Layers = interleave.Layers;
+const RayTree = @import("ray_tree.zig").RayTree;
+const Rectangle = @import("../../film.zig").Rectangle;
+
+/// Paths that lights are looked for by.
+const path_count_max = 1 << 15;
+/// Candidates that are weighed.
+const weighed_max = 1 << 14;
+/// Rows that are filtered at once.
+const band_rows = 8;
+
+/// One thread's integrator.
+pub fn InstantRadiosity(comptime Kernel: type) type {
+    return RayTree(Kernel, Lighting(Kernel));
+}
+
+/// A part of a sample's lights at every vertex.
+fn Lighting(comptime Kernel: type) type {
+    const Rays = Kernel.Rays;
+    const Vec3 = Rays.Vec3;
+    const group_count = Kernel.group_count;
+    return struct {
+        shared: *Shared,
+        /// Of the bundle's pixels.
+        part: usize,
+        light: interleaved_light.InterleavedLight(Kernel),
+        /// Where primary rays see something, and how it lies.
+        guided: [group_count]Rays.Mask,
+        normal: [group_count]Vec3,
+        distance: [group_count]Rays.F32,
+
+        const Self = @This();
+        const Tree = InstantRadiosity(Kernel);
+        const ones: [group_count]Rays.F32 = @splat(.splat(1));
+
+        pub const stride = interleave.side;
+        pub const Shared = SharedOf(Kernel);
+
+        pub fn init(lighting: *Self, _: *const Frame, settings: *const tiles.Settings) void {
+            lighting.shared = @ptrCast(@alignCast(settings.shared.?));
+        }
+
+        /// Pixels of one part, or a part of the area where all have all lights.
+        pub fn partOf(lighting: *const Self, area: Rectangle, index: usize) ?Rectangle {
+            const column: u32 = @intCast(index % stride);
+            const row: u32 = @intCast(index / stride);
+            var part = area;
+            if (lighting.shared.layers.is_interleaved) {
+                part.step = stride;
+                part.x0 += (column + stride - area.x0 % stride) % stride;
+                part.y0 += (row + stride - area.y0 % stride) % stride;
+            } else {
+                part.x0 += column * Kernel.bundle_width;
+                part.y0 += row * Kernel.bundle_height;
+                part.x1 = @min(part.x1, part.x0 + Kernel.bundle_width);
+                part.y1 = @min(part.y1, part.y0 + Kernel.bundle_height);
+            }
+            return if (part.x0 < part.x1 and part.y0 < part.y1) part else null;
+        }
+
+        pub fn start(lighting: *Self, rectangle: Rectangle) void {
+            lighting.part = interleave.partOf(rectangle.x0, rectangle.y0);
+            lighting.light.start(lighting.shared.sky.len > 0);
+            lighting.guided = @splat(.splat(false));
+            lighting.normal = @splat(.splat(.{ 0, 0, 0 }));
+            lighting.distance = @splat(.zero());
+        }
+
+        pub fn addLights(lighting: *Self, tree: *Tree, coherence: dispatch.Coherence) void {
+            const shared = lighting.shared;
+            const vertices = tree.receivers();
+            const sample = tree.sample.number;
+            if (tree.path.depth == 0) lighting.guide(tree);
+            lighting.light.find(&vertices);
+            tree.countShadow(if (shared.sky.len > 0) lighting.light.addSky(
+                &tree.visibility,
+                shared.sources,
+                shared.sky_sets.of(EnvironmentLight, shared.sky, sample, lighting.part),
+                &vertices,
+                coherence,
+                &tree.sample.radiance,
+            ) else environment_file.addLight(
+                Kernel,
+                &tree.visibility,
+                &EnvironmentLights.none,
+                sample,
+                &vertices,
+                coherence,
+                &tree.sample.radiance,
+            ));
+            tree.addDirect(coherence);
+            for (shared.sets.of(world_file.Light, shared.lights, sample, lighting.part)) |*one| {
+                tree.countShadow(lighting.light
+                    .addVirtual(&tree.visibility, one, &vertices, coherence));
+            }
+        }
+
+        fn guide(lighting: *Self, tree: *const Tree) void {
+            for (&tree.vertices, 0..) |*vertex, group| {
+                const fresh = vertex.seen.andNot(lighting.guided[group]);
+                if (fresh.none()) continue;
+                lighting.guided[group] = lighting.guided[group].bitOr(fresh);
+                const normal = &lighting.normal[group];
+                const distance = &lighting.distance[group];
+                normal.* = .select(fresh, vertex.point.normal_geometric, normal.*);
+                distance.* = .select(fresh, vertex.point.distance, distance.*);
+            }
+        }
+
+        pub fn expose(lighting: *Self, rectangle: Rectangle, sample: u32) void {
+            const layers = &lighting.shared.layers;
+            const light = &lighting.light;
+            put(layers, layers.guide, rectangle, sample, &lighting.normal, &lighting.distance);
+            inline for (.{ "bounced", "albedo" }) |name| {
+                const one = comptime std.mem.eql(u8, name, "albedo");
+                const count: ?*const [group_count]Rays.F32 = if (one) &ones else null;
+                put(layers, @field(layers, name), rectangle, sample, &@field(light, name), count);
+            }
+            if (layers.open.len > 0) inline for (.{ "arriving", "shining", "open" }) |name| {
+                put(layers, @field(layers, name), rectangle, sample, &@field(light, name), null);
+            };
+        }
+
+        fn put(
+            layers: *const Layers,
+            layer: []Layers.Pixel,
+            rectangle: Rectangle,
+            sample: u32,
+            colors: *const [group_count]Vec3,
+            fourth: ?*const [group_count]Rays.F32,
+        ) void {
+            for (colors, 0..) |*color, group| {
+                const x = color.x.toArray();
+                const y = color.y.toArray();
+                const z = color.z.toArray();
+                const w = if (fourth) |all| all[group].toArray() else @as([Kernel.ray_count]f32, @splat(0));
+                for (0..Kernel.ray_count) |lane| {
+                    const column = rectangle.x0 + rectangle.step * Kernel.pixelX(group, lane);
+                    const row = rectangle.y0 + rectangle.step * Kernel.pixelY(group, lane);
+                    if (column >= rectangle.x1 or row >= rectangle.y1) continue;
+                    const at = @as(usize, row) * layers.width + column;
+                    Layers.add(layer, at, sample, .{ x[lane], y[lane], z[lane], w[lane] });
+                }
+            }
+        }
+    };
+}
+
+/// What all threads share: the lights, and the layers that are filtered.
+fn SharedOf(comptime Kernel: type) type {
+    return struct {
+        gpa: std.mem.Allocator,
+        frame: *const Frame,
+        settings: *const tiles.Settings,
+        layers: Layers,
+        sky_sets: interleave.Sets,
+        /// In the order of `sky_sets`.
+        sky: []EnvironmentLight,
+        /// Small strong sources of the environment.
+        sources: []EnvironmentLight,
+        sets: interleave.Sets,
+        /// In the order of `sets`: room, and what of it is used, which is all or nothing.
+        room: []world_file.Light,
+        lights: []const world_file.Light,
+        /// Where light paths start.
+        starts: []emission.Source,
+        path_count: u32,
+        candidates: [][light_paths.bounce_max]Candidate,
+        found: []Candidate,
+        points: [light_paths.point_max]light_paths.Point,
+        point_count: usize,
+        /// What each gets of all candidates, and of those of a piece of work.
+        gains: [light_paths.point_max]f64,
+        piece_gains: [weighed_max / light_paths.piece_candidates][light_paths.point_max]f64,
+
+        const Self = @This();
+        const Tree = InstantRadiosity(Kernel);
+        const Paths = light_paths.LightPaths(Kernel, Tree);
+        const Step = enum { see, trace, gather, weigh, sum, finish, choose, filter };
+
+        pub const steps_before: u32 = @backingInt(Step.filter);
+        pub const step_count: u32 = steps_before + 1;
+
+        pub fn init(
+            gpa: std.mem.Allocator,
+            frame: *const Frame,
+            settings: *const tiles.Settings,
+        ) error{OutOfMemory}!*Self {
+            const shared = try gpa.create(Self);
+            errdefer gpa.destroy(shared);
+            const lights = &settings.lights;
+            const samples = settings.sample_count;
+            const environment = frame.environment;
+            shared.* = .{
+                .gpa = gpa,
+                .frame = frame,
+                .settings = settings,
+                .layers = undefined,
+                .sky_sets = .init(lights.sky_count, samples, lights.is_interleaved),
+                .sky = &.{},
+                .sources = &.{},
+                .sets = .init(lights.virtual_count, samples, lights.is_interleaved),
+                .room = &.{},
+                .lights = &.{},
+                .starts = &.{},
+                .path_count = 0,
+                .candidates = &.{},
+                .found = &.{},
+                .points = undefined,
+                .point_count = 0,
+                .gains = undefined,
+                .piece_gains = undefined,
+            };
+            errdefer shared.freeLights();
+            if (environment.map) |map| if (environment.shadow_count > 0) {
+                shared.sources = try gpa.alloc(EnvironmentLight, map.sources.len);
+                shared.sky = try gpa.alloc(EnvironmentLight, shared.sky_sets.count());
+            };
+            try shared.placeStarts();
+            const view = frame.view;
+            const has_sky = shared.sky.len > 0;
+            shared.layers = try .init(gpa, view, has_sky, lights.is_interleaved);
+            return shared;
+        }
+
+        pub fn deinit(shared: *Self, gpa: std.mem.Allocator) void {
+            shared.layers.deinit(gpa);
+            shared.freeLights();
+            gpa.destroy(shared);
+        }
+
+        fn freeLights(shared: *Self) void {
+            const gpa = shared.gpa;
+            gpa.free(shared.sky);
+            gpa.free(shared.sources);
+            gpa.free(shared.room);
+            gpa.free(shared.starts);
+            gpa.free(shared.candidates);
+        }
+
+        /// Makes the sky's lights, and takes room for light paths if there are to be any.
+        fn placeStarts(shared: *Self) error{OutOfMemory}!void {
+            const gpa = shared.gpa;
+            const frame = shared.frame;
+            const far_count = shared.sources.len + shared.sky.len;
+            shared.starts = try gpa.alloc(emission.Source, far_count + frame.lights.len);
+            var count: usize = 0;
+            for (shared.sources, 0..) |*source, index| {
+                source.* = environment_lights
+                    .ofSource(frame.environment, &frame.environment.map.?.sources[index]);
+                shared.starts[count] = .{ .light = parallel(source) };
+                count += 1;
+            }
+            for (0..shared.sky.len) |number| {
+                const weight: f32 = @floatCast(shared.sky_sets.weightOf(number));
+                const one = environment_lights
+                    .pieceOf(frame.environment, number, shared.sky.len, weight);
+                shared.sky[shared.sky_sets.indexOf(number)] = one;
+                shared.starts[count] = .{ .light = parallel(&one) };
+                count += 1;
+            }
+            for (shared.starts[count..], frame.lights) |*start, light| start.* = .{ .light = light };
+            const box = frame.geometry.bounds;
+            if (shared.settings.depth_max == 0 or shared.sets.part_size == 0 or box.isEmpty()) return;
+            shared.path_count = emission.shareOut(shared.starts, box, path_count_max);
+            if (shared.path_count == 0) return;
+            shared.candidates =
+                try gpa.alloc([light_paths.bounce_max]Candidate, shared.path_count);
+            shared.room = try gpa.alloc(world_file.Light, shared.sets.count());
+        }
+
+        /// A light of the environment by itself.
+        fn parallel(one: *const EnvironmentLight) world_file.Light {
+            var light = one.source;
+            for (&light.intensity, one.irradiance) |*to, channel| to.* = channel * std.math.pi;
+            return light;
+        }
+
+        pub fn pieces(shared: *const Self, number: u32) u32 {
+            const step: Step = @fromBackingInt(@intCast(number));
+            if (step != .filter and shared.path_count == 0) return 0;
+            return switch (step) {
+                .see, .gather, .sum, .choose => 1,
+                .trace => @divCeil(shared.path_count, light_paths.piece_paths),
+                .weigh, .finish => shared.weighedPieces(),
+                .filter => @divCeil(shared.layers.height, band_rows),
+            };
+        }
+
+        pub fn work(shared: *Self, tree: *Tree, number: u32, piece: u32, film: *Film) u64 {
+            switch (@as(Step, @fromBackingInt(@intCast(number)))) {
+                .see => shared.point_count = Paths.see(tree, &shared.points),
+                .trace => Paths
+                    .trace(tree, shared.starts, piece, shared.path_count, shared.candidates),
+                .gather => shared.gather(),
+                .weigh => {
+                    const sums = &shared.piece_gains[piece];
+                    sums.* = @splat(0);
+                    const found = shared.ofPiece(piece);
+                    Paths.weigh(tree, shared.seen(), found, shared.nearness(), sums);
+                },
+                .sum => shared.sumGains(),
+                .finish => {
+                    const found = shared.ofPiece(piece);
+                    const radius = shared.nearness();
+                    light_paths.finishWeights(shared.seen(), &shared.gains, found, radius);
+                },
+                .choose => {
+                    const geometry = shared.frame.geometry;
+                    if (virtual_lights.choose(shared.found, &shared.sets, geometry, shared.room))
+                        shared.lights = shared.room;
+                },
+                .filter => return shared.filter(piece, film),
+            }
+            return 0;
+        }
+
+        /// Puts the candidates of all paths together, and keeps those that are weighed.
+        fn gather(shared: *Self) void {
+            const all: []Candidate = @as([*]Candidate, @ptrCast(shared.candidates.ptr))[0 .. shared.candidates.len * light_paths.bounce_max];
+            var count: usize = 0;
+            for (shared.candidates) |of_path| for (of_path) |one| {
+                if (!(one.luminance() > 0)) break;
+                all[count] = one;
+                all[count].weight = one.luminance();
+                count += 1;
+            };
+            virtual_lights.sortAlongCurve(all[0..count], shared.frame.geometry.bounds);
+            shared.found = all[0..virtual_lights.thin(all[0..count], weighed_max)];
+        }
+
+        fn weighedPieces(shared: *const Self) u32 {
+            return @intCast(@divCeil(shared.found.len, light_paths.piece_candidates));
+        }
+
+        fn ofPiece(shared: *Self, piece: u32) []Candidate {
+            const first = piece * light_paths.piece_candidates;
+            const end = @min(first + light_paths.piece_candidates, shared.found.len);
+            return shared.found[first..end];
+        }
+
+        fn seen(shared: *const Self) []const light_paths.Point {
+            return shared.points[0..shared.point_count];
+        }
+
+        /// Radius of the disk that bounds what candidates give what is near.
+        fn nearness(shared: *const Self) f32 {
+            return shared.frame.geometry.size / 64;
+        }
+
+        fn sumGains(shared: *Self) void {
+            const all = shared.gains[0..shared.point_count];
+            for (all, 0..) |*sum, index| {
+                sum.* = 0;
+                for (shared.piece_gains[0..shared.weighedPieces()]) |*gains| sum.* += gains[index];
+            }
+            light_paths.invertGains(all);
+        }
+
+        fn filter(shared: *Self, band: u32, film: *Film) u64 {
+            const first = band * band_rows;
+            var non_finite_count: u64 = 0;
+            for (first..@min(first + band_rows, shared.layers.height)) |y| {
+                non_finite_count += shared.layers.finishRow(film, shared.frame.view, @intCast(y));
+            }
+            return non_finite_count;
+        }
+    };
+}

@@ -1,0 +1,389 @@
+//! Interleaved sampling (Keller and Heidrich 2001): each pixel of any 3x3 has another ninth of a
+//! sample's lights, and a filter gives each what its neighbours found (after Wald, Kollig, Benthin,
+//! Keller and Slusallek 2002, "Interactive Global Illumination using Fast Ray Tracing").
+//!
+//! In: by pixel the sums over its samples of light that arrives, of what it is weighed by, and of
+//! where it arrives. Out: that light on the film. What is filtered is a quotient, of light that
+//! arrives and the albedo it is multiplied by, or of the sky's light that arrives and all of it:
+//! both change slowly over a surface, and what changes quickly, the pixel's own albedo and the
+//! smooth integral of the sky, is multiplied in afterwards. A pixel that has like neighbours in all
+//! ninths thus has the light of all lights, without noise. Neighbours are like where they lie on
+//! much the same plane; pixels that see several surfaces take what all of theirs have.
+
+const std = @import("std");
+const vec3 = @import("../../math.zig").vec3;
+const film_file = @import("../../film.zig");
+const world_file = @import("../../world.zig");
+const Allocator = std.mem.Allocator;
+const Film = film_file.Film;
+const Vec3 = [3]f32;
+
+/// Pixels that share a sample's lights, along each side.
+pub const side = 3;
+/// In all.
+pub const part_count = side * side;
+/// Parts that like neighbours have, at least, the pixel's own among them.
+const like_least = 4;
+/// Sets that samples take turns with, at most.
+const set_count_max = 16;
+
+/// Lights in sets, one a sample, which are cut in parts, one a pixel.
+pub const Sets = struct {
+    set_count: usize,
+    /// Lights of a part.
+    part_size: usize,
+    sample_count: u32,
+    /// Pixels have a part each; else all of a set.
+    is_interleaved: bool,
+
+    /// With at least so many lights in a set.
+    pub fn init(light_count: u32, sample_count: u32, is_interleaved: bool) Sets {
+        return .{
+            .set_count = @min(sample_count, set_count_max),
+            .part_size = @divCeil(light_count, part_count),
+            .sample_count = sample_count,
+            .is_interleaved = is_interleaved,
+        };
+    }
+
+    /// In all sets.
+    pub fn count(sets: *const Sets) usize {
+        return sets.set_count * part_count * sets.part_size;
+    }
+
+    /// Where a light is in the order of sets and their parts: of lights in a row each is another
+    /// set's, and of those of a set each another part's.
+    pub fn indexOf(sets: *const Sets, number: usize) usize {
+        const set = number % sets.set_count;
+        const within = number / sets.set_count;
+        const part = within % part_count;
+        return (set * part_count + part) * sets.part_size + within / part_count;
+    }
+
+    /// How much more a light counts where it is one of a pixel's, than one of all.
+    pub fn weightOf(sets: *const Sets, number: usize) f64 {
+        const set = number % sets.set_count;
+        const uses = (sets.sample_count - set - 1) / sets.set_count + 1;
+        const total: f64 = @floatFromInt(sets.sample_count);
+        const among: f64 = if (sets.is_interleaved) part_count else 1;
+        return among * total / @as(f64, @floatFromInt(uses));
+    }
+
+    /// Those of a sample of pixels in this part.
+    pub fn of(sets: *const Sets, comptime T: type, all: []const T, sample: u32, part: usize) []const T {
+        if (all.len == 0) return all;
+        const first = sample % sets.set_count * part_count;
+        if (!sets.is_interleaved)
+            return all[first * sets.part_size ..][0 .. part_count * sets.part_size];
+        return all[(first + part) * sets.part_size ..][0..sets.part_size];
+    }
+};
+
+/// By pixel the sums over its samples.
+pub const Layers = struct {
+    width: u32,
+    height: u32,
+    is_interleaved: bool,
+    /// Geometric normal of what is seen first, and how far away it is.
+    guide: []Pixel,
+    /// Light of virtual lights, and the albedo that it was multiplied by; fourth, how many samples
+    /// there are.
+    bounced: []Pixel,
+    albedo: []Pixel,
+    /// The sky's light that arrives by its lights and all of it by these; none without a map.
+    arriving: []Pixel,
+    shining: []Pixel,
+    /// And by its integral.
+    open: []Pixel,
+
+    /// Four floats, of which colours have three.
+    pub const Pixel = @Vector(4, f32);
+    /// Names of the layers.
+    pub const Name = enum { guide, bounced, albedo, arriving, shining, open };
+
+    /// To be freed by `deinit`.
+    pub fn init(
+        gpa: Allocator,
+        view: *const world_file.View,
+        has_sky: bool,
+        is_interleaved: bool,
+    ) error{OutOfMemory}!Layers {
+        var layers: Layers = .{
+            .width = view.width,
+            .height = view.height,
+            .is_interleaved = is_interleaved,
+            .guide = &.{},
+            .bounced = &.{},
+            .albedo = &.{},
+            .arriving = &.{},
+            .shining = &.{},
+            .open = &.{},
+        };
+        errdefer layers.deinit(gpa);
+        const count = @as(usize, view.width) * view.height;
+        inline for (@typeInfo(Name).@"enum".field_names) |name| {
+            const is_sky = std.mem.eql(u8, name, "arriving") or
+                std.mem.eql(u8, name, "shining") or std.mem.eql(u8, name, "open");
+            if (has_sky or !is_sky) @field(layers, name) = try gpa.alloc(Pixel, count);
+        }
+        return layers;
+    }
+
+    /// Frees everything.
+    pub fn deinit(layers: *Layers, gpa: Allocator) void {
+        inline for (@typeInfo(Name).@"enum".field_names) |name| gpa.free(@field(layers, name));
+    }
+
+    /// Adds a sample to a pixel of a layer; number 0 begins it anew.
+    pub inline fn add(layer: []Pixel, at: usize, number: u32, value: Pixel) void {
+        layer[at] = if (number == 0) value else layer[at] + value;
+    }
+
+    /// Adds what the layers have to finished pixels of a row. Returns how many came out as not a
+    /// number; these are black.
+    pub fn finishRow(
+        layers: *const Layers,
+        film: *Film,
+        view: *const world_file.View,
+        y: u32,
+    ) u64 {
+        var non_finite_count: u64 = 0;
+        for (0..layers.width) |x| {
+            const light = layers.lightOf(view, @intCast(x), y);
+            const pixel = film.image.at(@intCast(x), y);
+            const count = layers.albedo[@as(usize, y) * layers.width + x][3];
+            const added = light / @as(Pixel, @splat(count));
+            const sum = added[0] + added[1] + added[2];
+            if (!std.math.isFinite(sum)) {
+                pixel.* = .{ 0, 0, 0, 1 };
+                non_finite_count += 1;
+                continue;
+            }
+            inline for (0..3) |channel| pixel[channel] += added[channel];
+        }
+        return non_finite_count;
+    }
+
+    /// What a pixel's samples have together of the light that is filtered.
+    fn lightOf(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Pixel {
+        const at = @as(usize, y) * layers.width + x;
+        var sums: Sums = .of(layers, at);
+        if (layers.is_interleaved) layers.gather(view, x, y, &sums);
+        var light = layers.albedo[at] * quotient(sums.bounced, sums.albedo, 0);
+        if (layers.open.len > 0)
+            light += layers.open[at] * quotient(sums.arriving, sums.shining, 1);
+        light[3] = 0;
+        return light;
+    }
+
+    inline fn quotient(part: Pixel, whole: Pixel, unknown: f32) Pixel {
+        const known = whole > @as(Pixel, @splat(1e-20));
+        const one: Pixel = @splat(1);
+        return @select(f32, known, part / @select(f32, known, whole, one), @as(Pixel, @splat(unknown)));
+    }
+
+    const Sums = struct {
+        bounced: Pixel,
+        albedo: Pixel,
+        arriving: Pixel,
+        shining: Pixel,
+
+        fn of(layers: *const Layers, at: usize) Sums {
+            const has_sky = layers.open.len > 0;
+            const none: Pixel = @splat(0);
+            return .{
+                .bounced = layers.bounced[at],
+                .albedo = layers.albedo[at],
+                .arriving = if (has_sky) layers.arriving[at] else none,
+                .shining = if (has_sky) layers.shining[at] else none,
+            };
+        }
+
+        fn add(sums: *Sums, other: *const Sums) void {
+            sums.bounced += other.bounced;
+            sums.albedo += other.albedo;
+            sums.arriving += other.arriving;
+            sums.shining += other.shining;
+        }
+    };
+
+    /// Adds what like neighbours of the other parts have, the nearest of each.
+    fn gather(
+        layers: *const Layers,
+        view: *const world_file.View,
+        x: u32,
+        y: u32,
+        sums: *Sums,
+    ) void {
+        const own: Place = .of(layers, view, x, y);
+        const found = layers.gatherLike(view, x, y, &own, sums);
+        if (@popCount(found) >= like_least) return;
+        // Too few: better light of what is around than noise.
+        var any = own;
+        any.is_plain = false;
+        sums.* = .of(layers, @as(usize, y) * layers.width + x);
+        _ = layers.gatherLike(view, x, y, &any, sums);
+    }
+
+    /// The same of what is like a place; returns the parts that are found.
+    fn gatherLike(
+        layers: *const Layers,
+        view: *const world_file.View,
+        x: u32,
+        y: u32,
+        own: *const Place,
+        sums: *Sums,
+    ) u32 {
+        var found: u32 = @as(u32, 1) << @intCast(partOf(x, y));
+        for (neighbours) |neighbour| {
+            if (found == (1 << part_count) - 1) break;
+            const other_x = @as(i64, x) + neighbour[0];
+            const other_y = @as(i64, y) + neighbour[1];
+            if (other_x < 0 or other_y < 0) continue;
+            if (other_x >= layers.width or other_y >= layers.height) continue;
+            const column: u32 = @intCast(other_x);
+            const row: u32 = @intCast(other_y);
+            const bit = @as(u32, 1) << @intCast(partOf(column, row));
+            if (found & bit != 0) continue;
+            const other: Place = .of(layers, view, column, row);
+            if (!own.isLike(&other)) continue;
+            found |= bit;
+            const at = @as(usize, row) * layers.width + column;
+            sums.add(&.of(layers, at));
+        }
+        return found;
+    }
+};
+
+/// The part of a pixel.
+pub fn partOf(x: u32, y: u32) usize {
+    return y % side * side + x % side;
+}
+
+/// Around a pixel, the nearest first.
+const neighbours = neighbours: {
+    var list: [24][2]i64 = undefined;
+    var count: usize = 0;
+    for (1..9) |distance| for (0..5) |row| for (0..5) |column| {
+        const x = @as(i64, column) - 2;
+        const y = @as(i64, row) - 2;
+        if (x * x + y * y != distance) continue;
+        list[count] = .{ x, y };
+        count += 1;
+    };
+    break :neighbours list;
+};
+
+/// Where a pixel's samples see something.
+const Place = struct {
+    position: Vec3,
+    /// Unit vector.
+    normal: Vec3,
+    /// Distance between neighbours in metres, across the view.
+    step: f32,
+    /// They see much the same.
+    is_plain: bool,
+
+    /// Length of the mean normal, at least, where they do.
+    const plain_min = 0.97;
+    /// Cosine between normals that are like.
+    const cosine_min = 0.9;
+    /// How far off the plane a neighbour may be, in steps.
+    const off_max = 2.5;
+
+    fn of(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Place {
+        const at = @as(usize, y) * layers.width + x;
+        const sums = layers.guide[at];
+        const sum: Vec3 = .{ sums[0], sums[1], sums[2] };
+        const size = vec3.length(sum);
+        const count = layers.albedo[at][3];
+        const distance = sums[3] / count;
+        const camera = &view.camera;
+        const across = (2 * @as(f32, @floatFromInt(x)) + 1) / @as(f32, @floatFromInt(view.width)) - 1;
+        const upward =
+            1 - (2 * @as(f32, @floatFromInt(y)) + 1) / @as(f32, @floatFromInt(view.height));
+        const sideways =
+            vec3.add(vec3.scale(camera.right, across), vec3.scale(camera.up, upward));
+        const way = if (camera.orthographic)
+            camera.forward
+        else
+            vec3.add(camera.forward, sideways);
+        const ahead = vec3.scale(way, distance / vec3.length(way));
+        const width = 2 * vec3.length(camera.right) / @as(f32, @floatFromInt(view.width));
+        return .{
+            .position = if (camera.orthographic) vec3.add(sideways, ahead) else ahead,
+            .normal = if (size > 0) vec3.scale(sum, 1 / size) else sum,
+            .step = if (camera.orthographic) width else width * distance / vec3.length(way),
+            .is_plain = size > plain_min * count,
+        };
+    }
+
+    fn isLike(place: *const Place, other: *const Place) bool {
+        if (!place.is_plain) return true;
+        if (!other.is_plain or vec3.dot(place.normal, other.normal) < cosine_min) return false;
+        const off = vec3.dot(place.normal, vec3.sub(other.position, place.position));
+        return @abs(off) < off_max * place.step;
+    }
+};
+
+test "every light is in one part of one set, and counts for all samples together as one" {
+    const cases = [_]struct { u32, u32, bool }{
+        .{ 96, 4, true }, .{ 32, 1, true }, .{ 1, 3, true }, .{ 20, 37, true }, .{ 20, 5, false },
+    };
+    for (cases) |case| {
+        const sets: Sets = .init(case[0], case[1], case[2]);
+        var numbers: [2000]usize = undefined;
+        const all = numbers[0..sets.count()];
+        for (0..all.len) |number| all[sets.indexOf(number)] = number;
+        var weights: [2000]f64 = @splat(0);
+        for (0..case[1]) |sample| for (0..part_count) |part| {
+            for (sets.of(usize, all, @intCast(sample), part)) |number|
+                weights[number] += sets.weightOf(number);
+        };
+        for (weights[0..all.len]) |weight| {
+            const samples: f64 = @floatFromInt(case[1] * part_count);
+            try std.testing.expectApproxEqRel(samples, weight, 1e-9);
+        }
+    }
+}
+
+test "like neighbours share light, so that each pixel of a plane has that of all parts" {
+    const gpa = std.testing.allocator;
+    var view: world_file.View = .nowhere;
+    view.width = 12;
+    view.height = 9;
+    var layers: Layers = try .init(gpa, &view, true, true);
+    defer layers.deinit(gpa);
+    var film: Film = try .init(gpa, view.width, view.height, .init(.{ .color = true }));
+    defer film.deinit(gpa);
+    // A wall on the left, a floor on the right; each part finds other light, of different albedos.
+    for (0..view.height) |y| for (0..view.width) |x| {
+        const at = y * view.width + x;
+        const is_left = x < 6;
+        const normal: Vec3 = if (is_left) .{ 0, 0, 1 } else .{ 0, 1, 0 };
+        const share: f32 = @floatFromInt(partOf(@intCast(x), @intCast(y)));
+        const albedo: f32 = @floatFromInt(1 + (x + y) % 4);
+        const light: f32 = if (is_left) share else 100 + share;
+        const open: f32 = if (is_left) 2 else 8;
+        Layers.add(layers.guide, at, 0, .{ normal[0], normal[1], normal[2], 2 });
+        Layers.add(layers.bounced, at, 0, @splat(light * albedo));
+        Layers.add(layers.albedo, at, 0, .{ albedo, albedo, albedo, 1 });
+        Layers.add(layers.arriving, at, 0, @splat(albedo * share));
+        Layers.add(layers.shining, at, 0, @splat(albedo * 8));
+        Layers.add(layers.open, at, 0, @splat(open));
+        film.add(@intCast(x), @intCast(y), 0, .{ 1, 1, 1, 0 });
+    };
+    for (0..view.height) |y|
+        try std.testing.expectEqual(0, layers.finishRow(&film, &view, @intCast(y)));
+    for (0..view.height) |y| for (0..view.width) |x| {
+        const found = film.image.at(@intCast(x), @intCast(y)).*[0];
+        const albedo: f32 = @floatFromInt(1 + (x + y) % 4);
+        const light: f32 = if (x < 6) 4 else 104;
+        const open: f32 = if (x < 6) 2 else 8;
+        // Parts whose pixels are darker count less in a quotient of sums.
+        const expected = 1 + light * albedo + open * 0.5;
+        try std.testing.expectApproxEqAbs(expected, found, 1.5 * albedo + 0.2 * open);
+        // No light crosses the edge.
+        if (x < 6) try std.testing.expect(found < 1 + 8 * albedo + open);
+    };
+}
