@@ -13,7 +13,7 @@ const expect = std.testing.expect;
 const gpa = std.testing.allocator;
 
 /// An equirectangular image in a file of its own.
-const Sky = struct {
+pub const Sky = struct {
     folder: std.testing.TmpDir,
     path: []u8,
 
@@ -21,7 +21,8 @@ const Sky = struct {
     const height = 32;
     const Texels = [width * height][3]f32;
 
-    fn init(texels: *const Texels) !Sky {
+    /// Of these texels, as far as 8 bits and an exponent hold them.
+    pub fn init(texels: *const Texels) !Sky {
         var sky: Sky = .{ .folder = std.testing.tmpDir(.{}), .path = undefined };
         errdefer sky.folder.cleanup();
         const io = std.testing.io;
@@ -49,16 +50,19 @@ const Sky = struct {
         return sky;
     }
 
-    fn deinit(sky: *Sky) void {
+    /// Deletes the file.
+    pub fn deinit(sky: *Sky) void {
         gpa.free(sky.path);
         sky.folder.cleanup();
     }
 
-    fn plain(color: [3]f32) Texels {
+    /// One colour everywhere.
+    pub fn plain(color: [3]f32) Texels {
         return @splat(color);
     }
 
-    fn around(sky: *const Sky) raylane.settings.Environment {
+    /// Has it around a scene.
+    pub fn around(sky: *const Sky) raylane.settings.Environment {
         return .{ .source = .{ .file = sky.path } };
     }
 };
