@@ -71,7 +71,7 @@ pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4
 /// And where a floor catches their shadows, unless the user says.
 pub const floor_shadow_count = 16;
 /// See `Lights`.
-pub const virtual_light_count: Range = .{ .min = 0, .max = 1024, .default = 64 };
+pub const virtual_light_count: Range = .{ .min = 0, .max = 1024, .default = 96 };
 /// See `Lights`.
 pub const sky_light_count: Range = .{ .min = 1, .max = 1024, .default = 32 };
 /// What automatic exposure chooses lies between these: far enough down for surfaces in the sun, of

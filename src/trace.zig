@@ -161,6 +161,9 @@ test {
     _ = bundle;
     _ = dispatch;
     _ = @import("trace/integrate/environment_lights.zig");
+    _ = @import("trace/integrate/interleave.zig");
+    _ = @import("trace/integrate/light_emission.zig");
+    _ = @import("trace/integrate/virtual_lights.zig");
     _ = @import("trace/integrate/camera.zig");
     _ = @import("trace/integrate/numbers.zig");
     _ = @import("trace/integrate/path.zig");

@@ -196,14 +196,17 @@ fn SharedOf(comptime Kernel: type) type {
         found: []Candidate,
         points: [light_paths.point_max]light_paths.Point,
         point_count: usize,
+        /// What each gets of all candidates, and of those of a piece of work.
+        gains: [light_paths.point_max]f64,
+        piece_gains: [weighed_max / light_paths.piece_candidates][light_paths.point_max]f64,
 
         const Self = @This();
         const Tree = InstantRadiosity(Kernel);
         const Paths = light_paths.LightPaths(Kernel, Tree);
-        const Step = enum { see, trace, gather, weigh, choose, filter };
+        const Step = enum { see, trace, gather, weigh, sum, finish, choose, filter };
 
-        pub const steps_before = @backingInt(Step.filter);
-        pub const step_count = steps_before + 1;
+        pub const steps_before: u32 = @backingInt(Step.filter);
+        pub const step_count: u32 = steps_before + 1;
 
         pub fn init(
             gpa: std.mem.Allocator,
@@ -232,6 +235,8 @@ fn SharedOf(comptime Kernel: type) type {
                 .found = &.{},
                 .points = undefined,
                 .point_count = 0,
+                .gains = undefined,
+                .piece_gains = undefined,
             };
             errdefer shared.freeLights();
             if (environment.map) |map| if (environment.shadow_count > 0) {
@@ -302,9 +307,9 @@ fn SharedOf(comptime Kernel: type) type {
             const step: Step = @fromBackingInt(@intCast(number));
             if (step != .filter and shared.path_count == 0) return 0;
             return switch (step) {
-                .see, .gather, .choose => 1,
+                .see, .gather, .sum, .choose => 1,
                 .trace => @divCeil(shared.path_count, light_paths.piece_paths),
-                .weigh => @intCast(@divCeil(shared.found.len, light_paths.piece_candidates)),
+                .weigh, .finish => shared.weighedPieces(),
                 .filter => @divCeil(shared.layers.height, band_rows),
             };
         }
@@ -316,11 +321,16 @@ fn SharedOf(comptime Kernel: type) type {
                     .trace(tree, shared.starts, piece, shared.path_count, shared.candidates),
                 .gather => shared.gather(),
                 .weigh => {
-                    const first = piece * light_paths.piece_candidates;
-                    const end = @min(first + light_paths.piece_candidates, shared.found.len);
-                    const radius = shared.frame.geometry.size / 64;
-                    const points = shared.points[0..shared.point_count];
-                    Paths.weigh(tree, points, shared.found[first..end], radius);
+                    const sums = &shared.piece_gains[piece];
+                    sums.* = @splat(0);
+                    const found = shared.ofPiece(piece);
+                    Paths.weigh(tree, shared.seen(), found, shared.nearness(), sums);
+                },
+                .sum => shared.sumGains(),
+                .finish => {
+                    const found = shared.ofPiece(piece);
+                    const radius = shared.nearness();
+                    light_paths.finishWeights(shared.seen(), &shared.gains, found, radius);
                 },
                 .choose => {
                     const geometry = shared.frame.geometry;
@@ -344,6 +354,34 @@ fn SharedOf(comptime Kernel: type) type {
             };
             virtual_lights.sortAlongCurve(all[0..count], shared.frame.geometry.bounds);
             shared.found = all[0..virtual_lights.thin(all[0..count], weighed_max)];
+        }
+
+        fn weighedPieces(shared: *const Self) u32 {
+            return @intCast(@divCeil(shared.found.len, light_paths.piece_candidates));
+        }
+
+        fn ofPiece(shared: *Self, piece: u32) []Candidate {
+            const first = piece * light_paths.piece_candidates;
+            const end = @min(first + light_paths.piece_candidates, shared.found.len);
+            return shared.found[first..end];
+        }
+
+        fn seen(shared: *const Self) []const light_paths.Point {
+            return shared.points[0..shared.point_count];
+        }
+
+        /// Radius of the disk that bounds what candidates give what is near.
+        fn nearness(shared: *const Self) f32 {
+            return shared.frame.geometry.size / 64;
+        }
+
+        fn sumGains(shared: *Self) void {
+            const all = shared.gains[0..shared.point_count];
+            for (all, 0..) |*sum, index| {
+                sum.* = 0;
+                for (shared.piece_gains[0..shared.weighedPieces()]) |*gains| sum.* += gains[index];
+            }
+            light_paths.invertGains(all);
         }
 
         fn filter(shared: *Self, band: u32, film: *Film) u64 {

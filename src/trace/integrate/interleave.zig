@@ -22,6 +22,8 @@ const Vec3 = [3]f32;
 pub const side = 3;
 /// In all.
 pub const part_count = side * side;
+/// Parts that like neighbours have, at least, the pixel's own among them.
+const like_least = 4;
 /// Sets that samples take turns with, at most.
 const set_count_max = 16;
 
@@ -214,9 +216,27 @@ pub const Layers = struct {
         sums: *Sums,
     ) void {
         const own: Place = .of(layers, view, x, y);
+        const found = layers.gatherLike(view, x, y, &own, sums);
+        if (@popCount(found) >= like_least) return;
+        // Too few: better light of what is around than noise.
+        var any = own;
+        any.is_plain = false;
+        sums.* = .of(layers, @as(usize, y) * layers.width + x);
+        _ = layers.gatherLike(view, x, y, &any, sums);
+    }
+
+    /// The same of what is like a place; returns the parts that are found.
+    fn gatherLike(
+        layers: *const Layers,
+        view: *const world_file.View,
+        x: u32,
+        y: u32,
+        own: *const Place,
+        sums: *Sums,
+    ) u32 {
         var found: u32 = @as(u32, 1) << @intCast(partOf(x, y));
         for (neighbours) |neighbour| {
-            if (found == (1 << part_count) - 1) return;
+            if (found == (1 << part_count) - 1) break;
             const other_x = @as(i64, x) + neighbour[0];
             const other_y = @as(i64, y) + neighbour[1];
             if (other_x < 0 or other_y < 0) continue;
@@ -231,6 +251,7 @@ pub const Layers = struct {
             const at = @as(usize, row) * layers.width + column;
             sums.add(&.of(layers, at));
         }
+        return found;
     }
 };
 
@@ -304,3 +325,65 @@ const Place = struct {
         return @abs(off) < off_max * place.step;
     }
 };
+
+test "every light is in one part of one set, and counts for all samples together as one" {
+    const cases = [_]struct { u32, u32, bool }{
+        .{ 96, 4, true }, .{ 32, 1, true }, .{ 1, 3, true }, .{ 20, 37, true }, .{ 20, 5, false },
+    };
+    for (cases) |case| {
+        const sets: Sets = .init(case[0], case[1], case[2]);
+        var numbers: [2000]usize = undefined;
+        const all = numbers[0..sets.count()];
+        for (0..all.len) |number| all[sets.indexOf(number)] = number;
+        var weights: [2000]f64 = @splat(0);
+        for (0..case[1]) |sample| for (0..part_count) |part| {
+            for (sets.of(usize, all, @intCast(sample), part)) |number|
+                weights[number] += sets.weightOf(number);
+        };
+        for (weights[0..all.len]) |weight| {
+            const samples: f64 = @floatFromInt(case[1] * part_count);
+            try std.testing.expectApproxEqRel(samples, weight, 1e-9);
+        }
+    }
+}
+
+test "like neighbours share light, so that each pixel of a plane has that of all parts" {
+    const gpa = std.testing.allocator;
+    var view: world_file.View = .nowhere;
+    view.width = 12;
+    view.height = 9;
+    var layers: Layers = try .init(gpa, &view, true, true);
+    defer layers.deinit(gpa);
+    var film: Film = try .init(gpa, view.width, view.height, .init(.{ .color = true }));
+    defer film.deinit(gpa);
+    // A wall on the left, a floor on the right; each part finds other light, of different albedos.
+    for (0..view.height) |y| for (0..view.width) |x| {
+        const at = y * view.width + x;
+        const is_left = x < 6;
+        const normal: Vec3 = if (is_left) .{ 0, 0, 1 } else .{ 0, 1, 0 };
+        const share: f32 = @floatFromInt(partOf(@intCast(x), @intCast(y)));
+        const albedo: f32 = @floatFromInt(1 + (x + y) % 4);
+        const light: f32 = if (is_left) share else 100 + share;
+        const open: f32 = if (is_left) 2 else 8;
+        Layers.add(layers.guide, at, 0, .{ normal[0], normal[1], normal[2], 2 });
+        Layers.add(layers.bounced, at, 0, @splat(light * albedo));
+        Layers.add(layers.albedo, at, 0, .{ albedo, albedo, albedo, 1 });
+        Layers.add(layers.arriving, at, 0, @splat(albedo * share));
+        Layers.add(layers.shining, at, 0, @splat(albedo * 8));
+        Layers.add(layers.open, at, 0, @splat(open));
+        film.add(@intCast(x), @intCast(y), 0, .{ 1, 1, 1, 0 });
+    };
+    for (0..view.height) |y|
+        try std.testing.expectEqual(0, layers.finishRow(&film, &view, @intCast(y)));
+    for (0..view.height) |y| for (0..view.width) |x| {
+        const found = film.image.at(@intCast(x), @intCast(y)).*[0];
+        const albedo: f32 = @floatFromInt(1 + (x + y) % 4);
+        const light: f32 = if (x < 6) 4 else 104;
+        const open: f32 = if (x < 6) 2 else 8;
+        // Parts whose pixels are darker count less in a quotient of sums.
+        const expected = 1 + light * albedo + open * 0.5;
+        try std.testing.expectApproxEqAbs(expected, found, 1.5 * albedo + 0.2 * open);
+        // No light crosses the edge.
+        if (x < 6) try std.testing.expect(found < 1 + 8 * albedo + open);
+    };
+}

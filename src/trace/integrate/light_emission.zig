@@ -226,3 +226,65 @@ pub fn numberOf(path: u32, dimension: u32) f64 {
     }
     return @min(number, 1 - 0x1p-53);
 }
+
+fn testLight(kind: Light.Kind) Light {
+    return .{
+        .kind = kind,
+        .from_receiver = false,
+        .position = .{ 1, 2, 3 },
+        .direction = .{ 0, -1, 0 },
+        .intensity = .{ 1, 2, 3 },
+        .range_inv_squared = 0,
+        .cone_scale = 1,
+        .cone_offset = 0,
+    };
+}
+
+test "paths have the flux of their lights, and parallel ones go through the box" {
+    const box: Box3 = .{ .lower = .{ 0, 0, 0 }, .upper = .{ 2, 3, 5 } };
+    var sources = [_]Source{
+        .{ .light = testLight(.directional) },
+        .{ .light = testLight(.emitter) },
+        .{ .light = testLight(.point) },
+        .{ .light = testLight(.spot) },
+    };
+    sources[0].light.direction = .{ 0.6, -0.8, 0 };
+    const path_count = 4096;
+    try std.testing.expectEqual(path_count, shareOut(&sources, box, path_count));
+    try std.testing.expectEqual(path_count / 2, sources[0].count);
+    // Faces across; pi, 4 pi; and the integral of the squared cosine over half a sphere.
+    const pi = std.math.pi;
+    const expected = [_]f64{ 0.6 * 15 + 0.8 * 10, pi, 4 * pi, 2 * pi / 3.0 };
+    for (&sources, expected) |*source, flux| {
+        var sum: f64 = 0;
+        for (source.first..source.first + source.count) |path| {
+            try std.testing.expectEqual(source, sourceOf(&sources, @intCast(path)));
+            var numbers: [4]f64 = undefined;
+            for (&numbers, 0..) |*number, dimension|
+                number.* = numberOf(@intCast(path), @intCast(dimension));
+            const one = start(source, box, numbers);
+            sum += one.flux[0];
+            try std.testing.expectApproxEqRel(one.flux[0] * 3, one.flux[2], 1e-5);
+            try std.testing.expectApproxEqAbs(1, vec3.length(one.direction), 1e-5);
+            if (source.light.kind == .point) continue;
+            try std.testing.expect(vec3.dot(one.direction, source.light.direction) > -1e-6);
+            if (source.light.kind != .directional) continue;
+            // It enters by the face in x or by the one above.
+            const before = box.grow(0.05);
+            try std.testing.expect(before.contains(Box3.empty.include(one.origin)));
+            try std.testing.expect(one.origin[0] < 0 or one.origin[1] > 3);
+        }
+        try std.testing.expectApproxEqRel(flux, sum, 0.01);
+    }
+}
+
+test "numbers of paths fill 0..1 evenly in each dimension" {
+    for ([_]u32{ 0, 1, 4, 27 }) |dimension| {
+        var counts: [8]u32 = @splat(0);
+        for (0..2048) |path| {
+            const number = numberOf(@intCast(path), dimension);
+            counts[@intFromFloat(number * 8)] += 1;
+        }
+        for (counts) |count| try std.testing.expect(count > 230 and count < 282);
+    }
+}

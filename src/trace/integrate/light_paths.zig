@@ -2,11 +2,13 @@
 //! surfaces, and how much of that the camera sees.
 //!
 //! In: where paths start (`light_emission.zig`). Out: candidates for virtual lights
-//! (`virtual_lights.zig`), with the flux that leaves them and what they add to the picture. At a
+//! (`virtual_lights.zig`), with the flux that leaves them and how much they matter. At a
 //! surface a path goes straight on through what is clear, as shadow rays do, or leaves it by the
 //! cosine or as a mirror would have it, or ends: by Russian roulette over what the surface does
-//! with light, so that its flux keeps its colour. What a candidate adds is summed over points that
-//! the camera sees, and two shadow rays to those that get the most of it say how much arrives.
+//! with light, so that its flux keeps its colour. Of what a candidate gives
+//! the points that the camera sees two shadow rays, to those that get much of it, say how much
+//! arrives. It matters by its shares of what all give each point, squared and summed: chosen by the
+//! root of that the variance is least, as a share of the light that there is.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -34,7 +36,7 @@ pub const point_max = points_side * points_side;
 const shadow_count = 2;
 /// Candidates of a piece of work.
 pub const piece_candidates = 256 / shadow_count;
-/// Share of what a candidate would add that counts though no shadow ray found it to.
+/// Share of what a candidate would give that counts though no shadow ray found it to.
 const hidden_share = 0.03;
 /// Growth of a path's cone by distance: textures are averaged over what a virtual light stands for.
 const cone_spread = 0.1;
@@ -391,54 +393,24 @@ pub fn LightPaths(comptime Kernel: type, comptime Tree: type) type {
             return .end;
         }
 
-        /// Finds what some candidates add to what the camera sees, where a disk of this radius
-        /// bounds what is near.
+        /// Finds how much of what some candidates would give arrives, their weights for now, and
+        /// adds what the points get of them to `sums`.
         pub fn weigh(
             tree: *Tree,
             points: []const Point,
             candidates: []Candidate,
             radius: f32,
+            sums: *[point_max]f64,
         ) void {
             var first: usize = 0;
             while (first < candidates.len) : (first += batch / shadow_count + batch % shadow_count) {
                 if (batch < shadow_count) {
-                    weighOne(tree, points, &candidates[first], radius);
+                    weighOne(tree, points, &candidates[first], radius, sums);
                     continue;
                 }
                 const end = @min(first + batch / shadow_count, candidates.len);
-                weighBatch(tree, points, candidates[first..end], radius);
+                weighBatch(tree, points, candidates[first..end], radius, sums);
             }
-        }
-
-        /// The points that a candidate's shadow rays go to, and what it adds were none hidden.
-        const Targets = struct { total: f64, chosen: [shadow_count]?*const Point };
-
-        fn targetsOf(points: []const Point, candidate: *const Candidate, radius: f32) Targets {
-            var gains: [point_max]f32 = undefined;
-            var total: f64 = 0;
-            for (points, gains[0..points.len]) |*point, *gain| {
-                const way = vec3.sub(point.position, candidate.position);
-                const squared = vec3.dot(way, way);
-                const leaving = vec3.dot(way, candidate.normal);
-                const arriving = -vec3.dot(way, point.normal);
-                gain.* = 0;
-                if (!(leaving > 0 and arriving > 0)) continue;
-                gain.* = point.albedo * leaving * arriving / (squared * (squared + radius * radius));
-                total += gain.*;
-            }
-            var targets: Targets = .{ .total = total, .chosen = @splat(null) };
-            if (!(total > 0)) return targets;
-            for (&targets.chosen, 0..) |*chosen, index| {
-                const share = (@as(f64, @floatFromInt(index)) + 0.5) / shadow_count;
-                var left = share * total;
-                for (points, gains[0..points.len]) |*point, gain| {
-                    if (gain == 0) continue;
-                    chosen.* = point;
-                    left -= gain;
-                    if (left < 0) break;
-                }
-            }
-            return targets;
         }
 
         fn weighBatch(
@@ -446,43 +418,36 @@ pub fn LightPaths(comptime Kernel: type, comptime Tree: type) type {
             points: []const Point,
             candidates: []Candidate,
             radius: f32,
+            sums: *[point_max]f64,
         ) void {
-            var totals: [batch / shadow_count]f64 = undefined;
             var rays: Shadows = .none;
-            for (candidates, totals[0..candidates.len], 0..) |*candidate, *total, index| {
-                const targets = targetsOf(points, candidate, radius);
-                total.* = targets.total;
-                for (targets.chosen, 0..) |chosen, part| {
+            for (candidates, 0..) |*candidate, index| {
+                for (targetsOf(points, candidate, radius), 0..) |chosen, part| {
                     if (chosen) |point| rays.put(index * shadow_count + part, candidate, point);
                 }
             }
             const shares = rays.trace(tree);
-            for (candidates, totals[0..candidates.len], 0..) |*candidate, total, index| {
-                finishWeight(candidate, total, shares[index * shadow_count ..][0..shadow_count]);
+            for (candidates, 0..) |*candidate, index| {
+                const of_it = shares[index * shadow_count ..][0..shadow_count];
+                addGains(points, candidate, radius, of_it, sums);
             }
         }
 
         /// The same of one by one, in bundles that are too small.
-        fn weighOne(tree: *Tree, points: []const Point, candidate: *Candidate, radius: f32) void {
-            const targets = targetsOf(points, candidate, radius);
+        fn weighOne(
+            tree: *Tree,
+            points: []const Point,
+            candidate: *Candidate,
+            radius: f32,
+            sums: *[point_max]f64,
+        ) void {
             var shares: [shadow_count]f32 = @splat(0);
-            for (targets.chosen, &shares) |chosen, *share| {
+            for (targetsOf(points, candidate, radius), &shares) |chosen, *share| {
                 var rays: Shadows = .none;
                 if (chosen) |point| rays.put(0, candidate, point);
                 share.* = rays.trace(tree)[0];
             }
-            finishWeight(candidate, targets.total, &shares);
-        }
-
-        fn finishWeight(
-            candidate: *Candidate,
-            total: f64,
-            shares: *const [shadow_count]f32,
-        ) void {
-            var arriving: f64 = 0;
-            for (shares) |share| arriving += share;
-            const seen = hidden_share + (1 - hidden_share) * arriving / shadow_count;
-            candidate.weight = candidate.luminance() * total * seen;
+            addGains(points, candidate, radius, &shares, sums);
         }
 
         /// Shadow rays of a bundle, each from another candidate.
@@ -534,6 +499,88 @@ pub fn LightPaths(comptime Kernel: type, comptime Tree: type) type {
             }
         };
     };
+}
+
+/// What a point gets of each unit of a candidate's flux, in any unit, where nothing is in the way: a
+/// disk of this radius bounds what is near.
+inline fn gainOf(point: *const Point, candidate: *const Candidate, radius: f32) f32 {
+    const way = vec3.sub(point.position, candidate.position);
+    const squared = vec3.dot(way, way);
+    const leaving = vec3.dot(way, candidate.normal);
+    const arriving = -vec3.dot(way, point.normal);
+    if (!(leaving > 0 and arriving > 0)) return 0;
+    return point.albedo * leaving * arriving / (squared * (squared + radius * radius));
+}
+
+/// The points that a candidate's shadow rays go to.
+fn targetsOf(
+    points: []const Point,
+    candidate: *const Candidate,
+    radius: f32,
+) [shadow_count]?*const Point {
+    var gains: [point_max]f32 = undefined;
+    var total: f64 = 0;
+    for (points, gains[0..points.len]) |*point, *gain| {
+        gain.* = gainOf(point, candidate, radius);
+        total += gain.*;
+    }
+    var targets: [shadow_count]?*const Point = @splat(null);
+    if (!(total > 0)) return targets;
+    for (&targets, 0..) |*target, index| {
+        const share = (@as(f64, @floatFromInt(index)) + 0.5) / shadow_count;
+        var left = share * total;
+        for (points, gains[0..points.len]) |*point, gain| {
+            if (gain == 0) continue;
+            target.* = point;
+            left -= gain;
+            if (left < 0) break;
+        }
+    }
+    return targets;
+}
+
+/// Makes the share of a candidate's light that arrives its weight, and adds what points get of it.
+fn addGains(
+    points: []const Point,
+    candidate: *Candidate,
+    radius: f32,
+    shares: *const [shadow_count]f32,
+    sums: *[point_max]f64,
+) void {
+    var arriving: f64 = 0;
+    for (shares) |share| arriving += share;
+    candidate.weight = hidden_share + (1 - hidden_share) * arriving / shadow_count;
+    const flux = candidate.luminance() * candidate.weight;
+    for (points, sums[0..points.len]) |*point, *sum| sum.* += flux * gainOf(point, candidate, radius);
+}
+
+/// Part of what points get in the mean that is added to what each gets: where there is next to no
+/// light at all it is not seen how much.
+const least_share = 0.1;
+
+/// Turns what each point gets into what its shares count.
+pub fn invertGains(sums: []f64) void {
+    var total: f64 = 0;
+    for (sums) |sum| total += sum;
+    const least = least_share * total / @as(f64, @floatFromInt(@max(1, sums.len)));
+    for (sums) |*sum| sum.* = if (least > 0) 1 / (sum.* + least) else 0;
+}
+
+/// Gives candidates whose weights say how much arrives their final ones.
+pub fn finishWeights(
+    points: []const Point,
+    inverse_gains: []const f64,
+    candidates: []Candidate,
+    radius: f32,
+) void {
+    for (candidates) |*candidate| {
+        var squares: f64 = 0;
+        for (points, inverse_gains[0..points.len]) |*point, inverse| {
+            const share = gainOf(point, candidate, radius) * inverse;
+            squares += share * share;
+        }
+        candidate.weight *= candidate.luminance() * @sqrt(squares);
+    }
 }
 
 /// Stands for where shadow rays come from, of which only the kind counts.

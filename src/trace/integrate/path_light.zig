@@ -190,8 +190,8 @@ pub noinline fn fromSurface(
     if (shines.none()) return none;
     const shared = shines.bitAnd(step.scatter_pdf.gt(.zero()));
     var share: F32 = .splat(1);
-    // Lights that are chosen have no coat.
-    if (bsdf.layered) share = .select(shared, share, bsdf.coating.below_coat);
+    // None of what shines below a coat is chosen.
+    if (bsdf.layered) share = bsdf.coating.below_coat;
     if (step.frame.light_sampler == null or shared.none()) return emissive.scale(share);
     const receiver = step.receiver();
     const way = point.position.sub(receiver.position);
@@ -206,5 +206,5 @@ pub noinline fn fromSurface(
         shared,
     );
     const weight = heuristic(Rays, step.scatter_pdf, other);
-    return emissive.scale(.select(shared, weight, share));
+    return emissive.scale(share.mul(F32.select(shared, weight, .splat(1))));
 }

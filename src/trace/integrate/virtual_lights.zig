@@ -169,3 +169,42 @@ fn isCoarseAt(geometry: *const world_file.Geometry, position: Vec3) bool {
     const shift = geometry.padding.ofBox(.{ .lower = position, .upper = position });
     return shift > geometry.size * 0x1p-10;
 }
+
+test "lights have the flux of all candidates, and are as near to each other as these" {
+    var candidates: [256]Candidate = undefined;
+    var total: f64 = 0;
+    for (&candidates, 0..) |*candidate, index| {
+        // On the floor of a room of 16 x 16, some brighter than others.
+        const flux: f32 = @floatFromInt(1 + index % 7);
+        candidate.* = .{
+            .position = .{ @floatFromInt(index % 16), 0, @floatFromInt(index / 16) },
+            .normal = .{ 0, 1, 0 },
+            .flux = @splat(flux),
+        };
+        candidate.weight = candidate.luminance();
+        total += flux;
+    }
+    var geometry: world_file.Geometry = .empty;
+    geometry.size = 16;
+    const box: Box3 = .{ .lower = @splat(0), .upper = .{ 15, 0, 15 } };
+    sortAlongCurve(&candidates, box);
+    const sets: interleave.Sets = .init(9, 4, true);
+    var lights: [36]Light = undefined;
+    try std.testing.expect(choose(&candidates, &sets, &geometry, &lights));
+    var flux: f64 = 0;
+    for (&lights) |*light| {
+        flux += light.intensity[0] * std.math.pi / @as(f64, interleave.part_count * 4);
+        // 36 lights on 256 square metres.
+        const area = std.math.pi * light.disk;
+        try std.testing.expect(area > 2 and area < 30);
+    }
+    try std.testing.expectApproxEqRel(total, flux, 1e-5);
+    // Fewer candidates have the same flux, too.
+    const kept = thin(&candidates, 50);
+    var sum: f64 = 0;
+    for (candidates[0..kept]) |*candidate| sum += candidate.flux[0];
+    try std.testing.expect(kept <= 50);
+    try std.testing.expectApproxEqRel(total, sum, 1e-5);
+    for (&candidates) |*candidate| candidate.weight = 0;
+    try std.testing.expect(!choose(&candidates, &sets, &geometry, &lights));
+}

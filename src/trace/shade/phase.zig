@@ -110,14 +110,14 @@ fn phase(along: Single.Vec3, g: f32, numbers: [2]Single.F32) Single.Vec3 {
 }
 
 test "directions have the phase function as their density, by chi-squared" {
-    for ([_]f32{ 0, 0.6 }) |g| try chi_squared.expectDistributed(&Scattered{ .g = g });
+    try chi_squared.expectDistributed(&Scattered{ .g = -0.6 });
 }
 
 test "directions around a way: straight on, back, in the narrowest peak" {
     const along: Single.Vec3 = .splat(Scattered.along);
     for ([_]f32{ -0.999999, -0.5, -1e-6, 0, 1e-4, 0.7, 0.99999994 }) |g| {
         var mean: f64 = 0;
-        const steps = 40;
+        const steps = 32;
         for (0..steps) |i| for (0..steps) |j| {
             const u = (@as(f32, @floatFromInt(i)) + 0.5) / steps;
             const v = (@as(f32, @floatFromInt(j)) + 0.5) / steps;
@@ -125,7 +125,7 @@ test "directions around a way: straight on, back, in the narrowest peak" {
             try std.testing.expectApproxEqAbs(1, way.length().lane(0), 1e-6);
             mean += way.dot(along).lane(0) / @as(f64, steps * steps);
         };
-        try std.testing.expectApproxEqAbs(g, mean, 0.01);
+        try std.testing.expectApproxEqAbs(g, mean, 0.015);
         for ([_]f32{ 0, 0.5, 1 }) |u| for ([_]f32{ 0, 0.5, 1 }) |v| {
             const way = phase(along, g, .{ .splat(u), .splat(v) });
             try std.testing.expectApproxEqAbs(1, way.length().lane(0), 1e-6);

@@ -631,15 +631,14 @@ const Distributed = struct {
 test "samples have their density, by chi-squared" {
     const some = [_]Change{
         .{
-            .metallic = 0.5,
-            .roughness = 0.6,
+            .metallic = 0.3,
             .sheen = 1,
             .anisotropy = 0.6,
             .coat = 1,
+            .transmission = 0.5,
             .diffuse_transmission = 0.5,
         },
-        .{ .roughness = 0.7, .transmission = 1, .eta = 1.5, .cosine = 0.6, .is_layered = false },
-        .{ .roughness = 0.8, .transmission = 0.8, .eta = 1.0 / 1.5, .dispersion = 5, .sheen = 1 },
+        .{ .transmission = 1, .eta = 1.5, .cosine = 0.6, .dispersion = 5, .sheen = 0.5 },
     };
     var surface: Surface(Single) = undefined;
     for (some) |change| {
