@@ -554,7 +554,7 @@ const Parser = struct {
                 try reader.number(given, settings.virtual_light_count),
             .sky_lights => lights.sky_count = try reader.number(given, settings.sky_light_count),
             .all_lights => lights.is_interleaved = false,
-            else => unreachable,
+            else => unreachable, // `set` hands over the above.
         }
     }
 
