@@ -7,7 +7,9 @@
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
-const vec3 = @import("../../math.zig").vec3;
+const math = @import("../../math.zig");
+const elementary = math.elementary;
+const vec3 = math.vec3;
 const choices = @import("../../settings.zig");
 const Environment = world_file.Environment;
 const Map = world_file.EnvironmentMap;
@@ -129,6 +131,30 @@ pub fn pieceOf(
     return light;
 }
 
+/// The same of light from everywhere, for environments without a map: along a spiral (Vogel 1979).
+pub fn evenPieceOf(
+    environment: *const Environment,
+    piece: usize,
+    count: usize,
+    weight: f32,
+) EnvironmentLight {
+    const number = @as(f64, @floatFromInt(piece)) + 0.5;
+    const share = 1 / @as(f64, @floatFromInt(count));
+    const height = 1 - 2 * number * share;
+    const radius = @sqrt(@max(0, 1 - height * height));
+    const turns = number * 0.6180339887498949;
+    const angle = 2 * std.math.pi * (turns - @floor(turns));
+    const direction: [3]f64 = .{
+        radius * elementary.cos(angle),
+        height,
+        radius * elementary.sin(angle),
+    };
+    var even = environment.*;
+    even.scale = @splat(environment.ambient);
+    const solid_angle = 4 * std.math.pi * share;
+    return lightOf(&even, narrow(direction), narrow(@splat(solid_angle)), weight);
+}
+
 fn lightOf(
     environment: *const Environment,
     direction: Vec3,
@@ -248,4 +274,20 @@ test "the lights of all sets have the light of the map, whatever their numbers" 
             try std.testing.expectApproxEqRel(energy / std.math.pi, mean, 1e-5);
         }
     };
+}
+
+test "lights of a sky that is the same all around are spread evenly, with all of its light" {
+    const environment: Environment = .{ .ambient = 0.5, .background = @splat(0) };
+    for ([_]usize{ 9, 144 }) |count| {
+        var energy: f64 = 0;
+        var moment: [3]f64 = @splat(0);
+        for (0..count) |piece| {
+            const light = evenPieceOf(&environment, piece, count, 1);
+            energy += light.irradiance[1] * std.math.pi;
+            for (&moment, light.to_light) |*sum, component| sum.* += component;
+        }
+        try std.testing.expectApproxEqRel(4 * std.math.pi * 0.5, energy, 1e-5);
+        const all: f64 = @floatFromInt(count);
+        for (moment) |sum| try std.testing.expectApproxEqAbs(0, sum / all, 0.1);
+    }
 }

@@ -63,6 +63,7 @@ fn Lighting(comptime Kernel: type) type {
         const Tree = InstantRadiosity(Kernel);
         const ones: [group_count]Rays.F32 = @splat(.splat(1));
 
+        pub const has_ambient = false;
         pub const stride = interleave.side;
         pub const Shared = SharedOf(Kernel);
 
@@ -245,10 +246,12 @@ fn SharedOf(comptime Kernel: type) type {
                 .piece_gains = undefined,
             };
             errdefer shared.freeLights();
-            if (environment.map) |map| if (environment.shadow_count > 0) {
-                shared.sources = try gpa.alloc(EnvironmentLight, map.sources.len);
+            const has_map_shadows = environment.map != null and environment.shadow_count > 0;
+            const has_even_sky = environment.map == null and environment.ambient > 0;
+            if (has_map_shadows)
+                shared.sources = try gpa.alloc(EnvironmentLight, environment.map.?.sources.len);
+            if (has_map_shadows or has_even_sky)
                 shared.sky = try gpa.alloc(EnvironmentLight, shared.sky_sets.count());
-            };
             try shared.placeStarts();
             const view = frame.view;
             const has_sky = shared.sky.len > 0;
@@ -286,8 +289,11 @@ fn SharedOf(comptime Kernel: type) type {
             }
             for (0..shared.sky.len) |number| {
                 const weight: f32 = @floatCast(shared.sky_sets.weightOf(number));
-                const one = environment_lights
-                    .pieceOf(frame.environment, number, shared.sky.len, weight);
+                const environment = frame.environment;
+                const one = if (environment.map == null)
+                    environment_lights.evenPieceOf(environment, number, shared.sky.len, weight)
+                else
+                    environment_lights.pieceOf(environment, number, shared.sky.len, weight);
                 shared.sky[shared.sky_sets.indexOf(number)] = one;
                 shared.starts[count] = .{ .light = parallel(&one) };
                 count += 1;

@@ -95,13 +95,13 @@ pub fn InterleavedLight(comptime Kernel: type) type {
             );
             for (&light.receivers, vertices.all, radiance, 0..) |*receiver, *vertex, *sum, group| {
                 if (receiver.lit.none()) continue;
-                const traced = vertices.traced[group];
-                var all = receiver.scatter(environment, .{ 0, 0, 0 }, vertex, traced, false);
-                if (vertex.bsdf.layered) all = all.add(receiver.further
-                    .scatter(environment, vertex, receiver.lit, vertices.coat_traced[group]));
-                all = .select(receiver.lit, vertex.throughput.mul(all), none);
+                const all = light.openSky(environment, vertices, group);
                 if (vertices.is_end) {
-                    const through = vertex.throughput.mul(receiver.through(environment, vertex));
+                    const seen = if (environment.map == null)
+                        vertex.bsdf.mirror.transmitted.scale(.splat(environment.ambient))
+                    else
+                        receiver.through(environment, vertex);
+                    const through = vertex.throughput.mul(seen);
                     sum.* = sum.add(.select(receiver.lit, through, none));
                 }
                 // The sources' part of it has shadows of its own.
@@ -111,6 +111,25 @@ pub fn InterleavedLight(comptime Kernel: type) type {
                 light.open[group] = light.open[group].add(all.sub(part));
             }
             return count;
+        }
+
+        /// The environment's light that vertices send to the view where nothing is in its way.
+        fn openSky(
+            light: *const Self,
+            environment: *const world_file.Environment,
+            vertices: *const Vertices,
+            group: usize,
+        ) Vec3 {
+            const worth = &light.worths[group];
+            if (environment.map == null)
+                return worth.front.add(worth.back).scale(.splat(environment.ambient));
+            const receiver = &light.receivers[group];
+            const vertex = &vertices.all[group];
+            const traced = vertices.traced[group];
+            var all = receiver.scatter(environment, .{ 0, 0, 0 }, vertex, traced, false);
+            if (vertex.bsdf.layered) all = all.add(receiver.further
+                .scatter(environment, vertex, receiver.lit, vertices.coat_traced[group]));
+            return .select(receiver.lit, vertex.throughput.mul(all), none);
         }
 
         fn quotient(part: Vec3, whole: Vec3) Vec3 {

@@ -8,6 +8,7 @@
 //! What lights surfaces is another type, Lighting(Kernel), a field of the tree, with
 //!
 //!     Shared                                    see `tiles.zig`
+//!     has_ambient                               light from everywhere has nothing in its way
 //!     stride                                    pixels between neighbours of a bundle, at most
 //!     init(lighting, frame, settings)           in place
 //!     partOf(lighting, rectangle, index)        of stride^2 bundles one, or null
@@ -213,13 +214,14 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
             const environment = tree.frame.environment;
             var glow = vertex.point.material.emissive.scale(tree.path.emission[group]);
             if (vertex.bsdf.layered) glow = glow.scale(vertex.bsdf.coating.below_coat);
-            if (environment.map == null) glow = glow.add(environment_light.scatterAmbient(
-                Rays,
-                environment,
-                vertex,
-                tree.bounces.reflected[group],
-                tree.isEnd(),
-            ));
+            if (Lighting.has_ambient and environment.map == null)
+                glow = glow.add(environment_light.scatterAmbient(
+                    Rays,
+                    environment,
+                    vertex,
+                    tree.bounces.reflected[group],
+                    tree.isEnd(),
+                ));
             if (tree.sample.features.kept) tree.addFeatures(group, vertex);
             tree.sample.addSurface(group, vertex, glow, tree.path.depth);
         }

@@ -21,6 +21,7 @@ fn Lighting(comptime Kernel: type) type {
         const Self = @This();
 
         pub const Shared = void;
+        pub const has_ambient = true;
         pub const stride = 1;
 
         pub inline fn init(_: *Self, _: *const world_file.Frame, _: *const tiles.Settings) void {}
