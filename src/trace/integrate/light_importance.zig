@@ -2,7 +2,7 @@
 //! Slusallek 2010, "Simple and Robust Iterative Importance Sampling of Virtual Point Lights").
 //!
 //! In: candidates (`light_paths.zig`). Out: their weights. Of what a candidate gives the points
-//! that the camera sees two shadow rays, to those that get much of it, say how much arrives. It
+//! that the camera sees four shadow rays, to those that get much of it, say how much arrives. It
 //! matters by its shares of what all give each point, squared and summed: chosen by the root of
 //! that the variance is least, as a share of the light that there is.
 
@@ -23,11 +23,12 @@ const points_side = 16;
 /// In all.
 pub const point_max = points_side * points_side;
 /// Shadow rays of a candidate.
-const shadow_count = 2;
+const shadow_count = 4;
 /// Candidates of a piece of work.
 pub const piece_candidates = 256 / shadow_count;
-/// Share of what a candidate would give that counts though no shadow ray found it to.
-const hidden_share = 0.03;
+/// Share of what a candidate would give that counts though no shadow ray found it to: one that is
+/// chosen all the same gets by so much more flux, and is a bright spot on what it does light.
+const hidden_share = 0.2;
 
 /// A point that the camera sees.
 pub const Point = struct {

@@ -141,9 +141,9 @@ pub fn choose(
     return true;
 }
 
-/// Lights that face much the same way and lie nearest to one, it itself among them, tell the area
-/// that each stands for.
-const neighbour_count = 6;
+/// Lights that face much the same way and lie nearest to one tell the area that it stands for;
+/// those in the same place stand for it together.
+const neighbour_count = 5;
 /// Radius of the smallest disk, as a part of the scene's size.
 const disk_radius_least = 1.0 / 512.0;
 
@@ -154,6 +154,7 @@ fn diskOf(light: *const Light, all: []const Light, size: f32) f32 {
         if (vec3.dot(other.direction, light.direction) < 0.5) continue;
         const way = vec3.sub(other.position, light.position);
         var distance = vec3.dot(way, way);
+        if (distance == 0) continue;
         for (&nearest) |*at| {
             if (distance < at.*) std.mem.swap(f32, at, &distance);
         }
