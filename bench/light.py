@@ -49,10 +49,10 @@ SHARED = [("sun", "pixels", "to the sun"), ("sun", "interleaved", "to the sun, e
 PARTS = ["rays", "frames", "error"]
 # Of pictures whose error is measured: pixels along each side, and samples a pixel of the truth, of
 # `lights` and of `path` at most.
-ERROR_SIZE = 256
-TRUTH_SAMPLES = 2048
+ERROR_SIZE = 128
+TRUTH_SAMPLES = 1024
 LIGHTS_SAMPLES = [1, 4, 16]
-PATH_SAMPLES_MAX = 512
+PATH_SAMPLES_MAX = 256
 
 
 def load_count():
@@ -227,7 +227,7 @@ def measure_frames(program, options):
         out = pathlib.Path(folder) / "bench.json"
         print("light: frames", file=sys.stderr)
         subprocess.run([program, "bench", *options.scenes.split(","), "--integrator", "path",
-                        "--depth", str(options.depth), "--spp", "1", "-r", "512x512", "-t", "1",
+                        "--depth", str(options.depth), "--spp", "1", "-r", "256x256", "-t", "1",
                         "--rounds", "3", "--time-limit", "600", "-q", "--json", out],
                        check=True, stdout=subprocess.DEVNULL)
         return json.loads(out.read_text())

@@ -25,6 +25,7 @@ test {
     _ = @import("instances.zig");
     _ = @import("integrators.zig");
     _ = @import("light_sampling.zig");
+    _ = @import("lights.zig");
     _ = @import("malformed.zig");
     _ = @import("meshes.zig");
     _ = @import("offset.zig");
