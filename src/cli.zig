@@ -530,11 +530,7 @@ const Parser = struct {
             .variant => options.render.variant = try parser.variantOf(given.value),
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
-            .virtual_lights => options.render.lights.virtual_count =
-                try reader.number(given, settings.virtual_light_count),
-            .sky_lights => options.render.lights.sky_count =
-                try reader.number(given, settings.sky_light_count),
-            .all_lights => options.render.lights.is_interleaved = false,
+            .virtual_lights, .sky_lights, .all_lights => try parser.setLights(given),
             .count_tests => options.count_tests = true,
             .point_size => options.view.point_size =
                 numberWithin(given.value, settings.point_size) orelse
@@ -547,6 +543,18 @@ const Parser = struct {
             .version => parser.other = parser.other orelse .version,
             .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
+        }
+    }
+
+    fn setLights(parser: *Parser, given: Reader.Given) Error!void {
+        const lights = &parser.options.render.lights;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .virtual_lights => lights.virtual_count =
+                try reader.number(given, settings.virtual_light_count),
+            .sky_lights => lights.sky_count = try reader.number(given, settings.sky_light_count),
+            .all_lights => lights.is_interleaved = false,
+            else => unreachable, // `set` hands over the above.
         }
     }
 

@@ -394,7 +394,7 @@ pub const Session = struct {
     }
 
     fn denoiseFilm(session: *Session) denoise.Error!void {
-        if (session.sampleCount(session.rendered) < denoise.sample_count_min) return session
+        if (session.traced.sample_count < denoise.sample_count_min) return session
             .diagnostic.warn("it is not denoised: one sample a pixel does not tell its noise", .{});
         const start = Io.Clock.awake.now(session.io);
         try denoise.run(session.gpa, &session.film.?, &session.pool);
@@ -1021,22 +1021,22 @@ test "a time budget's picture is that of as many samples, and one that is stoppe
     var session: Session = .init(testing.allocator, testing.io, 2, &diagnostic);
     defer session.deinit();
     try openForTest(&session);
-    try session.view(.{ .resolution = .{ 12, 8 } });
+    try session.view(.{ .resolution = .{ 12, 8 }, .environment = .{ .source = .none } });
     var stop: std.atomic.Value(bool) = .init(true);
     for ([_]settings.Integrator{ .whitted, .path }) |integrator| {
         try session.render(.{
             .integrator = integrator,
-            .sample_count = 5,
+            .sample_count = 3,
             .time_budget_s = 0.05,
         });
         const timed = session.report(.{ .time_budget_s = 0.05 });
-        try testing.expect(timed.sample_count >= 1 and timed.sample_count <= 5);
+        try testing.expect(timed.sample_count >= 1 and timed.sample_count <= 3);
         try session.render(.{ .integrator = integrator, .sample_count = timed.sample_count });
         try testing.expectEqual(timed.image_hash, session.film.?.hash());
 
         session.stop = &stop;
         defer session.stop = null;
-        try session.render(.{ .integrator = integrator, .sample_count = 64 });
+        try session.render(.{ .integrator = integrator, .sample_count = 3 });
         const stopped = session.report(.{});
         try testing.expect(stopped.is_partial and stopped.sample_count == 1);
         try testing.expectEqual(1, stopped.sample_mean);
@@ -1053,7 +1053,7 @@ test "a picture of work under way is the one of the samples so far, in a whole f
     var session: Session = .init(gpa, testing.io, 2, &folder.diagnostic);
     defer session.deinit();
     try openForTest(&session);
-    try session.view(.{ .resolution = .{ 12, 8 } });
+    try session.view(.{ .resolution = .{ 12, 8 }, .environment = .{ .source = .none } });
     const choices: settings.Write = .{ .format = .ppm, .exposure = .auto };
     const shown_path = try folder.pathOf("shown.ppm");
     defer gpa.free(shown_path);

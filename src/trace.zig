@@ -181,6 +181,7 @@ test {
     _ = @import("trace/shade/iridescence.zig");
     _ = light;
     _ = light_sampling;
+    _ = @import("trace/shade/emission.zig");
     _ = @import("trace/shade/environment_sampling.zig");
     _ = @import("trace/shade/offset.zig");
     _ = @import("trace/shade/albedo.zig");

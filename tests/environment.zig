@@ -6,6 +6,7 @@
 const std = @import("std");
 const fixture = @import("fixture.zig");
 const raylane = @import("raylane");
+const variants = @import("variants.zig");
 const Builder = fixture.Builder;
 const Image = raylane.image.Image;
 const Session = raylane.session.Session;
@@ -13,7 +14,7 @@ const expect = std.testing.expect;
 const gpa = std.testing.allocator;
 
 /// An equirectangular image in a file of its own.
-const Sky = struct {
+pub const Sky = struct {
     folder: std.testing.TmpDir,
     path: []u8,
 
@@ -21,7 +22,8 @@ const Sky = struct {
     const height = 32;
     const Texels = [width * height][3]f32;
 
-    fn init(texels: *const Texels) !Sky {
+    /// Of these texels, as far as 8 bits and an exponent hold them.
+    pub fn init(texels: *const Texels) !Sky {
         var sky: Sky = .{ .folder = std.testing.tmpDir(.{}), .path = undefined };
         errdefer sky.folder.cleanup();
         const io = std.testing.io;
@@ -49,16 +51,19 @@ const Sky = struct {
         return sky;
     }
 
-    fn deinit(sky: *Sky) void {
+    /// Deletes the file.
+    pub fn deinit(sky: *Sky) void {
         gpa.free(sky.path);
         sky.folder.cleanup();
     }
 
-    fn plain(color: [3]f32) Texels {
+    /// One colour everywhere.
+    pub fn plain(color: [3]f32) Texels {
         return @splat(color);
     }
 
-    fn around(sky: *const Sky) raylane.settings.Environment {
+    /// Has it around a scene.
+    pub fn around(sky: *const Sky) raylane.settings.Environment {
         return .{ .source = .{ .file = sky.path } };
     }
 };
@@ -73,29 +78,34 @@ fn sphere(material: raylane.scene.Material) !raylane.scene.Scene {
 test "furnace: in a white environment what absorbs nothing cannot be seen" {
     var sky: Sky = try .init(&Sky.plain(@splat(1)));
     defer sky.deinit();
-    var matte = fixture.matte(.{ 1, 1, 1 });
-    for (0..7) |step| for ([_]u32{ 0, 4 }) |shadow_count| {
-        if (step > 0) {
-            matte.metallic = 1;
-            matte.roughness = 0.2 * @as(f32, @floatFromInt(step - 1));
-        }
-        var scene = try sphere(matte);
-        defer scene.deinit();
-        var environment = sky.around();
-        environment.shadow_count = shadow_count;
-        var image = try fixture.render(&scene, .{
+    for ([_]u32{ 0, 4 }) |shadow_count| {
+        var options: fixture.Options = .{
             .width = 20,
             .height = 20,
-            .environment = environment,
+            .environment = sky.around(),
             .see_environment = true,
             .sample_count = 4,
-        });
-        defer image.deinit(gpa);
-        for (image.pixels) |pixel| {
-            const tolerance: f32 = if (step == 0) 0.01 else 0.02;
-            for (pixel) |channel| try std.testing.expectApproxEqAbs(1, channel, tolerance);
+        };
+        options.environment.shadow_count = shadow_count;
+        var diagnostic: raylane.diagnostic.Diagnostic = .{};
+        // Keeps the environment, which takes longer than a picture.
+        var session: Session = .init(gpa, std.testing.io, 1, &diagnostic);
+        defer session.deinit();
+        var matte = fixture.matte(.{ 1, 1, 1 });
+        for (0..7) |step| {
+            if (step > 0) {
+                matte.metallic = 1;
+                matte.roughness = 0.2 * @as(f32, @floatFromInt(step - 1));
+            }
+            var scene = try sphere(matte);
+            defer scene.deinit();
+            try fixture.view(&session, &scene, raylane.variant.default.lanes, options);
+            for ((try fixture.trace(&session, options)).pixels) |pixel| {
+                const tolerance: f32 = if (step == 0) 0.01 else 0.02;
+                for (pixel) |channel| try std.testing.expectApproxEqAbs(1, channel, tolerance);
+            }
         }
-    };
+    }
 }
 
 /// The picture of nothing but the sky along -z, by a wide angle.
@@ -205,23 +215,19 @@ test "it is darker below a box than beside it, and every variant says so alike" 
     defer sky.deinit();
     var scene = try boxScene();
     defer scene.deinit();
-    var hash: ?u64 = null;
-    for (0..raylane.variant.compiled.len) |variant| for ([_]usize{ 1, 3 }) |thread_count| {
-        var image = try fixture.render(&scene, .{
-            .width = 32,
-            .height = 24,
-            .sample_count = 4,
-            .environment = sky.around(),
-            .variant = variant,
-            .thread_count = thread_count,
-        });
-        defer image.deinit(gpa);
-        try std.testing.expectEqual(hash orelse image.hash(), image.hash());
-        hash = image.hash();
-        const below = image.at(16, 15).*;
-        const beside = image.at(2, 15).*;
-        for (below[0..3], beside[0..3]) |dark, bright| try expect(dark < 0.45 * bright);
+    var options: fixture.Options = .{
+        .width = 32,
+        .height = 24,
+        .sample_count = 4,
+        .environment = sky.around(),
     };
+    var shaded = try fixture.render(&scene, options);
+    defer shaded.deinit(gpa);
+    const below = shaded.at(16, 15).*;
+    const beside = shaded.at(2, 15).*;
+    for (below[0..3], beside[0..3]) |dark, bright| try expect(dark < 0.45 * bright);
+    options.thread_count = 3;
+    try variants.expectAllVariants(&scene, options, shaded.hash());
     var image = try fixture.render(&scene, .{
         .width = 32,
         .height = 24,
@@ -349,21 +355,16 @@ test "a floor shows the shadow on it alone" {
     var bare = try fixture.render(&scene, options);
     defer bare.deinit(gpa);
     options.floor = .shadow;
-    var hash: ?u64 = null;
-    for (0..raylane.variant.compiled.len) |variant| {
-        options.variant = variant;
-        var image = try fixture.render(&scene, options);
-        defer image.deinit(gpa);
-        try std.testing.expectEqual(hash orelse image.hash(), image.hash());
-        hash = image.hash();
-        // Below the sphere, far off, and above the horizon; the sphere itself is as before.
-        const below = image.at(32, 31).*;
-        try expect(below[3] > 0.4 and below[3] <= 1);
-        try std.testing.expectEqual([3]f32{ 0, 0, 0 }, below[0..3].*);
-        try expect(image.at(2, 40).*[3] < 0.1);
-        try std.testing.expectEqual(0, image.at(32, 2).*[3]);
-        try std.testing.expectEqual(bare.at(32, 26).*, image.at(32, 26).*);
-    }
+    var image = try fixture.render(&scene, options);
+    defer image.deinit(gpa);
+    // Below the sphere, far off, and above the horizon; the sphere itself is as before.
+    const below = image.at(32, 31).*;
+    try expect(below[3] > 0.4 and below[3] <= 1);
+    try std.testing.expectEqual([3]f32{ 0, 0, 0 }, below[0..3].*);
+    try expect(image.at(2, 40).*[3] < 0.1);
+    try std.testing.expectEqual(0, image.at(32, 2).*[3]);
+    try std.testing.expectEqual(bare.at(32, 26).*, image.at(32, 26).*);
+    try variants.expectAllVariants(&scene, options, image.hash());
 }
 
 test "a file that is no image or not there is an error in one line" {

@@ -23,7 +23,9 @@ test {
     _ = @import("gltf_quantization.zig");
     _ = @import("gltf_textures.zig");
     _ = @import("instances.zig");
+    _ = @import("integrators.zig");
     _ = @import("light_sampling.zig");
+    _ = @import("lights.zig");
     _ = @import("malformed.zig");
     _ = @import("meshes.zig");
     _ = @import("offset.zig");

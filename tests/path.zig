@@ -147,3 +147,31 @@ test "every variant, whatever threads and tiles, has the same path-traced pictur
         .ambient = 0.1,
     });
 }
+
+test "furnace: a ball of white mist, scattered in as often as it takes, cannot be seen" {
+    var builder: Builder = try .init();
+    try builder.addCamera(.{ 0, 0, 5 }, 0.1);
+    var mist = fixture.matte(.{ 1, 1, 1 });
+    mist.roughness = 0;
+    mist.transmission = 1;
+    mist.volume = true;
+    mist.double_sided = false;
+    mist.attenuation_color = .{ 0.2, 0.3, 0.4 };
+    mist.attenuation_distance = 1;
+    mist.multiscatter_color = .{ 1, 1, 1 };
+    mist.scatter_anisotropy = 0.5;
+    try builder.addSphere(mist, .{ 0, 0, 0 }, 1, 6);
+    try builder.addPointLight(.{ 0, 0, -50 }, 1e-3);
+    var scene = try builder.finish();
+    defer scene.deinit();
+    var image = try fixture.render(&scene, .{
+        .integrator = .path,
+        .width = 4,
+        .height = 4,
+        .depth_max = 32,
+        .sample_count = 32,
+        .ambient = 1,
+    });
+    defer image.deinit(gpa);
+    for (meanOf(&image)) |channel| try std.testing.expectApproxEqAbs(1, channel, 0.04);
+}

@@ -26,7 +26,7 @@ const patch_radius = 3;
 pub const margin = window_radius + patch_radius;
 
 /// How many times its deviation a difference may be.
-const strictness = 0.6;
+const strictness = 0.5;
 /// Light that nobody can tell from black, squared: differences below it do not matter.
 const dark = 1e-6;
 

@@ -50,8 +50,9 @@ const nowhere = 1e4;
 const normal_distance = 0.1;
 const depth_share = 0.002;
 const albedo_distance = 0.1;
-/// And by so many times the difference from a pixel to the next.
-const slope_reach = 4.0;
+/// And by so many times the difference from a pixel to the next; depths by more, for surfaces lean.
+const slope_reach = 0.75;
+const depth_slope_reach = 4.0;
 
 /// Halves may outshine the mean of every neighbour so many times.
 const cut_factor = 4.0;
@@ -265,9 +266,11 @@ const Work = struct {
             const albedo = planes.slopeOf(&.{ .albedo_r, .albedo_g, .albedo_b }, x, y);
             const share = depth_share * planes.of.get(.depth)[to];
             const reach = slope_reach * slope_reach;
+            const depth_reach = depth_slope_reach * depth_slope_reach;
             planes.of.get(.normal_strictness)[to] =
                 1 / (normal_distance * normal_distance + reach * normal);
-            planes.of.get(.depth_strictness)[to] = 1 / (share * share + 4 * reach * depth + 1e-12);
+            planes.of.get(.depth_strictness)[to] =
+                1 / (share * share + depth_reach * depth + 1e-12);
             planes.of.get(.albedo_strictness)[to] =
                 1 / (albedo_distance * albedo_distance + reach * albedo);
             work.raw[y * planes.width + x].expected = work.expectedVariance(x, y);

@@ -1,5 +1,5 @@
-//! Instant radiosity in beams (Keller 1997; Wald et al. 2002, "Interactive Global Illumination using
-//! Fast Ray Tracing"): all light that has bounced diffusely comes from virtual point lights.
+//! Instant radiosity in beams (Keller 1997; Wald et al. 2002, "Interactive Global Illumination
+//! using Fast Ray Tracing"): light that has bounced diffusely comes from virtual point lights.
 //!
 //! In: the frame, a bundle's place in the picture. Out: samples on the film, see `ray_tree.zig`.
 //! Before the picture light paths are traced and virtual lights chosen (`light_paths.zig`,
@@ -17,6 +17,7 @@ const environment_lights = @import("environment_lights.zig");
 const emission = @import("light_emission.zig");
 const interleave = @import("interleave.zig");
 const interleaved_light = @import("interleaved_light.zig");
+const light_importance = @import("light_importance.zig");
 const light_paths = @import("light_paths.zig");
 const tiles = @import("tiles.zig");
 const virtual_lights = @import("virtual_lights.zig");
@@ -29,7 +30,9 @@ const Layers = interleave.Layers;
 const RayTree = @import("ray_tree.zig").RayTree;
 const Rectangle = @import("../../film.zig").Rectangle;
 
-/// Paths that lights are looked for by.
+/// Paths that lights are looked for by: one for so many pixels, within bounds.
+const path_pixels = 8;
+const path_count_min = 1 << 9;
 const path_count_max = 1 << 15;
 /// Candidates that are weighed.
 const weighed_max = 1 << 14;
@@ -160,7 +163,8 @@ fn Lighting(comptime Kernel: type) type {
                 const x = color.x.toArray();
                 const y = color.y.toArray();
                 const z = color.z.toArray();
-                const w = if (fourth) |all| all[group].toArray() else @as([Kernel.ray_count]f32, @splat(0));
+                const none: Rays.F32 = .zero();
+                const w = (if (fourth) |all| all[group] else none).toArray();
                 for (0..Kernel.ray_count) |lane| {
                     const column = rectangle.x0 + rectangle.step * Kernel.pixelX(group, lane);
                     const row = rectangle.y0 + rectangle.step * Kernel.pixelY(group, lane);
@@ -194,19 +198,21 @@ fn SharedOf(comptime Kernel: type) type {
         path_count: u32,
         candidates: [][light_paths.bounce_max]Candidate,
         found: []Candidate,
-        points: [light_paths.point_max]light_paths.Point,
+        points: [light_importance.point_max]light_importance.Point,
         point_count: usize,
         /// What each gets of all candidates, and of those of a piece of work.
-        gains: [light_paths.point_max]f64,
-        piece_gains: [weighed_max / light_paths.piece_candidates][light_paths.point_max]f64,
+        gains: Gains,
+        piece_gains: [weighed_max / light_importance.piece_candidates]Gains,
 
         const Self = @This();
+        const Gains = [light_importance.point_max]f64;
         const Tree = InstantRadiosity(Kernel);
         const Paths = light_paths.LightPaths(Kernel, Tree);
-        const Step = enum { see, trace, gather, weigh, sum, finish, choose, filter };
+        const Importance = light_importance.LightImportance(Kernel, Tree);
+        const Step = enum { see, trace, gather, weigh, sum, finish, choose, place, filter };
 
-        pub const steps_before: u32 = @backingInt(Step.filter);
-        pub const step_count: u32 = steps_before + 1;
+        pub const steps_before: u32 = @backingInt(Step.place);
+        pub const step_count: u32 = steps_before + 2;
 
         pub fn init(
             gpa: std.mem.Allocator,
@@ -286,10 +292,16 @@ fn SharedOf(comptime Kernel: type) type {
                 shared.starts[count] = .{ .light = parallel(&one) };
                 count += 1;
             }
-            for (shared.starts[count..], frame.lights) |*start, light| start.* = .{ .light = light };
+            const rest = shared.starts[count..];
+            for (rest, frame.lights) |*start, light| start.* = .{ .light = light };
             const box = frame.geometry.bounds;
-            if (shared.settings.depth_max == 0 or shared.sets.part_size == 0 or box.isEmpty()) return;
-            shared.path_count = emission.shareOut(shared.starts, box, path_count_max);
+            if (shared.settings.depth_max == 0 or shared.sets.part_size == 0) return;
+            if (box.isEmpty()) return;
+            const view = frame.view;
+            const pixel_count = @as(u64, view.width) * view.height;
+            const path_count = std.math
+                .clamp(pixel_count / path_pixels, path_count_min, path_count_max);
+            shared.path_count = emission.shareOut(shared.starts, box, @intCast(path_count));
             if (shared.path_count == 0) return;
             shared.candidates =
                 try gpa.alloc([light_paths.bounce_max]Candidate, shared.path_count);
@@ -305,18 +317,18 @@ fn SharedOf(comptime Kernel: type) type {
 
         pub fn pieces(shared: *const Self, number: u32) u32 {
             const step: Step = @fromBackingInt(@intCast(number));
-            if (step != .filter and shared.path_count == 0) return 0;
+            if (number < steps_before and shared.path_count == 0) return 0;
             return switch (step) {
                 .see, .gather, .sum, .choose => 1,
                 .trace => @divCeil(shared.path_count, light_paths.piece_paths),
                 .weigh, .finish => shared.weighedPieces(),
-                .filter => @divCeil(shared.layers.height, band_rows),
+                .place, .filter => @divCeil(shared.layers.height, band_rows),
             };
         }
 
         pub fn work(shared: *Self, tree: *Tree, number: u32, piece: u32, film: *Film) u64 {
             switch (@as(Step, @fromBackingInt(@intCast(number)))) {
-                .see => shared.point_count = Paths.see(tree, &shared.points),
+                .see => shared.point_count = Importance.see(tree, &shared.points),
                 .trace => Paths
                     .trace(tree, shared.starts, piece, shared.path_count, shared.candidates),
                 .gather => shared.gather(),
@@ -324,19 +336,20 @@ fn SharedOf(comptime Kernel: type) type {
                     const sums = &shared.piece_gains[piece];
                     sums.* = @splat(0);
                     const found = shared.ofPiece(piece);
-                    Paths.weigh(tree, shared.seen(), found, shared.nearness(), sums);
+                    Importance.weigh(tree, shared.seen(), found, shared.nearness(), sums);
                 },
                 .sum => shared.sumGains(),
                 .finish => {
                     const found = shared.ofPiece(piece);
                     const radius = shared.nearness();
-                    light_paths.finishWeights(shared.seen(), &shared.gains, found, radius);
+                    light_importance.finishWeights(shared.seen(), &shared.gains, found, radius);
                 },
                 .choose => {
                     const geometry = shared.frame.geometry;
                     if (virtual_lights.choose(shared.found, &shared.sets, geometry, shared.room))
                         shared.lights = shared.room;
                 },
+                .place => shared.place(piece),
                 .filter => return shared.filter(piece, film),
             }
             return 0;
@@ -344,7 +357,8 @@ fn SharedOf(comptime Kernel: type) type {
 
         /// Puts the candidates of all paths together, and keeps those that are weighed.
         fn gather(shared: *Self) void {
-            const all: []Candidate = @as([*]Candidate, @ptrCast(shared.candidates.ptr))[0 .. shared.candidates.len * light_paths.bounce_max];
+            const first: [*]Candidate = @ptrCast(shared.candidates.ptr);
+            const all = first[0 .. shared.candidates.len * light_paths.bounce_max];
             var count: usize = 0;
             for (shared.candidates) |of_path| for (of_path) |one| {
                 if (!(one.luminance() > 0)) break;
@@ -357,16 +371,16 @@ fn SharedOf(comptime Kernel: type) type {
         }
 
         fn weighedPieces(shared: *const Self) u32 {
-            return @intCast(@divCeil(shared.found.len, light_paths.piece_candidates));
+            return @intCast(@divCeil(shared.found.len, light_importance.piece_candidates));
         }
 
         fn ofPiece(shared: *Self, piece: u32) []Candidate {
-            const first = piece * light_paths.piece_candidates;
-            const end = @min(first + light_paths.piece_candidates, shared.found.len);
+            const first = piece * light_importance.piece_candidates;
+            const end = @min(first + light_importance.piece_candidates, shared.found.len);
             return shared.found[first..end];
         }
 
-        fn seen(shared: *const Self) []const light_paths.Point {
+        fn seen(shared: *const Self) []const light_importance.Point {
             return shared.points[0..shared.point_count];
         }
 
@@ -381,7 +395,14 @@ fn SharedOf(comptime Kernel: type) type {
                 sum.* = 0;
                 for (shared.piece_gains[0..shared.weighedPieces()]) |*gains| sum.* += gains[index];
             }
-            light_paths.invertGains(all);
+            light_importance.invertGains(all);
+        }
+
+        fn place(shared: *Self, band: u32) void {
+            const first = band * band_rows;
+            for (first..@min(first + band_rows, shared.layers.height)) |y| {
+                shared.layers.placeRow(shared.frame.view, @intCast(y));
+            }
         }
 
         fn filter(shared: *Self, band: u32, film: *Film) u64 {

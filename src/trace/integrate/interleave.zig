@@ -70,7 +70,13 @@ pub const Sets = struct {
     }
 
     /// Those of a sample of pixels in this part.
-    pub fn of(sets: *const Sets, comptime T: type, all: []const T, sample: u32, part: usize) []const T {
+    pub fn of(
+        sets: *const Sets,
+        comptime T: type,
+        all: []const T,
+        sample: u32,
+        part: usize,
+    ) []const T {
         if (all.len == 0) return all;
         const first = sample % sets.set_count * part_count;
         if (!sets.is_interleaved)
@@ -95,11 +101,14 @@ pub const Layers = struct {
     shining: []Pixel,
     /// And by its integral.
     open: []Pixel,
+    /// What `placeRow` makes of the guide: a unit normal, 0 where several surfaces are seen, and
+    /// the distance in lengths of the camera's ray.
+    place: []Pixel,
 
     /// Four floats, of which colours have three.
     pub const Pixel = @Vector(4, f32);
     /// Names of the layers.
-    pub const Name = enum { guide, bounced, albedo, arriving, shining, open };
+    pub const Name = enum { guide, bounced, albedo, arriving, shining, open, place };
 
     /// To be freed by `deinit`.
     pub fn init(
@@ -118,6 +127,7 @@ pub const Layers = struct {
             .arriving = &.{},
             .shining = &.{},
             .open = &.{},
+            .place = &.{},
         };
         errdefer layers.deinit(gpa);
         const count = @as(usize, view.width) * view.height;
@@ -137,6 +147,27 @@ pub const Layers = struct {
     /// Adds a sample to a pixel of a layer; number 0 begins it anew.
     pub inline fn add(layer: []Pixel, at: usize, number: u32, value: Pixel) void {
         layer[at] = if (number == 0) value else layer[at] + value;
+    }
+
+    /// Finds how what the pixels of a row see lies. Before `finishRow` of it and two rows around.
+    pub fn placeRow(layers: *const Layers, view: *const world_file.View, y: u32) void {
+        for (0..layers.width) |x| {
+            const at = @as(usize, y) * layers.width + x;
+            const sums = layers.guide[at];
+            const count = layers.albedo[at][3];
+            const size = vec3.length(.{ sums[0], sums[1], sums[2] });
+            const length = if (view.camera.orthographic)
+                vec3.length(view.camera.forward)
+            else
+                vec3.length(wayOf(view, @intCast(x), y));
+            const scale = if (size > plain_min * count) 1 / size else 0;
+            layers.place[at] = .{
+                sums[0] * scale,
+                sums[1] * scale,
+                sums[2] * scale,
+                sums[3] / count / length,
+            };
+        }
     }
 
     /// Adds what the layers have to finished pixels of a row. Returns how many came out as not a
@@ -167,8 +198,7 @@ pub const Layers = struct {
     /// What a pixel's samples have together of the light that is filtered.
     fn lightOf(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Pixel {
         const at = @as(usize, y) * layers.width + x;
-        var sums: Sums = .of(layers, at);
-        if (layers.is_interleaved) layers.gather(view, x, y, &sums);
+        const sums = if (layers.is_interleaved) layers.gather(view, x, y) else Sums.of(layers, at);
         var light = layers.albedo[at] * quotient(sums.bounced, sums.albedo, 0);
         if (layers.open.len > 0)
             light += layers.open[at] * quotient(sums.arriving, sums.shining, 1);
@@ -179,7 +209,8 @@ pub const Layers = struct {
     inline fn quotient(part: Pixel, whole: Pixel, unknown: f32) Pixel {
         const known = whole > @as(Pixel, @splat(1e-20));
         const one: Pixel = @splat(1);
-        return @select(f32, known, part / @select(f32, known, whole, one), @as(Pixel, @splat(unknown)));
+        const otherwise: Pixel = @splat(unknown);
+        return @select(f32, known, part / @select(f32, known, whole, one), otherwise);
     }
 
     const Sums = struct {
@@ -190,66 +221,79 @@ pub const Layers = struct {
 
         fn of(layers: *const Layers, at: usize) Sums {
             const has_sky = layers.open.len > 0;
-            const none: Pixel = @splat(0);
+            const nothing: Pixel = @splat(0);
             return .{
                 .bounced = layers.bounced[at],
                 .albedo = layers.albedo[at],
-                .arriving = if (has_sky) layers.arriving[at] else none,
-                .shining = if (has_sky) layers.shining[at] else none,
+                .arriving = if (has_sky) layers.arriving[at] else nothing,
+                .shining = if (has_sky) layers.shining[at] else nothing,
             };
         }
 
-        fn add(sums: *Sums, other: *const Sums) void {
-            sums.bounced += other.bounced;
-            sums.albedo += other.albedo;
-            sums.arriving += other.arriving;
-            sums.shining += other.shining;
+        fn add(sums: *Sums, other: *const Sums, weight: f32) void {
+            const share: Pixel = @splat(weight);
+            sums.bounced += other.bounced * share;
+            sums.albedo += other.albedo * share;
+            sums.arriving += other.arriving * share;
+            sums.shining += other.shining * share;
         }
+
+        const none: Sums = .{
+            .bounced = @splat(0),
+            .albedo = @splat(0),
+            .arriving = @splat(0),
+            .shining = @splat(0),
+        };
     };
 
-    /// Adds what like neighbours of the other parts have, the nearest of each.
-    fn gather(
-        layers: *const Layers,
-        view: *const world_file.View,
-        x: u32,
-        y: u32,
-        sums: *Sums,
-    ) void {
-        const own: Place = .of(layers, view, x, y);
-        const found = layers.gatherLike(view, x, y, &own, sums);
-        if (@popCount(found) >= like_least) return;
-        // Too few: better light of what is around than noise.
-        var any = own;
-        any.is_plain = false;
-        sums.* = .of(layers, @as(usize, y) * layers.width + x);
-        _ = layers.gatherLike(view, x, y, &any, sums);
+    /// What a pixel and its neighbours have of all parts.
+    fn gather(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Sums {
+        const own = layers.place[@as(usize, y) * layers.width + x];
+        const is_plain = own[0] != 0 or own[1] != 0 or own[2] != 0;
+        var sums: Sums = .none;
+        // Too few are like it: better light of what is around than noise.
+        if (!is_plain or layers.gatherLike(view, x, y, true, &sums) < like_least) {
+            sums = .none;
+            _ = layers.gatherLike(view, x, y, false, &sums);
+        }
+        return sums;
     }
 
-    /// The same of what is like a place; returns the parts that are found.
+    /// Adds what each part has, between those of its pixels that are near: by a tent as wide as
+    /// they are apart, so that all of a part weigh 1 together. Returns how many parts are found.
     fn gatherLike(
         layers: *const Layers,
         view: *const world_file.View,
         x: u32,
         y: u32,
-        own: *const Place,
+        by_place: bool,
         sums: *Sums,
     ) u32 {
-        var found: u32 = @as(u32, 1) << @intCast(partOf(x, y));
-        for (neighbours) |neighbour| {
-            if (found == (1 << part_count) - 1) break;
-            const other_x = @as(i64, x) + neighbour[0];
-            const other_y = @as(i64, y) + neighbour[1];
-            if (other_x < 0 or other_y < 0) continue;
+        const tent = [_]f32{ 1.0 / 3.0, 2.0 / 3.0, 1, 2.0 / 3.0, 1.0 / 3.0 };
+        const place: Place = .of(layers, view, x, y);
+        var parts: [part_count]Sums = @splat(.none);
+        var weights: [part_count]f32 = @splat(0);
+        for (tent, 0..) |by_row, row_step| for (tent, 0..) |by_column, column_step| {
+            const row = @as(usize, y) + row_step;
+            const column = @as(usize, x) + column_step;
+            if (row < 2 or column < 2) continue;
+            const other_x: u32 = @intCast(column - 2);
+            const other_y: u32 = @intCast(row - 2);
             if (other_x >= layers.width or other_y >= layers.height) continue;
-            const column: u32 = @intCast(other_x);
-            const row: u32 = @intCast(other_y);
-            const bit = @as(u32, 1) << @intCast(partOf(column, row));
-            if (found & bit != 0) continue;
-            const other: Place = .of(layers, view, column, row);
-            if (!own.isLike(&other)) continue;
-            found |= bit;
-            const at = @as(usize, row) * layers.width + column;
-            sums.add(&.of(layers, at));
+            const is_own = other_x == x and other_y == y;
+            if (by_place and !is_own) {
+                if (!place.isLike(&.of(layers, view, other_x, other_y))) continue;
+            }
+            const part = partOf(other_x, other_y);
+            const weight = by_row * by_column;
+            parts[part].add(&.of(layers, @as(usize, other_y) * layers.width + other_x), weight);
+            weights[part] += weight;
+        };
+        var found: u32 = 0;
+        for (&parts, weights) |*part, weight| {
+            if (weight == 0) continue;
+            sums.add(part, 1 / weight);
+            found += 1;
         }
         return found;
     }
@@ -260,69 +304,56 @@ pub fn partOf(x: u32, y: u32) usize {
     return y % side * side + x % side;
 }
 
-/// Around a pixel, the nearest first.
-const neighbours = neighbours: {
-    var list: [24][2]i64 = undefined;
-    var count: usize = 0;
-    for (1..9) |distance| for (0..5) |row| for (0..5) |column| {
-        const x = @as(i64, column) - 2;
-        const y = @as(i64, row) - 2;
-        if (x * x + y * y != distance) continue;
-        list[count] = .{ x, y };
-        count += 1;
-    };
-    break :neighbours list;
-};
+/// Length of the mean normal, at least, where a pixel's samples see much the same.
+const plain_min = 0.97;
+/// Cosine between normals that are like.
+const cosine_min = 0.9;
+/// How far off the plane a neighbour may be, in distances between pixels.
+const off_max = 2.5;
+
+/// From the middle of the picture to a pixel, where the camera's forward ends.
+inline fn sidewaysOf(view: *const world_file.View, x: u32, y: u32) Vec3 {
+    const columns: f32 = @floatFromInt(view.width);
+    const rows: f32 = @floatFromInt(view.height);
+    const across = (2 * @as(f32, @floatFromInt(x)) + 1) / columns - 1;
+    const upward = 1 - (2 * @as(f32, @floatFromInt(y)) + 1) / rows;
+    return vec3.add(vec3.scale(view.camera.right, across), vec3.scale(view.camera.up, upward));
+}
+
+inline fn wayOf(view: *const world_file.View, x: u32, y: u32) Vec3 {
+    return vec3.add(view.camera.forward, sidewaysOf(view, x, y));
+}
 
 /// Where a pixel's samples see something.
 const Place = struct {
+    /// From the camera's origin.
     position: Vec3,
-    /// Unit vector.
+    /// See `Layers.place`.
     normal: Vec3,
-    /// Distance between neighbours in metres, across the view.
-    step: f32,
-    /// They see much the same.
-    is_plain: bool,
+    /// How far off a neighbour may be.
+    off: f32,
 
-    /// Length of the mean normal, at least, where they do.
-    const plain_min = 0.97;
-    /// Cosine between normals that are like.
-    const cosine_min = 0.9;
-    /// How far off the plane a neighbour may be, in steps.
-    const off_max = 2.5;
-
-    fn of(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Place {
-        const at = @as(usize, y) * layers.width + x;
-        const sums = layers.guide[at];
-        const sum: Vec3 = .{ sums[0], sums[1], sums[2] };
-        const size = vec3.length(sum);
-        const count = layers.albedo[at][3];
-        const distance = sums[3] / count;
+    inline fn of(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Place {
+        const place = layers.place[@as(usize, y) * layers.width + x];
         const camera = &view.camera;
-        const across = (2 * @as(f32, @floatFromInt(x)) + 1) / @as(f32, @floatFromInt(view.width)) - 1;
-        const upward =
-            1 - (2 * @as(f32, @floatFromInt(y)) + 1) / @as(f32, @floatFromInt(view.height));
-        const sideways =
-            vec3.add(vec3.scale(camera.right, across), vec3.scale(camera.up, upward));
-        const way = if (camera.orthographic)
-            camera.forward
-        else
-            vec3.add(camera.forward, sideways);
-        const ahead = vec3.scale(way, distance / vec3.length(way));
-        const width = 2 * vec3.length(camera.right) / @as(f32, @floatFromInt(view.width));
+        const distance = place[3];
+        const width = 2 * off_max / @as(f32, @floatFromInt(view.width));
+        const across = width * vec3.length(camera.right);
+        const sideways = sidewaysOf(view, x, y);
         return .{
-            .position = if (camera.orthographic) vec3.add(sideways, ahead) else ahead,
-            .normal = if (size > 0) vec3.scale(sum, 1 / size) else sum,
-            .step = if (camera.orthographic) width else width * distance / vec3.length(way),
-            .is_plain = size > plain_min * count,
+            .position = if (camera.orthographic)
+                vec3.add(sideways, vec3.scale(camera.forward, distance))
+            else
+                vec3.scale(vec3.add(camera.forward, sideways), distance),
+            .normal = .{ place[0], place[1], place[2] },
+            .off = if (camera.orthographic) across else across * distance,
         };
     }
 
-    fn isLike(place: *const Place, other: *const Place) bool {
-        if (!place.is_plain) return true;
-        if (!other.is_plain or vec3.dot(place.normal, other.normal) < cosine_min) return false;
+    inline fn isLike(place: *const Place, other: *const Place) bool {
+        if (!(vec3.dot(place.normal, other.normal) > cosine_min)) return false;
         const off = vec3.dot(place.normal, vec3.sub(other.position, place.position));
-        return @abs(off) < off_max * place.step;
+        return @abs(off) < place.off;
     }
 };
 
@@ -373,6 +404,7 @@ test "like neighbours share light, so that each pixel of a plane has that of all
         Layers.add(layers.open, at, 0, @splat(open));
         film.add(@intCast(x), @intCast(y), 0, .{ 1, 1, 1, 0 });
     };
+    for (0..view.height) |y| layers.placeRow(&view, @intCast(y));
     for (0..view.height) |y|
         try std.testing.expectEqual(0, layers.finishRow(&film, &view, @intCast(y)));
     for (0..view.height) |y| for (0..view.width) |x| {

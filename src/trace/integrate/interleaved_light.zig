@@ -30,6 +30,8 @@ pub fn InterleavedLight(comptime Kernel: type) type {
     const Receiver = environment_file.ReceiverOf(Rays);
     const Visibility = visibility_file.Visibility(Kernel);
     const Vertices = environment_file.Vertices(Kernel);
+    const Worth = WorthOf(Kernel);
+    const Shadows = ShadowsOf(Kernel);
     return struct {
         /// Of the sample under way, see `interleave.Layers`.
         bounced: [group_count]Vec3,
@@ -42,44 +44,6 @@ pub fn InterleavedLight(comptime Kernel: type) type {
         receivers: [group_count]Receiver,
 
         const Self = @This();
-
-        /// Albedos of the lobes that no rays are traced for, times the path's throughput; 0 in
-        /// lanes that light does not matter to.
-        const Worth = struct {
-            lit: Mask,
-            diffuse: Vec3,
-            glossy: Vec3,
-            coat: Vec3,
-            back: Vec3,
-            /// Of all in front.
-            front: Vec3,
-            has_back: bool,
-
-            fn find(worth: *Worth, vertices: *const Vertices, group: usize) void {
-                const vertex = &vertices.all[group];
-                worth.lit = .splat(false);
-                if (vertex.seen.none()) return;
-                const bsdf = &vertex.bsdf;
-                worth.lit = vertex.seen.andNot(vertex.point.material.unlit);
-                const throughput: Vec3 = .select(worth.lit, vertex.throughput, none);
-                var diffuse = bsdf.diffuse_albedo;
-                if (bsdf.layered) diffuse = diffuse.add(bsdf.coating.sheen_albedo);
-                const glossy: Vec3 = .select(vertices.traced[group], none, bsdf.specular_albedo);
-                worth.diffuse = throughput.mul(diffuse);
-                worth.glossy = throughput.mul(glossy);
-                worth.front = worth.diffuse.add(worth.glossy);
-                worth.coat = none;
-                worth.back = none;
-                worth.has_back = false;
-                if (!bsdf.layered) return;
-                const coat = throughput.scale(bsdf.coating.albedo);
-                worth.coat = .select(vertices.coat_traced[group], none, coat);
-                worth.front = worth.front.add(worth.coat);
-                worth.back = throughput.mul(bsdf.back_albedo);
-                const back = worth.back;
-                worth.has_back = back.x.max(back.y).max(back.z).gt(.zero()).any();
-            }
-        };
 
         /// No light yet.
         pub fn start(light: *Self, has_sky: bool) void {
@@ -175,7 +139,8 @@ pub fn InterleavedLight(comptime Kernel: type) type {
                 const point = &vertex.point;
                 const to_light: Vec3 = .splat(one.to_light);
                 const facing = worth.lit.bitAnd(environment_file.isFacing(Rays, point, to_light));
-                var gain: Vec3 = .select(facing, light.parallelWeight(group, vertex, to_light), none);
+                const weight = light.parallelWeight(group, vertex, to_light);
+                var gain: Vec3 = .select(facing, weight, none);
                 var behind: Mask = .splat(false);
                 if (worth.has_back) {
                     behind = worth.lit.bitAnd(
@@ -249,65 +214,123 @@ pub fn InterleavedLight(comptime Kernel: type) type {
             }
             return shadows.trace(visibility, one, vertices, coherence, &light.bounced);
         }
+    };
+}
 
-        /// Shadow rays of one light, and what they are worth.
-        const Shadows = struct {
-            bundle: bundle_file.Bundle(Kernel) = undefined,
-            gains: [group_count]Vec3 = undefined,
-            active: [group_count]Mask = undefined,
-            count: u64 = 0,
+/// Albedos of the lobes that no rays are traced for, times the path's throughput; 0 in
+/// lanes that light does not matter to.
+fn WorthOf(comptime Kernel: type) type {
+    const Rays = Kernel.Rays;
+    const Mask = Rays.Mask;
+    const Vec3 = Rays.Vec3;
+    const none: Vec3 = .splat(.{ 0, 0, 0 });
+    const Vertices = environment_file.Vertices(Kernel);
+    return struct {
+        lit: Mask,
+        diffuse: Vec3,
+        glossy: Vec3,
+        coat: Vec3,
+        back: Vec3,
+        /// Of all in front.
+        front: Vec3,
+        has_back: bool,
 
-            inline fn clear(shadows: *Shadows, group: usize) void {
-                shadows.active[group] = .splat(false);
-                shadows.bundle.groups[group].active = .splat(false);
+        fn find(worth: *@This(), vertices: *const Vertices, group: usize) void {
+            const vertex = &vertices.all[group];
+            worth.lit = .splat(false);
+            if (vertex.seen.none()) return;
+            const bsdf = &vertex.bsdf;
+            worth.lit = vertex.seen.andNot(vertex.point.material.unlit);
+            const throughput: Vec3 = .select(worth.lit, vertex.throughput, none);
+            var diffuse = bsdf.diffuse_albedo;
+            if (bsdf.layered) diffuse = diffuse.add(bsdf.coating.sheen_albedo);
+            const glossy: Vec3 = .select(vertices.traced[group], none, bsdf.specular_albedo);
+            worth.diffuse = throughput.mul(diffuse);
+            worth.glossy = throughput.mul(glossy);
+            worth.front = worth.diffuse.add(worth.glossy);
+            worth.coat = none;
+            worth.back = none;
+            worth.has_back = false;
+            if (!bsdf.layered) return;
+            const coat = throughput.scale(bsdf.coating.albedo);
+            worth.coat = .select(vertices.coat_traced[group], none, coat);
+            worth.front = worth.front.add(worth.coat);
+            worth.back = throughput.mul(bsdf.back_albedo);
+            const back = worth.back;
+            worth.has_back = back.x.max(back.y).max(back.z).gt(.zero()).any();
+        }
+    };
+}
+
+/// Shadow rays of one light, and what they are worth.
+fn ShadowsOf(comptime Kernel: type) type {
+    const Rays = Kernel.Rays;
+    const F32 = Rays.F32;
+    const Mask = Rays.Mask;
+    const Vec3 = Rays.Vec3;
+    const group_count = Kernel.group_count;
+    const none: Vec3 = .splat(.{ 0, 0, 0 });
+    const Vertices = environment_file.Vertices(Kernel);
+    const Visibility = visibility_file.Visibility(Kernel);
+    return struct {
+        const Self = @This();
+
+        bundle: bundle_file.Bundle(Kernel) = undefined,
+        gains: [group_count]Vec3 = undefined,
+        active: [group_count]Mask = undefined,
+        count: u64 = 0,
+
+        inline fn clear(shadows: *Self, group: usize) void {
+            shadows.active[group] = .splat(false);
+            shadows.bundle.groups[group].active = .splat(false);
+        }
+
+        inline fn put(
+            shadows: *Self,
+            vertices: *const Vertices,
+            one: *const Light,
+            group: usize,
+            gain: Vec3,
+            behind: Mask,
+            distance: F32,
+        ) void {
+            const shines = gain.x.max(gain.y).max(gain.z).gt(.zero());
+            if (shines.none()) return;
+            const point = &vertices.all[group].point;
+            var away = point.normal_geometric;
+            away = .select(behind, away.neg(), away);
+            const end = point.offsetOrigin(away, distance);
+            const primitive = vertices.path.bundle.groups[group].closest.primitive;
+            shadows.bundle.groups[group] =
+                visibility_file.shadowRay(Rays, one, end, primitive, shines);
+            shadows.gains[group] = gain;
+            shadows.active[group] = shines;
+            shadows.count += shines.popCount();
+        }
+
+        fn trace(
+            shadows: *Self,
+            visibility: *Visibility,
+            one: *const Light,
+            vertices: *const Vertices,
+            coherence: dispatch.Coherence,
+            sums: *[group_count]Vec3,
+        ) u64 {
+            if (shadows.count == 0) return 0;
+            var transmittances: [group_count]Vec3 = undefined;
+            visibility.transmittance(
+                &shadows.bundle,
+                one,
+                vertices.all,
+                coherence,
+                &transmittances,
+            );
+            const gains = &shadows.gains;
+            for (shadows.active, transmittances, gains, sums) |active, share, gain, *sum| {
+                if (active.none()) continue;
+                sum.* = sum.add(.select(active, gain.mul(share), none));
             }
-
-            inline fn put(
-                shadows: *Shadows,
-                vertices: *const Vertices,
-                one: *const Light,
-                group: usize,
-                gain: Vec3,
-                behind: Mask,
-                distance: F32,
-            ) void {
-                const shines = gain.x.max(gain.y).max(gain.z).gt(.zero());
-                if (shines.none()) return;
-                const point = &vertices.all[group].point;
-                var away = point.normal_geometric;
-                away = .select(behind, away.neg(), away);
-                const end = point.offsetOrigin(away, distance);
-                const primitive = vertices.path.bundle.groups[group].closest.primitive;
-                shadows.bundle.groups[group] =
-                    visibility_file.shadowRay(Rays, one, end, primitive, shines);
-                shadows.gains[group] = gain;
-                shadows.active[group] = shines;
-                shadows.count += shines.popCount();
-            }
-
-            fn trace(
-                shadows: *Shadows,
-                visibility: *Visibility,
-                one: *const Light,
-                vertices: *const Vertices,
-                coherence: dispatch.Coherence,
-                sums: *[group_count]Vec3,
-            ) u64 {
-                if (shadows.count == 0) return 0;
-                var transmittances: [group_count]Vec3 = undefined;
-                visibility.transmittance(
-                    &shadows.bundle,
-                    one,
-                    vertices.all,
-                    coherence,
-                    &transmittances,
-                );
-                for (shadows.active, transmittances, shadows.gains, sums) |active, share, gain, *sum| {
-                    if (active.none()) continue;
-                    sum.* = sum.add(.select(active, gain.mul(share), none));
-                }
-                return shadows.count;
-            }
-        };
+            return shadows.count;
+        }
     };
 }

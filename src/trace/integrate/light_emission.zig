@@ -133,7 +133,7 @@ pub fn start(source: *const Source, box: Box3, numbers: [4]f64) Start {
                 inCap(light.direction, -1, numbers[2..4].*);
             const cosine = vec3d.dot(direction, widen(light.direction));
             const lobe = @max(0, cosine * light.cone_scale + light.cone_offset);
-            flux *= if (is_flat) @as(f64, light.cone_scale) * std.math.pi else lobe * 4 * std.math.pi;
+            flux *= std.math.pi * if (is_flat) @as(f64, light.cone_scale) else 4 * lobe;
             const ahead = vec3d.scale(direction, light.radius);
             origin = vec3.add(origin, vec3d.toSingle(ahead));
         },

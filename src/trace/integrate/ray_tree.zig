@@ -119,7 +119,7 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
             return .{ .rays = tree.rays, .tests = tree.visibility.tests };
         }
 
-        /// Adds some samples of each pixel of `width` x `height`, or of a part of them, to the film.
+        /// Adds some samples of each pixel of `width` x `height`, or of a part, to the film.
         pub fn pass(
             tree: *Self,
             rectangle: Rectangle,

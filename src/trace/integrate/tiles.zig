@@ -16,7 +16,7 @@
 //!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it
 //!     counts()                                  of all its passes, `Counts`
 //!     tile_step                                 tiles' sides are multiples of it; none: of 1
-//!     Shared                                    what all threads' have in common; none, void: nothing
+//!     Shared                                    what all threads' share; none, void: nothing
 //!
 //! which is compiled in an object of its own: `Integrator` is what its kernel shows of it.
 

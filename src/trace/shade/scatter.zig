@@ -5,10 +5,10 @@
 //! times cosine with the density that a sample has there. A lobe is chosen by its share of the
 //! albedo for the view, weighed by what the channels of the path are worth; the specular lobes give
 //! mirror images about visible normals (`sampling.zig`), fibres the whole hemisphere, light in the
-//! surface and what is scattered more than once the cosine, what comes through `passing.zig`. One
-//! density stands for all lobes that have one: the mean of theirs by share (the balance heuristic
-//! of Veach and Guibas 1995). Lobes narrower than `sampling.sharp_alpha_least` are directions. So a
-//! white surface weighs 1 in the mean. Everything is + - * / sqrt in a fixed order.
+//! surface the cosine, what comes through `passing.zig`. One density stands for all lobes that have
+//! one: the mean of theirs by share (the balance heuristic of Veach and Guibas 1995). Lobes that
+//! are narrower than `sampling.sharp_alpha_least` are directions. So a white surface weighs 1 in
+//! the mean. Everything is + - * / sqrt in a fixed order.
 
 const std = @import("std");
 const simd = @import("../../simd.zig");
@@ -72,10 +72,9 @@ fn Shares(comptime Lanes: type) type {
             passing: *const Passing(Lanes),
             worth: Vec3,
         ) void {
-            const again = bsdf.multiple.scale(bsdf.albedo.missing_mean.mul(.splat(std.math.pi)));
-            const single = bsdf.specular_albedo.sub(again).max(.splat(.{ 0, 0, 0 })).dot(worth);
-            const specular = F32.select(passing.inside, .zero(), single);
-            var whole = specular.add(bsdf.diffuse_albedo.add(again).dot(worth));
+            const specular =
+                F32.select(passing.inside, .zero(), bsdf.specular_albedo.dot(worth));
+            var whole = specular.add(bsdf.diffuse_albedo.dot(worth));
             shares.coat = .zero();
             shares.sheen = .zero();
             shares.behind = .zero();
@@ -190,10 +189,10 @@ pub fn Scatter(comptime Lanes: type) type {
                 scatter.sharp = scatter.sharp.bitOr(denser.bitAnd(passing.sharp))
                     .andNot(passing.inside);
             }
+            gather(Lanes, bsdf);
             const gone = scatter.sharp.bitOr(passing.inside);
             bsdf.f0 = .select(gone, none, bsdf.f0);
             bsdf.f90 = .select(gone, .zero(), bsdf.f90);
-            bsdf.multiple = .select(gone, none, bsdf.multiple);
             scatter.shares.become(bsdf, passing, worth);
         }
 
@@ -374,6 +373,24 @@ pub fn Scatter(comptime Lanes: type) type {
             seen.pdf = seen.pdf.add(rough).add(sheen).add(behind);
         }
     };
+}
+
+/// Puts light that microfacets send on more than once into the lobe of what they send on
+/// once (Turquin 2019, "Practical multiple scattering compensation for microfacet models"),
+/// as path tracers do that others compare with: Kulla and Conty's lobe is as wide as the
+/// hemisphere, and brings colours of all of it.
+fn gather(comptime Lanes: type, bsdf: *Bsdf(Lanes)) void {
+    const again = bsdf.multiple.scale(bsdf.albedo.missing_mean.mul(.splat(std.math.pi)));
+    const whole = bsdf.specular_albedo;
+    const once = whole.sub(again).max(.splat(@splat(1e-6)));
+    const gain: Lanes.Vec3 = .{
+        .x = whole.x.div(once.x),
+        .y = whole.y.div(once.y),
+        .z = whole.z.div(once.z),
+    };
+    bsdf.f0 = bsdf.f0.mul(gain);
+    bsdf.f90 = bsdf.f90.mul(gain.dot(.splat(@splat(1.0 / 3.0))));
+    bsdf.multiple = .splat(.{ 0, 0, 0 });
 }
 
 const Single = simd.Lanes(.scalar, 1);
@@ -606,7 +623,8 @@ test "weight times density is the BSDF times cosine, and no weight is far from t
             }
         }
         const channels: f32 = if (change.dispersion > 0) 3 else 1;
-        try std.testing.expect(worst < 2 * channels);
+        // Of rough metals what is scattered again makes up for more than half.
+        try std.testing.expect(worst < 3 * channels);
     }
     for (seen) |count| try std.testing.expect(count > 100);
 }
@@ -758,9 +776,9 @@ test "paths end at unlit and at black surfaces" {
     }
 }
 
-test "reciprocity: light and view change places on opaque surfaces, smooth ones as well" {
+test "reciprocity, but for what is scattered more than once: light and view change places" {
     var surface: Surface(Single) = undefined;
-    for ([_]f32{ 0.06, 0.3, 1 }) |roughness| for (0..8) |index| {
+    for ([_]f32{ 0.06, 0.3, 1 }, [_]f32{ 0.01, 0.05, 0.4 }) |roughness, again| for (0..8) |index| {
         const change: Change = .{ .roughness = roughness, .metallic = 0.5 };
         surface.become(.{change});
         const found = surface.draw(numbersOf(index));
@@ -777,7 +795,7 @@ test "reciprocity: light and view change places on opaque surfaces, smooth ones 
         surface.scatter
             .become(&surface.point, bsdf, &surface.layers, .splat(true), .splat(.{ 1, 1, 1 }));
         const back = surface.eval(view.lane(0)).value.x.lane(0) / cosines[0];
-        try std.testing.expectApproxEqRel(there, back, 0.01);
+        try std.testing.expectApproxEqRel(there, back, again);
     };
 }
 
@@ -827,7 +845,8 @@ test "light without size has the highlights of narrow lobes that other integrato
         else
             fresh.become(&surface.point);
         const wanted = fresh.eval(&surface.point, .splat(way)).lane(0);
-        for (wanted, found) |a, b| try std.testing.expectApproxEqRel(a, b, 1e-6);
+        // They have another lobe for what is scattered more than once.
+        for (wanted, found) |a, b| try std.testing.expectApproxEqRel(a, b, 0.02);
         try std.testing.expect(found[0] > 0);
         try std.testing.expectEqual(change.roughness < 0.05, found[0] != seen.x.lane(0));
     }

@@ -1,0 +1,309 @@
+//! How much candidates for virtual lights matter to what the camera sees (after Georgiev and
+//! Slusallek 2010, "Simple and Robust Iterative Importance Sampling of Virtual Point Lights").
+//!
+//! In: candidates (`light_paths.zig`). Out: their weights. Of what a candidate gives the points
+//! that the camera sees two shadow rays, to those that get much of it, say how much arrives. It
+//! matters by its shares of what all give each point, squared and summed: chosen by the root of
+//! that the variance is least, as a share of the light that there is.
+
+const std = @import("std");
+const world_file = @import("../../world.zig");
+const math = @import("../../math.zig");
+const bundle_file = @import("../traverse/bundle.zig");
+const ray_file = @import("../traverse/ray.zig");
+const camera = @import("camera.zig");
+const ByLane = @import("by_lane.zig").ByLane;
+const Candidate = @import("virtual_lights.zig").Candidate;
+const LightPaths = @import("light_paths.zig").LightPaths;
+const vec3 = math.vec3;
+const Vec3 = math.Vec3;
+
+/// Points that the camera sees along each side of the picture.
+const points_side = 16;
+/// In all.
+pub const point_max = points_side * points_side;
+/// Shadow rays of a candidate.
+const shadow_count = 2;
+/// Candidates of a piece of work.
+pub const piece_candidates = 256 / shadow_count;
+/// Share of what a candidate would give that counts though no shadow ray found it to.
+const hidden_share = 0.03;
+
+/// A point that the camera sees.
+pub const Point = struct {
+    position: Vec3,
+    normal: Vec3,
+    primitive: i32,
+    /// Luminance of what is seen of white light that falls on it.
+    albedo: f32,
+};
+
+/// What one thread's trees do for it.
+pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
+    const Rays = Kernel.Rays;
+    const I32 = Rays.I32;
+    const V = Rays.Vec3;
+    const lanes = Kernel.ray_count;
+    const batch = Kernel.group_count * lanes;
+    const Lane3 = ByLane(Rays);
+    return struct {
+        /// Finds points that the camera sees, evenly over the picture. Returns how many.
+        pub fn see(tree: *Tree, points: *[point_max]Point) usize {
+            const view = tree.frame.view;
+            const step = @max(1, @max(view.width, view.height) / points_side);
+            var count: usize = 0;
+            for (0..points_side / Kernel.bundle_height) |row| {
+                for (0..points_side / Kernel.bundle_width) |column| {
+                    const x: u32 = @intCast(column * Kernel.bundle_width * step + step / 2);
+                    const y: u32 = @intCast(row * Kernel.bundle_height * step + step / 2);
+                    if (x >= view.width or y >= view.height) continue;
+                    camera.primaryRays(Kernel, view, .{
+                        .x0 = x,
+                        .y0 = y,
+                        .x1 = view.width,
+                        .y1 = view.height,
+                        .step = step,
+                    }, .{ .x = 0.5, .y = 0.5 }, &tree.path.bundle);
+                    LightPaths(Kernel, Tree).start(tree);
+                    _ = tree.visibility.closest(&tree.path, null);
+                    for (&tree.vertices, 0..) |*vertex, group| {
+                        vertex.find(&tree.visibility, &tree.path, group);
+                        if (vertex.seen.any()) count += takePoints(tree, group, points[count..]);
+                    }
+                }
+            }
+            return count;
+        }
+
+        fn takePoints(tree: *const Tree, group: usize, points: []Point) usize {
+            const vertex = &tree.vertices[group];
+            const point = &vertex.point;
+            const albedo = vertex.throughput
+                .mul(vertex.bsdf.diffuse_albedo.add(vertex.bsdf.specular_albedo))
+                .dot(.splat(.{ 0.2126, 0.7152, 0.0722 })).toArray();
+            const off = Lane3.of(point.offsetOrigin(point.normal_geometric, .zero()));
+            const normal = Lane3.of(point.normal_geometric);
+            const primitive = tree.path.bundle.groups[group].closest.primitive.toArray();
+            const lit = vertex.seen.andNot(point.material.unlit);
+            var count: usize = 0;
+            for (0..lanes) |lane| {
+                if (!lit.lane(lane)) continue;
+                points[count] = .{
+                    .position = off.at(lane),
+                    .normal = normal.at(lane),
+                    .primitive = primitive[lane],
+                    .albedo = albedo[lane],
+                };
+                count += 1;
+            }
+            return count;
+        }
+
+        /// Finds how much of what some candidates would give arrives, their weights for now, and
+        /// adds what the points get of them to `sums`.
+        pub fn weigh(
+            tree: *Tree,
+            points: []const Point,
+            candidates: []Candidate,
+            radius: f32,
+            sums: *[point_max]f64,
+        ) void {
+            var first: usize = 0;
+            const step = @max(1, batch / shadow_count);
+            while (first < candidates.len) : (first += step) {
+                const some = candidates[first..@min(first + step, candidates.len)];
+                if (batch < shadow_count)
+                    weighOne(tree, points, &some[0], radius, sums)
+                else
+                    weighBatch(tree, points, some, radius, sums);
+            }
+        }
+
+        fn weighBatch(
+            tree: *Tree,
+            points: []const Point,
+            candidates: []Candidate,
+            radius: f32,
+            sums: *[point_max]f64,
+        ) void {
+            var rays: Shadows = .none;
+            for (candidates, 0..) |*candidate, index| {
+                for (targetsOf(points, candidate, radius), 0..) |chosen, part| {
+                    if (chosen) |point| rays.put(index * shadow_count + part, candidate, point);
+                }
+            }
+            const shares = rays.trace(tree);
+            for (candidates, 0..) |*candidate, index| {
+                const of_it = shares[index * shadow_count ..][0..shadow_count];
+                addGains(points, candidate, radius, of_it, sums);
+            }
+        }
+
+        /// The same of one by one, in bundles that are too small.
+        fn weighOne(
+            tree: *Tree,
+            points: []const Point,
+            candidate: *Candidate,
+            radius: f32,
+            sums: *[point_max]f64,
+        ) void {
+            var shares: [shadow_count]f32 = @splat(0);
+            for (targetsOf(points, candidate, radius), &shares) |chosen, *share| {
+                var rays: Shadows = .none;
+                if (chosen) |point| rays.put(0, candidate, point);
+                share.* = rays.trace(tree)[0];
+            }
+            addGains(points, candidate, radius, &shares, sums);
+        }
+
+        /// Shadow rays of a bundle, each from another candidate.
+        const Shadows = struct {
+            origin: [Kernel.group_count]Lane3,
+            target: [Kernel.group_count]Lane3,
+            skip: [Kernel.group_count][lanes]i32,
+            active: [Kernel.group_count]u32,
+
+            const none: Shadows = .{
+                .origin = @splat(.splat(.{ 0, 0, 0 })),
+                .target = @splat(.splat(.{ 1, 1, 1 })),
+                .skip = @splat(@splat(ray_file.no_primitive)),
+                .active = @splat(0),
+            };
+
+            fn put(
+                rays: *Shadows,
+                at: usize,
+                candidate: *const Candidate,
+                point: *const Point,
+            ) void {
+                const group = at / lanes;
+                const lane = at % lanes;
+                rays.origin[group].put(lane, candidate.position);
+                rays.target[group].put(lane, point.position);
+                rays.skip[group][lane] = point.primitive;
+                rays.active[group] |= @as(u32, 1) << @intCast(lane);
+            }
+
+            /// Luminance of what arrives, as a share.
+            fn trace(rays: *const Shadows, tree: *Tree) [batch]f32 {
+                var shares: [batch]f32 = @splat(0);
+                var bundle: bundle_file.Bundle(Kernel) = undefined;
+                for (&bundle.groups, 0..) |*ray, group| {
+                    const origin = rays.origin[group].toLanes();
+                    const way = rays.target[group].toLanes().sub(origin);
+                    const skip: I32 = .fromArray(rays.skip[group]);
+                    ray.* = .endless(.init(origin, way), skip, .fromBits(rays.active[group]));
+                    ray.closest = .before(.splat(1));
+                    tree.vertices[group].point.cone_width = .zero();
+                }
+                var arriving: [Kernel.group_count]V = undefined;
+                tree.visibility
+                    .transmittance(&bundle, &any_point, &tree.vertices, .none, &arriving);
+                for (arriving, rays.active, 0..) |share, active, group| {
+                    if (active == 0) continue;
+                    const seen = share.dot(.splat(.{ 0.2126, 0.7152, 0.0722 })).toArray();
+                    for (0..lanes) |lane| {
+                        if (active >> @intCast(lane) & 1 == 0) continue;
+                        shares[group * lanes + lane] = seen[lane];
+                    }
+                }
+                return shares;
+            }
+        };
+    };
+}
+
+/// What a point gets of each unit of a candidate's flux, in any unit, where nothing is in the way:
+/// a disk of this radius bounds what is near.
+inline fn gainOf(point: *const Point, candidate: *const Candidate, radius: f32) f32 {
+    const way = vec3.sub(point.position, candidate.position);
+    const squared = vec3.dot(way, way);
+    const leaving = vec3.dot(way, candidate.normal);
+    const arriving = -vec3.dot(way, point.normal);
+    if (!(leaving > 0 and arriving > 0)) return 0;
+    return point.albedo * leaving * arriving / (squared * (squared + radius * radius));
+}
+
+/// The points that a candidate's shadow rays go to.
+fn targetsOf(
+    points: []const Point,
+    candidate: *const Candidate,
+    radius: f32,
+) [shadow_count]?*const Point {
+    var gains: [point_max]f32 = undefined;
+    var total: f64 = 0;
+    for (points, gains[0..points.len]) |*point, *gain| {
+        gain.* = gainOf(point, candidate, radius);
+        total += gain.*;
+    }
+    var targets: [shadow_count]?*const Point = @splat(null);
+    if (!(total > 0)) return targets;
+    for (&targets, 0..) |*target, index| {
+        const share = (@as(f64, @floatFromInt(index)) + 0.5) / shadow_count;
+        var left = share * total;
+        for (points, gains[0..points.len]) |*point, gain| {
+            if (gain == 0) continue;
+            target.* = point;
+            left -= gain;
+            if (left < 0) break;
+        }
+    }
+    return targets;
+}
+
+/// Makes the share of a candidate's light that arrives its weight, and adds what points get of it.
+fn addGains(
+    points: []const Point,
+    candidate: *Candidate,
+    radius: f32,
+    shares: *const [shadow_count]f32,
+    sums: *[point_max]f64,
+) void {
+    var arriving: f64 = 0;
+    for (shares) |share| arriving += share;
+    candidate.weight = hidden_share + (1 - hidden_share) * arriving / shadow_count;
+    const flux = candidate.luminance() * candidate.weight;
+    for (points, sums[0..points.len]) |*point, *sum|
+        sum.* += flux * gainOf(point, candidate, radius);
+}
+
+/// Part of what points get in the mean that is added to what each gets: where there is next to no
+/// light at all it is not seen how much.
+const least_share = 0.1;
+
+/// Turns what each point gets into what its shares count.
+pub fn invertGains(sums: []f64) void {
+    var total: f64 = 0;
+    for (sums) |sum| total += sum;
+    const least = least_share * total / @as(f64, @floatFromInt(@max(1, sums.len)));
+    for (sums) |*sum| sum.* = if (least > 0) 1 / (sum.* + least) else 0;
+}
+
+/// Gives candidates whose weights say how much arrives their final ones.
+pub fn finishWeights(
+    points: []const Point,
+    inverse_gains: []const f64,
+    candidates: []Candidate,
+    radius: f32,
+) void {
+    for (candidates) |*candidate| {
+        var squares: f64 = 0;
+        for (points, inverse_gains[0..points.len]) |*point, inverse| {
+            const share = gainOf(point, candidate, radius) * inverse;
+            squares += share * share;
+        }
+        candidate.weight *= candidate.luminance() * @sqrt(squares);
+    }
+}
+
+/// Stands for where shadow rays come from, of which only the kind counts.
+const any_point: world_file.Light = .{
+    .kind = .point,
+    .from_receiver = false,
+    .position = @splat(0),
+    .direction = .{ 0, 0, -1 },
+    .intensity = @splat(0),
+    .range_inv_squared = 0,
+    .cone_scale = 0,
+    .cone_offset = 1,
+};
