@@ -234,7 +234,8 @@ def measure_frames(program, options):
 
 
 def frames_table(results):
-    """Nanoseconds a ray of `path`, shading with it, and how often quicker than single rays."""
+    """Nanoseconds a ray of `path` over all scenes, shading with it, and how many times less than
+    the first variant."""
     def step(bounces, index):
         before = bounces[index - 1]["frame_ms"] if bounces[index]["depth"] else None
         after = bounces[index]["frame_ms"]
@@ -245,18 +246,17 @@ def frames_table(results):
              "|---|" + "---:|" * (1 + len(names))]
     pixels = results["settings"]["width"] * results["settings"]["height"]
     for depth in range(depths):
-        counts, times = [], {name: [] for name in names}
+        counts, times = [], dict.fromkeys(names, 0)
         for scene in results["scenes"]:
             for index, bounce in enumerate(scene["bounces"]):
                 if bounce["depth"] != depth:
                     continue
-                rays = bounce["closest"] + bounce["shadow"]
                 if bounce["variant"] == names[0]:
                     counts.append((bounce["closest"] / pixels, bounce["shadow"] / pixels))
-                times[bounce["variant"]].append(step(scene["bounces"], index) * 1e6 / max(1, rays))
-        first = geometric_mean(times[names[0]])
-        cells = [f"{geometric_mean(times[name]):.0f} ns ({first / geometric_mean(times[name]):.2f})"
-                 for name in names]
+                times[bounce["variant"]] += step(scene["bounces"], index) * 1e6
+        rays = sum(map(sum, counts)) * pixels
+        first = times[names[0]]
+        cells = [f"{times[name] / rays:.0f} ns ({first / times[name]:.2f})" for name in names]
         means = [statistics.mean(column) for column in zip(*counts)]
         lines.append(row([str(depth), f"{means[0]:.2f}, {means[1]:.2f}", *cells]))
     return lines
