@@ -12,7 +12,6 @@
 
 const std = @import("std");
 const math = @import("../math.zig");
-const light_file = @import("light.zig");
 const pose = @import("pose.zig");
 const world = @import("../world.zig");
 const emitters = @import("emitters.zig");
@@ -198,7 +197,7 @@ fn lightOf(cluster: *const Cluster, geometry: *const world.Geometry) world.Light
     const lobe = lobeOf(flatness);
     return .{
         .kind = .emitter,
-        .from_receiver = !is_flat or light_file.isCoarseAt(geometry, position),
+        .from_receiver = !is_flat or geometry.isCoarseAt(position),
         .position = position,
         .direction = vec3d.toSingle(direction),
         .intensity = intensity,

@@ -52,15 +52,6 @@ pub fn place(
     return placed[0..placed_count];
 }
 
-/// Rays start from points and spots as long as padding there is less than this part of the scene.
-const source_shift_max = 0x1p-10;
-
-/// Whether rounding at a position is so large that rays to a light there start at the receiver.
-pub fn isCoarseAt(geometry: *const world.Geometry, position: Vec3) bool {
-    const shift = geometry.padding.ofBox(.{ .lower = position, .upper = position });
-    return shift > geometry.size * source_shift_max;
-}
-
 fn placeOne(
     light: *const scene.Light,
     map: AffineD,
@@ -81,7 +72,7 @@ fn placeOne(
             .spot => .spot,
             .directional => .directional,
         },
-        .from_receiver = light.kind != .directional and isCoarseAt(geometry, position),
+        .from_receiver = light.kind != .directional and geometry.isCoarseAt(position),
         .position = position,
         .direction = direction,
         .intensity = undefined,

@@ -208,6 +208,9 @@ pub const TreeStatistics = struct {
 /// Sets of texture coordinates at most.
 pub const texcoord_set_count = 4;
 
+/// Rays start from points and spots as long as padding there is less than this part of the scene.
+const source_shift_max = 0x1p-10;
+
 /// What there is to hit: a function of the scene's meshes and their pose.
 pub const Geometry = struct {
     tree: AnyTree,
@@ -260,6 +263,12 @@ pub const Geometry = struct {
     pub fn vertexCount(geometry: *const Geometry) usize {
         if (geometry.shared.runs.len > 0) return geometry.shared.vertex_count;
         return geometry.positions.len;
+    }
+
+    /// Whether rounding at a position is so large that rays to a light there start at the receiver.
+    pub fn isCoarseAt(geometry: *const Geometry, position: Vec3) bool {
+        const shift = geometry.padding.ofBox(.{ .lower = position, .upper = position });
+        return shift > geometry.size * source_shift_max;
     }
 
     /// Whether any vertex has a colour.

@@ -30,7 +30,9 @@ const Layers = interleave.Layers;
 const RayTree = @import("ray_tree.zig").RayTree;
 const Rectangle = @import("../../film.zig").Rectangle;
 
-/// Paths that lights are looked for by.
+/// Paths that lights are looked for by: one for so many pixels, within bounds.
+const path_pixels = 8;
+const path_count_min = 1 << 9;
 const path_count_max = 1 << 15;
 /// Candidates that are weighed.
 const weighed_max = 1 << 14;
@@ -295,7 +297,11 @@ fn SharedOf(comptime Kernel: type) type {
             const box = frame.geometry.bounds;
             if (shared.settings.depth_max == 0 or shared.sets.part_size == 0) return;
             if (box.isEmpty()) return;
-            shared.path_count = emission.shareOut(shared.starts, box, path_count_max);
+            const view = frame.view;
+            const pixel_count = @as(u64, view.width) * view.height;
+            const path_count = std.math
+                .clamp(pixel_count / path_pixels, path_count_min, path_count_max);
+            shared.path_count = emission.shareOut(shared.starts, box, @intCast(path_count));
             if (shared.path_count == 0) return;
             shared.candidates =
                 try gpa.alloc([light_paths.bounce_max]Candidate, shared.path_count);

@@ -126,7 +126,7 @@ pub fn choose(
             const share: f32 = @floatCast(each * sets.weightOf(number) / std.math.pi);
             lights[sets.indexOf(number)] = .{
                 .kind = .emitter,
-                .from_receiver = isCoarseAt(geometry, candidate.position),
+                .from_receiver = geometry.isCoarseAt(candidate.position),
                 .position = candidate.position,
                 .direction = vec3.neg(vec3.neg(candidate.normal)),
                 .intensity = vec3.scale(candidate.flux, share),
@@ -162,12 +162,6 @@ fn diskOf(light: *const Light, all: []const Light, size: f32) f32 {
     const most = size / 16;
     const area = nearest[neighbour_count - 1] / neighbour_count;
     return std.math.clamp(area, least * least, most * most);
-}
-
-/// As `prepare/light.zig` has it.
-fn isCoarseAt(geometry: *const world_file.Geometry, position: Vec3) bool {
-    const shift = geometry.padding.ofBox(.{ .lower = position, .upper = position });
-    return shift > geometry.size * 0x1p-10;
 }
 
 test "lights have the flux of all candidates, and are as near to each other as these" {

@@ -189,29 +189,11 @@ pub fn Scatter(comptime Lanes: type) type {
                 scatter.sharp = scatter.sharp.bitOr(denser.bitAnd(passing.sharp))
                     .andNot(passing.inside);
             }
-            gather(bsdf);
+            gather(Lanes, bsdf);
             const gone = scatter.sharp.bitOr(passing.inside);
             bsdf.f0 = .select(gone, none, bsdf.f0);
             bsdf.f90 = .select(gone, .zero(), bsdf.f90);
             scatter.shares.become(bsdf, passing, worth);
-        }
-
-        /// Puts light that microfacets send on more than once into the lobe of what they send on
-        /// once (Turquin 2019, "Practical multiple scattering compensation for microfacet models"),
-        /// as path tracers do that others compare with: Kulla and Conty's lobe is as wide as the
-        /// hemisphere, and brings colours of all of it.
-        fn gather(bsdf: *Bsdf(Lanes)) void {
-            const again = bsdf.multiple.scale(bsdf.albedo.missing_mean.mul(.splat(std.math.pi)));
-            const whole = bsdf.specular_albedo;
-            const once = whole.sub(again).max(.splat(@splat(1e-6)));
-            const gain: Vec3 = .{
-                .x = whole.x.div(once.x),
-                .y = whole.y.div(once.y),
-                .z = whole.z.div(once.z),
-            };
-            bsdf.f0 = bsdf.f0.mul(gain);
-            bsdf.f90 = bsdf.f90.mul(gain.dot(.splat(@splat(1.0 / 3.0))));
-            bsdf.multiple = none;
         }
 
         /// A direction for four numbers in 0..1: the lobe, two for the direction in it, and what
@@ -391,6 +373,24 @@ pub fn Scatter(comptime Lanes: type) type {
             seen.pdf = seen.pdf.add(rough).add(sheen).add(behind);
         }
     };
+}
+
+/// Puts light that microfacets send on more than once into the lobe of what they send on
+/// once (Turquin 2019, "Practical multiple scattering compensation for microfacet models"),
+/// as path tracers do that others compare with: Kulla and Conty's lobe is as wide as the
+/// hemisphere, and brings colours of all of it.
+fn gather(comptime Lanes: type, bsdf: *Bsdf(Lanes)) void {
+    const again = bsdf.multiple.scale(bsdf.albedo.missing_mean.mul(.splat(std.math.pi)));
+    const whole = bsdf.specular_albedo;
+    const once = whole.sub(again).max(.splat(@splat(1e-6)));
+    const gain: Lanes.Vec3 = .{
+        .x = whole.x.div(once.x),
+        .y = whole.y.div(once.y),
+        .z = whole.z.div(once.z),
+    };
+    bsdf.f0 = bsdf.f0.mul(gain);
+    bsdf.f90 = bsdf.f90.mul(gain.dot(.splat(@splat(1.0 / 3.0))));
+    bsdf.multiple = .splat(.{ 0, 0, 0 });
 }
 
 const Single = simd.Lanes(.scalar, 1);
