@@ -11,6 +11,7 @@ pub const builtin = raylane.builtin;
 pub const cli = raylane.cli;
 pub const compare = raylane.compare;
 pub const decode = raylane.decode;
+pub const denoise = raylane.denoise;
 pub const diagnostic = raylane.diagnostic;
 pub const energy = raylane.energy;
 pub const film = raylane.film;
