@@ -140,6 +140,7 @@ fn integratorsOf(
     comptime variants: []const Variant,
 ) [variants.len]*const Integrator {
     comptime {
+        @setEvalBranchQuota(1_000_000); // For the names.
         var list: [variants.len]*const Integrator = undefined;
         for (&list, variants) |*to, variant| {
             const symbol = link.symbolOf(Integrator, variant, what);

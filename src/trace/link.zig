@@ -14,7 +14,7 @@ pub fn symbolOf(
     comptime variant: Variant,
     comptime what: []const u8,
 ) [:0]const u8 {
-    return std.fmt.comptimePrint("rl_{s}_{s}_{x:0>16}", .{ variant.name(), what, layoutOf(Face) });
+    return std.fmt.comptimePrint("rl_{s}_{s}_{x:0>16}", .{ variant.name(), what, LayoutOf(Face).hash });
 }
 
 /// Ends the program with a message; exported by the program, for its kernels.
@@ -25,14 +25,17 @@ pub fn panicOfKernel(message: [*]const u8, byte_count: usize, _: usize) callconv
     @panic(message[0..byte_count]);
 }
 
-/// Hash of the sizes, alignments and offsets of everything that can be reached from a type.
-fn layoutOf(comptime T: type) u64 {
-    comptime {
-        @setEvalBranchQuota(1_000_000);
-        var layout: Layout = .{};
-        layout.add(T);
-        return layout.hash;
-    }
+/// Hash of the sizes, alignments and offsets of everything that can be reached from a type. A type
+/// of its own, so that it is found once.
+fn LayoutOf(comptime T: type) type {
+    return struct {
+        const hash: u64 = found: {
+            @setEvalBranchQuota(1_000_000);
+            var layout: Layout = .{};
+            layout.add(T);
+            break :found layout.hash;
+        };
+    };
 }
 
 const Layout = struct {
@@ -86,7 +89,7 @@ test "the hash sees offsets, order and what pointers lead to" {
     const C = extern struct { a: *const A, y: u8, list: [*]const u16 };
     const D = extern struct { y: u8, a: *const A, list: [*]const u32 };
     const E = extern struct { y: u8, a: *const A, list: [*]const u16 };
-    try std.testing.expect(comptime layoutOf(B) != layoutOf(C));
-    try std.testing.expect(comptime layoutOf(B) != layoutOf(D));
-    try std.testing.expect(comptime layoutOf(B) == layoutOf(E));
+    try std.testing.expect(LayoutOf(B).hash != LayoutOf(C).hash);
+    try std.testing.expect(LayoutOf(B).hash != LayoutOf(D).hash);
+    try std.testing.expect(LayoutOf(B).hash == LayoutOf(E).hash);
 }
