@@ -277,7 +277,7 @@ const sections: []const Section = &.{
                 "of tracing; says the --spp with the same picture",
         },
         .{
-            .usage = "--progress-image FILE",
+            .usage = "--progress-image OUT",
             .help = "the picture so far, every two seconds, as a whole,\nencoded as the output is",
         },
         .{
