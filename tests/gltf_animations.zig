@@ -363,9 +363,9 @@ test "a channel or a sampler that is broken costs no other" {
             "animation 0, channel 0: there is no sampler 5, left out",
         },
         .{
-            "{\"sampler\":4294967296,\"target\":{\"node\":1,\"path\":\"scale\"}}",
+            "{\"sampler\":2147483648,\"target\":{\"node\":1,\"path\":\"scale\"}}",
             sampler,
-            "animation 0, channel 0: there is no sampler 4294967296, left out",
+            "animation 0, channel 0: there is no sampler 2147483648, left out",
         },
         .{
             "{\"sampler\":0,\"target\":{\"node\":9,\"path\":\"scale\"}}",

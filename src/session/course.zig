@@ -83,7 +83,7 @@ test "rounds double, end where the picture is due, and fit into the time" {
     try std.testing.expectEqual(1, course.roundOf(0, 0, 1));
     try std.testing.expectEqual(1, course.roundOf(1, second_ns, second_ns));
     try std.testing.expectEqual(64, course.roundOf(64, 64 * second_ns, second_ns));
-    course.viewer = undefined;
+    course.viewer = .{ .context = undefined, .show = undefined };
     course.due_ns = 2 * second_ns;
     try std.testing.expectEqual(10, course.roundOf(64, second_ns, second_ns / 10));
     try std.testing.expectEqual(1, course.roundOf(64, 5 * second_ns, second_ns));

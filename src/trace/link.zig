@@ -14,7 +14,8 @@ pub fn symbolOf(
     comptime variant: Variant,
     comptime what: []const u8,
 ) [:0]const u8 {
-    return std.fmt.comptimePrint("rl_{s}_{s}_{x:0>16}", .{ variant.name(), what, LayoutOf(Face).hash });
+    const layout = LayoutOf(Face).hash;
+    return std.fmt.comptimePrint("rl_{s}_{s}_{x:0>16}", .{ variant.name(), what, layout });
 }
 
 /// Ends the program with a message; exported by the program, for its kernels.

@@ -37,6 +37,12 @@ pub const Point = struct {
     primitive: i32,
     /// Luminance of what is seen of white light that falls on it.
     albedo: f32,
+    /// Where it is seen, row by row: points are in that order, however rays are bundled.
+    pixel: usize,
+
+    fn isBefore(_: void, point: Point, other: Point) bool {
+        return point.pixel < other.pixel;
+    }
 };
 
 /// What one thread's trees do for it.
@@ -69,14 +75,25 @@ pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
                     _ = tree.visibility.closest(&tree.path, null);
                     for (&tree.vertices, 0..) |*vertex, group| {
                         vertex.find(&tree.visibility, &tree.path, group);
-                        if (vertex.seen.any()) count += takePoints(tree, group, points[count..]);
+                        if (vertex.seen.none()) continue;
+                        const more = points[count..];
+                        const corner = [2]usize{
+                            column * Kernel.bundle_width, row * Kernel.bundle_height,
+                        };
+                        count += takePoints(tree, group, corner, more);
                     }
                 }
             }
+            std.mem.sort(Point, points[0..count], {}, Point.isBefore);
             return count;
         }
 
-        fn takePoints(tree: *const Tree, group: usize, points: []Point) usize {
+        fn takePoints(
+            tree: *const Tree,
+            group: usize,
+            corner: [2]usize,
+            points: []Point,
+        ) usize {
             const vertex = &tree.vertices[group];
             const point = &vertex.point;
             const albedo = vertex.throughput
@@ -94,6 +111,8 @@ pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
                     .normal = normal.at(lane),
                     .primitive = primitive[lane],
                     .albedo = albedo[lane],
+                    .pixel = (corner[1] + Kernel.pixelY(group, lane)) * points_side +
+                        corner[0] + Kernel.pixelX(group, lane),
                 };
                 count += 1;
             }
