@@ -317,9 +317,7 @@ pub fn render(
     if (integrator.shared) |shared| _ = job.doSteps(0, shared.steps_before, film);
     const is_whole = job.run();
     if (settings.isCancelled()) return error.Canceled;
-    var total = try settings.pool
-        .reduce(Statistics, .{}, Job.add, tiles.count, &job, Job.finishTile);
-    total.is_partial = !is_whole;
+    var total = try job.finish(is_whole);
     if (integrator.shared) |shared|
         total.non_finite_count += job.doSteps(shared.steps_before, shared.step_count, film);
     var tests: statistics.TestCounts = .{};
@@ -469,14 +467,19 @@ const Job = struct {
         }
     };
 
-    fn add(sum: *Statistics, other: *const Statistics) void {
-        sum.non_finite_count += other.non_finite_count;
-        sum.sample_count = @max(sum.sample_count, other.sample_count);
-        sum.sample_sum += other.sample_sum;
+    /// Makes means of sums, of all tiles.
+    fn finish(job: *Job, is_whole: bool) parallel.Error!Statistics {
+        const finished = try job.settings.pool
+            .reduce(Finished, .{}, Finished.add, job.tiles.count, job, finishTile);
+        return .{
+            .non_finite_count = finished.non_finite_count,
+            .sample_count = finished.sample_count,
+            .sample_sum = finished.sample_sum,
+            .is_partial = !is_whole,
+        };
     }
 
-    /// Makes means of sums.
-    fn finishTile(job: *Job, number: usize, sum: *Statistics) void {
+    fn finishTile(job: *Job, number: usize, sum: *Finished) void {
         var parts = job.partsOf(@intCast(number));
         while (parts.next()) |part| {
             const rectangle = part.rectangle;
@@ -485,6 +488,19 @@ const Job = struct {
             const pixel_count = (rectangle.x1 - rectangle.x0) * (rectangle.y1 - rectangle.y0);
             sum.sample_sum += @as(u64, pixel_count) * part.sample_count;
         }
+    }
+};
+
+/// Of tiles that are finished, see `Statistics`: small, since each thread has one on the stack.
+const Finished = struct {
+    non_finite_count: u64 = 0,
+    sample_count: u32 = 0,
+    sample_sum: u64 = 0,
+
+    fn add(sum: *Finished, other: *const Finished) void {
+        sum.non_finite_count += other.non_finite_count;
+        sum.sample_count = @max(sum.sample_count, other.sample_count);
+        sum.sample_sum += other.sample_sum;
     }
 };
 
