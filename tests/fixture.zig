@@ -234,6 +234,52 @@ pub fn render(scene: *const Scene, options: Options) !Image {
     return (try trace(&session, options)).*;
 }
 
+/// A box, open towards the camera, with a lamp of some size, a pane that blends and a metal.
+pub fn addBox(builder: *Builder, lamp_side: f32) !void {
+    try builder.addCamera(.{ 0, 0, 3 }, 0.4);
+    const white = matte(.{ 0.8, 0.8, 0.8 });
+    try builder.addQuad(white, .{ 0, -1, 0 }, .{ 1, 0, 0 }, .{ 0, 0, -1 });
+    try builder.addQuad(white, .{ 0, 1, 0 }, .{ 1, 0, 0 }, .{ 0, 0, 1 });
+    try builder.addQuad(white, .{ 0, 0, -1 }, .{ 1, 0, 0 }, .{ 0, 1, 0 });
+    const red = matte(.{ 0.8, 0.1, 0.1 });
+    try builder.addQuad(red, .{ -1, 0, 0 }, .{ 0, 0, -1 }, .{ 0, 1, 0 });
+    var metal = matte(.{ 0.9, 0.8, 0.5 });
+    metal.metallic = 1;
+    metal.roughness = 0.4;
+    try builder.addQuad(metal, .{ 1, 0, 0 }, .{ 0, 0, 1 }, .{ 0, 1, 0 });
+    var lamp = matte(.{ 0, 0, 0 });
+    lamp.emissive = .{ 5, 5, 5 };
+    const half = 0.5 * lamp_side;
+    try builder.addQuad(lamp, .{ 0, 0.9, 0 }, .{ half, 0, 0 }, .{ 0, 0, half });
+    var pane = matte(.{ 0.2, 0.5, 0.9 });
+    pane.alpha_mode = .blend;
+    pane.base_color[3] = 0.5;
+    try builder.addQuad(pane, .{ 0.3, 0, 0 }, .{ 0.4, 0, 0.3 }, .{ 0, 0.5, 0 });
+}
+
+/// Expects one picture of every variant that has the integrator, by one and two threads and with
+/// small tiles.
+pub fn expectOnePicture(scene: *const Scene, base: Options) !void {
+    var first: ?u64 = null;
+    for (raylane.variant.compiled, 0..) |variant, index| {
+        if (raylane.variant.litIndexOf(index) == null) continue;
+        var options = base;
+        options.variant = index;
+        for ([_]usize{ 2, 1 }, [_]u32{ 16, 5 }) |thread_count, tile_size| {
+            // Other threads and tiles once will do.
+            if (tile_size != 16 and index > 0) continue;
+            var diagnostic: raylane.diagnostic.Diagnostic = .{};
+            var session: Session = .init(gpa, std.testing.io, thread_count, &diagnostic);
+            defer session.deinit();
+            options.tile_size = tile_size;
+            try view(&session, scene, variant.lanes, options);
+            const image = try trace(&session, options);
+            if (first) |hash| try std.testing.expectEqual(hash, image.hash());
+            first = first orelse image.hash();
+        }
+    }
+}
+
 /// How many of `count` random things are enough here: under an emulator, which is some twenty times
 /// slower and whose machine has the same random things tested natively elsewhere, a quarter.
 pub fn enough(count: usize) usize {

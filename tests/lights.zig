@@ -4,7 +4,6 @@ const std = @import("std");
 const fixture = @import("fixture.zig");
 const raylane = @import("raylane");
 const Builder = fixture.Builder;
-const Session = raylane.session.Session;
 const gpa = std.testing.allocator;
 
 test "the inside of a sphere has the light that bounces in it, everywhere the same" {
@@ -38,23 +37,7 @@ test "the inside of a sphere has the light that bounces in it, everywhere the sa
 
 test "every variant, whatever threads and tiles, has the same picture by virtual lights" {
     var builder: Builder = try .init();
-    try builder.addCamera(.{ 0, 0, 3 }, 0.4);
-    const white = fixture.matte(.{ 0.8, 0.8, 0.8 });
-    try builder.addQuad(white, .{ 0, -1, 0 }, .{ 1, 0, 0 }, .{ 0, 0, -1 });
-    try builder.addQuad(white, .{ 0, 0, -1 }, .{ 1, 0, 0 }, .{ 0, 1, 0 });
-    const red = fixture.matte(.{ 0.8, 0.1, 0.1 });
-    try builder.addQuad(red, .{ -1, 0, 0 }, .{ 0, 0, -1 }, .{ 0, 1, 0 });
-    var metal = fixture.matte(.{ 0.9, 0.8, 0.5 });
-    metal.metallic = 1;
-    metal.roughness = 0.4;
-    try builder.addQuad(metal, .{ 1, 0, 0 }, .{ 0, 0, 1 }, .{ 0, 1, 0 });
-    var lamp = fixture.matte(.{ 0, 0, 0 });
-    lamp.emissive = .{ 5, 5, 5 };
-    try builder.addQuad(lamp, .{ 0, 0.9, 0 }, .{ 0.2, 0, 0 }, .{ 0, 0, 0.2 });
-    var pane = fixture.matte(.{ 0.2, 0.5, 0.9 });
-    pane.alpha_mode = .blend;
-    pane.base_color[3] = 0.5;
-    try builder.addQuad(pane, .{ 0.3, 0, 0 }, .{ 0.4, 0, 0.3 }, .{ 0, 0.5, 0 });
+    try fixture.addBox(&builder, 0.4);
     var glass = fixture.matte(.{ 0.9, 1, 0.9 });
     glass.transmission = 1;
     glass.volume = true;
@@ -62,29 +45,12 @@ test "every variant, whatever threads and tiles, has the same picture by virtual
     try builder.addSphere(glass, .{ -0.3, -0.5, 0.2 }, 0.4, 3);
     var scene = try builder.finish();
     defer scene.deinit();
-    var first: ?u64 = null;
-    for (raylane.variant.compiled, 0..) |variant, index| {
-        if (raylane.variant.litIndexOf(index) == null) continue;
-        var options: fixture.Options = .{
-            .integrator = .lights,
-            .width = 19,
-            .height = 17,
-            .depth_max = 4,
-            .sample_count = 2,
-            .environment = .{ .source = .studio },
-            .variant = index,
-        };
-        for ([_]usize{ 2, 1 }, [_]u32{ 16, 5 }) |thread_count, tile_size| {
-            // Other threads and tiles once will do.
-            if (tile_size != 16 and first != null and index > 0) continue;
-            var diagnostic: raylane.diagnostic.Diagnostic = .{};
-            var session: Session = .init(gpa, std.testing.io, thread_count, &diagnostic);
-            defer session.deinit();
-            options.tile_size = tile_size;
-            try fixture.view(&session, &scene, variant.lanes, options);
-            const image = try fixture.trace(&session, options);
-            if (first) |hash| try std.testing.expectEqual(hash, image.hash());
-            first = first orelse image.hash();
-        }
-    }
+    try fixture.expectOnePicture(&scene, .{
+        .integrator = .lights,
+        .width = 19,
+        .height = 17,
+        .depth_max = 4,
+        .sample_count = 2,
+        .environment = .{ .source = .studio },
+    });
 }

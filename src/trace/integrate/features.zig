@@ -14,6 +14,11 @@ const Film = film_file.Film;
 /// Surfaces up to this roughness show what they mirror, and what is behind them.
 pub const smooth_roughness_max = 0.1;
 
+/// Whether a film keeps any.
+pub fn areKept(layers: film_file.Layers) bool {
+    return layers.contains(.albedo) or layers.contains(.normal) or layers.contains(.depth);
+}
+
 /// Of one sample of a bundle.
 pub fn Features(comptime Kernel: type) type {
     const Rays = Kernel.Rays;
@@ -36,8 +41,7 @@ pub fn Features(comptime Kernel: type) type {
 
         /// Nothing seen yet.
         pub fn start(features: *Self, layers: film_file.Layers) void {
-            features.kept = layers.contains(.albedo) or layers.contains(.normal) or
-                layers.contains(.depth);
+            features.kept = areKept(layers);
             if (!features.kept) return;
             features.albedo = @splat(none);
             features.normal = @splat(none);

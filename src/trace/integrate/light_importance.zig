@@ -119,8 +119,8 @@ pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
             return count;
         }
 
-        /// Finds how much of what some candidates would give arrives, their weights for now, and
-        /// adds what the points get of them to `sums`.
+        /// Makes the share of what some candidates would give that arrives their weights, and adds
+        /// what the points get of them to `sums`.
         pub fn weigh(
             tree: *Tree,
             points: []const Point,

@@ -90,15 +90,12 @@ pub fn Passage(comptime Kernel: type) type {
             direction: Vec3,
         ) Vec3 {
             for (ends, 0..) |t, lane| if (t < std.math.inf(f32)) passage.advance(lane, t);
-            const length = direction.length().neg();
-            return .{
-                .x = exponential
-                    .expNegative(Rays, Rays.F32.fromArray(passage.depth[0]).mul(length)),
-                .y = exponential
-                    .expNegative(Rays, Rays.F32.fromArray(passage.depth[1]).mul(length)),
-                .z = exponential
-                    .expNegative(Rays, Rays.F32.fromArray(passage.depth[2]).mul(length)),
+            const depth: Vec3 = .{
+                .x = .fromArray(passage.depth[0]),
+                .y = .fromArray(passage.depth[1]),
+                .z = .fromArray(passage.depth[2]),
             };
+            return exponential.transmittance(Rays, depth, direction.length());
         }
 
         fn advance(passage: *Self, lane: usize, t: f32) void {

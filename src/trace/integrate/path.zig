@@ -183,12 +183,7 @@ pub fn PathState(comptime Kernel: type) type {
             const zero: Rays.F32 = .zero();
             const clear = sigma_t.x.eq(zero).bitAnd(sigma_t.y.eq(zero)).bitAnd(sigma_t.z.eq(zero));
             if (clear.all()) return throughput;
-            const way = distance.neg();
-            return throughput.mul(.{
-                .x = exponential.expNegative(Rays, sigma_t.x.mul(way)),
-                .y = exponential.expNegative(Rays, sigma_t.y.mul(way)),
-                .z = exponential.expNegative(Rays, sigma_t.z.mul(way)),
-            });
+            return throughput.mul(exponential.transmittance(Rays, sigma_t, distance));
         }
     };
 }
@@ -299,16 +294,26 @@ pub fn Vertex(comptime Lanes: type) type {
             visibility.findInteraction(Lanes, frame, path, group, point);
             if (frame.materials.volumes.len > 0) seer.boundaries[group].apply(point);
             point.opacity = Lanes.F32.select(point.culled, .zero(), point.opacity);
-            if (frame.hasLayers())
-                vertex.findLayers(frame, path, group)
-            else
-                vertex.bsdf.become(point);
+            vertex.findBsdf(frame, path, group);
             vertex.seen = point.hit.bitAnd(point.opacity.gt(.zero()));
             const throughput = path.throughputAt(group, point.distance).scale(point.opacity);
             vertex.throughput = .select(vertex.seen, throughput, .splat(.{ 0, 0, 0 }));
         }
 
-        /// Finds the BSDF in frames in which some have further lobes.
+        /// Finds the BSDF at points that are found.
+        pub inline fn findBsdf(
+            vertex: *@This(),
+            frame: *const Frame,
+            path: anytype,
+            group: usize,
+        ) void {
+            if (frame.hasLayers())
+                vertex.findLayers(frame, path, group)
+            else
+                vertex.bsdf.become(&vertex.point);
+        }
+
+        /// The same in frames in which some have further lobes.
         noinline fn findLayers(
             vertex: *@This(),
             frame: *const Frame,

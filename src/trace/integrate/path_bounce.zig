@@ -48,27 +48,37 @@ pub noinline fn bounce(
     step: *PathStep(Kernel),
     lanes: Kernel.Rays.Mask,
 ) void {
-    const F32 = Kernel.Rays.F32;
     const lobe = step.chances.at(.lobe);
     const direction = step.chances.at(.lobe_direction);
     const sampled =
         step.scattering.sample(.{ lobe[0], direction[0], direction[1], lobe[1] });
     var throughput = step.throughput.mul(sampled.weight);
-    const largest = throughput.x.max(throughput.y).max(throughput.z);
-    var going = lanes.andNot(sampled.is_end).bitAnd(largest.gt(.zero()))
-        .bitAnd(largest.lt(.splat(std.math.inf(f32))));
-    const chance = largest.min(.splat(1));
-    const asked = going.bitAnd(step.depth.gt(.splat(roulette_depth - 1)))
-        .bitAnd(chance.lt(.splat(1)));
-    if (asked.any()) {
-        const number = step.chances.at(.chance)[0];
-        going = going.andNot(asked.andNot(number.lt(chance)));
-        throughput =
-            throughput.scale(.select(asked, F32.splat(1).div(chance), .splat(1)));
-    }
+    var going = lanes.andNot(sampled.is_end)
+        .bitAnd(path_light.carriesLight(Kernel.Rays, throughput));
+    const asked = step.depth.gt(.splat(roulette_depth - 1));
+    going = survive(Kernel, step, going, asked, &throughput);
     if (step.keeps_features)
         path_features.bounce(Kernel, step, going, sampled.is_delta, sampled.pdf);
     if (going.any()) leave(Kernel, step, going, &sampled, throughput);
+}
+
+/// Russian roulette (Arvo and Kirk 1990) in the lanes asked for: paths end by chance that are worth
+/// less than 1, and the others make up for them. Returns those that go on.
+pub inline fn survive(
+    comptime Kernel: type,
+    step: *const PathStep(Kernel),
+    going: Kernel.Rays.Mask,
+    asked: Kernel.Rays.Mask,
+    throughput: *Kernel.Rays.Vec3,
+) Kernel.Rays.Mask {
+    const F32 = Kernel.Rays.F32;
+    const largest = throughput.x.max(throughput.y).max(throughput.z);
+    const chance = largest.min(.splat(1));
+    const risking = going.bitAnd(asked).bitAnd(chance.lt(.splat(1)));
+    if (risking.none()) return going;
+    throughput.* =
+        throughput.scale(.select(risking, F32.splat(1).div(chance), .splat(1)));
+    return going.andNot(risking.andNot(step.chances.at(.chance)[0].lt(chance)));
 }
 
 fn leave(

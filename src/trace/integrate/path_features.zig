@@ -31,12 +31,6 @@ pub const Features = struct {
     };
 };
 
-/// Whether a film keeps any.
-pub fn areKept(film: *const Film) bool {
-    const layers = film.layers;
-    return layers.contains(.albedo) or layers.contains(.normal) or layers.contains(.depth);
-}
-
 /// Lanes of those asked for whose paths still show what primary rays see.
 fn seeing(
     comptime Kernel: type,
@@ -113,11 +107,10 @@ pub noinline fn bounce(
     pdf: Kernel.Rays.F32,
 ) void {
     const narrow = is_delta.bitOr(pdf.gt(.splat(smooth_pdf_least)));
-    var bits = asked.andNot(isSmooth(Kernel, step).bitAnd(narrow)).bits();
-    while (bits != 0) : (bits &= bits - 1) step.features[step.numbers[@ctz(bits)]].sees = 0;
+    scatter(Kernel, step, asked.andNot(isSmooth(Kernel, step).bitAnd(narrow)));
 }
 
-/// Notes that paths are scattered.
+/// Notes that paths are scattered: what they meet is not what primary rays see.
 pub noinline fn scatter(
     comptime Kernel: type,
     step: *PathStep(Kernel),

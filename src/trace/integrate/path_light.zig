@@ -26,6 +26,47 @@ inline fn heuristic(comptime Lanes: type, own: Lanes.F32, other: Lanes.F32) Lane
     return one.div(one.add(ratio.mul(ratio)));
 }
 
+/// Lanes in which some light is worth something, and none is beyond all numbers.
+pub inline fn carriesLight(comptime Lanes: type, worth: Lanes.Vec3) Lanes.Mask {
+    const largest = worth.x.max(worth.y).max(worth.z);
+    return largest.gt(.zero()).bitAnd(largest.lt(.splat(std.math.inf(f32))));
+}
+
+/// A light for each receiver in lanes.
+fn choose(
+    comptime Kernel: type,
+    step: *const PathStep(Kernel),
+    receiver: *const light_sampling.Receiver(Kernel.Rays),
+    lanes: Kernel.Rays.Mask,
+) light_sampling.Sample(Kernel.Rays) {
+    const choice = step.chances.at(.light);
+    const place = step.chances.at(.light_point);
+    const numbers = [3]Kernel.Rays.F32{ choice[0], place[0], place[1] };
+    return light_sampling.sample(Kernel.Rays, step.frame, receiver, numbers, lanes);
+}
+
+/// What chosen light counts, where rays that meet it by themselves have a density of `other`.
+inline fn shareOf(
+    comptime Lanes: type,
+    light: *const light_sampling.Sample(Lanes),
+    other: Lanes.F32,
+) Lanes.F32 {
+    const weight = heuristic(Lanes, light.pdf, other);
+    return Lanes.F32.select(light.is_delta, .splat(1), weight)
+        .div(light.pdf.max(.splat(std.math.floatMin(f32))));
+}
+
+/// Where shadow rays end that are as long as the light is far.
+inline fn endOf(
+    comptime Lanes: type,
+    light: *const light_sampling.Sample(Lanes),
+) Lanes.F32 {
+    const inf: Lanes.F32 = .splat(std.math.inf(f32));
+    const has_primitive = light.primitive.gt(.splat(light_sampling.no_primitive));
+    const end = Lanes.F32.select(has_primitive, .splat(end_share), .splat(1));
+    return .select(light.distance.eq(inf), inf, end);
+}
+
 /// Takes shadow rays to a light that is chosen for each vertex. Asserts that the frame has a light
 /// list.
 pub noinline fn addLight(
@@ -34,42 +75,32 @@ pub noinline fn addLight(
     lanes: Kernel.Rays.Mask,
 ) void {
     const Rays = Kernel.Rays;
-    const F32 = Rays.F32;
     const Vec3 = Rays.Vec3;
     const point = &step.vertex.point;
     const receiver = receiverAt(Kernel, step);
-    const choice = step.chances.at(.light);
-    const place = step.chances.at(.light_point);
-    const numbers = [3]F32{ choice[0], place[0], place[1] };
-    const light = light_sampling.sample(Rays, step.frame, &receiver, numbers, lanes);
+    const light = choose(Kernel, step, &receiver, lanes);
     const there = lanes.bitAnd(light.pdf.gt(.zero()));
     if (there.none()) return;
     const found = step.scattering.eval(light.to_light);
     const value = step.scattering.evalPoint(light.to_light, light.is_delta, found.value);
-    const weight = heuristic(Rays, light.pdf, found.pdf);
-    const share = F32.select(light.is_delta, .splat(1), weight)
-        .div(light.pdf.max(.splat(std.math.floatMin(f32))));
+    const share = shareOf(Rays, &light, found.pdf);
     const worth = step.throughput.mul(value).mul(light.radiance).scale(share);
-    const largest = worth.x.max(worth.y).max(worth.z);
-    const lit = there.bitAnd(largest.gt(.zero()))
-        .bitAnd(largest.lt(.splat(std.math.inf(f32))));
+    const lit = there.bitAnd(carriesLight(Rays, worth));
     if (lit.none()) return;
     const normal = point.normal_geometric;
     const behind = normal.dot(light.to_light).lt(.zero());
     const away: Vec3 = .select(behind, normal.neg(), normal);
     const origin = point.offsetOrigin(away, .zero());
-    const inf: F32 = .splat(std.math.inf(f32));
-    const is_far = light.distance.eq(inf);
+    const is_far = light.distance.eq(.splat(std.math.inf(f32)));
     const target = point.position
         .add(light.to_light.scale(.select(is_far, .splat(1), light.distance)));
     const own = step.path.bundle.groups[step.group].closest.primitive;
     const has_primitive = light.primitive.gt(.splat(light_sampling.no_primitive));
-    const end = F32.select(has_primitive, .splat(end_share), .splat(1));
     step.shadows.take(&.{
         .lanes = lit,
         .origin = origin,
         .direction = .select(is_far, light.to_light, target.sub(origin)),
-        .end = .select(is_far, inf, end),
+        .end = endOf(Rays, &light),
         .skip = .select(has_primitive, light.primitive, own),
         .cone_width = if (step.frame.needsFootprints()) point.cone_width else .zero(),
         .straight = light.is_delta,
@@ -99,34 +130,24 @@ pub noinline fn addScattered(
     anisotropy: Kernel.Rays.F32,
 ) void {
     const Rays = Kernel.Rays;
-    const F32 = Rays.F32;
     const Vec3 = Rays.Vec3;
     const receiver: light_sampling.Receiver(Rays) = .{
         .position = position,
         .normal = .splat(.{ 0, 0, 0 }),
     };
-    const choice = step.chances.at(.light);
-    const place = step.chances.at(.light_point);
-    const numbers = [3]F32{ choice[0], place[0], place[1] };
-    const light = light_sampling.sample(Rays, step.frame, &receiver, numbers, lanes);
+    const light = choose(Kernel, step, &receiver, lanes);
     const found = phase.eval(Rays, along.dot(light.to_light), anisotropy);
-    const weight = heuristic(Rays, light.pdf, found);
-    const share = F32.select(light.is_delta, .splat(1), weight)
-        .div(light.pdf.max(.splat(std.math.floatMin(f32))));
+    const share = shareOf(Rays, &light, found);
     const worth = step.throughput.mul(light.radiance).scale(share.mul(found));
-    const largest = worth.x.max(worth.y).max(worth.z);
-    const lit = lanes.bitAnd(light.pdf.gt(.zero())).bitAnd(largest.gt(.zero()))
-        .bitAnd(largest.lt(.splat(std.math.inf(f32))));
+    const lit = lanes.bitAnd(light.pdf.gt(.zero())).bitAnd(carriesLight(Rays, worth));
     if (lit.none()) return;
     const is_far = light.distance.eq(.splat(std.math.inf(f32)));
-    const has_primitive = light.primitive.gt(.splat(light_sampling.no_primitive));
-    const end = F32.select(has_primitive, .splat(end_share), .splat(1));
     const reach: Vec3 = light.to_light.scale(.select(is_far, .splat(1), light.distance));
     step.shadows.take(&.{
         .lanes = lit,
         .origin = position,
         .direction = reach,
-        .end = .select(is_far, light.distance, end),
+        .end = endOf(Rays, &light),
         .skip = light.primitive,
         .cone_width = .zero(),
         .straight = light.is_delta,

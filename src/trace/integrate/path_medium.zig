@@ -12,6 +12,7 @@ const ray_file = @import("../traverse/ray.zig");
 const exponential = @import("../shade/exponential.zig");
 const light_sampling = @import("../shade/light_sampling.zig");
 const phase = @import("../shade/phase.zig");
+const path_bounce = @import("path_bounce.zig");
 const path_features = @import("path_features.zig");
 const path_light = @import("path_light.zig");
 const records_file = @import("path_records.zig");
@@ -88,11 +89,7 @@ pub noinline fn scatter(
     const distance = depth.div(sigma.max(.splat(1e-30)));
     const scattered = medium.lanes.bitAnd(distance.lt(way));
     const reached = F32.select(scattered, distance, way.max(.zero()));
-    const left: Vec3 = .{
-        .x = exponential.expNegative(Rays, sigma_t.x.mul(reached).neg()),
-        .y = exponential.expNegative(Rays, sigma_t.y.mul(reached).neg()),
-        .z = exponential.expNegative(Rays, sigma_t.z.mul(reached).neg()),
-    };
+    const left = exponential.transmittance(Rays, sigma_t, reached);
     const ones: Vec3 = .splat(.{ 1, 1, 1 });
     const densities = left.mul(.select(scattered, sigma_t, ones));
     const pdf = densities.dot(odds).max(.splat(std.math.floatMin(f32)));
@@ -147,7 +144,6 @@ fn goOn(
     anisotropy: Kernel.Rays.F32,
 ) void {
     const Rays = Kernel.Rays;
-    const F32 = Rays.F32;
     const Stored = records_file.Stored(Rays);
     const numbers = step.chances.at(.lobe_direction);
     const to_light = phase.sample(Rays, along, anisotropy, numbers);
@@ -155,16 +151,10 @@ fn goOn(
     const count =
         records_file.integers(Rays, step.records, &step.numbers, "scatter_count");
     var throughput = step.throughput;
-    const largest = throughput.x.max(throughput.y).max(throughput.z);
     var going = lanes.bitAnd(count.lt(.splat(scatter_count_max)))
-        .bitAnd(largest.gt(.zero())).bitAnd(largest.lt(.splat(std.math.inf(f32))));
-    const chance = largest.min(.splat(1));
-    const asked = going.bitAnd(count.gt(.splat(roulette_count))).bitAnd(chance.lt(.splat(1)));
-    if (asked.any()) {
-        going = going.andNot(asked.andNot(step.chances.at(.chance)[0].lt(chance)));
-        throughput =
-            throughput.scale(.select(asked, F32.splat(1).div(chance), .splat(1)));
-    }
+        .bitAnd(path_light.carriesLight(Rays, throughput));
+    const asked = count.gt(.splat(roulette_count));
+    going = path_bounce.survive(Kernel, step, going, asked, &throughput);
     const positions: Stored = .of(position);
     const directions: Stored = .of(to_light);
     const throughputs: Stored = .of(throughput);

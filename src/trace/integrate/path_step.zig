@@ -175,19 +175,13 @@ pub fn PathStep(comptime Kernel: type) type {
             const frame = step.frame;
             const vertex = &step.vertex;
             const point = &vertex.point;
-            const ray = &step.path.bundle.groups[step.group];
             visibility_file.findInteraction(Rays, frame, &step.path, step.group, point);
             if (frame.materials.volumes.len > 0)
                 step.visibility.boundaries[step.group].apply(point);
             // Backs that the eye does not see are there for other light.
             const unseen = point.culled.bitAnd(step.turns.eq(.zero()));
             point.opacity = .select(unseen, .zero(), point.opacity);
-            if (!frame.hasLayers()) return vertex.bsdf.become(point);
-            visibility_file.findLayers(Rays, frame, ray, point, &vertex.layers);
-            if (vertex.layers.present.any())
-                vertex.bsdf.becomeLayered(point, &vertex.layers)
-            else
-                vertex.bsdf.become(point);
+            vertex.findBsdf(frame, &step.path, step.group);
         }
 
         /// Takes away what volumes absorb on the way of the rays (Beer and Lambert).
@@ -196,12 +190,9 @@ pub fn PathStep(comptime Kernel: type) type {
             const sigma_t = step.path.sigma_t[step.group];
             const zero: F32 = .zero();
             if (sigma_t.x.max(sigma_t.y).max(sigma_t.z).le(zero).all()) return;
-            const way = ray.closest.t.sub(ray.tnear.t).mul(ray.line.direction.length()).neg();
-            step.throughput = step.throughput.mul(.{
-                .x = exponential.expNegative(Rays, sigma_t.x.mul(way)),
-                .y = exponential.expNegative(Rays, sigma_t.y.mul(way)),
-                .z = exponential.expNegative(Rays, sigma_t.z.mul(way)),
-            });
+            const way = ray.closest.t.sub(ray.tnear.t).mul(ray.line.direction.length());
+            step.throughput =
+                step.throughput.mul(exponential.transmittance(Rays, sigma_t, way));
         }
 
         /// The path of a lane takes another step.

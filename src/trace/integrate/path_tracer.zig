@@ -13,6 +13,7 @@ const statistics = @import("../../statistics.zig");
 const dispatch = @import("../traverse/dispatch.zig");
 const ray_file = @import("../traverse/ray.zig");
 const boundaries_file = @import("boundaries.zig");
+const features_file = @import("features.zig");
 const path_features = @import("path_features.zig");
 const path_file = @import("path.zig");
 const path_primary = @import("path_primary.zig");
@@ -131,7 +132,7 @@ pub fn PathTracer(comptime Kernel: type) type {
         ) void {
             const step = &tracer.step;
             step.rectangle = rectangle;
-            step.keeps_features = path_features.areKept(film);
+            step.keeps_features = features_file.areKept(film.layers);
             step.is_transparent = film.layers.contains(.alpha);
             step.keeps_display = film.layers.contains(.display);
             var done: u32 = 0;

@@ -5,7 +5,10 @@
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
+const simd = @import("../../simd.zig");
 const lookups_file = @import("lookups.zig");
+const material_file = @import("material.zig");
+const Single = simd.Lanes(.scalar, 1);
 const Frame = world_file.Frame;
 
 /// Linear RGB; `weights` are of corners 1 and 2.
@@ -28,24 +31,18 @@ pub fn radianceAt(frame: *const Frame, primitive: u32, weights: [2]f32) [3]f32 {
     const is_solid = material.blend == 0 and material.alpha_cutoff < 0;
     if (material.is_hidden_lamp or is_solid) return radiance;
     lookups_file.sampleSlot(.base, frame, lookups, .base_color, &point, &values);
-    var alpha = material.base_color[3] *
-        values[lookups_file.Slots.base.indexOf(.base_color)][3];
+    var alpha = values[lookups_file.Slots.base.indexOf(.base_color)][3];
     if (geometry.hasColors()) {
         const a = face.color(geometry, 0)[3];
         const b = face.color(geometry, 1)[3];
         const c = face.color(geometry, 2)[3];
         alpha *= a * ((1 - weights[0]) - weights[1]) + b * weights[0] + c * weights[1];
     }
-    const opacity: f32 = if (material.blend > 0)
-        clamped(alpha)
-    else if (alpha < material.alpha_cutoff) 0 else 1;
+    const materials: material_file.Materials(Single) =
+        .of(frame.materials.all, .splat(@intCast(face.material)), .splat(true));
+    const opacity = material_file.opacity(Single, &materials, .splat(alpha)).lane(0);
     for (&radiance) |*channel| channel.* *= opacity;
     return radiance;
-}
-
-fn clamped(alpha: f32) f32 {
-    if (!(alpha > 0)) return 0;
-    return if (alpha < 1) alpha else 1;
 }
 
 test "factors times texels, less what alpha leaves open; hidden lamps have all of it" {

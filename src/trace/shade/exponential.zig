@@ -16,6 +16,21 @@ pub inline fn expNegative(comptime Lanes: type, x: Lanes.F32) Lanes.F32 {
     return F32.select(bounded.lt(.splat(-87)), .zero(), power);
 }
 
+/// Share of light that is left at a distance: Beer and Lambert's law, of an extinction coefficient
+/// by channel, per metre.
+pub inline fn transmittance(
+    comptime Lanes: type,
+    sigma_t: Lanes.Vec3,
+    distance: Lanes.F32,
+) Lanes.Vec3 {
+    const way = distance.neg();
+    return .{
+        .x = expNegative(Lanes, sigma_t.x.mul(way)),
+        .y = expNegative(Lanes, sigma_t.y.mul(way)),
+        .z = expNegative(Lanes, sigma_t.z.mul(way)),
+    };
+}
+
 /// e^x. Asserts nothing: what is beyond -87 or 87 counts as that, NaN as 87. Relative error
 /// < 4e-7 + 1.2e-7 |x|.
 pub inline fn exp(comptime Lanes: type, x: Lanes.F32) Lanes.F32 {
