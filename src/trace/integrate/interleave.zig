@@ -15,6 +15,7 @@ const vec3 = @import("../../math.zig").vec3;
 const film_file = @import("../../film.zig");
 const world_file = @import("../../world.zig");
 const Allocator = std.mem.Allocator;
+const Correction = @import("light_correction.zig").Correction;
 const Film = film_file.Film;
 const Vec3 = [3]f32;
 
@@ -52,17 +53,20 @@ pub const Sets = struct {
     }
 
     /// Where a light is in the order of sets and their parts: of lights in a row each is another
-    /// set's, and of those of a set each another part's.
+    /// part's, and of those of a part each another set's, so that those of a pixel are far apart.
     pub fn indexOf(sets: *const Sets, number: usize) usize {
-        const set = number % sets.set_count;
-        const within = number / sets.set_count;
-        const part = within % part_count;
-        return (set * part_count + part) * sets.part_size + within / part_count;
+        const part = number % part_count;
+        const within = number / part_count / sets.set_count;
+        return (sets.setOf(number) * part_count + part) * sets.part_size + within;
+    }
+
+    fn setOf(sets: *const Sets, number: usize) usize {
+        return number / part_count % sets.set_count;
     }
 
     /// How much more a light counts where it is one of a pixel's, than one of all.
     pub fn weightOf(sets: *const Sets, number: usize) f64 {
-        const set = number % sets.set_count;
+        const set = sets.setOf(number);
         const uses = (sets.sample_count - set - 1) / sets.set_count + 1;
         const total: f64 = @floatFromInt(sets.sample_count);
         const among: f64 = if (sets.is_interleaved) part_count else 1;
@@ -177,10 +181,11 @@ pub const Layers = struct {
         film: *Film,
         view: *const world_file.View,
         y: u32,
+        correction: *const Correction,
     ) u64 {
         var non_finite_count: u64 = 0;
         for (0..layers.width) |x| {
-            const light = layers.lightOf(view, @intCast(x), y);
+            const light = layers.lightOf(view, @intCast(x), y, correction);
             const pixel = film.image.at(@intCast(x), y);
             const count = layers.albedo[@as(usize, y) * layers.width + x][3];
             const added = light / @as(Pixel, @splat(count));
@@ -196,10 +201,17 @@ pub const Layers = struct {
     }
 
     /// What a pixel's samples have together of the light that is filtered.
-    fn lightOf(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Pixel {
+    fn lightOf(
+        layers: *const Layers,
+        view: *const world_file.View,
+        x: u32,
+        y: u32,
+        correction: *const Correction,
+    ) Pixel {
         const at = @as(usize, y) * layers.width + x;
         const sums = if (layers.is_interleaved) layers.gather(view, x, y) else Sums.of(layers, at);
         var light = layers.albedo[at] * quotient(sums.bounced, sums.albedo, 0);
+        light *= correction.of(layers, view, x, y);
         if (layers.open.len > 0)
             light += layers.open[at] * quotient(sums.arriving, sums.shining, 1);
         light[3] = 0;
@@ -309,7 +321,7 @@ const plain_min = 0.97;
 /// Cosine between normals that are like.
 const cosine_min = 0.9;
 /// How far off the plane a neighbour may be, in distances between pixels.
-const off_max = 2.5;
+pub const off_max = 2.5;
 
 /// From the middle of the picture to a pixel, where the camera's forward ends.
 inline fn sidewaysOf(view: *const world_file.View, x: u32, y: u32) Vec3 {
@@ -325,7 +337,7 @@ inline fn wayOf(view: *const world_file.View, x: u32, y: u32) Vec3 {
 }
 
 /// Where a pixel's samples see something.
-const Place = struct {
+pub const Place = struct {
     /// From the camera's origin.
     position: Vec3,
     /// See `Layers.place`.
@@ -333,7 +345,7 @@ const Place = struct {
     /// How far off a neighbour may be.
     off: f32,
 
-    inline fn of(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Place {
+    pub inline fn of(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Place {
         const place = layers.place[@as(usize, y) * layers.width + x];
         const camera = &view.camera;
         const distance = place[3];
@@ -406,7 +418,7 @@ test "like neighbours share light, so that each pixel of a plane has that of all
     };
     for (0..view.height) |y| layers.placeRow(&view, @intCast(y));
     for (0..view.height) |y|
-        try std.testing.expectEqual(0, layers.finishRow(&film, &view, @intCast(y)));
+        try std.testing.expectEqual(0, layers.finishRow(&film, &view, @intCast(y), &.none));
     for (0..view.height) |y| for (0..view.width) |x| {
         const found = film.image.at(@intCast(x), @intCast(y)).*[0];
         const albedo: f32 = @floatFromInt(1 + (x + y) % 4);

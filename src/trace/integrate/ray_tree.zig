@@ -252,9 +252,13 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
             ));
         }
 
-        /// Adds what the points that rays see scatter of the scene's lights.
-        pub fn addDirect(tree: *Self, coherence: dispatch.Coherence) void {
-            for (tree.frame.lights) |*light| tree.countShadow(direct.addLight(
+        /// Adds what the points that rays see scatter of these of the scene's lights.
+        pub fn addDirect(
+            tree: *Self,
+            lights: []const world_file.Light,
+            coherence: dispatch.Coherence,
+        ) void {
+            for (lights) |*light| tree.countShadow(direct.addLight(
                 Kernel,
                 &tree.visibility,
                 light,
