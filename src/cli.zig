@@ -362,13 +362,10 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--progress HOW",
-            .help = "auto: one line on a terminal; json: lines for programs\n" ++
-                "on stderr (docs/progress.md); or none",
+            .help = "auto: a line on a terminal; json: lines for programs,\n" ++
+                "see docs/progress.md; or none",
         },
-        .{
-            .usage = "--progress-fd N",
-            .help = "json to that open descriptor",
-        },
+        .{ .usage = "--progress-fd N", .help = "json to that descriptor, not to stderr" },
         .{
             .usage = "--count-tests",
             .help = "count intersection tests, in a second, untimed pass",
