@@ -533,10 +533,7 @@ const Parser = struct {
             .tonemap => {
                 options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
             },
-            .stats => options.stats = try reader.choice(given, Stats),
-            .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
-            .progress_fd => options.progress.file =
-                try reader.number(given, settings.progress_file),
+            .stats, .progress, .progress_fd => try parser.setMessages(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
@@ -617,6 +614,19 @@ const Parser = struct {
         noise.exposure = parser.options.write.exposure;
         if (!render.integrator.isOpen())
             return parser.reader.fail("'--noise' is for '--integrator path'", .{});
+    }
+
+    fn setMessages(parser: *Parser, given: Reader.Given) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .stats => options.stats = try reader.choice(given, Stats),
+            .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
+            .progress_fd => {
+                options.progress.file = try reader.number(given, settings.progress_file);
+            },
+            else => unreachable, // `set` hands over the above.
+        }
     }
 
     fn settleProgress(parser: *Parser) Error!void {

@@ -96,24 +96,22 @@ fn float(number: anytype) f64 {
 
 const testing = std.testing;
 
-/// `done` of `total` pieces and some rays, for tests.
-fn progressOf(done: usize, total: usize, rays: usize) Progress {
-    return .{
-        .done = .init(done),
-        .total = .init(total),
-        .rays = .init(rays),
+/// With so many pieces done, pieces in all, and rays.
+fn ofForTest(work: *const Work, counts: [3]usize, times: Times) Standing {
+    return .of(.{ .index = 1, .count = 1, .name = "a.glb" }, work, &.{
+        .done = .init(counts[0]),
+        .total = .init(counts[1]),
+        .rays = .init(counts[2]),
         .context = undefined,
         .begun = undefined,
-    };
+    }, times);
 }
 
-const place_for_test: Place = .{ .index = 1, .count = 1, .name = "a.glb" };
-const times_for_test: Times = .{ .file_s = 3, .work_s = 2 };
+const recently: Times = .{ .file_s = 3, .work_s = 2 };
 
 test "a quarter is done in 2 s, so 6 s are left" {
     const work: Work = .{ .stage = .tracing, .total = 64, .pieces_per_unit = 16 };
-    const standing: Standing =
-        .of(place_for_test, &work, &progressOf(16, 64, 4_000_000), times_for_test);
+    const standing = ofForTest(&work, .{ 16, 64, 4_000_000 }, recently);
     try testing.expectEqual(1, standing.done.?);
     try testing.expectEqual(4, standing.total.?);
     try testing.expectEqual(0.25, standing.fraction.?);
@@ -123,29 +121,25 @@ test "a quarter is done in 2 s, so 6 s are left" {
     // Nothing was finished since; what is overdue is about to be.
     for ([_][2]f64{ .{ 4, 2 }, .{ 9, 1 } }) |case| {
         const times: Times = .{ .file_s = 3, .work_s = 2, .idle_s = case[0] };
-        const later: Standing = .of(place_for_test, &work, &progressOf(16, 64, 0), times);
+        const later = ofForTest(&work, .{ 16, 64, 0 }, times);
         try testing.expectEqual(case[1], later.left_s.?);
     }
 }
 
 test "what is not known is not told" {
-    const standing: Standing =
-        .of(place_for_test, &.{ .stage = .writing }, &progressOf(0, 0, 0), times_for_test);
+    const standing = ofForTest(&.{ .stage = .writing }, .{ 0, 0, 0 }, recently);
     try testing.expectEqual(null, standing.done);
     try testing.expectEqual(null, standing.total);
     try testing.expectEqual(null, standing.fraction);
     try testing.expectEqual(null, standing.left_s);
     try testing.expectEqual(null, standing.rays_per_s);
-    const reading: Standing =
-        .of(place_for_test, &.{ .stage = .reading }, &progressOf(7, 0, 0), times_for_test);
+    const reading = ofForTest(&.{ .stage = .reading }, .{ 7, 0, 0 }, recently);
     try testing.expectEqual(7, reading.done.?);
     try testing.expectEqual(null, reading.fraction);
-    const begun: Standing =
-        .of(place_for_test, &.{ .stage = .tree, .total = 10_000 }, &progressOf(1, 10_000, 0), times_for_test);
+    const begun = ofForTest(&.{ .stage = .tree, .total = 10_000 }, .{ 1, 10_000, 0 }, recently);
     try testing.expectEqual(null, begun.left_s);
     // More than was announced: files name others.
-    const more: Standing =
-        .of(place_for_test, &.{ .stage = .tree, .total = 2 }, &progressOf(3, 2, 0), times_for_test);
+    const more = ofForTest(&.{ .stage = .tree, .total = 2 }, .{ 3, 2, 0 }, recently);
     try testing.expectEqual(1, more.fraction.?);
     try testing.expectEqual(0, more.left_s.?);
 }
@@ -153,11 +147,11 @@ test "what is not known is not told" {
 test "a time for the work ends it, or its pieces do" {
     const work: Work = .{ .stage = .tracing, .total = 100, .budget_ns = 10 * std.time.ns_per_s };
     const times: Times = .{ .file_s = 4, .work_s = 4 };
-    const by_time: Standing = .of(place_for_test, &work, &progressOf(10, 100, 0), times);
+    const by_time = ofForTest(&work, .{ 10, 100, 0 }, times);
     try testing.expectEqual(null, by_time.total);
     try testing.expectApproxEqAbs(0.4, by_time.fraction.?, 1e-9);
     try testing.expectApproxEqAbs(6, by_time.left_s.?, 1e-9);
-    const by_pieces: Standing = .of(place_for_test, &work, &progressOf(80, 100, 0), times);
+    const by_pieces = ofForTest(&work, .{ 80, 100, 0 }, times);
     try testing.expectApproxEqAbs(0.8, by_pieces.fraction.?, 1e-9);
     try testing.expectApproxEqAbs(1, by_pieces.left_s.?, 1e-9);
 }
