@@ -17,7 +17,8 @@ const Row = struct { part: []const u8, may_import: []const []const u8 };
 /// file of `src` with the folder of the same name; `module:` begins the name of a module of the
 /// build other than the language's own.
 const directions = [_]Row{
-    .{ .part = "main", .may_import = &.{ "module:raylane", "signals" } },
+    .{ .part = "main", .may_import = &.{ "module:raylane", "signals", "commands" } },
+    .{ .part = "commands", .may_import = &.{ "module:raylane", "signals" } },
     .{ .part = "signals", .may_import = &.{"module:raylane"} },
     .{ .part = "cli", .may_import = &.{ "module:config", "variant" } },
     .{
