@@ -100,9 +100,12 @@ pub const Format = enum {
     ppm,
     /// Its relative for floats, linear: the picture itself, bit for bit, without alpha.
     pfm,
-    /// OpenEXR: linear, halves, with alpha where the background is transparent.
+    /// OpenEXR: linear, halves or floats, with alpha where the background is transparent.
     exr,
 };
+
+/// What colours are in an OpenEXR file.
+pub const ExrKind = enum { half, float };
 
 /// What is known of pixels besides their colours, for other programs: channels of an OpenEXR file.
 pub const Layer = enum {
@@ -473,6 +476,7 @@ pub const Write = struct {
     tone_mapping: ToneMapping = .neutral,
     /// Within `jpeg_quality`.
     jpeg_quality: u32 = jpeg_quality.default,
+    exr_kind: ExrKind = .half,
 };
 
 test Range {
