@@ -126,6 +126,7 @@ const sections: []const Section = &.{
             .help = "png, jpg, tga, bmp or ppm, or linear: hdr, pfm or exr",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
+        .{ .usage = "--exr KIND", .help = "half or float: colours of an EXR file (default: half)" },
         .{
             .usage = "-r, --resolution WxH|N",
             .help = comptimePrint("size in pixels, or of the long side in the camera's\n" ++
@@ -498,6 +499,7 @@ const Parser = struct {
             .jpeg_quality => {
                 options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
             },
+            .exr => options.write.exr_kind = try reader.choice(given, settings.ExrKind),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
             .resolution => {
@@ -1101,6 +1103,7 @@ test "numbers keep to their ranges" {
             .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },
             .bad = &.{ "tiff", "" },
         },
+        .{ .flag = "--exr", .good = &.{ "half", "float" }, .bad = &.{ "Half", "double", "" } },
         .{ .flag = "--jpeg-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "", "x" } },
         .{
             .flag = "--max-memory",

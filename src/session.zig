@@ -561,6 +561,7 @@ pub const Session = struct {
             .transparent = session.seen.background == .transparent,
             .background = session.behind(),
             .jpeg_quality = @intCast(choices.jpeg_quality),
+            .exr_kind = choices.exr_kind,
             .pool = &session.pool,
         };
     }

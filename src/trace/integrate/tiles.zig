@@ -31,6 +31,7 @@ const sampler = @import("sampler.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Film = film_file.Film;
+const Layout = film_file.Layout;
 const Frame = world_file.Frame;
 const Progress = @import("../../progress.zig").Progress;
 const Rectangle = film_file.Rectangle;
@@ -60,6 +61,8 @@ pub const Settings = struct {
     noise: ?adaptive.Noise = null,
     /// Null: all samples in one round.
     course: ?Course = null,
+    /// Which pixels; null: all of the picture, as `render` fills in.
+    layout: ?*const Layout = null,
     /// The integrator's `Shared`: `render` fills it in.
     shared: ?*anyopaque = null,
 
@@ -179,6 +182,7 @@ pub const Integrator = extern struct {
                         .y0 = y,
                         .x1 = @min(x + I.width, tile.x1),
                         .y1 = @min(y + I.height, tile.y1),
+                        .shift = tile.shift,
                     }, first_sample, sample_count, film);
                 }
             }
@@ -278,7 +282,10 @@ pub fn render(
     defer gpa.free(offsets);
     var with_tiles = chosen.*;
     with_tiles.tile_size = @divCeil(chosen.tile_size, integrator.tile_step) * integrator.tile_step;
+    const whole: Layout = .whole(film.image.width, film.image.height);
+    if (with_tiles.layout == null) with_tiles.layout = &whole;
     const settings = &with_tiles;
+    const layout = settings.layout.?;
     var shown = settings.*;
     shown.offsets = offsets;
     if (settings.integrator.isOpen()) {
@@ -288,14 +295,14 @@ pub fn render(
     if (integrator.shared) |shared|
         shown.shared = shared.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
     defer if (integrator.shared) |shared| shared.deinit(shown.shared.?, &gpa);
-    const image = &film.image;
+    assert(film.image.width == layout.film_width and film.image.height == layout.film_height);
     var blocks: ?adaptive.Blocks = null;
     defer if (blocks) |*all| all.deinit(gpa);
     if (settings.noise) |noise| {
         assert(settings.integrator.isOpen());
-        blocks = try .init(gpa, image.width, image.height, noise);
+        blocks = try .init(gpa, layout, noise);
     }
-    var tiles: Tiles = .init(image.width, image.height, settings);
+    var tiles: Tiles = .init(layout, settings);
     tiles.states = try gpa.alloc(Tiles.State, tiles.count);
     defer gpa.free(tiles.states);
     @memset(tiles.states, .{});
@@ -466,11 +473,13 @@ const Job = struct {
         const sample_count = passSamples(done, job.tiles.samples_due);
         state.samples_done = done + sample_count;
         if (job.blocks) |blocks| {
-            var all = blocks.of(tile);
+            const on_film = tile.onFilm();
+            var all = blocks.of(on_film);
             while (all.nextActive()) |active| {
-                job.integrator.pass(integrator, &active, done, sample_count, job.film);
+                const rectangle = tile.ofFilm(active);
+                job.integrator.pass(integrator, &rectangle, done, sample_count, job.film);
             }
-            const judged = blocks.judge(tile, job.film, done + sample_count);
+            const judged = blocks.judge(on_film, job.film, done + sample_count);
             // Those that have enough count as if they had all.
             const saved = job.settings.sample_count - (done + sample_count);
             return judged.active_before * sample_count + judged.finished * saved;
@@ -479,9 +488,9 @@ const Job = struct {
         return sample_count;
     }
 
-    /// A tile in parts whose pixels have the same number of samples.
+    /// A tile of the film in parts whose pixels have the same number of samples.
     fn partsOf(job: *const Job, number: u32) Parts {
-        const tile = job.tiles.rectangleOf(number);
+        const tile = job.tiles.rectangleOf(number).onFilm();
         const sample_count = job.tiles.states[number].samples_done;
         const blocks = job.blocks orelse
             return .{ .whole = .{ .rectangle = tile, .sample_count = sample_count } };
@@ -529,8 +538,7 @@ const Job = struct {
             const rectangle = part.rectangle;
             sum.non_finite_count += job.film.finish(rectangle, part.sample_count);
             sum.sample_count = @max(sum.sample_count, part.sample_count);
-            const pixel_count = (rectangle.x1 - rectangle.x0) * (rectangle.y1 - rectangle.y0);
-            sum.sample_sum += @as(u64, pixel_count) * part.sample_count;
+            sum.sample_sum += rectangle.pixelCount() * part.sample_count;
         }
     }
 };
@@ -558,11 +566,12 @@ fn passSamples(samples_done: u32, samples_due: u32) u32 {
     return @min(samples_due - samples_done, @min(@as(u32, @intCast(rest)), 64));
 }
 
-/// The picture in tiles, each as often as there are passes.
+/// What is traced in tiles, each as often as there are passes.
 const Tiles = struct {
     next: std.atomic.Value(u32) align(std.atomic.cache_line) = .init(0),
-    width: u32,
-    height: u32,
+    layout: *const Layout,
+    /// Side of a tile where there is one window, and how many there are in a row of it; windows of
+    /// several are tiles themselves.
     size: u32,
     columns: u32,
     count: u32,
@@ -587,7 +596,8 @@ const Tiles = struct {
     const passes_max = 128;
 
     /// Asserts that no size is 0. A side of a tile is raised where there would be too many.
-    fn init(width: u32, height: u32, settings: *const Settings) Tiles {
+    fn init(layout: *const Layout, settings: *const Settings) Tiles {
+        const width, const height = .{ layout.film_width, layout.film_height };
         var size = settings.tile_size;
         assert(width > 0 and height > 0 and size > 0 and settings.sample_count > 0);
         if (settings.noise != null) size = std.mem.alignForward(u32, size, adaptive.block_side);
@@ -595,11 +605,13 @@ const Tiles = struct {
             size *= 2;
         const columns = @divCeil(width, size);
         return .{
-            .width = width,
-            .height = height,
+            .layout = layout,
             .size = size,
             .columns = columns,
-            .count = columns * @divCeil(height, size),
+            .count = switch (layout.form) {
+                .window => columns * @divCeil(height, size),
+                .share => layout.count(),
+            },
         };
     }
 
@@ -625,13 +637,16 @@ const Tiles = struct {
     }
 
     fn rectangleOf(tiles: *const Tiles, number: u32) Rectangle {
-        const x0 = (number % tiles.columns) * tiles.size;
-        const y0 = (number / tiles.columns) * tiles.size;
+        if (tiles.layout.form == .share) return tiles.layout.windowAt(number).traced;
+        const all = tiles.layout.windowAt(0).traced;
+        const x0 = all.x0 + (number % tiles.columns) * tiles.size;
+        const y0 = all.y0 + (number / tiles.columns) * tiles.size;
         return .{
             .x0 = x0,
             .y0 = y0,
-            .x1 = x0 + @min(tiles.size, tiles.width - x0),
-            .y1 = y0 + @min(tiles.size, tiles.height - y0),
+            .x1 = x0 + @min(tiles.size, all.x1 - x0),
+            .y1 = y0 + @min(tiles.size, all.y1 - y0),
+            .shift = all.shift,
         };
     }
 };
@@ -641,7 +656,7 @@ test "every pixel is in exactly one tile, and every tile is due once a pass" {
     defer pool.deinit();
     for ([_][3]u32{ .{ 1, 1, 1 }, .{ 7, 5, 3 }, .{ 64, 64, 16 }, .{ 3, 100, 256 } }) |case| {
         var covered: [100 * 100]u8 = @splat(0);
-        var tiles: Tiles = .init(case[0], case[1], &.{
+        var tiles: Tiles = .init(&.whole(case[0], case[1]), &.{
             .pool = &pool,
             .tile_size = case[2],
         });
@@ -661,7 +676,7 @@ test "every pixel is in exactly one tile, and every tile is due once a pass" {
 test "huge pictures have a countable number of tiles" {
     var pool: parallel.Pool = .init(1);
     defer pool.deinit();
-    var tiles: Tiles = .init(65536, 65536, &.{ .pool = &pool, .tile_size = 1 });
+    var tiles: Tiles = .init(&.whole(65536, 65536), &.{ .pool = &pool, .tile_size = 1 });
     tiles.begin(0, 4096);
     try std.testing.expect(@as(u64, tiles.count) * tiles.pass_count <= Tiles.count_max);
     try std.testing.expect(tiles.pass_count <= Tiles.passes_max);
