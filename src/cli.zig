@@ -535,7 +535,7 @@ const Parser = struct {
             .tonemap => {
                 options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
             },
-            .stats, .progress, .progress_fd => try parser.setMessages(given),
+            .stats, .quiet, .verbose, .progress, .progress_fd => try parser.setMessages(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
@@ -549,8 +549,6 @@ const Parser = struct {
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
                     settings.point_size.min, settings.point_size.max,
                 })),
-            .quiet => options.quiet = true,
-            .verbose => options.verbose = true,
             .help => parser.other = .help,
             .version => parser.other = parser.other orelse .version,
             .licenses => parser.other = parser.other orelse .licenses,
@@ -623,6 +621,8 @@ const Parser = struct {
         const reader = &parser.reader;
         switch (given.id) {
             .stats => options.stats = try reader.choice(given, Stats),
+            .quiet => options.quiet = true,
+            .verbose => options.verbose = true,
             .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
             .progress_fd => {
                 options.progress.file = try reader.number(given, settings.progress_file);
