@@ -22,6 +22,14 @@ pub fn print(io: Io, text: []const u8) ExitCode {
     return .ok;
 }
 
+/// Prints what a function writes.
+pub fn printBy(gpa: std.mem.Allocator, io: Io, write: anytype, arguments: anytype) ExitCode {
+    var text: Io.Writer.Allocating = .init(gpa);
+    defer text.deinit();
+    @call(.auto, write, .{&text.writer} ++ arguments) catch return outOfMemory(io);
+    return print(io, text.written());
+}
+
 /// Writes all of a text to standard output; the diagnostic says why it cannot.
 pub fn writeToStdout(
     io: Io,
