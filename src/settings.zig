@@ -62,6 +62,12 @@ pub const side: Range = .{ .min = 1, .max = 65_536, .default = 1024 };
 pub const pixel_count_max = 1 << 28;
 /// The longer side where it alone is given: a square one has as many pixels as there may be.
 pub const long_side: Range = .{ .min = 1, .max = 1 << 14, .default = side.default };
+/// Frames of a film, and pictures that are numbered.
+pub const frame_count_max = 1_000_000;
+/// Files that are rendered side by side.
+pub const job_count: Range = .{ .min = 1, .max = 64 };
+/// Views around a scene.
+pub const view_count: Range = .{ .min = 1, .max = 36_000 };
 /// Quality of a JPEG.
 pub const jpeg_quality: Range = .{ .min = 1, .max = 100, .default = 90 };
 /// Largest exposure either way, in stops.
@@ -100,6 +106,8 @@ pub const Format = enum {
     pfm,
     /// OpenEXR: linear, halves, with alpha where the background is transparent.
     exr,
+    /// YUV4MPEG2: frames of a film, one after the other.
+    y4m,
 };
 
 /// What is known of pixels besides their colours, for other programs: channels of an OpenEXR file.
@@ -431,14 +439,37 @@ pub const Render = struct {
     layers: std.EnumSet(Layer) = .empty,
 };
 
+/// Frames of a film a second, as a fraction of numbers of 1 or more.
+pub const FrameRate = struct {
+    numerator: u32 = 24,
+    denominator: u32 = 1,
+
+    /// When a frame is seen, in seconds.
+    pub fn timeOf(rate: FrameRate, frame: i32) f32 {
+        const numerator: f64 = @floatFromInt(rate.numerator);
+        const denominator: f64 = @floatFromInt(rate.denominator);
+        return @floatCast(@as(f64, @floatFromInt(frame)) * denominator / numerator);
+    }
+};
+
 /// How a picture is encoded.
 pub const Write = struct {
     format: Format = .png,
+    /// Of a format that holds a film.
+    frame_rate: FrameRate = .{},
+    /// The film has frames already.
+    is_continued: bool = false,
     exposure: Exposure = .default,
     tone_mapping: ToneMapping = .neutral,
     /// Within `jpeg_quality`.
     jpeg_quality: u32 = jpeg_quality.default,
 };
+
+test FrameRate {
+    const film: FrameRate = .{ .numerator = 24_000, .denominator = 1001 };
+    try std.testing.expectEqual(1.001, film.timeOf(24));
+    try std.testing.expectEqual(-0.5, (FrameRate{}).timeOf(-12));
+}
 
 test Range {
     try std.testing.expect(depth.holds(0) and depth.holds(32) and !depth.holds(33));
