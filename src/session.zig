@@ -223,6 +223,14 @@ pub const Session = struct {
         };
     }
 
+    /// Frees the scene and all that is made of it. Threads, film and environments stay for another.
+    pub fn drop(session: *Session) void {
+        session.dropWorld();
+        session.dropLoaded();
+        session.dropScene();
+        session.reference = null;
+    }
+
     /// Frees the scene, for which there is no use after the last `view`.
     pub fn dropScene(session: *Session) void {
         session.dropPosed();
@@ -388,10 +396,8 @@ pub const Session = struct {
         try session.dimStudio();
         const world = &session.world.?;
         const is_exposed = !output.isLinear(written.format) or choices.noise != null;
-        const is_framed = world.facts.camera_is_default or
-            session.seen.viewpoint.replacesCamera();
         return .{
-            .view = .of(world, is_framed, session.pose_cache.?.shift),
+            .view = session.framing(),
             .emission = session.weight,
             .exposure_ev = if (is_exposed) try session.exposureOf(written.exposure) else 0,
             .is_metered = session.isMetered(written.exposure),
@@ -414,6 +420,14 @@ pub const Session = struct {
             session.output,
             session.diagnostic,
         );
+    }
+
+    /// How the view is framed. Asserts that there is one.
+    pub fn framing(session: *const Session) prepare.Reference {
+        const world = &session.world.?;
+        const is_framed = world.facts.camera_is_default or
+            session.seen.viewpoint.replacesCamera();
+        return .of(world, is_framed, session.pose_cache.?.shift);
     }
 
     /// Traces the picture. Asserts that there is a view, and a tree of the variant's width.

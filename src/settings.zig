@@ -176,6 +176,9 @@ pub const Orbit = struct {
     };
 };
 
+/// Where a turntable begins: as the automatic view does of what has no better front.
+pub const orbit_turntable: Orbit = .{ .theta_degrees = 30, .phi_degrees = 70 };
+
 /// A camera of the user's own; what is null follows from a framing of the scene. Numbers are
 /// finite; not both `eye` and `orbit`; `orthographic` without `fov_degrees`.
 pub const Viewpoint = struct {

@@ -1,8 +1,8 @@
 //! Names of pictures by a template: `{model}_{frame:4}.png`.
 //!
-//! In: a text with placeholders, and what stands for each. Out: the name of one picture. `{frame:4}`
-//! fills up with zeros; `{{` and `}}` are the braces themselves. Names that come from files are made
-//! parts of a path: no slash, nothing that a terminal obeys, no dot in front.
+//! In: a text with placeholders, and what stands for each. Out: the name of one picture.
+//! `{frame:4}` fills up with zeros; `{{` and `}}` are the braces themselves. Names that come from
+//! files are made parts of a path: no slash, nothing that a terminal obeys, no dot in front.
 
 const std = @import("std");
 const diagnostic = @import("../diagnostic.zig");
@@ -148,7 +148,8 @@ const Pieces = struct {
         const name = inside[0 .. colon orelse inside.len];
         const field = std.meta.stringToEnum(Field, name) orelse
             return .{ .fault = .{ .unknown = name } };
-        const digits = inside[(colon orelse return .{ .field = .{ .field = field, .width = 1 } }) + 1 ..];
+        const at = colon orelse return .{ .field = .{ .field = field, .width = 1 } };
+        const digits = inside[at + 1 ..];
         const is_width = digits.len == 1 and digits[0] >= '1' and digits[0] <= '9';
         if (!is_width or !field.isNumber()) return .{ .fault = .{ .width = inside } };
         return .{ .field = .{ .field = field, .width = digits[0] - '0' } };
@@ -166,7 +167,10 @@ fn expectName(expected: []const u8, text: []const u8, values: Values) !void {
 }
 
 test "placeholders, numbers with zeros, braces" {
-    try expectName("out/fox_0012.png", "out/{model}_{frame:4}.png", .{ .model = "fox", .frame = 12 });
+    try expectName("out/fox_0012.png", "out/{model}_{frame:4}.png", .{
+        .model = "fox",
+        .frame = 12,
+    });
     try expectName("7-007-12345", "{view}-{view:3}-{frame:4}", .{ .view = 7, .frame = 12345 });
     try expectName("-3 -003 -2147483648", "{frame} {frame:4} {view}", .{
         .frame = -3,
