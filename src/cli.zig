@@ -478,7 +478,11 @@ const sections: []const Section = &.{
                 "ninth of them and its neighbours' by a filter",
         },
         .{ .usage = "--denoise", .help = "filter the noise out" },
-        .{ .usage = "--variant NAME", .words = variant_file.names, .help = "how rays are traced; the image is always the same" },
+        .{
+            .usage = "--variant NAME",
+            .words = variant_file.names,
+            .help = "how rays are traced; the image is always the same",
+        },
         .{
             .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
@@ -696,7 +700,8 @@ const Parser = struct {
             .tonemap => {
                 options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
             },
-            .stats, .quiet, .verbose, .progress, .progress_fd => try parser.setMessages(given),
+            .stats, .count_tests, .quiet, .verbose => try parser.setMessages(given),
+            .progress, .progress_fd => try parser.setMessages(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
@@ -704,7 +709,6 @@ const Parser = struct {
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
             .virtual_lights, .sky_lights, .all_lights => try parser.setLights(given),
-            .count_tests => options.count_tests = true,
             .point_size => options.view.point_size =
                 numberWithin(given.value, settings.point_size) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
@@ -834,6 +838,7 @@ const Parser = struct {
         const reader = &parser.reader;
         switch (given.id) {
             .stats => options.stats = try reader.choice(given, Stats),
+            .count_tests => options.count_tests = true,
             .quiet => options.quiet = true,
             .verbose => options.verbose = true,
             .progress => parser.progress = try reader.choice(given, settings.ProgressForm),

@@ -189,6 +189,8 @@ pub const Batch = struct {
         const options = batch.options;
         batch.display.start();
         defer batch.display.stop();
+        batch.foretell();
+        defer signals.outcome.clear();
         signals.stop.is_awaited.store(options.partial, .release);
         defer signals.stop.is_awaited.store(false, .release);
         var threads: [settings.job_count.max]std.Thread = undefined;
@@ -252,6 +254,13 @@ pub const Batch = struct {
         batch.mutex.lockUncancelable(batch.io);
         defer batch.mutex.unlock(batch.io);
         @field(batch, @tagName(what) ++ "_count") += number;
+        batch.foretell();
+    }
+
+    /// What a signal says that ends the program. Called by one thread at a time.
+    fn foretell(batch: *const Batch) void {
+        if (!batch.options.quiet)
+            signals.outcome.set("{d} pictures written", .{batch.written_count});
     }
 
     /// Prints the report of a picture, one at a time.
