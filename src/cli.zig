@@ -267,7 +267,7 @@ const sections: []const Section = &.{
         .{
             .usage = "--jobs N",
             .help = "scenes side by side, " ++ settings.job_count.text() ++
-                " (default: by their number\nand the pictures' size)",
+                " (default: by their\nnumber and the pictures' size)",
         },
     } },
     .{ .title = "Camera", .options = &.{
@@ -530,9 +530,9 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\       raylane man                           (the manual's page)
     \\
     \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, a folder of such, - for
-    \\standard input, or builtin:cornell, atrium, nave or handles. The image is written
-    \\to the working directory under the scene's name, as a whole or not at all, a
-    \\report to stdout. Names of several come from a template: -o DIR/ or
+    \\standard input, or builtin:cornell, atrium, nave or handles. The image is
+    \\written to the working directory under the scene's name, as a whole or not at
+    \\all, a report to stdout. Names of several come from a template: -o DIR/ or
     \\-o 'DIR/{model}_{frame:4}.png', of {model}, {camera}, {material_variant},
     \\{frame}, {view} and {layer}.
     \\

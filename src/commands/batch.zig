@@ -260,7 +260,7 @@ pub const Batch = struct {
     /// What a signal says that ends the program. Called by one thread at a time.
     fn foretell(batch: *const Batch) void {
         if (!batch.options.quiet)
-            signals.outcome.set("{d} pictures written", .{batch.written_count});
+            signals.outcome.set("pictures written: {d}", .{batch.written_count});
     }
 
     /// Prints the report of a picture, one at a time.
