@@ -128,8 +128,9 @@ pub const Statistics = struct {
     non_finite_count: u64 = 0,
     /// Of the pixels that have the most.
     sample_count: u32 = 0,
-    /// Of all pixels.
+    /// Of all pixels that were traced, and how many these are.
     sample_sum: u64 = 0,
+    pixel_count: u64 = 0,
     /// The work was stopped before its end.
     is_partial: bool = false,
 };
@@ -484,6 +485,7 @@ const Job = struct {
             .non_finite_count = finished.non_finite_count,
             .sample_count = finished.sample_count,
             .sample_sum = finished.sample_sum,
+            .pixel_count = job.tiles.layout.tracedCount(),
             .is_partial = !is_whole,
         };
     }
