@@ -95,6 +95,7 @@ pub const Options = struct {
     progress_image: ?[]const u8 = null,
     /// A signal that ends tracing has what there is written.
     partial: bool = false,
+    progress: settings.Progress = .{},
     /// Null: not asked for.
     stats: ?Stats = null,
     count_tests: bool = false,
@@ -140,13 +141,13 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--crop X0,Y0,X1,Y1",
-            .help = "this part alone: pixels, or fractions where a dot is\n" ++
-                "in them; an exr file can be merged",
+            .help = "a part alone: pixels, or fractions where a dot is in\n" ++
+                "them; exr files of parts can be merged",
         },
         .{
             .usage = "--tile I/N",
-            .help = "tiles that are 1/N of the picture, spread over it; the\n" ++
-                "exr files of all I are for 'raylane merge'",
+            .help = "1/N of the picture in tiles all over it, an exr file;\n" ++
+                "'raylane merge' makes the picture of all I",
         },
         .{
             .usage = "--exposure EV|auto",
@@ -378,6 +379,15 @@ const sections: []const Section = &.{
                 "given, a report that cannot be printed is an error",
         },
         .{
+            .usage = "--progress HOW",
+            .help = "auto: one line on a terminal; json: lines for programs\n" ++
+                "on stderr (docs/progress.md); or none",
+        },
+        .{
+            .usage = "--progress-fd N",
+            .help = "json to that open descriptor",
+        },
+        .{
             .usage = "--count-tests",
             .help = "count intersection tests, in a second, untimed pass",
         },
@@ -456,6 +466,8 @@ const Parser = struct {
     has_time: bool = false,
     /// The explicit `--format`.
     format: ?settings.Format = null,
+    /// The explicit `--progress`.
+    progress: ?settings.ProgressForm = null,
     /// Set by the flags that print something and end.
     other: ?Command = null,
 
@@ -478,6 +490,7 @@ const Parser = struct {
         try parser.settleFormat();
         try parser.checkSampling();
         try parser.checkPart();
+        try parser.settleProgress();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
         return .{ .render = parser.options };
@@ -554,6 +567,9 @@ const Parser = struct {
                 options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
             },
             .stats => options.stats = try reader.choice(given, Stats),
+            .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
+            .progress_fd => options.progress.file =
+                try reader.number(given, settings.progress_file),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
@@ -634,6 +650,19 @@ const Parser = struct {
         noise.exposure = parser.options.write.exposure;
         if (!render.integrator.isOpen())
             return parser.reader.fail("'--noise' is for '--integrator path'", .{});
+    }
+
+    fn settleProgress(parser: *Parser) Error!void {
+        const progress = &parser.options.progress;
+        const quiet: settings.ProgressForm = if (parser.options.quiet) .none else .auto;
+        progress.form = parser.progress orelse if (progress.file != null) .json else quiet;
+        const file = progress.file orelse return;
+        if (progress.form != .json)
+            return parser.reader.fail("'--progress-fd' is for '--progress json'", .{});
+        if (file == std.posix.STDOUT_FILENO and parser.options.toStdout())
+            return parser.reader.fail("'--progress-fd 1' is where the image goes", .{});
+        if (std.c.fcntl(@intCast(file), std.c.F.GETFD) < 0)
+            return parser.reader.fail("'--progress-fd {d}' is not open", .{file});
     }
 
     fn setLoad(parser: *Parser, given: Reader.Given) Error!void {
@@ -1435,6 +1464,23 @@ test {
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");
+}
+
+test "progress: its form, its descriptor, and what contradicts it" {
+    const none: settings.Progress = .{ .form = .none };
+    try std.testing.expectEqual(none, (try parseForTest(&.{ "a", "-q" })).render.progress);
+    try std.testing.expectEqual(.auto, (try parseForTest(&.{"a"})).render.progress.form);
+    const json: settings.Progress = .{ .form = .json, .file = 2 };
+    for ([_][]const [:0]const u8{
+        &.{ "a", "--progress-fd=2" }, &.{ "a", "-q", "--progress=json", "--progress-fd", "2" },
+    }) |arguments| {
+        try std.testing.expectEqual(json, (try parseForTest(arguments)).render.progress);
+    }
+    try expectUsage("'--progress'", &.{ "a", "--progress=bar" });
+    try expectUsage("'--progress-fd'", &.{ "a", "--progress-fd=0" });
+    try expectUsage("for '--progress json'", &.{ "a", "--progress=none", "--progress-fd=2" });
+    try expectUsage("where the image goes", &.{ "a", "-o-", "--progress-fd=1" });
+    try expectUsage("'--progress-fd 65536' is not open", &.{ "a", "--progress-fd=65536" });
 }
 
 test "info is a command where it comes first, and where it is misspelt" {

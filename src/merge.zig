@@ -175,10 +175,8 @@ const Merger = struct {
             .{part_file.attribute_name},
         );
         const first = &merger.records[0];
-        if (record.differenceFrom(first)) |what| return diagnostic.invalid(
-            "it is of another {s} than {f}",
-            .{ what, quote(merger.paths[0]) },
-        );
+        if (record.differenceFrom(first)) |how|
+            return diagnostic.invalid("{s} {f}", .{ how, quote(merger.paths[0]) });
         if (std.meta.activeTag(record.part) != first.part) return diagnostic.invalid(
             "it is a {t}, where {f} is a {t}",
             .{ record.part, quote(merger.paths[0]), first.part },

@@ -5,6 +5,7 @@
 
 const std = @import("std");
 const Identity = @import("identity.zig").Identity;
+const progress = @import("progress.zig");
 
 /// Whole numbers to choose from.
 pub const Range = struct {
@@ -342,7 +343,21 @@ pub const Load = struct {
     up_axis: ?UpAxis = null,
     /// A file that is about to be replaced: a scene that is read from it is refused.
     output: ?Identity = null,
+    /// Told how far reading has come; null: nobody is.
+    progress: ?*progress.Progress = null,
 };
+
+/// How the work under way is shown.
+pub const ProgressForm = enum { auto, json, none };
+
+/// And where.
+pub const Progress = struct {
+    form: ProgressForm = .auto,
+    /// Of JSON, an open descriptor; null: standard error.
+    file: ?u32 = null,
+};
+/// Descriptors for it.
+pub const progress_file: Range = .{ .min = 1, .max = 1 << 16 };
 
 /// What is seen of a scene, and by what light.
 pub const View = struct {

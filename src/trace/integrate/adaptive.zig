@@ -139,17 +139,23 @@ pub const Blocks = struct {
     /// One of them.
     pub const Block = struct { state: *State, rectangle: Rectangle };
 
+    /// How many of some blocks had a pass, and how many of those get no more.
+    pub const Judged = struct { active_before: usize = 0, finished: usize = 0 };
+
     /// After a pass over the active blocks of a tile: which of them get more.
-    pub fn judge(blocks: *Blocks, tile: Rectangle, film: *const Film, sample_count: u32) void {
+    pub fn judge(blocks: *Blocks, tile: Rectangle, film: *const Film, sample_count: u32) Judged {
+        var judged: Judged = .{};
         var all = blocks.of(tile);
         while (all.next()) |block| {
             if (!block.state.is_active) continue;
+            judged.active_before += 1;
             block.state.sample_count = sample_count;
             if (!std.math.isPowerOfTwo(sample_count)) continue;
             if (sample_count >= sample_count_min) {
                 const found = blocks.errorOf(block.rectangle, film, sample_count);
                 if (found < blocks.noise.error_max) {
                     block.state.is_active = false;
+                    judged.finished += 1;
                     _ = blocks.active_count.fetchSub(1, .monotonic);
                     continue;
                 }
@@ -162,6 +168,7 @@ pub const Blocks = struct {
                 }
             }
         }
+        return judged;
     }
 
     /// Not a number where a pixel is not.
@@ -229,6 +236,8 @@ test "the error of a block is that of its mean, as it is shown" {
     defer blocks.deinit(gpa);
     const left: Rectangle = .{ .x0 = 0, .y0 = 0, .x1 = 16, .y1 = 16 };
     const tile: Rectangle = .{ .x0 = 0, .y0 = 0, .x1 = 32, .y1 = 16 };
+    // Passes of blocks, and those that they are spared.
+    var pieces: usize = 0;
     for (0..64) |number| {
         for (0..16) |y| for (0..32) |x| {
             const value = 0.09 + 0.03 * random.random().floatNorm(f32);
@@ -242,8 +251,10 @@ test "the error of a block is that of its mean, as it is shown" {
             const found = blocks.errorOf(left, &film, 64);
             try std.testing.expectApproxEqRel(wanted, found, 0.1);
         }
-        blocks.judge(tile, &film, count);
+        const judged = blocks.judge(tile, &film, count);
+        pieces += judged.active_before + judged.finished * (64 - count);
     }
+    try std.testing.expectEqual(2 * 64, pieces);
     for (blocks.states, [_]bool{ false, true }) |state, is_active| {
         const wanted: Blocks.State = .{ .sample_count = 64, .is_active = is_active };
         try std.testing.expectEqual(wanted, state);

@@ -26,6 +26,7 @@ const world_file = @import("../../world.zig");
 const statistics = @import("../../statistics.zig");
 const parallel = @import("../../parallel.zig");
 const adaptive = @import("adaptive.zig");
+const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
 const film_file = @import("../../film.zig");
 const sampler = @import("sampler.zig");
 const assert = std.debug.assert;
@@ -33,6 +34,7 @@ const Allocator = std.mem.Allocator;
 const Film = film_file.Film;
 const Layout = film_file.Layout;
 const Frame = world_file.Frame;
+const Progress = @import("../../progress.zig").Progress;
 const Rectangle = film_file.Rectangle;
 
 /// How a frame is traced, and who does the work.
@@ -49,8 +51,8 @@ pub const Settings = struct {
     depth_max: u32 = choices.depth.default,
     /// Side of a tile in pixels, at least 1.
     tile_size: u32 = choices.tile_size.default,
-    /// Told of every finished tile of a pass.
-    progress: std.Progress.Node = .none,
+    /// Told of the rays and of every finished tile of a pass; null: nobody is.
+    progress: ?*Progress = null,
     /// Looked at between tiles: set, it ends the work.
     cancel: ?*const std.atomic.Value(bool) = null,
     /// Looked at between tiles: set, it ends the work as soon as every pixel has a sample, and the
@@ -83,6 +85,8 @@ pub const Course = struct {
     /// Called while nobody traces. Returns how many samples pixels are to have after the next
     /// round; the work ends where they have as many.
     next: *const fn (context: *anyopaque, standing: *const Standing) u32,
+    /// What it goes by, if it is a time.
+    budget_ns: ?u64 = null,
 };
 
 /// Where the work stands between rounds.
@@ -97,7 +101,7 @@ pub const Standing = struct {
         const copy: Copy = .{ .job = job, .film = film };
         try job.settings.pool.forEach(job.tiles.count, &copy, Copy.tile);
         const shared = job.integrator.shared orelse return;
-        _ = job.doSteps(shared.steps_before, shared.step_count, film);
+        _ = job.doSteps(shared.steps_before, shared.step_count, film, null);
     }
 
     const Copy = struct {
@@ -322,12 +326,14 @@ pub fn render(
         };
         job.by_thread = by_thread[0 .. job.by_thread.len + 1];
     }
-    if (integrator.shared) |shared| _ = job.doSteps(0, shared.steps_before, film);
+    const progress = settings.progress;
+    if (integrator.shared) |shared| _ = job.doSteps(0, shared.steps_before, film, progress);
+    job.tellBegin();
     const is_whole = job.run();
     if (settings.isCancelled()) return error.Canceled;
     var total = try job.finish(is_whole);
-    if (integrator.shared) |shared|
-        total.non_finite_count += job.doSteps(shared.steps_before, shared.step_count, film);
+    if (integrator.shared) |shared| total.non_finite_count +=
+        job.doSteps(shared.steps_before, shared.step_count, film, progress);
     var tests: statistics.TestCounts = .{};
     for (job.by_thread) |one| {
         var counts: Counts = undefined;
@@ -352,12 +358,19 @@ const Job = struct {
 
     /// Work that is shared, from one step to before another. Returns how many pixels were made
     /// black.
-    fn doSteps(job: *const Job, first: u32, end: u32, film: *Film) u64 {
-        var steps: Steps = .{ .job = job, .film = film };
+    fn doSteps(
+        job: *const Job,
+        first: u32,
+        end: u32,
+        film: *Film,
+        progress: ?*Progress,
+    ) u64 {
+        var steps: Steps = .{ .job = job, .film = film, .progress = progress };
         for (first..end) |step| {
             steps.step = @intCast(step);
             steps.piece_count = job.integrator.shared.?.pieces(job.shared.?, steps.step);
             steps.next.store(0, .monotonic);
+            Progress.begin(progress, .{ .stage = .lights, .total = steps.piece_count });
             const thread_count = @min(job.by_thread.len, steps.piece_count);
             if (thread_count > 0) job.settings.pool.share(thread_count, &steps, Steps.work);
         }
@@ -367,6 +380,7 @@ const Job = struct {
     const Steps = struct {
         job: *const Job,
         film: *Film,
+        progress: ?*Progress,
         /// Under way.
         step: u32 = 0,
         piece_count: u32 = 0,
@@ -382,6 +396,7 @@ const Job = struct {
                 const one = job.by_thread[thread_index];
                 const count = shared.work(job.shared.?, one, steps.step, piece, steps.film);
                 if (count > 0) _ = steps.non_finite_count.fetchAdd(@intCast(count), .monotonic);
+                Progress.add(steps.progress, 1);
             }
         }
     };
@@ -413,26 +428,55 @@ const Job = struct {
         return job.settings.isStopped() and job.tiles.isEachTaken();
     }
 
+    /// Tells the progress of the tiles, each as often as there are samples; of blocks, each of
+    /// which may have enough sooner, where they are judged.
+    fn tellBegin(job: *const Job) void {
+        const settings = job.settings;
+        const count: u64 = if (job.blocks) |blocks|
+            blocks.active_count.load(.monotonic)
+        else
+            job.tiles.count;
+        Progress.begin(settings.progress, .{
+            .stage = .tracing,
+            .total = count * settings.sample_count,
+            .pieces_per_unit = count,
+            .budget_ns = if (settings.course) |course| course.budget_ns else null,
+        });
+    }
+
+    /// Rays of a thread so far, where somebody is told of them.
+    fn raysOf(job: *const Job, thread_index: usize) u64 {
+        if (job.settings.progress == null) return 0;
+        var counts: Counts = undefined;
+        job.integrator.counts(job.by_thread[thread_index], &counts);
+        return counts.rays.primary + counts.rays.shadow + counts.rays.secondary;
+    }
+
     fn work(job: *Job, thread_index: usize) void {
+        const progress = job.settings.progress;
+        var told = job.raysOf(thread_index);
         while (!job.isEnded()) {
             const number = job.tiles.take() orelse return;
             const state = &job.tiles.states[number];
             if (state.due.fetchAdd(1, .acquire) > 0) continue;
             while (true) {
-                job.passTile(job.by_thread[thread_index], number);
-                job.settings.progress.completeOne();
+                Progress.add(progress, job.passTile(job.by_thread[thread_index], number));
+                const rays = job.raysOf(thread_index);
+                Progress.addRays(progress, rays - told);
+                told = rays;
                 if (job.isEnded()) return;
                 if (state.due.fetchSub(1, .acq_rel) == 1) break;
             }
         }
     }
 
-    /// The next samples of a tile.
-    fn passTile(job: *Job, integrator: *anyopaque, number: u32) void {
+    /// The next samples of a tile. Returns how many pieces that are, see `tellBegin`.
+    fn passTile(job: *Job, integrator: *anyopaque, number: u32) usize {
         const state = &job.tiles.states[number];
         const tile = job.tiles.rectangleOf(number);
         const done = state.samples_done;
         const sample_count = passSamples(done, job.tiles.samples_due);
+        state.samples_done = done + sample_count;
         if (job.blocks) |blocks| {
             const on_film = tile.onFilm();
             var all = blocks.of(on_film);
@@ -440,9 +484,13 @@ const Job = struct {
                 const rectangle = tile.ofFilm(active);
                 job.integrator.pass(integrator, &rectangle, done, sample_count, job.film);
             }
-            blocks.judge(on_film, job.film, done + sample_count);
-        } else job.integrator.pass(integrator, &tile, done, sample_count, job.film);
-        state.samples_done = done + sample_count;
+            const judged = blocks.judge(on_film, job.film, done + sample_count);
+            // Those that have enough count as if they had all.
+            const saved = job.settings.sample_count - (done + sample_count);
+            return judged.active_before * sample_count + judged.finished * saved;
+        }
+        job.integrator.pass(integrator, &tile, done, sample_count, job.film);
+        return sample_count;
     }
 
     /// A tile of the film in parts whose pixels have the same number of samples.
@@ -786,7 +834,8 @@ const NoisyIntegrator = struct {
                 var random: std.Random.SplitMix64 = .init((y * 64 + x) * 4096 + sample);
                 const value: f32 = @floatFromInt(random.next() >> 40);
                 const shown = if (x < quiet_width) 0.25 else value * 0x1p-25;
-                film.add(@intCast(x), @intCast(y), @intCast(sample), @splat(shown));
+                const column, const row = rectangle.placeOf(@intCast(x), @intCast(y));
+                film.add(column, row, @intCast(sample), @splat(shown));
             }
         };
     }
@@ -825,4 +874,54 @@ test "quiet blocks get no more samples than they need, whatever tiles, threads a
             hash = film.hash();
         }
     };
+}
+
+test "parts of a picture are what it has there, with blocks of its own grid" {
+    const gpa = std.testing.allocator;
+    const frame: Frame = undefined;
+    var pool: parallel.Pool = .init(2);
+    defer pool.deinit();
+    var diagnostic: Diagnostic = .{};
+    const width = 45;
+    const height = 37;
+    var whole: Film = try .init(gpa, width, height, .init(.{ .color = true }));
+    defer whole.deinit(gpa);
+    var shown: Settings = .{
+        .pool = &pool,
+        .integrator = .path,
+        .sample_count = 50,
+        .tile_size = 24,
+        .noise = .{ .error_max = 0.015, .exposure_scale = 1 },
+    };
+    const total = try render(&.of(NoisyIntegrator), gpa, &frame, &whole, &shown);
+    var sample_sum: u64 = 0;
+    for ([_]choices.Part{
+        .{ .crop = .{ .pixels = .{ 17, 3, 44, 34 } } },
+        .{ .tile = .{ .number = 1, .count = 2 } },
+        .{ .tile = .{ .number = 2, .count = 2 } },
+    }) |part| {
+        var layout: Layout = try .init(gpa, width, height, part, .{
+            .step = adaptive.block_side,
+            .margin = if (part == .crop) 2 else 0,
+        }, &diagnostic);
+        defer layout.deinit(gpa);
+        shown.layout = &layout;
+        var film: Film =
+            try .init(gpa, layout.film_width, layout.film_height, whole.layers);
+        defer film.deinit(gpa);
+        const found = try render(&.of(NoisyIntegrator), gpa, &frame, &film, &shown);
+        if (part == .tile) sample_sum += found.sample_sum;
+        var cut = try film.cut(gpa, &layout);
+        defer cut.deinit(gpa);
+        const bare = layout.bare();
+        for (0..bare.count()) |number| {
+            const own = bare.windowAt(@intCast(number)).own;
+            for (own.y0..own.y1) |y| for (own.x0..own.x1) |x| {
+                const place = own.placeOf(@intCast(x), @intCast(y));
+                const expected = whole.image.at(@intCast(x), @intCast(y)).*;
+                try std.testing.expectEqual(expected, cut.image.at(place[0], place[1]).*);
+            };
+        }
+    }
+    try std.testing.expectEqual(total.sample_sum, sample_sum);
 }
