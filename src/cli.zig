@@ -99,6 +99,7 @@ pub const Options = struct {
     progress_image: ?[]const u8 = null,
     /// A signal that ends tracing has what there is written.
     partial: bool = false,
+    progress: settings.Progress = .{},
     /// Null: not asked for.
     stats: ?Stats = null,
     count_tests: bool = false,
@@ -181,6 +182,7 @@ const sections: []const Section = &.{
                 "or a film: y4m",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
+        .{ .usage = "--exr KIND", .help = "half or float: colours of an EXR file (default: half)" },
         .{
             .usage = "-r, --resolution WxH|N",
             .help = comptimePrint("size in pixels, or of the long side in the camera's\n" ++
@@ -228,7 +230,7 @@ const sections: []const Section = &.{
         .{
             .usage = "--jobs N",
             .help = "scenes side by side, " ++ settings.job_count.text() ++
-                " (default: by their number\nand the pictures' size)",
+                " (default: by their\nnumber and the pictures' size)",
         },
     } },
     .{ .title = "Camera", .options = &.{
@@ -442,6 +444,15 @@ const sections: []const Section = &.{
                 "given, a report that cannot be printed is an error",
         },
         .{
+            .usage = "--progress HOW",
+            .help = "auto: one line on a terminal; json: lines for programs\n" ++
+                "on stderr (docs/progress.md); or none",
+        },
+        .{
+            .usage = "--progress-fd N",
+            .help = "json to that open descriptor",
+        },
+        .{
             .usage = "--count-tests",
             .help = "count intersection tests, in a second, untimed pass",
         },
@@ -465,9 +476,9 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\       raylane info SCENE [options]          (see raylane info --help)
     \\
     \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, a folder of such, - for
-    \\standard input, or builtin:cornell, atrium, nave or handles. The image is written
-    \\to the working directory under the scene's name, as a whole or not at all, a
-    \\report to stdout. Names of several come from a template: -o DIR/ or
+    \\standard input, or builtin:cornell, atrium, nave or handles. The image goes to the
+    \\working directory under the scene's name, as a whole or not at all, a report to
+    \\stdout. Names of several come from a template: -o DIR/, or such as
     \\-o 'DIR/{model}_{frame:4}.png', of {model}, {camera}, {material_variant},
     \\{frame}, {view} and {layer}.
     \\
@@ -522,6 +533,8 @@ const Parser = struct {
     has_time: bool = false,
     /// The explicit `--format`.
     format: ?settings.Format = null,
+    /// The explicit `--progress`.
+    progress: ?settings.ProgressForm = null,
     /// Set by the flags that print something and end.
     other: ?Command = null,
 
@@ -543,6 +556,7 @@ const Parser = struct {
         try parser.checkViewpoint();
         try parser.settleFormat();
         try parser.checkSampling();
+        try parser.settleProgress();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
         return .{ .render = parser.options };
@@ -578,6 +592,7 @@ const Parser = struct {
             .jpeg_quality => {
                 options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
             },
+            .exr => options.write.exr_kind = try reader.choice(given, settings.ExrKind),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
             .resolution => {
@@ -614,6 +629,9 @@ const Parser = struct {
                 options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
             },
             .stats => options.stats = try reader.choice(given, Stats),
+            .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
+            .progress_fd => options.progress.file =
+                try reader.number(given, settings.progress_file),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
@@ -746,6 +764,19 @@ const Parser = struct {
         noise.exposure = parser.options.write.exposure;
         if (!render.integrator.isOpen())
             return parser.reader.fail("'--noise' is for '--integrator path'", .{});
+    }
+
+    fn settleProgress(parser: *Parser) Error!void {
+        const progress = &parser.options.progress;
+        const quiet: settings.ProgressForm = if (parser.options.quiet) .none else .auto;
+        progress.form = parser.progress orelse if (progress.file != null) .json else quiet;
+        const file = progress.file orelse return;
+        if (progress.form != .json)
+            return parser.reader.fail("'--progress-fd' is for '--progress json'", .{});
+        if (file == std.posix.STDOUT_FILENO and parser.options.toStdout())
+            return parser.reader.fail("'--progress-fd 1' is where the image goes", .{});
+        if (std.c.fcntl(@intCast(file), std.c.F.GETFD) < 0)
+            return parser.reader.fail("'--progress-fd {d}' is not open", .{file});
     }
 
     fn setLoad(parser: *Parser, given: Reader.Given) Error!void {
@@ -1264,6 +1295,7 @@ test "numbers keep to their ranges" {
             .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },
             .bad = &.{ "tiff", "" },
         },
+        .{ .flag = "--exr", .good = &.{ "half", "float" }, .bad = &.{ "Half", "double", "" } },
         .{ .flag = "--jpeg-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "", "x" } },
         .{
             .flag = "--max-memory",
@@ -1523,6 +1555,23 @@ test {
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");
+}
+
+test "progress: its form, its descriptor, and what contradicts it" {
+    const none: settings.Progress = .{ .form = .none };
+    try std.testing.expectEqual(none, (try parseForTest(&.{ "a", "-q" })).render.progress);
+    try std.testing.expectEqual(.auto, (try parseForTest(&.{"a"})).render.progress.form);
+    const json: settings.Progress = .{ .form = .json, .file = 2 };
+    for ([_][]const [:0]const u8{
+        &.{ "a", "--progress-fd=2" }, &.{ "a", "-q", "--progress=json", "--progress-fd", "2" },
+    }) |arguments| {
+        try std.testing.expectEqual(json, (try parseForTest(arguments)).render.progress);
+    }
+    try expectUsage("'--progress'", &.{ "a", "--progress=bar" });
+    try expectUsage("'--progress-fd'", &.{ "a", "--progress-fd=0" });
+    try expectUsage("for '--progress json'", &.{ "a", "--progress=none", "--progress-fd=2" });
+    try expectUsage("where the image goes", &.{ "a", "-o-", "--progress-fd=1" });
+    try expectUsage("'--progress-fd 65536' is not open", &.{ "a", "--progress-fd=65536" });
 }
 
 test "info is a command where it comes first, and where it is misspelt" {

@@ -26,6 +26,7 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
 const Film = film_file.Film;
 const Identity = @import("identity.zig").Identity;
+const Progress = @import("progress.zig").Progress;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
@@ -100,8 +101,6 @@ pub const Session = struct {
     /// What the stages have to say: the line of an error, and warnings.
     diagnostic: *Diagnostic,
     pool: parallel.Pool,
-    /// Told of every finished tile.
-    progress: std.Progress.Node = .none,
     /// Where pictures are shown on which `render` is at work; the caller's.
     progress_image: ?*ProgressImage = null,
     /// Set, it ends what `render` traces when every pixel has a sample.
@@ -194,7 +193,10 @@ pub const Session = struct {
         session.dropWorld();
         session.dropScene();
         const start = Io.Clock.awake.now(session.io);
-        const scene = try loadScene(session.gpa, session.io, name, choices, session.diagnostic);
+        Progress.begin(session.pool.progress, .{ .stage = .reading });
+        var told = choices;
+        told.progress = session.pool.progress;
+        const scene = try loadScene(session.gpa, session.io, name, told, session.diagnostic);
         session.adopt(scene, .owned);
         session.output = choices.output;
         session.texture_side_max = choices.texture_side_max;
@@ -340,6 +342,7 @@ pub const Session = struct {
         session.world.?.environment.map = null;
         session.world.?.environment.backdrop = null;
         const start = Io.Clock.awake.now(session.io);
+        Progress.begin(session.pool.progress, .{ .stage = .view });
         var environment = try session.chooseFor(&session.environment, &choices.environment);
         environment.is_seen = background == .env or background == .studio;
         environment.shadow_count = choices.shadowCount();
@@ -586,6 +589,7 @@ pub const Session = struct {
         var further: [std.enums.values(settings.Layer).len]output.Further = undefined;
         var chosen = session.outputSettings(choices, session.appearance);
         chosen.further = session.furtherLayers(&further);
+        Progress.begin(session.pool.progress, .{ .stage = .writing });
         const tally = try output.write(session.gpa, .{
             .image = &film.image,
             .display = film.imageOf(.display),
@@ -619,6 +623,7 @@ pub const Session = struct {
             .jpeg_quality = @intCast(choices.jpeg_quality),
             .frame_rate = choices.frame_rate,
             .is_continued = choices.is_continued,
+            .exr_kind = choices.exr_kind,
             .pool = &session.pool,
         };
     }
@@ -713,7 +718,7 @@ pub const Session = struct {
         var chosen = session.traceSettings(session.rendered);
         chosen.integrator = .whitted;
         chosen.sample_count = 1;
-        chosen.progress = .none;
+        chosen.progress = null;
         const variant_index = session.rendered.variant;
         _ = try trace.trace(session.gpa, variant_index, &world.frame(), &film, chosen);
         return film;
@@ -853,7 +858,8 @@ pub const Session = struct {
         };
     }
 
-    fn sampleCount(session: *const Session, choices: settings.Render) u32 {
+    /// Samples a pixel that `render` takes at most. Asserts that there is a view.
+    pub fn sampleCount(session: *const Session, choices: settings.Render) u32 {
         if (choices.sample_count) |count| return count;
         if (choices.noise != null) return settings.noise_sample_count;
         if (choices.time_budget_s != null) return settings.sample_count.max;
@@ -875,7 +881,7 @@ pub const Session = struct {
             .sample_count = session.sampleCount(choices),
             .depth_max = session.depthOf(choices),
             .tile_size = choices.tile_size,
-            .progress = session.progress,
+            .progress = session.pool.progress,
             .cancel = &session.pool.cancelled,
         };
     }
@@ -1126,6 +1132,49 @@ test "a time budget's picture is that of as many samples, and one that is stoppe
     const stopped_hash = session.film.?.hash();
     try session.render(.{ .integrator = .path, .sample_count = 1 });
     try testing.expectEqual(stopped_hash, session.film.?.hash());
+}
+
+test "pictures that go by another one have its exposure, and that one is as by itself" {
+    var diagnostic: Diagnostic = .{};
+    var session: Session = .init(testing.allocator, testing.io, 2, &diagnostic);
+    defer session.deinit();
+    const views = [_]settings.View{
+        .{ .resolution = .{ 12, 8 }, .floor = .shadow, .camera = .auto },
+        .{ .resolution = .{ 12, 8 }, .floor = .shadow, .viewpoint = .{
+            .orbit = .{ .theta_degrees = 100, .phi_degrees = 20 },
+        } },
+    };
+    const written: settings.Write = .{ .exposure = .auto };
+    try openForTest(&session);
+    var exposures: [2]f32 = undefined;
+    var hashes: [2]u64 = undefined;
+    for (views, &exposures, &hashes) |view, *ev, *hash| {
+        try session.view(view);
+        try session.render(.{});
+        ev.* = try session.exposureOf(.auto);
+        hash.* = session.film.?.hash();
+    }
+    try testing.expect(exposures[0] != exposures[1]);
+    try session.view(views[0]);
+    const reference = try session.refer(.{}, written);
+    try testing.expect(reference.is_metered);
+    try testing.expectEqual(exposures[0], reference.exposure_ev);
+    session.reference = &reference;
+    var unframed = reference;
+    for (views, 0..) |view, index| {
+        if (index == 1) {
+            unframed.view.view = null;
+            session.reference = &unframed;
+        }
+        try session.view(view);
+        try session.render(.{});
+        try testing.expectEqual(exposures[0], (try session.appearanceOf(written)).?.exposure_ev);
+        try testing.expectEqual(index == 0, session.film.?.hash() == hashes[0]);
+    }
+    // Framed as the other one.
+    session.reference = &reference;
+    try session.view(views[1]);
+    try testing.expect(session.world.?.view.camera.origin[0] == reference.view.facing.origin[0]);
 }
 
 test "a picture of work under way is the one of the samples so far, in a whole file" {
