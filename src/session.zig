@@ -621,9 +621,9 @@ pub const Session = struct {
             .transparent = session.seen.background == .transparent,
             .background = session.behind(),
             .jpeg_quality = @intCast(choices.jpeg_quality),
+            .exr_kind = choices.exr_kind,
             .frame_rate = choices.frame_rate,
             .is_continued = choices.is_continued,
-            .exr_kind = choices.exr_kind,
             .pool = &session.pool,
         };
     }
@@ -1132,49 +1132,6 @@ test "a time budget's picture is that of as many samples, and one that is stoppe
     const stopped_hash = session.film.?.hash();
     try session.render(.{ .integrator = .path, .sample_count = 1 });
     try testing.expectEqual(stopped_hash, session.film.?.hash());
-}
-
-test "pictures that go by another one have its exposure, and that one is as by itself" {
-    var diagnostic: Diagnostic = .{};
-    var session: Session = .init(testing.allocator, testing.io, 2, &diagnostic);
-    defer session.deinit();
-    const views = [_]settings.View{
-        .{ .resolution = .{ 12, 8 }, .floor = .shadow, .camera = .auto },
-        .{ .resolution = .{ 12, 8 }, .floor = .shadow, .viewpoint = .{
-            .orbit = .{ .theta_degrees = 100, .phi_degrees = 20 },
-        } },
-    };
-    const written: settings.Write = .{ .exposure = .auto };
-    try openForTest(&session);
-    var exposures: [2]f32 = undefined;
-    var hashes: [2]u64 = undefined;
-    for (views, &exposures, &hashes) |view, *ev, *hash| {
-        try session.view(view);
-        try session.render(.{});
-        ev.* = try session.exposureOf(.auto);
-        hash.* = session.film.?.hash();
-    }
-    try testing.expect(exposures[0] != exposures[1]);
-    try session.view(views[0]);
-    const reference = try session.refer(.{}, written);
-    try testing.expect(reference.is_metered);
-    try testing.expectEqual(exposures[0], reference.exposure_ev);
-    session.reference = &reference;
-    var unframed = reference;
-    for (views, 0..) |view, index| {
-        if (index == 1) {
-            unframed.view.view = null;
-            session.reference = &unframed;
-        }
-        try session.view(view);
-        try session.render(.{});
-        try testing.expectEqual(exposures[0], (try session.appearanceOf(written)).?.exposure_ev);
-        try testing.expectEqual(index == 0, session.film.?.hash() == hashes[0]);
-    }
-    // Framed as the other one.
-    session.reference = &reference;
-    try session.view(views[1]);
-    try testing.expect(session.world.?.view.camera.origin[0] == reference.view.facing.origin[0]);
 }
 
 test "a picture of work under way is the one of the samples so far, in a whole file" {

@@ -63,14 +63,14 @@ pub const side: Range = .{ .min = 1, .max = 65_536, .default = 1024 };
 pub const pixel_count_max = 1 << 28;
 /// The longer side where it alone is given: a square one has as many pixels as there may be.
 pub const long_side: Range = .{ .min = 1, .max = 1 << 14, .default = side.default };
+/// Parts of a picture that are tiles.
+pub const part_count: Range = .{ .min = 1, .max = 1 << 16 };
 /// Frames of a film, and pictures that are numbered.
 pub const frame_count_max = 1_000_000;
 /// Files that are rendered side by side.
 pub const job_count: Range = .{ .min = 1, .max = 64 };
 /// Views around a scene.
 pub const view_count: Range = .{ .min = 1, .max = 36_000 };
-/// Parts of a picture that are tiles.
-pub const part_count: Range = .{ .min = 1, .max = 1 << 16 };
 /// Quality of a JPEG.
 pub const jpeg_quality: Range = .{ .min = 1, .max = 100, .default = 90 };
 /// Largest exposure either way, in stops.

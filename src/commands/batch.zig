@@ -336,6 +336,7 @@ const Worker = struct {
             .name = path,
         });
         worker.session.pool.progress = progress;
+        defer worker.session.pool.progress = null;
         defer worker.session.drop();
         var pictures: Pictures = .init(batch, &worker.session, index);
         defer pictures.deinit();
