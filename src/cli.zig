@@ -247,7 +247,7 @@ const sections: []const Section = &.{
         .{
             .usage = "--jobs N",
             .help = "scenes side by side, " ++ settings.job_count.text() ++
-                " (default: by their number\nand the pictures' size)",
+                " (default: by their\nnumber and the pictures' size)",
         },
     } },
     .{ .title = "Camera", .options = &.{
@@ -491,9 +491,9 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\       raylane merge -o FILE PART...         (see raylane merge --help)
     \\
     \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, a folder of such, - for
-    \\standard input, or builtin:cornell, atrium, nave or handles. The image is written
-    \\to the working directory under the scene's name, as a whole or not at all, a
-    \\report to stdout. Names of several come from a template: -o DIR/ or
+    \\standard input, or builtin:cornell, atrium, nave or handles. The image goes to
+    \\the working directory under the scene's name, as a whole or not at all, a report
+    \\to stdout. Names of several come from a template: -o DIR/, or such as
     \\-o 'DIR/{model}_{frame:4}.png', of {model}, {camera}, {material_variant},
     \\{frame}, {view} and {layer}.
     \\
@@ -607,9 +607,8 @@ const Parser = struct {
             .denoise => options.render.denoise = true,
             .layers => options.render.layers = layersOf(given.value) orelse
                 return reader.bad(given, comptime namesOf(settings.Layer)),
-            .jpeg_quality => {
-                options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
-            },
+            .jpeg_quality => options.write.jpeg_quality =
+                try reader.number(given, settings.jpeg_quality),
             .exr => options.write.exr_kind = try reader.choice(given, settings.ExrKind),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
@@ -650,9 +649,8 @@ const Parser = struct {
                 return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
                     settings.exposure_ev_max, settings.exposure_ev_max,
                 })),
-            .tonemap => {
-                options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
-            },
+            .tonemap => options.write.tone_mapping =
+                try reader.choice(given, settings.ToneMapping),
             .stats, .quiet, .verbose, .progress, .progress_fd => try parser.setMessages(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
