@@ -88,6 +88,7 @@ pub const Options = struct {
     progress_image: ?[]const u8 = null,
     /// A signal that ends tracing has what there is written.
     partial: bool = false,
+    progress: settings.Progress = .{},
     /// Null: not asked for.
     stats: ?Stats = null,
     count_tests: bool = false,
@@ -125,6 +126,7 @@ const sections: []const Section = &.{
             .help = "png, jpg, tga, bmp or ppm, or linear: hdr, pfm or exr",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
+        .{ .usage = "--exr KIND", .help = "half or float: colours of an EXR file (default: half)" },
         .{
             .usage = "-r, --resolution WxH|N",
             .help = comptimePrint("size in pixels, or of the long side in the camera's\n" ++
@@ -360,6 +362,12 @@ const sections: []const Section = &.{
                 "given, a report that cannot be printed is an error",
         },
         .{
+            .usage = "--progress HOW",
+            .help = "auto: a line on a terminal; json: lines for programs,\n" ++
+                "see docs/progress.md; or none",
+        },
+        .{ .usage = "--progress-fd N", .help = "json to that descriptor, not to stderr" },
+        .{
             .usage = "--count-tests",
             .help = "count intersection tests, in a second, untimed pass",
         },
@@ -435,6 +443,8 @@ const Parser = struct {
     has_time: bool = false,
     /// The explicit `--format`.
     format: ?settings.Format = null,
+    /// The explicit `--progress`.
+    progress: ?settings.ProgressForm = null,
     /// Set by the flags that print something and end.
     other: ?Command = null,
 
@@ -456,6 +466,7 @@ const Parser = struct {
         try parser.checkViewpoint();
         try parser.settleFormat();
         try parser.checkSampling();
+        try parser.settleProgress();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
         return .{ .render = parser.options };
@@ -488,6 +499,7 @@ const Parser = struct {
             .jpeg_quality => {
                 options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
             },
+            .exr => options.write.exr_kind = try reader.choice(given, settings.ExrKind),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
             .resolution => {
@@ -523,7 +535,7 @@ const Parser = struct {
             .tonemap => {
                 options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
             },
-            .stats => options.stats = try reader.choice(given, Stats),
+            .stats, .quiet, .verbose, .progress, .progress_fd => try parser.setMessages(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
@@ -537,8 +549,6 @@ const Parser = struct {
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
                     settings.point_size.min, settings.point_size.max,
                 })),
-            .quiet => options.quiet = true,
-            .verbose => options.verbose = true,
             .help => parser.other = .help,
             .version => parser.other = parser.other orelse .version,
             .licenses => parser.other = parser.other orelse .licenses,
@@ -604,6 +614,34 @@ const Parser = struct {
         noise.exposure = parser.options.write.exposure;
         if (!render.integrator.isOpen())
             return parser.reader.fail("'--noise' is for '--integrator path'", .{});
+    }
+
+    fn setMessages(parser: *Parser, given: Reader.Given) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .stats => options.stats = try reader.choice(given, Stats),
+            .quiet => options.quiet = true,
+            .verbose => options.verbose = true,
+            .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
+            .progress_fd => {
+                options.progress.file = try reader.number(given, settings.progress_file);
+            },
+            else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    fn settleProgress(parser: *Parser) Error!void {
+        const progress = &parser.options.progress;
+        const quiet: settings.ProgressForm = if (parser.options.quiet) .none else .auto;
+        progress.form = parser.progress orelse if (progress.file != null) .json else quiet;
+        const file = progress.file orelse return;
+        if (progress.form != .json)
+            return parser.reader.fail("'--progress-fd' is for '--progress json'", .{});
+        if (file == std.posix.STDOUT_FILENO and parser.options.toStdout())
+            return parser.reader.fail("'--progress-fd 1' is where the image goes", .{});
+        if (std.c.fcntl(@intCast(file), std.c.F.GETFD) < 0)
+            return parser.reader.fail("'--progress-fd {d}' is not open", .{file});
     }
 
     fn setLoad(parser: *Parser, given: Reader.Given) Error!void {
@@ -1065,6 +1103,7 @@ test "numbers keep to their ranges" {
             .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },
             .bad = &.{ "tiff", "" },
         },
+        .{ .flag = "--exr", .good = &.{ "half", "float" }, .bad = &.{ "Half", "double", "" } },
         .{ .flag = "--jpeg-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "", "x" } },
         .{
             .flag = "--max-memory",
@@ -1323,6 +1362,23 @@ test {
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");
+}
+
+test "progress: its form, its descriptor, and what contradicts it" {
+    const none: settings.Progress = .{ .form = .none };
+    try std.testing.expectEqual(none, (try parseForTest(&.{ "a", "-q" })).render.progress);
+    try std.testing.expectEqual(.auto, (try parseForTest(&.{"a"})).render.progress.form);
+    const json: settings.Progress = .{ .form = .json, .file = 2 };
+    for ([_][]const [:0]const u8{
+        &.{ "a", "--progress-fd=2" }, &.{ "a", "-q", "--progress=json", "--progress-fd", "2" },
+    }) |arguments| {
+        try std.testing.expectEqual(json, (try parseForTest(arguments)).render.progress);
+    }
+    try expectUsage("'--progress'", &.{ "a", "--progress=bar" });
+    try expectUsage("'--progress-fd'", &.{ "a", "--progress-fd=0" });
+    try expectUsage("for '--progress json'", &.{ "a", "--progress=none", "--progress-fd=2" });
+    try expectUsage("where the image goes", &.{ "a", "-o-", "--progress-fd=1" });
+    try expectUsage("'--progress-fd 65536' is not open", &.{ "a", "--progress-fd=65536" });
 }
 
 test "info is a command where it comes first, and where it is misspelt" {

@@ -7,6 +7,7 @@ const signals = @import("../signals.zig");
 const Account = raylane.memory_account.Account;
 const Allocator = std.mem.Allocator;
 const Diagnostic = raylane.diagnostic.Diagnostic;
+const Display = raylane.display.Display;
 const ExitCode = @import("exit_code.zig").ExitCode;
 const Io = std.Io;
 const Options = raylane.cli.Options;
@@ -15,6 +16,7 @@ const Session = raylane.session.Session;
 const Target = raylane.output.Target;
 const World = raylane.world.World;
 const cli = raylane.cli;
+const printable = raylane.diagnostic.printable;
 
 /// Renders one scene, then says what it cost or why it failed.
 pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnostic) ExitCode {
@@ -56,7 +58,13 @@ fn renderAndReport(
         ),
     };
     defer job.session.deinit();
+    var display: Display = .init(io, options.progress, &signals.progress_line);
+    display.start();
+    const progress = display.beginFile(.{ .index = 1, .count = 1, .name = options.scene });
+    job.session.pool.progress = progress;
     const outcome = job.run();
+    display.endFile(progress, if (outcome) |_| .done else |_| .failed);
+    display.stop();
     job.sayWarnings();
     if (!options.quiet) console.sayDropped(io, options.scene, diagnostic);
     const report = outcome catch |err| {
@@ -68,7 +76,12 @@ fn renderAndReport(
     };
     const exit_code = job.printReport(&report);
     if (exit_code != .ok or !report.is_partial) return exit_code;
-    return @fromBackingInt(@intCast(128 + signals.stop.signal.load(.monotonic)));
+    const signal = signals.stop.signal.load(.monotonic);
+    if (!options.quiet) console.say(io, "raylane: {s}: {f} written with {d} of {d} samples\n", .{
+        signals.verbOf(@fromBackingInt(signal)), printable(job.outputTitle()),
+        report.sample_count,                     job.session.sampleCount(options.render),
+    });
+    return @fromBackingInt(@intCast(128 + signal));
 }
 
 /// The way of one scene through the session.
@@ -87,14 +100,12 @@ const Job = struct {
 
     fn run(job: *Job) Error!Report {
         const session = &job.session;
-        if (!job.options.quiet) {
-            session.progress = std.Progress.start(job.io, .{ .root_name = "raylane" });
-        }
-        defer session.progress.end();
         const options = job.options;
         // Before the work, so that a place that cannot be written is an error in the first second.
         var target = try job.openTarget();
         defer target.abandon();
+        job.foretell(&target);
+        defer signals.outcome.clear();
         var progress_image = try job.openProgressImage();
         defer if (progress_image) |*image| image.close();
         session.progress_image = if (progress_image) |*image| image else null;
@@ -123,12 +134,23 @@ const Job = struct {
             error.OutOfMemory, error.Canceled => |other| other,
             error.InputOutput => error.OutputFailed,
         };
+        signals.outcome.clear();
         var report = session.report(options.render);
         report.version = cli.version;
         report.scene = options.scene;
         report.output = job.outputTitle();
         if (options.count_tests) report.tests = try session.countTests(options.render);
         return report;
+    }
+
+    /// What a signal says that ends the program.
+    fn foretell(job: *const Job, target: *const Target) void {
+        if (job.options.quiet) return;
+        const title = printable(job.outputTitle());
+        if (target.replaces != null)
+            signals.outcome.set("{f} kept as it was", .{title})
+        else
+            signals.outcome.set("{f} not written", .{title});
     }
 
     /// What messages call the image's place.
