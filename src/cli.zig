@@ -11,6 +11,7 @@ const info = @import("cli/info.zig");
 const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
+const scenario_file = @import("cli/scenario.zig");
 const settings = @import("settings.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Section = arguments_file.Section;
@@ -28,10 +29,15 @@ pub const version: []const u8 = config.version;
 /// What the user wants.
 pub const Command = union(enum) {
     help,
+    /// Nothing was asked for.
+    beginning,
     version,
     licenses,
     list_variants,
     render: Options,
+    scenario: ScenarioCall,
+    serve: []const [:0]const u8,
+    serve_help,
     bench: Bench,
     bench_help,
     compare: Compare,
@@ -53,8 +59,16 @@ pub const Info = info.Info;
 /// What `raylane info --help` prints.
 pub const info_help = info.help;
 
+/// Scenarios on the command line.
+pub const ScenarioCall = struct {
+    /// JSON, or the name of a file of it.
+    scenario: []const u8,
+    /// All arguments of `render`, `--scenario` among them.
+    arguments: []const [:0]const u8,
+};
+
 /// Words that stand before all others, but for `render`, which may stand among flags.
-const Word = enum { bench, compare, info };
+const Word = enum { bench, compare, info, serve, help };
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -119,7 +133,11 @@ pub fn outputName(gpa: std.mem.Allocator, options: *const Options) error{OutOfMe
 
 const sections: []const Section = &.{
     .{ .title = "Image", .options = &.{
-        .{ .usage = "-o, --output FILE", .help = "name ending in a format; - is standard output" },
+        .{
+            .usage = "-o, --output FILE",
+            .help = "name ending in a format; - is standard output",
+            .also = &.{ "--outfile", "--output-file" },
+        },
         .{
             .usage = "--format FORMAT",
             .help = "png, jpg, tga, bmp or ppm, or linear: hdr, pfm or exr",
@@ -129,6 +147,15 @@ const sections: []const Section = &.{
             .usage = "-r, --resolution WxH|N",
             .help = comptimePrint("size in pixels, or of the long side in the camera's\n" ++
                 "aspect (default: the scene's own, or {d})", .{settings.long_side.default}),
+            .also = &.{"--size"},
+            .meant = &.{ "--geometry", "--res" },
+        },
+        .{ .usage = "--width N", .help = "with --height N: -r in two numbers" },
+        .{ .usage = "--height N", .help = "with --width N" },
+        .{
+            .usage = "--pixel-ratio N",
+            .help = "multiply both sides of that size, " ++ settings.pixel_ratio.textWithDefault(),
+            .also = &.{"--device-pixel-ratio"},
         },
         .{
             .usage = "--exposure EV|auto",
@@ -138,11 +165,13 @@ const sections: []const Section = &.{
         .{
             .usage = "--tonemap CURVE",
             .help = namesOf(settings.ToneMapping) ++ " (default: neutral)",
+            .also = &.{ "--tone-mapping", "--tonemapping" },
         },
         .{
             .usage = "--background WHAT",
             .help = "env, studio, transparent, a CSS colour (red, #rrggbb)\n" ++
                 "or radiance R,G,B (default: a grey gradient)",
+            .meant = &.{ "--bg", "--background-color" },
         },
         .{
             .usage = "--layers LIST",
@@ -150,23 +179,44 @@ const sections: []const Section = &.{
         },
     } },
     .{ .title = "Camera", .options = &.{
-        .{ .usage = "--camera WHICH", .help = "name or index of a camera, or auto: all in view" },
+        .{
+            .usage = "--camera WHICH",
+            .help = "name or index of a camera, or auto: all in view",
+            .also = &.{"--camera-index"},
+        },
         .{
             .usage = "--eye X,Y,Z",
             .help = "where the camera stands, in place of the file's",
+            .also = &.{"--camera-position"},
         },
         .{
             .usage = "--target X,Y,Z",
             .help = "what it looks at (default: the middle of the scene)",
+            .also = &.{"--camera-focal-point"},
+            .meant = &.{ "--look-at", "--camera-target" },
         },
-        .{ .usage = "--up X,Y,Z", .help = "what is upwards in the picture (default: 0,1,0)" },
+        .{
+            .usage = "--up X,Y,Z",
+            .help = "what is upwards in the picture (default: 0,1,0)",
+            .also = &.{"--camera-view-up"},
+        },
         .{
             .usage = "--orbit THETA,PHI,R",
             .help = "stand about the target, degrees from +z and from\n" ++
                 "above, R metres or percent (default: 100%, all seen)",
+            .meant = &.{"--camera-orbit"},
         },
-        .{ .usage = "--fov DEG", .help = "vertical angle of view, in place of the camera's" },
-        .{ .usage = "--ortho", .help = "no perspective" },
+        .{
+            .usage = "--fov DEG",
+            .help = "vertical angle of view, in place of the camera's",
+            .also = &.{"--camera-view-angle"},
+            .meant = &.{"--field-of-view"},
+        },
+        .{
+            .usage = "--ortho",
+            .help = "no perspective",
+            .also = &.{ "--orthographic", "--camera-orthographic" },
+        },
         .{
             .usage = "--frame-all",
             .help = "frame all that the animation shows at any time",
@@ -177,10 +227,12 @@ const sections: []const Section = &.{
         .{
             .usage = "--material-variant N",
             .help = "name or index of one of its variants of materials",
+            .also = &.{"--variant-name"},
         },
         .{
             .usage = "--animation WHICH",
             .help = "name or index of an animation, or all (default: none)",
+            .also = &.{ "--animation-index", "--animation-name" },
         },
         .{
             .usage = "--animation-time S",
@@ -199,6 +251,8 @@ const sections: []const Section = &.{
             .help = "light from all around: an equirectangular image of\n" ++
                 "radiance (exr, hdr, png), studio or none (default:\n" ++
                 "the scene's, or studio, dim around its own lights)",
+            .also = &.{ "--hdri", "--hdri-file", "--environment" },
+            .meant = &.{ "--ibl", "--environment-image" },
         },
         .{ .usage = "--env-intensity X", .help = "multiplies its radiance (default: 1)" },
         .{
@@ -264,6 +318,7 @@ const sections: []const Section = &.{
                 settings.sample_count_small,  settings.side_small,
                 settings.sample_count_path,
             }),
+            .also = &.{ "--samples", "--samples-per-pixel" },
         },
         .{
             .usage = "--noise E",
@@ -291,6 +346,7 @@ const sections: []const Section = &.{
                 "(default: {d}; path, all bounces of light: {d})", .{
                 settings.depth.text(), settings.depth.default, settings.depth_path,
             }),
+            .also = &.{ "--max-depth", "--maxdepth", "--bounces", "--max-bounces" },
         },
         .{
             .usage = "--thesis",
@@ -303,6 +359,7 @@ const sections: []const Section = &.{
         .{
             .usage = "-t, --threads N",
             .help = settings.thread_count.text() ++ " (default: as many as CPUs)",
+            .also = &.{ "--nthreads", "--num-threads" },
         },
         .{
             .usage = "--tile-size N",
@@ -358,6 +415,12 @@ const sections: []const Section = &.{
             .help = "report as " ++ namesOf(Stats) ++ " (default: text, or none\n" ++
                 "when the image goes to standard output); when it is\n" ++
                 "given, a report that cannot be printed is an error",
+            .meant = &.{"--json"},
+        },
+        .{
+            .usage = "--scenario FILE|JSON",
+            .help = "options as JSON (docs/json.md), or scenarios of Khronos's\n" ++
+                "render fidelity comparison; all other options here win",
         },
         .{
             .usage = "--count-tests",
@@ -366,12 +429,47 @@ const sections: []const Section = &.{
         .{ .usage = "-q, --quiet", .help = "no warnings, no progress, no report but by --stats" },
         .{ .usage = "-v, --verbose", .help = "say what was chosen by default" },
         .{ .usage = "-h, --help", .help = "print this" },
-        .{ .usage = "--version", .help = "print the version" },
-        .{ .usage = "--licenses", .help = "print the licence, and those of the libraries used" },
+        .{ .usage = "-V, --version", .help = "print the version" },
+        .{
+            .usage = "--licenses",
+            .help = "print the licence, and those of the libraries used",
+            .also = &.{ "--license", "--licence" },
+        },
     } },
 };
 
 const Reader = arguments_file.Arguments(sections);
+
+/// One of `--scenario`'s, or a job.
+pub const Scenario = scenario_file.Scenario;
+/// Where the text of scenarios is from.
+pub const ScenarioSource = scenario_file.Source;
+/// Longest text of scenarios.
+pub const scenario_bytes_max = scenario_file.bytes_max;
+/// The `id` of a job that is wrong otherwise.
+pub const idOf = scenario_file.idOf;
+/// Why scenarios cannot be read.
+pub const ScenarioError = scenario_file.Error;
+
+/// Reads scenarios; all memory is from `arena`. See `parseParts` for what becomes of them.
+pub fn readScenarios(
+    arena: std.mem.Allocator,
+    io: std.Io,
+    source: ScenarioSource,
+    diagnostic: *Diagnostic,
+) ScenarioError![]const Scenario {
+    return scenario_file.read(arena, io, Reader.flags, source, diagnostic);
+}
+
+/// Reads a job.
+pub fn readJob(
+    arena: std.mem.Allocator,
+    io: std.Io,
+    text: []const u8,
+    diagnostic: *Diagnostic,
+) ScenarioError!Scenario {
+    return scenario_file.readOne(arena, io, Reader.flags, text, diagnostic);
+}
 
 /// What `--help` prints.
 pub const help: []const u8 = "raylane " ++ version ++
@@ -381,6 +479,8 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
     \\       raylane info SCENE [options]          (see raylane info --help)
+    \\       raylane serve [options]               (see raylane serve --help)
+    \\       raylane help [COMMAND]
     \\
     \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, - for standard input, or
     \\builtin:cornell, atrium, nave or handles. The image is written to the working
@@ -388,10 +488,31 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\
 ++ arguments_file.helpOf(sections) ++
     \\
+    \\Examples
+    \\  raylane model.glb
+    \\      model.png: all of it in view, in the light of a studio
+    \\  raylane model.glb -o a.png -r 800x600 --orbit 30,70 --env sky.hdr
+    \\      from the right and a little above, in the light of an image
+    \\  raylane room.pbrt -o room.exr --integrator path --spp 256 --denoise
+    \\      with all the light that bounces, as radiance
+    \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
-    \\supported, 128 + N ended by signal N (with --partial, the picture may be there).
+    \\supported, 4 images differ (bench, compare), 128 + N ended by signal N (with
+    \\--partial, the picture may be there).
     \\
 ;
+
+/// What `raylane` alone prints.
+pub const beginning: []const u8 =
+    \\usage: raylane SCENE [options]
+    \\
+    \\  raylane model.glb                        writes model.png
+    \\  raylane builtin:cornell -o box.png       a scene that needs no file
+    \\  raylane --help                           all options, and examples
+    \\
+;
+/// What `raylane serve --help` prints.
+pub const serve_help: []const u8 = @import("cli/serve.zig").help;
 
 pub const Error = error{UsageInvalid};
 
@@ -403,6 +524,7 @@ pub fn parse(
     diagnostic: *Diagnostic,
 ) Error!Command {
     assert(variant_names.len >= 1);
+    if (arguments.len == 0) return .beginning;
     const first = if (arguments.len > 0) std.meta.stringToEnum(Word, arguments[0]) else null;
     // Help wins over everything, for it is what somebody asks for who got the rest wrong.
     for (arguments) |argument| {
@@ -412,18 +534,81 @@ pub fn parse(
                 .bench => .bench_help,
                 .compare => .compare_help,
                 .info => .info_help,
+                .serve => .serve_help,
+                .help => .help,
             } else .help;
     }
     if (first) |word| return switch (word) {
+        .help => helpWith(arguments[1..], diagnostic),
+        .serve => .{ .serve = try checkedDefaults(arguments[1..], variant_names, diagnostic) },
         .bench => .{ .bench = try bench.parse(arguments[1..], diagnostic) },
         .compare => .{ .compare = try compare.parse(arguments[1..], diagnostic) },
         .info => .{ .info = try info.parse(arguments[1..], diagnostic) },
     };
-    var parser: Parser = .{
-        .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
-        .variant_names = variant_names,
-    };
+    var parser: Parser = .init(arguments, variant_names, diagnostic);
     return parser.run();
+}
+
+/// What `--stats=json` is for, wherever it stands among arguments that may be wrong.
+pub fn wantsJson(arguments: []const [:0]const u8) bool {
+    for (arguments, 0..) |argument, index| {
+        if (std.mem.eql(u8, argument, "--stats=json")) return true;
+        if (!std.mem.eql(u8, argument, "--stats") or index + 1 == arguments.len) continue;
+        if (std.mem.eql(u8, arguments[index + 1], "json")) return true;
+    }
+    return false;
+}
+
+/// Reads arguments of `render` in two parts, of which the second counts where both say the same:
+/// a scenario and the command line, or the defaults of `serve` and a job.
+pub fn parseParts(
+    parts: [2][]const [:0]const u8,
+    variant_names: []const []const u8,
+    diagnostic: *Diagnostic,
+) Error!Options {
+    var parser: Parser = .init(parts[0], variant_names, diagnostic);
+    try parser.read();
+    const scene = parser.scene;
+    parser.scene = null;
+    parser.reader = .{ .arguments = parts[1], .diagnostic = diagnostic, .help = "--help" };
+    try parser.read();
+    parser.scene = parser.scene orelse scene;
+    return parser.finish();
+}
+
+/// Refuses defaults of `serve` that no job could do with.
+fn checkedDefaults(
+    arguments: []const [:0]const u8,
+    variant_names: []const []const u8,
+    diagnostic: *Diagnostic,
+) Error![]const [:0]const u8 {
+    var parser: Parser = .init(arguments, variant_names, diagnostic);
+    parser.reader.help = "raylane serve --help";
+    try parser.read();
+    if (parser.scene) |scene| return parser.reader.fail("{f}: scenes come by standard input", .{
+        quote(scene),
+    });
+    if (parser.other != null or parser.scenario != null)
+        return parser.reader.fail("one of the options is no default of pictures", .{});
+    return arguments;
+}
+
+/// `help`, `help WORD`.
+fn helpWith(words: []const [:0]const u8, diagnostic: *Diagnostic) Error!Command {
+    if (words.len == 0 or std.mem.eql(u8, words[0], "render")) return .help;
+    return switch (std.meta.stringToEnum(Word, words[0]) orelse {
+        const candidates = comptime std.meta.fieldNames(Word);
+        const name = nearest(words[0], candidates) orelse "--help";
+        return diagnostic.fail(error.UsageInvalid, "no command {f}, did you mean '{s}'?", .{
+            quote(words[0]), name,
+        });
+    }) {
+        .bench => .bench_help,
+        .compare => .compare_help,
+        .info => .info_help,
+        .serve => .serve_help,
+        .help => .help,
+    };
 }
 
 const Parser = struct {
@@ -437,8 +622,35 @@ const Parser = struct {
     format: ?settings.Format = null,
     /// Set by the flags that print something and end.
     other: ?Command = null,
+    /// The explicit `--scenario`.
+    scenario: ?[]const u8 = null,
+    /// The explicit `--width` and `--height`.
+    sides: [2]?u32 = .{ null, null },
+    pixel_ratio: u32 = settings.pixel_ratio.default,
+
+    fn init(
+        arguments: []const [:0]const u8,
+        variant_names: []const []const u8,
+        diagnostic: *Diagnostic,
+    ) Parser {
+        return .{
+            .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
+            .variant_names = variant_names,
+        };
+    }
 
     fn run(parser: *Parser) Error!Command {
+        try parser.read();
+        if (parser.other) |command| return command;
+        if (parser.scenario) |scenario| return .{ .scenario = .{
+            .scenario = scenario,
+            .arguments = parser.reader.arguments,
+        } };
+        return .{ .render = try parser.finish() };
+    }
+
+    /// Reads all arguments.
+    fn read(parser: *Parser) Error!void {
         const reader = &parser.reader;
         var command_seen = false;
         while (try reader.next()) |argument| switch (argument) {
@@ -449,8 +661,13 @@ const Parser = struct {
                 if (is_command) command_seen = true else try parser.positional(word);
             },
         };
-        if (parser.other) |command| return command;
+    }
+
+    /// Checks them together.
+    fn finish(parser: *Parser) Error!Options {
+        const reader = &parser.reader;
         parser.options.scene = parser.scene orelse return reader.fail("no scene given", .{});
+        try parser.settleSize();
         const animation = &parser.options.animation;
         if (parser.has_time and animation.which == .default) animation.which = .{ .index = 0 };
         try parser.checkViewpoint();
@@ -458,7 +675,7 @@ const Parser = struct {
         try parser.checkSampling();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
-        return .{ .render = parser.options };
+        return parser.options;
     }
 
     fn positional(parser: *Parser, argument: []const u8) Error!void {
@@ -490,12 +707,7 @@ const Parser = struct {
             },
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
-            .resolution => {
-                options.view.long_side = integer(given.value, settings.long_side);
-                options.view.resolution = resolutionOf(given.value);
-                if (options.view.long_side == null and options.view.resolution == null)
-                    return reader.bad(given, expected_size);
-            },
+            .resolution, .width, .height, .pixel_ratio => try parser.setSize(given),
             .threads => options.thread_count = try reader.number(given, settings.thread_count),
             .spp => options.render.sample_count = try reader.number(given, settings.sample_count),
             .noise, .time_budget, .progress_image, .partial => try parser.setSampling(given),
@@ -524,6 +736,10 @@ const Parser = struct {
                 options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
             },
             .stats => options.stats = try reader.choice(given, Stats),
+            .scenario => {
+                if (parser.scenario != null) return reader.fail("'--scenario' is there twice", .{});
+                parser.scenario = try reader.text(given, "a file name or JSON");
+            },
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
@@ -544,6 +760,55 @@ const Parser = struct {
             .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
         }
+    }
+
+    fn setSize(parser: *Parser, given: Reader.Given) Error!void {
+        const view = &parser.options.view;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .resolution => {
+                parser.sides = .{ null, null };
+                view.long_side = integer(given.value, settings.long_side);
+                view.resolution = resolutionOf(given.value);
+                if (view.long_side == null and view.resolution == null)
+                    return reader.bad(given, expected_size);
+            },
+            .width => parser.sides[0] = try reader.number(given, settings.side),
+            .height => parser.sides[1] = try reader.number(given, settings.side),
+            .pixel_ratio => parser.pixel_ratio = try reader.number(given, settings.pixel_ratio),
+            else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    /// Makes one size of what may be said in several options.
+    fn settleSize(parser: *Parser) Error!void {
+        const view = &parser.options.view;
+        const reader = &parser.reader;
+        if (parser.sides[0] != null or parser.sides[1] != null) {
+            view.long_side = null;
+            view.resolution = .{
+                parser.sides[0] orelse return reader.fail("'--height' without '--width'; " ++
+                    "-r N is the long side alone", .{}),
+                parser.sides[1] orelse return reader.fail("'--width' without '--height'; " ++
+                    "-r N is the long side alone", .{}),
+            };
+        }
+        const ratio = parser.pixel_ratio;
+        if (view.resolution) |*sides| {
+            for (sides) |*length| length.* *= ratio;
+            const is_large = for (sides) |length| {
+                if (!settings.side.holds(length)) break true;
+            } else @as(u64, sides[0]) * sides[1] > settings.pixel_count_max;
+            if (is_large) return reader.fail("a picture of {d}x{d} is not " ++
+                expected_resolution, .{ sides[0], sides[1] });
+        } else if (view.long_side) |*length| {
+            length.* *= ratio;
+            if (!settings.long_side.holds(length.*))
+                return reader.fail("a long side of {d} is not {s}", .{
+                    length.*, comptime settings.long_side.text(),
+                });
+        } else if (ratio != 1) return reader.fail("'--pixel-ratio' multiplies a size: say it " ++
+            "by '--resolution'", .{});
     }
 
     fn setLights(parser: *Parser, given: Reader.Given) Error!void {
@@ -949,7 +1214,7 @@ test "a scene alone is rendered by the defaults" {
     const named = try parseForTest(&.{ "render", "render" });
     try std.testing.expectEqualStrings("render", named.render.scene);
     try expectUsage("no scene", &.{"render"});
-    try expectUsage("no scene", &.{});
+    try std.testing.expectEqual(.beginning, try parseForTest(&.{}));
     try expectUsage("no scene", &.{ "-q", "--" });
     try expectUsage("empty", &.{""});
     try expectUsage("'a' and 'b'", &.{ "a", "b" });
@@ -1323,6 +1588,8 @@ test {
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");
+    _ = scenario_file;
+    _ = @import("cli/serve.zig");
 }
 
 test "info is a command where it comes first, and where it is misspelt" {

@@ -16,3 +16,7 @@ pub const compare = @import("commands/compare.zig");
 pub const info = @import("commands/info.zig");
 /// Renders a scene.
 pub const render = @import("commands/render.zig");
+/// Renders what JSON describes.
+pub const scenario = @import("commands/scenario.zig");
+/// Renders what jobs on standard input ask for.
+pub const serve = @import("commands/serve.zig");

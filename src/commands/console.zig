@@ -3,6 +3,7 @@
 const std = @import("std");
 const exit_code = @import("exit_code.zig");
 const raylane = @import("raylane");
+const Allocator = std.mem.Allocator;
 const Account = raylane.memory_account.Account;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const ExitCode = exit_code.ExitCode;
@@ -29,6 +30,14 @@ pub fn writeToStdout(
 ) raylane.output.TargetError!void {
     var target: Target = .openStdout(io);
     return target.finish(&.{text}, diagnostic);
+}
+
+/// Prints the JSON of what went wrong; why is on standard error already.
+pub fn printFailure(gpa: Allocator, io: Io, failure: *const raylane.report.Failure) void {
+    var text: Io.Writer.Allocating = .init(gpa);
+    defer text.deinit();
+    raylane.report.writeFailure(failure, &text.writer) catch return;
+    _ = print(io, text.written());
 }
 
 /// Says something of a scene.
