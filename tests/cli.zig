@@ -1490,17 +1490,29 @@ test "info: text, JSON, and the line that rendering ends with" {
         "file         builtin:cornell\nformat       built in\n",
     );
     try testing.expectEqualStrings("", text.stderr);
-    const document = "{\"asset\":{\"version\":\"2.0\"},\"extensionsUsed\":[\"A_b\"]}";
+    const document = "{\"asset\":{\"version\":\"2.0\"},\"extensionsUsed\":[\"A_b\"]," ++
+        "\"buffers\":[{\"byteLength\":3,\"uri\":\"b%20c.bin\"}]}";
     try sandbox.write("a.gltf", document);
+    try sandbox.write("b c.bin", "four");
     const json = try sandbox.expectExit(0, &.{ "info", "a.gltf", "--json" });
     const found = try std.json.parseFromSliceLeaky(
-        struct { file: []const u8, bytes: u64, warnings: []const []const u8 },
+        struct {
+            file: []const u8,
+            bytes: u64,
+            files: []const struct { path: []const u8, bytes: u64 },
+            warnings: []const []const u8,
+        },
         sandbox.arena_state.allocator(),
         json.stdout,
         .{ .ignore_unknown_fields = true },
     );
     try testing.expectEqualStrings("a.gltf", found.file);
-    try testing.expectEqual(document.len, found.bytes);
+    try testing.expectEqual(document.len + 4, found.bytes);
+    try testing.expectEqual(2, found.files.len);
+    try testing.expectEqualStrings("a.gltf", found.files[0].path);
+    try testing.expectEqual(document.len, found.files[0].bytes);
+    try testing.expectEqualStrings("b c.bin", found.files[1].path);
+    try testing.expectEqual(4, found.files[1].bytes);
     try testing.expectEqual(2, found.warnings.len);
     try testing.expectStringStartsWith(
         json.stderr,
@@ -1509,7 +1521,7 @@ test "info: text, JSON, and the line that rendering ends with" {
     const absent = try sandbox.expectExit(1, &.{ "info", "b.gltf" });
     try testing.expectEqualStrings("raylane: b.gltf: does not exist\n", absent.stderr);
     _ = try sandbox.expectExit(2, &.{ "info", "a.gltf", "--scene=7" });
-    try sandbox.expectFiles(&.{"a.gltf"});
+    try sandbox.expectFiles(&.{ "a.gltf", "b c.bin" });
 }
 
 test "compare: figures, a map, thresholds, and images that cannot be compared" {

@@ -23,6 +23,9 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
         .@"error" = null,
         .file = Text{ .bytes = info.name },
         .bytes = file.byte_count,
+    });
+    try writeFiles(&json, file.files);
+    try writeFields(&json, .{
         .format = file.format,
         .format_version = optional(file.version),
         .generator = optional(file.generator),
@@ -86,6 +89,16 @@ pub fn writeFailure(
 
 fn optional(text: []const u8) ?Text {
     return if (text.len > 0) .{ .bytes = text } else null;
+}
+
+fn writeFiles(json: *Stringify, files: []const scene_data.File.Source) Writer.Error!void {
+    try json.objectField("files");
+    try json.beginArray();
+    for (files) |*source| try json.write(.{
+        .path = Text{ .bytes = source.path },
+        .bytes = source.byte_count,
+    });
+    try json.endArray();
 }
 
 fn writeScenes(json: *Stringify, file: *const scene_data.File) Writer.Error!void {

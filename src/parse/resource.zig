@@ -50,8 +50,25 @@ folder: Io.Dir,
 settings: Settings,
 /// Bytes of all files so far.
 bytes_read: u64 = 0,
+/// Where the files that the scene names are noted as they are read; null: nowhere.
+listing: ?*Listing = null,
 /// Entries of folders that may still be looked at for names in another letter case.
 entries_left: u32 = 1 << 18,
+
+/// Files that were read, each path once, with its bytes.
+pub const Listing = struct {
+    arena: Allocator,
+    byte_counts: std.array_hash_map.String(u64) = .empty,
+
+    /// Notes a file; of one that is noted already, nothing.
+    pub fn add(listing: *Listing, path: []const u8, byte_count: u64) Allocator.Error!void {
+        const entry = try listing.byte_counts.getOrPut(listing.arena, path);
+        if (entry.found_existing) return;
+        errdefer _ = listing.byte_counts.pop();
+        entry.key_ptr.* = try listing.arena.dupe(u8, path);
+        entry.value_ptr.* = byte_count;
+    }
+};
 
 /// A scene file and what it takes to read those that it names.
 pub const Scene = struct {
@@ -236,7 +253,10 @@ fn load(
 ) LoadError!File {
     const file = try resources.openFile(path, reason);
     defer file.close(resources.io);
-    return resources.loadFile(allocator, file, reason);
+    const loaded = try resources.loadFile(allocator, file, reason);
+    errdefer allocator.free(loaded.bytes);
+    if (resources.listing) |listing| try listing.add(path, loaded.bytes.len);
+    return loaded;
 }
 
 fn openFile(resources: *const Resources, path: []const u8, reason: *Reason) LoadError!Io.File {
@@ -386,10 +406,19 @@ test "regular files of the scene's folder only, and the reason in words" {
     try inner.symLink(io, "../a", "link", .{});
     var resources: Resources = .{ .gpa = gpa, .io = io, .folder = temporary.dir, .settings = .{} };
     var reason: Reason = .{};
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    defer arena.deinit();
+    var listing: Listing = .{ .arena = arena.allocator() };
+    resources.listing = &listing;
     const file = try resources.read("a", &reason);
     defer gpa.free(file.bytes);
     try std.testing.expectEqualStrings("hello", file.bytes);
     try std.testing.expectEqual(5, resources.bytes_read);
+    gpa.free((try resources.readOptional(gpa, "a", &reason)).bytes);
+    try std.testing.expectError(error.Unreadable, resources.readOptional(gpa, "no", &reason));
+    try std.testing.expectEqual(1, listing.byte_counts.count());
+    try std.testing.expectEqual(5, listing.byte_counts.get("a"));
+    resources.listing = null;
 
     try temporary.dir.writeFile(io, .{ .sub_path = "p", .data = "version https://git-lfs.x" });
     try std.testing.expectError(error.InvalidInput, resources.read("p", &reason));
