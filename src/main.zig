@@ -28,7 +28,7 @@ fn run(init: std.process.Init) ExitCode {
         if (cli.wantsJson(own_arguments)) console.printFailure(init.gpa, io, &.{
             .version = cli.version,
             .problem = .of(&diagnostic, "", @backingInt(ExitCode.usage)),
-        });
+        }, false);
         return .usage;
     };
     switch (command) {

@@ -544,19 +544,19 @@ test "the JSON has every key and nothing else" {
 test "the JSON of a failure says where, as far as that is known" {
     const Case = struct { place: []const u8, message: []const u8, json: []const u8 };
     for ([_]Case{
-        .{ .place = "", .message = "no such file", .json = 
+        .{ .place = "", .message = "no such file", .json =
         \\"message":"no such file","file":"s.glb","line":null,"column":null,"exit_code":3
         },
-        .{ .place = "a:b.pbrt:12:7", .message = "no", .json = 
+        .{ .place = "a:b.pbrt:12:7", .message = "no", .json =
         \\"message":"no","file":"a:b.pbrt","line":12,"column":7,"exit_code":3
         },
-        .{ .place = "", .message = "line 31: odd", .json = 
+        .{ .place = "", .message = "line 31: odd", .json =
         \\"message":"line 31: odd","file":"s.glb","line":31,"column":null,"exit_code":3
         },
-        .{ .place = "", .message = "JSON line 2, byte 9: odd", .json = 
+        .{ .place = "", .message = "JSON line 2, byte 9: odd", .json =
         \\"message":"JSON line 2, byte 9: odd","file":"s.glb","line":2,"column":null,"exit_code":3
         },
-        .{ .place = "", .message = "line by line", .json = 
+        .{ .place = "", .message = "line by line", .json =
         \\"message":"line by line","file":"s.glb","line":null,"column":null,"exit_code":3
         },
     }) |case| {

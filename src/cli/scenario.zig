@@ -265,8 +265,8 @@ const Builder = struct {
         const orbit = try builder.partsOf("orbit", polar, default_orbit) orelse default_orbit;
         const radius = std.fmt.parseFloat(f64, orbit[2]) catch 1;
         if (radius != 0) {
-            try builder.append("--target={s},{s},{s}", target);
-            return builder.append("--orbit={s},{s},{s}", orbit);
+            try builder.append("--target={s},{s},{s}", .{ target[0], target[1], target[2] });
+            return builder.append("--orbit={s},{s},{s}", .{ orbit[0], orbit[1], orbit[2] });
         }
         // The camera stands at the target and looks as it would from any distance.
         const theta = std.math.degreesToRadians(std.fmt.parseFloat(f64, orbit[0]) catch 0);
@@ -278,7 +278,7 @@ const Builder = struct {
         for (&ahead, target, back) |*ordinate, text, part| {
             ordinate.* = (std.fmt.parseFloat(f64, text) catch 0) - part;
         }
-        try builder.append("--eye={s},{s},{s}", target);
+        try builder.append("--eye={s},{s},{s}", .{ target[0], target[1], target[2] });
         try builder.append("--target={d},{d},{d}", .{ ahead[0], ahead[1], ahead[2] });
     }
 

@@ -32,12 +32,18 @@ pub fn writeToStdout(
     return target.finish(&.{text}, diagnostic);
 }
 
-/// Prints the JSON of what went wrong; why is on standard error already.
-pub fn printFailure(gpa: Allocator, io: Io, failure: *const raylane.report.Failure) void {
+/// Prints the JSON of what went wrong, to standard error where a picture has the output. In words
+/// it has been said already.
+pub fn printFailure(
+    gpa: Allocator,
+    io: Io,
+    failure: *const raylane.report.Failure,
+    to_stderr: bool,
+) void {
     var text: Io.Writer.Allocating = .init(gpa);
     defer text.deinit();
     raylane.report.writeFailure(failure, &text.writer) catch return;
-    _ = print(io, text.written());
+    if (to_stderr) say(io, "{s}", .{text.written()}) else _ = print(io, text.written());
 }
 
 /// Says something of a scene.
