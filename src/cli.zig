@@ -102,6 +102,7 @@ pub const Options = struct {
     progress_image: ?[]const u8 = null,
     /// A signal that ends tracing has what there is written.
     partial: bool = false,
+    progress: settings.Progress = .{},
     /// Null: not asked for.
     stats: ?Stats = null,
     count_tests: bool = false,
@@ -143,6 +144,7 @@ const sections: []const Section = &.{
             .help = "png, jpg, tga, bmp or ppm, or linear: hdr, pfm or exr",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
+        .{ .usage = "--exr KIND", .help = "half or float: colours of an EXR file (default: half)" },
         .{
             .usage = "-r, --resolution WxH|N",
             .help = comptimePrint("size in pixels, or of the long side in the camera's\n" ++
@@ -423,6 +425,15 @@ const sections: []const Section = &.{
                 "render fidelity comparison; all other options here win",
         },
         .{
+            .usage = "--progress HOW",
+            .help = "auto: one line on a terminal; json: lines for programs\n" ++
+                "on stderr (docs/progress.md); or none",
+        },
+        .{
+            .usage = "--progress-fd N",
+            .help = "json to that open descriptor",
+        },
+        .{
             .usage = "--count-tests",
             .help = "count intersection tests, in a second, untimed pass",
         },
@@ -620,6 +631,8 @@ const Parser = struct {
     has_time: bool = false,
     /// The explicit `--format`.
     format: ?settings.Format = null,
+    /// The explicit `--progress`.
+    progress: ?settings.ProgressForm = null,
     /// Set by the flags that print something and end.
     other: ?Command = null,
     /// The explicit `--scenario`.
@@ -673,6 +686,7 @@ const Parser = struct {
         try parser.checkViewpoint();
         try parser.settleFormat();
         try parser.checkSampling();
+        try parser.settleProgress();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
         return parser.options;
@@ -705,6 +719,7 @@ const Parser = struct {
             .jpeg_quality => {
                 options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
             },
+            .exr => options.write.exr_kind = try reader.choice(given, settings.ExrKind),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
             .resolution, .width, .height, .pixel_ratio => try parser.setSize(given),
@@ -740,6 +755,9 @@ const Parser = struct {
                 if (parser.scenario != null) return reader.fail("'--scenario' is there twice", .{});
                 parser.scenario = try reader.text(given, "a file name or JSON");
             },
+            .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
+            .progress_fd => options.progress.file =
+                try reader.number(given, settings.progress_file),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
@@ -869,6 +887,19 @@ const Parser = struct {
         noise.exposure = parser.options.write.exposure;
         if (!render.integrator.isOpen())
             return parser.reader.fail("'--noise' is for '--integrator path'", .{});
+    }
+
+    fn settleProgress(parser: *Parser) Error!void {
+        const progress = &parser.options.progress;
+        const quiet: settings.ProgressForm = if (parser.options.quiet) .none else .auto;
+        progress.form = parser.progress orelse if (progress.file != null) .json else quiet;
+        const file = progress.file orelse return;
+        if (progress.form != .json)
+            return parser.reader.fail("'--progress-fd' is for '--progress json'", .{});
+        if (file == std.posix.STDOUT_FILENO and parser.options.toStdout())
+            return parser.reader.fail("'--progress-fd 1' is where the image goes", .{});
+        if (std.c.fcntl(@intCast(file), std.c.F.GETFD) < 0)
+            return parser.reader.fail("'--progress-fd {d}' is not open", .{file});
     }
 
     fn setLoad(parser: *Parser, given: Reader.Given) Error!void {
@@ -1330,6 +1361,7 @@ test "numbers keep to their ranges" {
             .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },
             .bad = &.{ "tiff", "" },
         },
+        .{ .flag = "--exr", .good = &.{ "half", "float" }, .bad = &.{ "Half", "double", "" } },
         .{ .flag = "--jpeg-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "", "x" } },
         .{
             .flag = "--max-memory",
@@ -1590,6 +1622,23 @@ test {
     _ = @import("cli/nearest.zig");
     _ = scenario_file;
     _ = @import("cli/serve.zig");
+}
+
+test "progress: its form, its descriptor, and what contradicts it" {
+    const none: settings.Progress = .{ .form = .none };
+    try std.testing.expectEqual(none, (try parseForTest(&.{ "a", "-q" })).render.progress);
+    try std.testing.expectEqual(.auto, (try parseForTest(&.{"a"})).render.progress.form);
+    const json: settings.Progress = .{ .form = .json, .file = 2 };
+    for ([_][]const [:0]const u8{
+        &.{ "a", "--progress-fd=2" }, &.{ "a", "-q", "--progress=json", "--progress-fd", "2" },
+    }) |arguments| {
+        try std.testing.expectEqual(json, (try parseForTest(arguments)).render.progress);
+    }
+    try expectUsage("'--progress'", &.{ "a", "--progress=bar" });
+    try expectUsage("'--progress-fd'", &.{ "a", "--progress-fd=0" });
+    try expectUsage("for '--progress json'", &.{ "a", "--progress=none", "--progress-fd=2" });
+    try expectUsage("where the image goes", &.{ "a", "-o-", "--progress-fd=1" });
+    try expectUsage("'--progress-fd 65536' is not open", &.{ "a", "--progress-fd=65536" });
 }
 
 test "info is a command where it comes first, and where it is misspelt" {

@@ -10,7 +10,7 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Image = @import("image.zig").Image;
 const huge_pages = @import("huge_pages.zig");
 const parallel = @import("parallel.zig");
-const openexr = @import("output/openexr.zig");
+const layers_file = @import("output/layers.zig");
 const stb_image_write = @import("output/stb_image_write.zig");
 const target_file = @import("output/target.zig");
 const encode_file = @import("output/encode.zig");
@@ -25,7 +25,9 @@ pub const Background = @import("output/background.zig").Background;
 /// What is written: the layers of a film.
 pub const Picture = encode_file.Picture;
 /// What a file may hold besides the picture.
-pub const Further = openexr.Further;
+pub const Further = layers_file.Further;
+/// Writes channels of any kind with texts beside them.
+pub const openexr = @import("output/openexr.zig");
 /// How many pixels look like nothing.
 pub const Tally = encode_file.Tally;
 /// The exposure that suits a picture.
@@ -46,13 +48,20 @@ fn sideMax(format: choices.Format) u32 {
     };
 }
 
-fn formOf(format: choices.Format, transparent: bool) encode_file.Form {
+fn formOf(
+    format: choices.Format,
+    transparent: bool,
+    exr_kind: choices.ExrKind,
+) encode_file.Form {
     return switch (format) {
         .png, .tga => if (transparent) .rgba else .rgb,
         .jpg, .bmp, .ppm => .rgb,
         .hdr => .radiance,
         .pfm => .linear,
-        .exr => if (transparent) .half_alpha else .half,
+        .exr => switch (exr_kind) {
+            .half => if (transparent) .half_alpha else .half,
+            .float => if (transparent) .linear_alpha else .linear,
+        },
     };
 }
 
@@ -67,6 +76,8 @@ pub const Settings = struct {
     background: Background = .none,
     /// Within `settings.jpeg_quality`.
     jpeg_quality: u8 = choices.jpeg_quality.default,
+    /// Of the colours in an OpenEXR file.
+    exr_kind: choices.ExrKind = .half,
     /// Layers of the picture's size, each once at most; only a file in OpenEXR holds them.
     further: []const Further = &.{},
     pool: *parallel.Pool,
@@ -105,7 +116,7 @@ pub fn check(
         "a {t} file has {d} pixels on a side at most",
         .{ format, sideMax(format) },
     );
-    const channel_count: u64 = channelCount(formOf(format, transparent));
+    const channel_count: u64 = channelCount(formOf(format, transparent, .half));
     const by_library = format != .ppm and format != .pfm;
     const value_count = (width * channel_count + 1) * height;
     if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
@@ -117,15 +128,15 @@ pub fn check(
 
 fn channelCount(form: encode_file.Form) u8 {
     return switch (form) {
-        .rgba, .half_alpha => 4,
+        .rgba, .half_alpha, .linear_alpha => 4,
         .rgb, .linear, .radiance, .half => 3,
     };
 }
 
 /// Whether a format keeps radiance as it is, without exposure and tone mapping.
 pub fn isLinear(format: choices.Format) bool {
-    return switch (formOf(format, false)) {
-        .linear, .radiance, .half, .half_alpha => true,
+    return switch (formOf(format, false, .half)) {
+        .linear, .linear_alpha, .radiance, .half, .half_alpha => true,
         .rgb, .rgba => false,
     };
 }
@@ -143,7 +154,7 @@ pub fn write(
     const format = settings.format;
     const image = picture.image;
     try check(format, settings.transparent, image.width, image.height, diagnostic);
-    const form = formOf(format, settings.transparent);
+    const form = formOf(format, settings.transparent, settings.exr_kind);
     var work: Work = .{
         .rows = .{
             .picture = picture,
@@ -183,12 +194,13 @@ pub fn write(
             try target.finish(&.{file}, diagnostic);
         },
         .exr => {
+            var channels: layers_file.Channels = .{};
+            channels.addPicture(pixels, channelCount(form), settings.exr_kind);
+            for (settings.further) |*further| channels.addLayer(further);
             const file = try openexr.encode(gpa, .{
                 .width = image.width,
                 .height = image.height,
-                .channel_count = channelCount(form),
-                .pixels = pixels,
-                .further = settings.further,
+                .channels = channels.all(),
             });
             defer gpa.free(file);
             try target.finish(&.{file}, diagnostic);

@@ -41,6 +41,7 @@ const view_file = @import("prepare/view.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Clock = std.Io.Clock;
+const Progress = @import("progress.zig").Progress;
 const Scene = scene.Scene;
 const StageTimes = statistics.StageTimes;
 const TreeQuality = choices.TreeQuality;
@@ -422,6 +423,7 @@ fn placeAll(
     const mode = simd.setFlushToZero();
     defer simd.setFloatControl(mode);
     const start = Clock.awake.now(io);
+    Progress.begin(settings.pool.progress, .{ .stage = .geometry });
     const gpa = cache.gpa;
     const arena = posed.pose_arena.allocator();
     const place = &snapshot.place;
@@ -725,6 +727,7 @@ noinline fn growTree(
     const kept = if (geometry.dropped_count > 0) try listKept(gpa, geometry) else null;
     defer if (kept) |numbers| gpa.free(numbers);
     const input = inputOf(geometry, settings, kept);
+    Progress.begin(settings.pool.progress, bvh_wide.workOf(input.count(), input.quality));
     return switch (settings.lanes) {
         4 => .{ .w4 = .{ .built = try bvh_wide.build(gpa, arena, &input, 4) } },
         8 => .{ .w8 = .{ .built = try bvh_wide.build(gpa, arena, &input, 8) } },

@@ -26,6 +26,7 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
 const Film = film_file.Film;
 const Identity = @import("identity.zig").Identity;
+const Progress = @import("progress.zig").Progress;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
@@ -87,8 +88,6 @@ pub const Session = struct {
     /// What the stages have to say: the line of an error, and warnings.
     diagnostic: *Diagnostic,
     pool: parallel.Pool,
-    /// Told of every finished tile.
-    progress: std.Progress.Node = .none,
     /// Where pictures are shown on which `render` is at work; the caller's.
     progress_image: ?*ProgressImage = null,
     /// Set, it ends what `render` traces when every pixel has a sample.
@@ -177,7 +176,10 @@ pub const Session = struct {
         session.dropWorld();
         session.dropScene();
         const start = Io.Clock.awake.now(session.io);
-        const scene = try loadScene(session.gpa, session.io, name, choices, session.diagnostic);
+        Progress.begin(session.pool.progress, .{ .stage = .reading });
+        var told = choices;
+        told.progress = session.pool.progress;
+        const scene = try loadScene(session.gpa, session.io, name, told, session.diagnostic);
         session.adopt(scene, .owned);
         session.output = choices.output;
         session.texture_side_max = choices.texture_side_max;
@@ -320,6 +322,7 @@ pub const Session = struct {
         session.world.?.environment.map = null;
         session.world.?.environment.backdrop = null;
         const start = Io.Clock.awake.now(session.io);
+        Progress.begin(session.pool.progress, .{ .stage = .view });
         var environment = try session.chooseFor(&session.environment, &choices.environment);
         environment.is_seen = background == .env or background == .studio;
         environment.shadow_count = choices.shadowCount();
@@ -531,6 +534,7 @@ pub const Session = struct {
         var further: [std.enums.values(settings.Layer).len]output.Further = undefined;
         var chosen = session.outputSettings(choices, session.appearance);
         chosen.further = session.furtherLayers(&further);
+        Progress.begin(session.pool.progress, .{ .stage = .writing });
         const tally = try output.write(session.gpa, .{
             .image = &film.image,
             .display = film.imageOf(.display),
@@ -562,6 +566,7 @@ pub const Session = struct {
             .transparent = session.seen.background == .transparent,
             .background = session.behind(),
             .jpeg_quality = @intCast(choices.jpeg_quality),
+            .exr_kind = choices.exr_kind,
             .pool = &session.pool,
         };
     }
@@ -648,7 +653,7 @@ pub const Session = struct {
         var chosen = session.traceSettings(session.rendered);
         chosen.integrator = .whitted;
         chosen.sample_count = 1;
-        chosen.progress = .none;
+        chosen.progress = null;
         const variant_index = session.rendered.variant;
         _ = try trace.trace(session.gpa, variant_index, &world.frame(), &film, chosen);
         return film;
@@ -776,7 +781,8 @@ pub const Session = struct {
         };
     }
 
-    fn sampleCount(session: *const Session, choices: settings.Render) u32 {
+    /// Samples a pixel that `render` takes at most. Asserts that there is a view.
+    pub fn sampleCount(session: *const Session, choices: settings.Render) u32 {
         if (choices.sample_count) |count| return count;
         if (choices.noise != null) return settings.noise_sample_count;
         if (choices.time_budget_s != null) return settings.sample_count.max;
@@ -798,7 +804,7 @@ pub const Session = struct {
             .sample_count = session.sampleCount(choices),
             .depth_max = session.depthOf(choices),
             .tile_size = choices.tile_size,
-            .progress = session.progress,
+            .progress = session.pool.progress,
             .cancel = &session.pool.cancelled,
         };
     }

@@ -30,7 +30,7 @@ const directions = [_]Row{
         },
     },
     .{ .part = "kernel", .may_import = &.{ "module:config", "trace", "variant" } },
-    .{ .part = "bench", .may_import = &.{ "session", "variant", "energy" } },
+    .{ .part = "bench", .may_import = &.{ "display", "session", "variant", "energy" } },
     .{ .part = "compare", .may_import = &.{ "decode", "parse" } },
     .{
         .part = "info",
@@ -54,19 +54,21 @@ const directions = [_]Row{
     .{ .part = "memory_account", .may_import = &.{} },
     .{ .part = "output", .may_import = &.{ "image", "memory_account", "parallel" } },
     .{ .part = "report", .may_import = &.{} },
+    .{ .part = "display", .may_import = &.{"report"} },
     .{ .part = "energy", .may_import = &.{} },
     .{ .part = "decode", .may_import = &.{ "module:config", "memory_account" } },
     .{ .part = "diagnostic", .may_import = &.{} },
     .{ .part = "huge_pages", .may_import = &.{} },
     .{ .part = "identity", .may_import = &.{} },
     .{ .part = "math", .may_import = &.{} },
+    .{ .part = "progress", .may_import = &.{} },
     .{ .part = "settings", .may_import = &.{} },
     .{ .part = "statistics", .may_import = &.{} },
 };
 
 /// Parts that import no other part and that all may import; `raylane` re-exports everything.
 const leaves = [_][]const u8{
-    "diagnostic", "huge_pages", "identity", "math", "settings", "statistics",
+    "diagnostic", "huge_pages", "identity", "math", "progress", "settings", "statistics",
 };
 
 /// Rooms of a part, and which others of its files each may import besides its own, and does. How a

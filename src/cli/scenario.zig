@@ -341,13 +341,15 @@ const Builder = struct {
         if (!flag.takes_value) return builder.fail("{f} is true or false", .{quote(key)});
         var text: std.ArrayList(u8) = .empty;
         const separator: u8 = if (std.mem.startsWith(u8, flag.value, "WxH")) 'x' else ',';
-        if (value.* == .array) for (value.array.items, 0..) |*item, index| {
-            if (index > 0) try text.append(builder.arena, separator);
-            const part = scalarOf(item) orelse
-                return builder.fail("{f} is a list of other things than text or numbers", .{
-                    quote(key),
-                });
-            try text.appendSlice(builder.arena, part);
+        if (value.* == .array) {
+            for (value.array.items, 0..) |*item, index| {
+                if (index > 0) try text.append(builder.arena, separator);
+                const part = scalarOf(item) orelse
+                    return builder.fail("{f} is a list of other things than text or numbers", .{
+                        quote(key),
+                    });
+                try text.appendSlice(builder.arena, part);
+            }
         } else try text.appendSlice(builder.arena, scalarOf(value) orelse
             return builder.fail("{f} is neither text, a number nor a list", .{quote(key)}));
         if (std.mem.findScalar(u8, text.items, 0) != null)

@@ -38,19 +38,19 @@ pub fn run(init: std.process.Init, options: *const cli.Bench, diagnostic: *Diagn
     };
     defer target.abandon();
     settings.output = target.replaces;
+    const shown: raylane.settings.Progress = .{ .form = if (options.quiet) .none else .auto };
+    var display: raylane.display.Display = .init(io, shown, &signals.progress_line);
+    display.start();
     var run_of: raylane.bench.Bench = .{
         .arena = init.arena.allocator(),
         .gpa = init.gpa,
         .io = io,
         .settings = &settings,
         .diagnostic = diagnostic,
-        .progress = if (options.quiet)
-            .none
-        else
-            std.Progress.start(io, .{ .root_name = "raylane bench" }),
+        .display = &display,
     };
     const outcome = run_of.run();
-    run_of.progress.end();
+    display.stop();
     if (!options.quiet) for (diagnostic.warnings[0..diagnostic.warning_count]) |*warning| {
         console.say(io, "raylane: warning: {s}\n", .{warning.text()});
     };

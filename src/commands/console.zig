@@ -4,6 +4,7 @@ const std = @import("std");
 const exit_code = @import("exit_code.zig");
 const raylane = @import("raylane");
 const Allocator = std.mem.Allocator;
+const signals = @import("../signals.zig");
 const Account = raylane.memory_account.Account;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const ExitCode = exit_code.ExitCode;
@@ -58,14 +59,16 @@ pub fn sayDropped(io: Io, scene: []const u8, diagnostic: *const Diagnostic) void
     if (count > 0) sayOf(io, scene, "warning: {d} more", .{count});
 }
 
-/// Writes to standard error, beside the progress that may be shown there. When that fails there is
-/// nobody left to tell.
+/// Writes to standard error, in place of the progress that may be shown there until it is drawn
+/// again. When that fails there is nobody left to tell.
 pub fn say(io: Io, comptime format: []const u8, arguments: anytype) void {
     var buffer: [512]u8 = undefined;
     const stderr = io.lockStderr(&buffer, null) catch return;
     defer io.unlockStderr();
-    stderr.file_writer.interface.print(format, arguments) catch return;
-    stderr.file_writer.interface.flush() catch return;
+    const writer = &stderr.file_writer.interface;
+    signals.progress_line.erase(writer) catch return;
+    writer.print(format, arguments) catch return;
+    writer.flush() catch return;
 }
 
 /// Says that there is no memory.

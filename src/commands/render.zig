@@ -15,6 +15,7 @@ const Session = raylane.session.Session;
 const Target = raylane.output.Target;
 const World = raylane.world.World;
 const cli = raylane.cli;
+const printable = raylane.diagnostic.printable;
 
 /// Renders one scene, then says what it cost or why it failed.
 pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnostic) ExitCode {
@@ -90,7 +91,14 @@ fn renderAndReport(
         ),
     };
     defer job.session.deinit();
+    const shown: raylane.settings.Progress = options.progress;
+    var display: raylane.display.Display = .init(io, shown, &signals.progress_line);
+    display.start();
+    const progress = display.beginFile(.{ .index = 1, .count = 1, .name = options.scene });
+    job.session.pool.progress = progress;
     const outcome = job.run();
+    display.endFile(progress, if (outcome) |_| .done else |_| .failed);
+    display.stop();
     job.sayWarnings();
     if (!options.quiet) console.sayDropped(io, options.scene, diagnostic);
     const report = outcome catch |err| {
@@ -103,7 +111,12 @@ fn renderAndReport(
     };
     const exit_code = job.printReport(&report);
     if (exit_code != .ok or !report.is_partial) return exit_code;
-    return @fromBackingInt(@intCast(128 + signals.stop.signal.load(.monotonic)));
+    const signal = signals.stop.signal.load(.monotonic);
+    if (!options.quiet) console.say(io, "raylane: {s}: {f} has {d} of {d} samples a pixel\n", .{
+        signals.verbOf(@fromBackingInt(signal)), printable(job.outputTitle()),
+        report.sample_count,                     job.session.sampleCount(options.render),
+    });
+    return @fromBackingInt(@intCast(128 + signal));
 }
 
 /// The way of one scene through the session.
@@ -122,14 +135,12 @@ const Job = struct {
 
     fn run(job: *Job) Error!Report {
         const session = &job.session;
-        if (!job.options.quiet) {
-            session.progress = std.Progress.start(job.io, .{ .root_name = "raylane" });
-        }
-        defer session.progress.end();
         const options = job.options;
         // Before the work, so that a place that cannot be written is an error in the first second.
         var target = try job.openTarget();
         defer target.abandon();
+        job.foretell(&target);
+        defer signals.outcome.clear();
         var progress_image = try job.openProgressImage();
         defer if (progress_image) |*image| image.close();
         session.progress_image = if (progress_image) |*image| image else null;
@@ -158,12 +169,23 @@ const Job = struct {
             error.OutOfMemory, error.Canceled => |other| other,
             error.InputOutput => error.OutputFailed,
         };
+        signals.outcome.clear();
         var report = session.report(options.render);
         report.version = cli.version;
         report.scene = options.scene;
         report.output = job.outputTitle();
         if (options.count_tests) report.tests = try session.countTests(options.render);
         return report;
+    }
+
+    /// What a signal says that ends the program.
+    fn foretell(job: *const Job, target: *const Target) void {
+        if (job.options.quiet) return;
+        const title = printable(job.outputTitle());
+        if (target.replaces != null)
+            signals.outcome.set("{f} is as it was", .{title})
+        else
+            signals.outcome.set("{f} is not written", .{title});
     }
 
     /// What messages call the image's place.

@@ -21,6 +21,8 @@ pub const Form = enum {
     rgba,
     /// Floats as they are, over the background.
     linear,
+    /// Floats as they are, multiplied by alpha, and alpha.
+    linear_alpha,
     /// Floats that a pixel of Radiance HDR can hold: none below 0, none that has no exponent there.
     radiance,
     /// Floats that a half can hold, over the background.
@@ -34,7 +36,7 @@ pub const Form = enum {
             .rgb => 3,
             .rgba => 4,
             .linear, .radiance, .half => @sizeOf([3]f32),
-            .half_alpha => @sizeOf([4]f32),
+            .half_alpha, .linear_alpha => @sizeOf([4]f32),
         };
     }
 };
@@ -104,10 +106,10 @@ pub const Rows = struct {
             inline else => |mapping| switch (rows.form) {
                 .rgb => return row.encode(mapping, 3, std.mem.bytesAsSlice([3]u8, bytes)),
                 .rgba => return row.encode(mapping, 4, std.mem.bytesAsSlice([4]u8, bytes)),
-                .linear, .radiance, .half, .half_alpha => {},
+                .linear, .linear_alpha, .radiance, .half, .half_alpha => {},
             },
         }
-        if (rows.form == .half_alpha)
+        if (rows.form == .half_alpha or rows.form == .linear_alpha)
             row.copy(4, std.mem.bytesAsSlice([4]f32, bytes))
         else
             row.copy(3, std.mem.bytesAsSlice([3]f32, bytes));

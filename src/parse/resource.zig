@@ -20,6 +20,7 @@ const Allocator = std.mem.Allocator;
 const Diagnostic = diagnostic_data.Diagnostic;
 const Identity = @import("../identity.zig").Identity;
 const Io = std.Io;
+const Progress = @import("../progress.zig").Progress;
 const Reason = diagnostic_data.Message;
 const Settings = @import("../settings.zig").Load;
 const format = @import("format.zig");
@@ -277,6 +278,9 @@ fn identify(resources: *const Resources, file: Io.File, reason: *Reason) LoadErr
     return identity;
 }
 
+/// Bytes of a file that are read between one time that the progress is told of them and the next.
+const told_bytes = 16 << 20;
+
 fn loadFile(
     resources: *Resources,
     allocator: Allocator,
@@ -296,9 +300,16 @@ fn loadFile(
     if (stat.size > bytesMax()) return refuseSize(reason);
     const bytes = try allocator.allocSentinel(u8, @intCast(stat.size), 0);
     errdefer allocator.free(bytes);
-    const count = file.readPositionalAll(io, bytes, 0) catch |err|
-        return refuseError(reason, err);
-    if (count < bytes.len) return refuse(reason, error.InputOutput, "changed while it was read");
+    var done: usize = 0;
+    while (done < bytes.len) {
+        const part = bytes[done..@min(done + told_bytes, bytes.len)];
+        const count = file.readPositionalAll(io, part, done) catch |err|
+            return refuseError(reason, err);
+        if (count < part.len)
+            return refuse(reason, error.InputOutput, "changed while it was read");
+        done += count;
+        Progress.add(resources.settings.progress, count);
+    }
     resources.bytes_read += bytes.len;
     return .{ .bytes = bytes, .identity = identity };
 }

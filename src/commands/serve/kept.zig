@@ -170,9 +170,19 @@ pub const Kept = struct {
     fn keyOf(gpa: Allocator, options: *const Options) error{OutOfMemory}![]const u8 {
         var text: Io.Writer.Allocating = .init(gpa);
         errdefer text.deinit();
-        std.json.Stringify.value(.{
-            options.scene, options.load, options.thread_count, options.memory_max,
-        }, .{}, &text.writer) catch return error.OutOfMemory;
+        var json: std.json.Stringify = .{ .writer = &text.writer };
+        writeKey(&json, options) catch return error.OutOfMemory;
         return text.toOwnedSlice();
+    }
+
+    fn writeKey(json: *std.json.Stringify, options: *const Options) Io.Writer.Error!void {
+        try json.beginArray();
+        try json.write(.{ options.scene, options.thread_count, options.memory_max });
+        inline for (comptime std.meta.fieldNames(settings.Load)) |name| {
+            const is_of_job = comptime std.mem.eql(u8, name, "progress") or
+                std.mem.eql(u8, name, "output");
+            if (!is_of_job) try json.write(@field(options.load, name));
+        }
+        try json.endArray();
     }
 };

@@ -23,6 +23,7 @@ const Binning = split.Binning(split.bin_count_large);
 const Cells = cells_file.Cells;
 const Input = bvh_input.Input;
 const Item = cells_file.Item;
+const Progress = @import("../../progress.zig").Progress;
 const Box = split.Box;
 const Box3 = math.Box3;
 const Side = split.Side;
@@ -441,7 +442,9 @@ fn Builder(comptime pack_size: u32) type {
             stretches: []Tree.Stretch,
 
             fn run(work: *TaskWork, index: usize, _: usize) void {
-                work.stretches[index] = work.cutTask(&work.builder.tasks.items[index]);
+                const task = &work.builder.tasks.items[index];
+                work.stretches[index] = work.cutTask(task);
+                Progress.add(work.builder.input.pool.progress, task.end - task.begin);
             }
 
             /// Cuts the sets of a task down to leaves. Returns its pairs.
