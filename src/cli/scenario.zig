@@ -505,6 +505,7 @@ test "Khronos's scenarios, with what is left out of them" {
         \\--background=env
         \\--exposure=0
         \\--output=goldens/a/raylane-golden.png
+        \\--spp=2
         \\--spp=4
         \\--
         \\../a.glb

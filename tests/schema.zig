@@ -1,0 +1,198 @@
+//! Checks JSON against a schema: of draft 2020-12, the keywords that docs/*.schema.json have.
+//!
+//! In: both as parsed JSON. Out: an error that has said where and what. A keyword that is not known
+//! is an error, too: it would be a rule that nobody checks.
+
+const std = @import("std");
+const Value = std.json.Value;
+
+pub const Error = error{ SchemaUnknown, SchemaBroken };
+
+const Keyword = enum {
+    @"$schema",
+    @"$defs",
+    @"$ref",
+    title,
+    description,
+    type,
+    @"enum",
+    oneOf,
+    properties,
+    required,
+    additionalProperties,
+    items,
+    minItems,
+    maxItems,
+    minLength,
+    maxLength,
+    minimum,
+};
+
+const Type = enum { null, boolean, object, array, number, integer, string };
+
+/// Checks a value against a schema, whose references are to `$defs` of `root`. Both are parsed with
+/// numbers as such.
+pub fn check(root: *const Value, schema: *const Value, value: *const Value) Error!void {
+    var rules = schema.object.iterator();
+    while (rules.next()) |rule| {
+        const name = rule.key_ptr.*;
+        const keyword = std.meta.stringToEnum(Keyword, name) orelse {
+            std.debug.print("the schema has '{s}'\n", .{name});
+            return error.SchemaUnknown;
+        };
+        if (try obeys(root, schema, keyword, rule.value_ptr, value)) continue;
+        return error.SchemaBroken;
+    }
+}
+
+fn obeys(
+    root: *const Value,
+    schema: *const Value,
+    keyword: Keyword,
+    rule: *const Value,
+    value: *const Value,
+) Error!bool {
+    switch (keyword) {
+        .@"$schema", .@"$defs", .title, .description => return true,
+        .@"$ref" => {
+            const name = std.mem.cutPrefix(u8, rule.string, "#/$defs/") orelse
+                return error.SchemaUnknown;
+            const definition = root.object.getPtr("$defs").?.object.getPtr(name) orelse
+                return error.SchemaUnknown;
+            try check(root, definition, value);
+            return true;
+        },
+        .type => return if (rule.* == .array) for (rule.array.items) |*one| {
+            if (try hasType(one.string, value)) break true;
+        } else false else hasType(rule.string, value),
+        .@"enum" => return for (rule.array.items) |*one| {
+            if (isSame(one, value)) break true;
+        } else false,
+        .oneOf => {
+            var count: usize = 0;
+            for (rule.array.items) |*one| {
+                check(root, one, value) catch |err| switch (err) {
+                    error.SchemaUnknown => return err,
+                    error.SchemaBroken => continue,
+                };
+                count += 1;
+            }
+            return count == 1;
+        },
+        .properties => {
+            if (value.* != .object) return true;
+            var fields = value.object.iterator();
+            while (fields.next()) |field| {
+                const property = rule.object.getPtr(field.key_ptr.*) orelse continue;
+                check(root, property, field.value_ptr) catch |err| {
+                    std.debug.print("in '{s}'\n", .{field.key_ptr.*});
+                    return err;
+                };
+            }
+            return true;
+        },
+        .required => {
+            if (value.* != .object) return true;
+            return for (rule.array.items) |*name| {
+                if (value.object.contains(name.string)) continue;
+                std.debug.print("no '{s}'\n", .{name.string});
+                break false;
+            } else true;
+        },
+        .additionalProperties => {
+            if (rule.bool or value.* != .object) return true;
+            const known = &schema.object.getPtr("properties").?.object;
+            for (value.object.keys()) |name| {
+                if (known.contains(name)) continue;
+                std.debug.print("'{s}' is not in the schema\n", .{name});
+                return false;
+            }
+            return true;
+        },
+        .items => {
+            if (value.* == .array) for (value.array.items) |*item| try check(root, rule, item);
+            return true;
+        },
+        .minItems => return value.* != .array or value.array.items.len >= rule.integer,
+        .maxItems => return value.* != .array or value.array.items.len <= rule.integer,
+        .minLength => return value.* != .string or value.string.len >= rule.integer,
+        .maxLength => return value.* != .string or value.string.len <= rule.integer,
+        .minimum => return (numberOf(value) orelse return true) >= numberOf(rule).?,
+    }
+}
+
+fn hasType(name: []const u8, value: *const Value) error{SchemaUnknown}!bool {
+    return switch (std.meta.stringToEnum(Type, name) orelse return error.SchemaUnknown) {
+        .null => value.* == .null,
+        .boolean => value.* == .bool,
+        .object => value.* == .object,
+        .array => value.* == .array,
+        .string => value.* == .string,
+        .number => numberOf(value) != null,
+        .integer => if (numberOf(value)) |number| @trunc(number) == number else false,
+    };
+}
+
+fn isSame(left: *const Value, right: *const Value) bool {
+    if (left.* == .string and right.* == .string)
+        return std.mem.eql(u8, left.string, right.string);
+    return left.* == .null and right.* == .null;
+}
+
+fn numberOf(value: *const Value) ?f64 {
+    return switch (value.*) {
+        .integer => |number| @floatFromInt(number),
+        .float => |number| number,
+        else => null,
+    };
+}
+
+test "each keyword refuses what it is there for" {
+    const Case = struct { schema: []const u8, good: []const u8, bad: []const u8 };
+    for ([_]Case{
+        .{ .schema = "{\"type\":\"integer\"}", .good = "2.0", .bad = "2.5" },
+        .{ .schema = "{\"type\":[\"null\",\"string\"]}", .good = "null", .bad = "0" },
+        .{ .schema = "{\"enum\":[\"a\",null]}", .good = "\"a\"", .bad = "\"b\"" },
+        .{ .schema = "{\"minimum\":1}", .good = "1", .bad = "0.5" },
+        .{ .schema = "{\"minLength\":1}", .good = "\"a\"", .bad = "\"\"" },
+        .{ .schema = "{\"maxLength\":1}", .good = "\"a\"", .bad = "\"ab\"" },
+        .{ .schema = "{\"minItems\":1}", .good = "[1]", .bad = "[]" },
+        .{ .schema = "{\"maxItems\":1}", .good = "[1]", .bad = "[1,2]" },
+        .{ .schema = "{\"required\":[\"a\"]}", .good = "{\"a\":1}", .bad = "{\"b\":1}" },
+        .{
+            .schema = "{\"properties\":{\"a\":{\"type\":\"null\"}},\"additionalProperties\":false}",
+            .good = "{\"a\":null}",
+            .bad = "{\"b\":null}",
+        },
+        .{ .schema = "{\"properties\":{\"a\":{\"type\":\"null\"}}}", .good = "{}", .bad = "{\"a\":1}" },
+        .{ .schema = "{\"items\":{\"type\":\"null\"}}", .good = "[null]", .bad = "[null,1]" },
+        .{
+            .schema = "{\"oneOf\":[{\"minimum\":3},{\"type\":\"integer\"}]}",
+            .good = "1",
+            .bad = "3",
+        },
+        .{
+            .schema = "{\"$ref\":\"#/$defs/a\",\"$defs\":{\"a\":{\"type\":\"boolean\"}}}",
+            .good = "true",
+            .bad = "1",
+        },
+    }) |case| {
+        const gpa = std.testing.allocator;
+        const schema = try std.json.parseFromSlice(Value, gpa, case.schema, .{});
+        defer schema.deinit();
+        for ([_][]const u8{ case.good, case.bad }, [_]bool{ true, false }) |text, is_good| {
+            const value = try std.json.parseFromSlice(Value, gpa, text, .{});
+            defer value.deinit();
+            const result = check(&schema.value, &schema.value, &value.value);
+            if (is_good) try result else try std.testing.expectError(error.SchemaBroken, result);
+        }
+    }
+}
+
+test "an unknown keyword is an error" {
+    const gpa = std.testing.allocator;
+    const schema = try std.json.parseFromSlice(Value, gpa, "{\"maximum\":3}", .{});
+    defer schema.deinit();
+    const root = &schema.value;
+    try std.testing.expectError(error.SchemaUnknown, check(root, root, &.null));
+}
