@@ -30,96 +30,114 @@ const Keyword = enum {
 
 const Type = enum { null, boolean, object, array, number, integer, string };
 
-/// Checks a value against a schema, whose references are to `$defs` of `root`. Both are parsed with
-/// numbers as such.
-pub fn check(root: *const Value, schema: *const Value, value: *const Value) Error!void {
-    var rules = schema.object.iterator();
-    while (rules.next()) |rule| {
-        const name = rule.key_ptr.*;
-        const keyword = std.meta.stringToEnum(Keyword, name) orelse {
-            std.debug.print("the schema has '{s}'\n", .{name});
-            return error.SchemaUnknown;
-        };
-        if (try obeys(root, schema, keyword, rule.value_ptr, value)) continue;
-        return error.SchemaBroken;
-    }
+/// Checks a value against a schema. Both are parsed with numbers as such.
+pub fn check(root: *const Value, value: *const Value) Error!void {
+    const checker: Checker = .{ .root = root };
+    return checker.check(root, value);
 }
 
-fn obeys(
+const Checker = struct {
+    /// Whose `$defs` references are to.
     root: *const Value,
-    schema: *const Value,
-    keyword: Keyword,
-    rule: *const Value,
-    value: *const Value,
-) Error!bool {
-    switch (keyword) {
-        .@"$schema", .@"$defs", .title, .description => return true,
-        .@"$ref" => {
-            const name = std.mem.cutPrefix(u8, rule.string, "#/$defs/") orelse
+    /// Says what is wrong.
+    is_loud: bool = true,
+
+    fn check(checker: Checker, schema: *const Value, value: *const Value) Error!void {
+        var rules = schema.object.iterator();
+        while (rules.next()) |rule| {
+            const name = rule.key_ptr.*;
+            const keyword = std.meta.stringToEnum(Keyword, name) orelse {
+                checker.say("the schema has", name);
                 return error.SchemaUnknown;
-            const definition = root.object.getPtr("$defs").?.object.getPtr(name) orelse
-                return error.SchemaUnknown;
-            try check(root, definition, value);
-            return true;
-        },
-        .type => return if (rule.* == .array) for (rule.array.items) |*one| {
-            if (try hasType(one.string, value)) break true;
-        } else false else hasType(rule.string, value),
-        .@"enum" => return for (rule.array.items) |*one| {
-            if (isSame(one, value)) break true;
-        } else false,
-        .oneOf => {
-            var count: usize = 0;
-            for (rule.array.items) |*one| {
-                check(root, one, value) catch |err| switch (err) {
-                    error.SchemaUnknown => return err,
-                    error.SchemaBroken => continue,
-                };
-                count += 1;
-            }
-            return count == 1;
-        },
-        .properties => {
-            if (value.* != .object) return true;
-            var fields = value.object.iterator();
-            while (fields.next()) |field| {
-                const property = rule.object.getPtr(field.key_ptr.*) orelse continue;
-                check(root, property, field.value_ptr) catch |err| {
-                    std.debug.print("in '{s}'\n", .{field.key_ptr.*});
-                    return err;
-                };
-            }
-            return true;
-        },
-        .required => {
-            if (value.* != .object) return true;
-            return for (rule.array.items) |*name| {
-                if (value.object.contains(name.string)) continue;
-                std.debug.print("no '{s}'\n", .{name.string});
-                break false;
-            } else true;
-        },
-        .additionalProperties => {
-            if (rule.bool or value.* != .object) return true;
-            const known = &schema.object.getPtr("properties").?.object;
-            for (value.object.keys()) |name| {
-                if (known.contains(name)) continue;
-                std.debug.print("'{s}' is not in the schema\n", .{name});
-                return false;
-            }
-            return true;
-        },
-        .items => {
-            if (value.* == .array) for (value.array.items) |*item| try check(root, rule, item);
-            return true;
-        },
-        .minItems => return value.* != .array or value.array.items.len >= rule.integer,
-        .maxItems => return value.* != .array or value.array.items.len <= rule.integer,
-        .minLength => return value.* != .string or value.string.len >= rule.integer,
-        .maxLength => return value.* != .string or value.string.len <= rule.integer,
-        .minimum => return (numberOf(value) orelse return true) >= numberOf(rule).?,
+            };
+            if (try checker.obeys(schema, keyword, rule.value_ptr, value)) continue;
+            checker.say("against", name);
+            return error.SchemaBroken;
+        }
     }
-}
+
+    fn say(checker: Checker, what: []const u8, name: []const u8) void {
+        if (checker.is_loud) std.debug.print("{s} '{s}'\n", .{ what, name });
+    }
+
+    fn obeys(
+        checker: Checker,
+        schema: *const Value,
+        keyword: Keyword,
+        rule: *const Value,
+        value: *const Value,
+    ) Error!bool {
+        switch (keyword) {
+            .@"$schema", .@"$defs", .title, .description => return true,
+            .@"$ref" => {
+                const name = std.mem.cutPrefix(u8, rule.string, "#/$defs/") orelse
+                    return error.SchemaUnknown;
+                const definition = checker.root.object.getPtr("$defs").?.object.getPtr(name) orelse
+                    return error.SchemaUnknown;
+                try checker.check(definition, value);
+                return true;
+            },
+            .type => return if (rule.* == .array) for (rule.array.items) |*one| {
+                if (try hasType(one.string, value)) break true;
+            } else false else hasType(rule.string, value),
+            .@"enum" => return for (rule.array.items) |*one| {
+                if (isSame(one, value)) break true;
+            } else false,
+            .oneOf => {
+                const quiet: Checker = .{ .root = checker.root, .is_loud = false };
+                var count: usize = 0;
+                for (rule.array.items) |*one| {
+                    quiet.check(one, value) catch |err| switch (err) {
+                        error.SchemaUnknown => return err,
+                        error.SchemaBroken => continue,
+                    };
+                    count += 1;
+                }
+                if (count == 0) for (rule.array.items) |*one| checker.check(one, value) catch {};
+                return count == 1;
+            },
+            .properties => {
+                if (value.* != .object) return true;
+                var fields = value.object.iterator();
+                while (fields.next()) |field| {
+                    const property = rule.object.getPtr(field.key_ptr.*) orelse continue;
+                    checker.check(property, field.value_ptr) catch |err| {
+                        checker.say("in", field.key_ptr.*);
+                        return err;
+                    };
+                }
+                return true;
+            },
+            .required => {
+                if (value.* != .object) return true;
+                return for (rule.array.items) |*name| {
+                    if (value.object.contains(name.string)) continue;
+                    checker.say("no", name.string);
+                    break false;
+                } else true;
+            },
+            .additionalProperties => {
+                if (rule.bool or value.* != .object) return true;
+                const known = &schema.object.getPtr("properties").?.object;
+                for (value.object.keys()) |name| {
+                    if (known.contains(name)) continue;
+                    checker.say("not in the schema:", name);
+                    return false;
+                }
+                return true;
+            },
+            .items => {
+                if (value.* == .array) for (value.array.items) |*item| try checker.check(rule, item);
+                return true;
+            },
+            .minItems => return value.* != .array or value.array.items.len >= rule.integer,
+            .maxItems => return value.* != .array or value.array.items.len <= rule.integer,
+            .minLength => return value.* != .string or value.string.len >= rule.integer,
+            .maxLength => return value.* != .string or value.string.len <= rule.integer,
+            .minimum => return (numberOf(value) orelse return true) >= numberOf(rule).?,
+        }
+    }
+};
 
 fn hasType(name: []const u8, value: *const Value) error{SchemaUnknown}!bool {
     return switch (std.meta.stringToEnum(Type, name) orelse return error.SchemaUnknown) {
@@ -183,7 +201,8 @@ test "each keyword refuses what it is there for" {
         for ([_][]const u8{ case.good, case.bad }, [_]bool{ true, false }) |text, is_good| {
             const value = try std.json.parseFromSlice(Value, gpa, text, .{});
             defer value.deinit();
-            const result = check(&schema.value, &schema.value, &value.value);
+            const checker: Checker = .{ .root = &schema.value, .is_loud = false };
+            const result = checker.check(&schema.value, &value.value);
             if (is_good) try result else try std.testing.expectError(error.SchemaBroken, result);
         }
     }
@@ -193,6 +212,7 @@ test "an unknown keyword is an error" {
     const gpa = std.testing.allocator;
     const schema = try std.json.parseFromSlice(Value, gpa, "{\"maximum\":3}", .{});
     defer schema.deinit();
-    const root = &schema.value;
-    try std.testing.expectError(error.SchemaUnknown, check(root, root, &.null));
+    const checker: Checker = .{ .root = &schema.value, .is_loud = false };
+    const result = checker.check(&schema.value, &.null);
+    try std.testing.expectError(error.SchemaUnknown, result);
 }

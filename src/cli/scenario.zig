@@ -521,7 +521,7 @@ test "Khronos's scenarios, with what is left out of them" {
         \\--resolution=768x768
         \\--fov=30
         \\--eye=0.003,0.003,0.01
-        \\--target=0.003,0.003,-0.99
+        \\--target=0.003,0.002999999999999939,-0.99
         \\--background=transparent
         \\--exposure=0
         \\--output=inside.png

@@ -13,12 +13,12 @@ pub const help: []const u8 = "raylane " ++ cli.version ++
     \\
     \\  {"id": 1, "input": "a.glb", "output": "a.png", "resolution": [256, 256]}
     \\
-    \\Each gets one line on standard output when it is done: the report of --stats json
-    \\with its id, or the error. Jobs are done in turn, each by all threads. A scene
-    \\that the job before had, too, is not read again while its files are as they
-    \\were. The end of input ends the program with 0.
+    \\Each gets one line on standard output when it is done: its id with the report of
+    \\--stats json, or with the error. Jobs are done in turn, each by all threads. A
+    \\scene that the job before had, too, is not read again while its files are as
+    \\they were. The end of input ends the program with 0.
     \\
-    \\Options here are for all jobs that say nothing else; raylane --help has them, and
+    \\Options here are for all jobs that say nothing else; raylane --help has them,
     \\docs/json.md the keys of jobs and answers.
     \\
 ;

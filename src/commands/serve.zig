@@ -124,9 +124,11 @@ const Server = struct {
     }
 
     fn refuseLine(server: *Server) ExitCode {
+        var arena: std.heap.ArenaAllocator = .init(server.gpa);
+        defer arena.deinit();
         var diagnostic: Diagnostic = .{};
         diagnostic.message.set("the line is longer than {d} bytes", .{line_bytes_max});
-        return server.refuse(server.gpa, .null, null, &diagnostic);
+        return server.refuse(arena.allocator(), .null, null, &diagnostic);
     }
 
     /// Refuses what has no place among jobs.
