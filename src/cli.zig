@@ -427,13 +427,10 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--progress HOW",
-            .help = "auto: one line on a terminal; json: lines for programs\n" ++
-                "on stderr (docs/progress.md); or none",
+            .help = "auto: a line on a terminal; json: lines for programs,\n" ++
+                "see docs/progress.md; or none",
         },
-        .{
-            .usage = "--progress-fd N",
-            .help = "json to that open descriptor",
-        },
+        .{ .usage = "--progress-fd N", .help = "json to that descriptor, not to stderr" },
         .{
             .usage = "--count-tests",
             .help = "count intersection tests, in a second, untimed pass",
@@ -751,14 +748,8 @@ const Parser = struct {
             .tonemap => {
                 options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
             },
-            .stats => options.stats = try reader.choice(given, Stats),
-            .scenario => {
-                if (parser.scenario != null) return reader.fail("'--scenario' is there twice", .{});
-                parser.scenario = try reader.text(given, "a file name or JSON");
-            },
-            .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
-            .progress_fd => options.progress.file =
-                try reader.number(given, settings.progress_file),
+            .stats, .quiet, .verbose, .progress, .progress_fd => try parser.setMessages(given),
+            .scenario => try parser.setScenario(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
@@ -772,13 +763,17 @@ const Parser = struct {
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
                     settings.point_size.min, settings.point_size.max,
                 })),
-            .quiet => options.quiet = true,
-            .verbose => options.verbose = true,
             .help => parser.other = .help,
             .version => parser.other = parser.other orelse .version,
             .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
         }
+    }
+
+    fn setScenario(parser: *Parser, given: Reader.Given) Error!void {
+        if (parser.scenario != null)
+            return parser.reader.fail("'--scenario' is there twice", .{});
+        parser.scenario = try parser.reader.text(given, "a file name or JSON");
     }
 
     fn setSize(parser: *Parser, given: Reader.Given) Error!void {
@@ -888,6 +883,21 @@ const Parser = struct {
         noise.exposure = parser.options.write.exposure;
         if (!render.integrator.isOpen())
             return parser.reader.fail("'--noise' is for '--integrator path'", .{});
+    }
+
+    fn setMessages(parser: *Parser, given: Reader.Given) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .stats => options.stats = try reader.choice(given, Stats),
+            .quiet => options.quiet = true,
+            .verbose => options.verbose = true,
+            .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
+            .progress_fd => {
+                options.progress.file = try reader.number(given, settings.progress_file);
+            },
+            else => unreachable, // `set` hands over the above.
+        }
     }
 
     fn settleProgress(parser: *Parser) Error!void {

@@ -64,6 +64,9 @@ pub const Display = struct {
         /// Since the display's begin.
         begin_s: f64 = 0,
         work_begin_s: f64 = 0,
+        /// What was done when it was last looked at, and when there was first so much.
+        seen_done: usize = 0,
+        seen_s: f64 = 0,
 
         fn begun(context: *anyopaque, work: *const Work) void {
             const slot: *Slot = @ptrCast(@alignCast(context));
@@ -73,17 +76,22 @@ pub const Display = struct {
             slot.progress.restart(work);
             slot.work = work.*;
             slot.work_begin_s = display.now();
+            slot.seen_done = 0;
+            slot.seen_s = slot.work_begin_s;
             if (display.form == .json) display.tell(@tagName(work.stage), slot);
         }
 
-        fn standing(slot: *const Slot, now_s: f64) Standing {
-            return .of(
-                slot.place.?,
-                &(slot.work orelse .{ .stage = .reading }),
-                &slot.progress,
-                now_s - slot.work_begin_s,
-                now_s - slot.begin_s,
-            );
+        fn standing(slot: *Slot, now_s: f64) Standing {
+            const done = slot.progress.done.load(.monotonic);
+            if (done != slot.seen_done) {
+                slot.seen_done = done;
+                slot.seen_s = now_s;
+            }
+            return .of(slot.place.?, &(slot.work orelse .{ .stage = .reading }), &slot.progress, .{
+                .file_s = now_s - slot.begin_s,
+                .work_s = slot.seen_s - slot.work_begin_s,
+                .idle_s = now_s - slot.seen_s,
+            });
         }
     };
 
@@ -96,13 +104,16 @@ pub const Display = struct {
                 .json => .json,
                 .auto => if (isTerminal(io)) .line else .ended_files,
             },
-            .file = if (chosen.file) |handle|
-                .{ .handle = @intCast(handle), .flags = .{ .nonblocking = false } }
-            else
-                null,
+            .file = fileOf(chosen.file),
             .line = line,
             .begin = Io.Clock.awake.now(io),
         };
+    }
+
+    fn fileOf(descriptor: ?u32) ?Io.File {
+        const handle: std.posix.fd_t = @intCast(descriptor orelse return null);
+        if (handle == std.posix.STDERR_FILENO) return null;
+        return .{ .handle = handle, .flags = .{ .nonblocking = false } };
     }
 
     /// Begins to show. Where the system has no thread to spare, only what begins and ends is told.
@@ -203,7 +214,7 @@ pub const Display = struct {
     fn draw(display: *Display) void {
         const now_s = display.now();
         if (now_s * std.time.ms_per_s < quiet_ms) return;
-        var first: ?*const Slot = null;
+        var first: ?*Slot = null;
         var count: usize = 0;
         for (&display.slots) |*slot| {
             const place = slot.place orelse continue;
@@ -219,7 +230,7 @@ pub const Display = struct {
         display.line.draw(&stderr.file_writer.interface, shown) catch return;
     }
 
-    fn tell(display: *Display, stage: []const u8, slot: *const Slot) void {
+    fn tell(display: *Display, stage: []const u8, slot: *Slot) void {
         if (display.has_failed) return;
         const standing = slot.standing(display.now());
         // Room for all but the longest names, so that a line is written in one piece.

@@ -225,11 +225,10 @@ test "a job finds the scene of the one before only while its files are as they w
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
     const arena = sandbox.arena_state.allocator();
-    const one = "WorldBegin\nAttributeBegin\nShape \"sphere\"\nAttributeEnd\n";
+    const one = "Camera \"perspective\"\nWorldBegin\nShape \"sphere\"\n";
     try sandbox.write("s.pbrt", one);
     try sandbox.write("t.pbrt", one ++ "Shape \"disk\"\n");
-    // Lit, for a black picture has a warning, and what had one is not kept.
-    const job = "{\"input\":\"s.pbrt\",\"output\":\"a.png\",\"ambient\":0.3," ++ quick ++ "}";
+    const job = "{\"input\":\"s.pbrt\",\"output\":\"a.png\"," ++ quick ++ "}";
     // The scene is old, then newly written under the same name; the program runs meanwhile.
     const script = try arena.print("touch -d '1 hour ago' s.pbrt t.pbrt; mkfifo in; " ++
         "\"$@\" <in >out & exec 3>in; wanted() {{ while test \"$(wc -l <out)\" -lt $1; " ++

@@ -83,19 +83,7 @@ const Checker = struct {
             .@"enum" => return for (rule.array.items) |*one| {
                 if (isSame(one, value)) break true;
             } else false,
-            .oneOf => {
-                const quiet: Checker = .{ .root = checker.root, .is_loud = false };
-                var count: usize = 0;
-                for (rule.array.items) |*one| {
-                    quiet.check(one, value) catch |err| switch (err) {
-                        error.SchemaUnknown => return err,
-                        error.SchemaBroken => continue,
-                    };
-                    count += 1;
-                }
-                if (count == 0) for (rule.array.items) |*one| checker.check(one, value) catch {};
-                return count == 1;
-            },
+            .oneOf => return checker.obeysOne(rule, value),
             .properties => {
                 if (value.* != .object) return true;
                 var fields = value.object.iterator();
@@ -127,7 +115,11 @@ const Checker = struct {
                 return true;
             },
             .items => {
-                if (value.* == .array) for (value.array.items) |*item| try checker.check(rule, item);
+            .items => {
+                if (value.* != .array) return true;
+                for (value.array.items) |*item| try checker.check(rule, item);
+                return true;
+            },
                 return true;
             },
             .minItems => return value.* != .array or value.array.items.len >= rule.integer,
@@ -136,6 +128,20 @@ const Checker = struct {
             .maxLength => return value.* != .string or value.string.len <= rule.integer,
             .minimum => return (numberOf(value) orelse return true) >= numberOf(rule).?,
         }
+    }
+
+    fn obeysOne(checker: Checker, rule: *const Value, value: *const Value) Error!bool {
+        const quiet: Checker = .{ .root = checker.root, .is_loud = false };
+        var count: usize = 0;
+        for (rule.array.items) |*one| {
+            quiet.check(one, value) catch |err| switch (err) {
+                error.SchemaUnknown => return err,
+                error.SchemaBroken => continue,
+            };
+            count += 1;
+        }
+        if (count == 0) for (rule.array.items) |*one| checker.check(one, value) catch {};
+        return count == 1;
     }
 };
 
@@ -182,7 +188,11 @@ test "each keyword refuses what it is there for" {
             .good = "{\"a\":null}",
             .bad = "{\"b\":null}",
         },
-        .{ .schema = "{\"properties\":{\"a\":{\"type\":\"null\"}}}", .good = "{}", .bad = "{\"a\":1}" },
+        .{
+            .schema = "{\"properties\":{\"a\":{\"type\":\"null\"}}}",
+            .good = "{}",
+            .bad = "{\"a\":1}",
+        },
         .{ .schema = "{\"items\":{\"type\":\"null\"}}", .good = "[null]", .bad = "[null,1]" },
         .{
             .schema = "{\"oneOf\":[{\"minimum\":3},{\"type\":\"integer\"}]}",

@@ -7,6 +7,7 @@ const signals = @import("../signals.zig");
 const Account = raylane.memory_account.Account;
 const Allocator = std.mem.Allocator;
 const Diagnostic = raylane.diagnostic.Diagnostic;
+const Display = raylane.display.Display;
 const ExitCode = @import("exit_code.zig").ExitCode;
 const Io = std.Io;
 const Options = raylane.cli.Options;
@@ -91,8 +92,7 @@ fn renderAndReport(
         ),
     };
     defer job.session.deinit();
-    const shown: raylane.settings.Progress = options.progress;
-    var display: raylane.display.Display = .init(io, shown, &signals.progress_line);
+    var display: Display = .init(io, options.progress, &signals.progress_line);
     display.start();
     const progress = display.beginFile(.{ .index = 1, .count = 1, .name = options.scene });
     job.session.pool.progress = progress;
@@ -112,7 +112,7 @@ fn renderAndReport(
     const exit_code = job.printReport(&report);
     if (exit_code != .ok or !report.is_partial) return exit_code;
     const signal = signals.stop.signal.load(.monotonic);
-    if (!options.quiet) console.say(io, "raylane: {s}: {f} has {d} of {d} samples a pixel\n", .{
+    if (!options.quiet) console.say(io, "raylane: {s}: {f} written with {d} of {d} samples\n", .{
         signals.verbOf(@fromBackingInt(signal)), printable(job.outputTitle()),
         report.sample_count,                     job.session.sampleCount(options.render),
     });
@@ -183,9 +183,9 @@ const Job = struct {
         if (job.options.quiet) return;
         const title = printable(job.outputTitle());
         if (target.replaces != null)
-            signals.outcome.set("{f} is as it was", .{title})
+            signals.outcome.set("{f} kept as it was", .{title})
         else
-            signals.outcome.set("{f} is not written", .{title});
+            signals.outcome.set("{f} not written", .{title});
     }
 
     /// What messages call the image's place.

@@ -164,6 +164,8 @@ const Server = struct {
             .view = options.view,
         });
         try session.view(options.view);
+        // They would not be said again, and what was missing may be there next time.
+        if (diagnostic.warning_count > 0) kept.is_good = false;
         session.checkWrite(options.write) catch return error.OutputFailed;
         try session.render(options.render);
         session.write(&target, options.write) catch |err| return switch (err) {
@@ -174,8 +176,6 @@ const Server = struct {
         report.version = cli.version;
         report.scene = options.scene;
         if (options.count_tests) report.tests = try session.countTests(options.render);
-        // Some would not be said again, and what was missing may be there next time.
-        if (diagnostic.warning_count > 0) kept.is_good = false;
         return report;
     }
 

@@ -67,7 +67,11 @@ fn writeText(writer: *Writer, standing: *const Standing, under_way: usize) Write
         try writeDuration(writer, left_s);
         try writer.writeAll(" left");
     }
-    if (standing.rays_per_s) |rate| try writer.print(", {d:.1} Mrays/s", .{rate / 1e6});
+    const rate = (standing.rays_per_s orelse return) / 1e6;
+    try if (rate < 1)
+        writer.print(", {d:.2} Mrays/s", .{rate})
+    else
+        writer.print(", {d:.1} Mrays/s", .{rate});
 }
 
 /// `3/60 Fox.glb`, or without the number where it is the only one.
