@@ -14,7 +14,7 @@ pub const bench = @import("commands/bench.zig");
 pub const compare = @import("commands/compare.zig");
 /// Describes a scene.
 pub const info = @import("commands/info.zig");
-/// Renders a scene.
+/// Renders scenes.
 pub const render = @import("commands/render.zig");
 /// Renders what JSON describes.
 pub const scenario = @import("commands/scenario.zig");

@@ -115,11 +115,8 @@ const Checker = struct {
                 return true;
             },
             .items => {
-            .items => {
                 if (value.* != .array) return true;
                 for (value.array.items) |*item| try checker.check(rule, item);
-                return true;
-            },
                 return true;
             },
             .minItems => return value.* != .array or value.array.items.len >= rule.integer,
