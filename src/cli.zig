@@ -256,7 +256,7 @@ const sections: []const Section = &.{
         .{
             .usage = "--jobs N",
             .help = "scenes side by side, " ++ settings.job_count.text() ++
-                " (default: by their number\nand the pictures' size)",
+                "\n(default: by their number and the pictures' size)",
         },
     } },
     .{ .title = "Camera", .options = &.{
@@ -571,9 +571,9 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\       raylane help [COMMAND]
     \\
     \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, a folder of such, - for
-    \\standard input, or builtin:cornell, atrium, nave or handles. The image is written
-    \\to the working directory under the scene's name, as a whole or not at all, a
-    \\report to stdout. Names of several come from a template: -o DIR/ or
+    \\standard input, or builtin:cornell, atrium, nave or handles. The image is
+    \\written to the working directory under the scene's name, as a whole or not at
+    \\all, a report to stdout. Names of several come from a template: -o DIR/ or
     \\-o 'DIR/{model}_{frame:4}.png', of {model}, {camera}, {material_variant},
     \\{frame}, {view} and {layer}.
     \\
@@ -1509,6 +1509,96 @@ test "a long option takes its value joined or apart, a short one also attached" 
     }
     try expectUsage("'-t' needs a value", &.{ "s", "-t" });
     try expectUsage("'--threads': '' is not 1 to 256", &.{ "s", "--threads=" });
+}
+
+test "names of other programs are understood or answered with ours" {
+    const options = try optionsForTest(&.{
+        "--samples=3", "--hdri=none", "--nthreads", "2", "--camera-position=1,2,3", "--max-depth=4",
+    });
+    try std.testing.expectEqual(3, options.render.sample_count);
+    try std.testing.expectEqual(.none, options.view.environment.source);
+    try std.testing.expectEqual(2, options.thread_count.?);
+    try std.testing.expectEqual([3]f32{ 1, 2, 3 }, options.view.viewpoint.eye.?);
+    try std.testing.expectEqual(4, options.render.depth);
+    try expectUsage("option '--camera-orbit' is '--orbit' here", &.{"--camera-orbit=1deg 2deg 3m"});
+    try expectUsage("'--background-color' is '--background'", &.{"--background-color=0,0,0"});
+    try std.testing.expectEqual(.version, try parseForTest(&.{"-V"}));
+    // No name may be that of two options.
+    for (Reader.flags, 0..) |*flag, index| for ([_][]const []const u8{
+        flag.also, flag.meant, &.{flag.long},
+    }) |names| for (names) |name| {
+        for (Reader.flags[index + 1 ..]) |*other|
+            try std.testing.expect(!other.isNamed(name[2..]) and !other.isMeant(name[2..]));
+    };
+}
+
+test "help for a command by a word" {
+    try std.testing.expectEqual(.help, try parseForTest(&.{"help"}));
+    try std.testing.expectEqual(.help, try parseForTest(&.{ "help", "render" }));
+    try std.testing.expectEqual(.bench_help, try parseForTest(&.{ "help", "bench" }));
+    try std.testing.expectEqual(.serve_help, try parseForTest(&.{ "help", "serve" }));
+    try std.testing.expectEqual(.serve_help, try parseForTest(&.{ "serve", "-h" }));
+    var diagnostic: Diagnostic = .{};
+    const result = parse(&.{ "help", "benhc" }, test_names, &diagnostic);
+    try std.testing.expectError(error.UsageInvalid, result);
+    const expected = "no command 'benhc', did you mean 'bench'?";
+    try std.testing.expectEqualStrings(expected, diagnostic.message.text());
+}
+
+test "a size in two options, and pixels of pixels" {
+    const view = (try optionsForTest(&.{ "-r512", "--width=8", "--height=4" })).view;
+    try std.testing.expectEqual([2]u32{ 8, 4 }, view.resolution.?);
+    try std.testing.expectEqual(null, view.long_side);
+    const later = (try optionsForTest(&.{ "--width=8", "--height=4", "-r3x2" })).view;
+    try std.testing.expectEqual([2]u32{ 3, 2 }, later.resolution.?);
+    const doubled = (try optionsForTest(&.{ "--pixel-ratio=2", "-r8x4" })).view;
+    try std.testing.expectEqual([2]u32{ 16, 8 }, doubled.resolution.?);
+    const long = (try optionsForTest(&.{ "-r100", "--pixel-ratio=3" })).view;
+    try std.testing.expectEqual(300, long.long_side.?);
+    try expectUsage("'--width' without '--height'", &.{ "s", "--width=8" });
+    try expectUsage("'--height' without '--width'", &.{ "s", "--height=8" });
+    try expectUsage("multiplies a size", &.{ "s", "--pixel-ratio=2" });
+    try expectUsage("is not 1 to 8", &.{ "s", "--pixel-ratio=9" });
+    try expectUsage("32768x32768 is not WxH", &.{ "s", "--pixel-ratio=2", "-r16384x16384" });
+    try expectUsage("131072x2 is not WxH", &.{ "s", "--pixel-ratio=2", "-r65536x1" });
+    try expectUsage("side of 32768 is not 1 to", &.{ "s", "--pixel-ratio=2", "-r16384" });
+    try expectUsage("65536x65536 is not WxH", &.{ "s", "--width=65536", "--height=65536" });
+}
+
+test "scenarios are kept for whoever reads them, and what comes after counts" {
+    const call = (try parseForTest(&.{ "--scenario={}", "-q", "a.glb" })).scenario;
+    try std.testing.expectEqualStrings("{}", call.scenario);
+    try std.testing.expectEqual(3, call.arguments.len);
+    try expectUsage("twice", &.{ "--scenario=a", "--scenario=b" });
+    try expectUsage("'--scenario'", &.{"--scenario="});
+    var diagnostic: Diagnostic = .{};
+    const scenario: []const [:0]const u8 = &.{ "--spp=2", "--depth=3", "--", "-a", "b" };
+    const own = try parseParts(.{ scenario, &.{ "--spp=4", "-q" } }, test_names, &diagnostic);
+    try std.testing.expectEqual(4, own.render.sample_count);
+    try std.testing.expectEqual(3, own.render.depth);
+    try std.testing.expectEqualStrings("-a", own.scene);
+    try std.testing.expectEqual(2, own.batch.input_count);
+    var inputs = own.inputs(&diagnostic);
+    for ([_][]const u8{ "-a", "b" }) |name|
+        try std.testing.expectEqualStrings(name, inputs.next().?);
+    const other = try parseParts(.{ scenario, &.{"c"} }, test_names, &diagnostic);
+    try std.testing.expectEqualStrings("c", other.scene);
+    try std.testing.expectEqual(1, other.batch.input_count);
+    inputs = other.inputs(&diagnostic);
+    try std.testing.expectEqualStrings("c", inputs.next().?);
+    try std.testing.expectEqual(2, (try parseForTest(&.{ "serve", "-q", "-t2" })).serve.len);
+    const bad = parse(&.{ "serve", "--spp=0" }, test_names, &diagnostic);
+    try std.testing.expectError(error.UsageInvalid, bad);
+    const named = parse(&.{ "serve", "a.glb" }, test_names, &diagnostic);
+    try std.testing.expectError(error.UsageInvalid, named);
+    const text = diagnostic.message.text();
+    try std.testing.expectStringEndsWith(text, "(see raylane serve --help)");
+}
+
+test wantsJson {
+    try std.testing.expect(wantsJson(&.{ "a", "--stats=json" }));
+    try std.testing.expect(wantsJson(&.{ "--stats", "json", "--spp=0" }));
+    try std.testing.expect(!wantsJson(&.{ "--stats=text", "json", "--stats" }));
 }
 
 test "unknown options are named, misspelt ones are recognised" {
