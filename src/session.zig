@@ -268,6 +268,11 @@ pub const Session = struct {
         session.scene = null;
     }
 
+    /// Has the next view read its environment's file again.
+    pub fn forgetEnvironment(session: *Session) void {
+        session.environment.deinit();
+    }
+
     fn dropPosed(session: *Session) void {
         if (session.posed) |*posed| posed.deinit();
         session.posed = null;
