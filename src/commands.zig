@@ -16,5 +16,5 @@ pub const compare = @import("commands/compare.zig");
 pub const info = @import("commands/info.zig");
 /// Makes a picture of its parts.
 pub const merge = @import("commands/merge.zig");
-/// Renders a scene.
+/// Renders scenes.
 pub const render = @import("commands/render.zig");

@@ -1,6 +1,6 @@
 //! Stage 4: `Image` -> file.
 //!
-//! In: a finished picture. Out: a file in one of eight formats, whole and in its place, or nothing
+//! In: a finished picture. Out: a file in one of nine formats, whole and in its place, or nothing
 //! at all. Colours are made by all threads; the bytes depend on the picture and the settings alone.
 
 const std = @import("std");
@@ -13,6 +13,7 @@ const parallel = @import("parallel.zig");
 const layers_file = @import("output/layers.zig");
 const stb_image_write = @import("output/stb_image_write.zig");
 const target_file = @import("output/target.zig");
+const y4m = @import("output/y4m.zig");
 const encode_file = @import("output/encode.zig");
 const exposure_file = @import("output/exposure.zig");
 const assert = std.debug.assert;
@@ -57,7 +58,7 @@ fn formOf(
 ) encode_file.Form {
     return switch (format) {
         .png, .tga => if (transparent) .rgba else .rgb,
-        .jpg, .bmp, .ppm => .rgb,
+        .jpg, .bmp, .ppm, .y4m => .rgb,
         .hdr => .radiance,
         .pfm => .linear,
         .exr => switch (exr_kind) {
@@ -82,6 +83,10 @@ pub const Settings = struct {
     jpeg_quality: u8 = choices.jpeg_quality.default,
     /// Of the colours in an OpenEXR file.
     exr_kind: choices.ExrKind = .half,
+    /// Of a film.
+    frame_rate: choices.FrameRate = .{},
+    /// The film has frames already.
+    is_continued: bool = false,
     /// Layers of the picture's size, each once at most; only a file in OpenEXR holds them.
     further: []const Further = &.{},
     pool: *parallel.Pool,
@@ -121,7 +126,7 @@ pub fn check(
         .{ format, sideMax(format) },
     );
     const channel_count: u64 = channelCount(formOf(format, transparent, .half));
-    const by_library = format != .ppm and format != .pfm;
+    const by_library = format != .ppm and format != .pfm and format != .y4m;
     const value_count = (width * channel_count + 1) * height;
     if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
         error.InputOutput,
@@ -184,6 +189,16 @@ pub fn write(
         .pfm => try target.finish(&.{
             std.mem.print(&buffer, "PF\n{d} {d}\n-1.0\n", size) catch unreachable, pixels,
         }, diagnostic),
+        .y4m => {
+            var header: [y4m.header_bytes_max]u8 = undefined;
+            const is_first = !settings.is_continued;
+            const planes = try y4m.planes(gpa, pixels);
+            defer gpa.free(planes);
+            try target.finish(&.{
+                y4m.header(&header, image.width, image.height, settings.frame_rate, is_first),
+                planes,
+            }, diagnostic);
+        },
         inline .png, .jpg, .tga, .bmp, .hdr => |coded| {
             const file = try stb_image_write.encode(gpa, @field(
                 stb_image_write.Codec,
@@ -259,6 +274,7 @@ const Work = struct {
 
 test {
     _ = openexr;
+    _ = y4m;
     _ = stb_image_write;
     _ = target_file;
     _ = @import("output/temporary.zig");

@@ -6,6 +6,7 @@
 
 const std = @import("std");
 
+pub const batch = @import("batch.zig");
 pub const bench = @import("bench.zig");
 pub const builtin = @import("builtin.zig");
 pub const cli = @import("cli.zig");

@@ -33,6 +33,7 @@ const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
 const Frame = @import("world.zig").Frame;
+const Light = @import("world.zig").Light;
 const World = @import("world.zig").World;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -83,6 +84,18 @@ pub const Pose = struct {
     view: settings.View = .{},
 };
 
+/// What the pictures of a film have of one of them: a film neither jumps nor flickers.
+pub const Reference = struct {
+    view: prepare.Reference,
+    /// What the light of surfaces that emit is worth; null: it was not weighed.
+    emission: ?emission.Weight,
+    /// In stops, of formats that are exposed.
+    exposure_ev: f32,
+    is_metered: bool,
+    /// What a dimmed studio is multiplied by.
+    studio_scale: ?f32,
+};
+
 /// One scene, its threads, and what has been made so far. Must stay where it is.
 pub const Session = struct {
     gpa: Allocator,
@@ -123,11 +136,17 @@ pub const Session = struct {
     layout: ?film_file.Layout = null,
     /// What parts say of what they are of.
     identity: ?PictureIdentity = null,
+    /// Of the scene, once it is known.
+    scene_fingerprint: ?u64 = null,
     traced: trace.Statistics = .{},
     /// What the film was traced with.
     rendered: settings.Render = .{},
     /// What the view shows, for the exposure; null: not metered yet.
     metered: ?output.Metered = null,
+    /// What `view` and `render` take from another picture; the caller's.
+    reference: ?*const Reference = null,
+    /// What the light of surfaces that emit is worth in the view; null: not weighed.
+    weight: ?emission.Weight = null,
     /// What it was written with, where that is not linear.
     appearance: ?Report.Appearance = null,
 
@@ -208,6 +227,7 @@ pub const Session = struct {
         session.dropScene();
         session.start = Io.Clock.awake.now(session.io);
         session.environment.dropScene();
+        session.scene_fingerprint = null;
         session.scene = scene;
         session.ownership = ownership;
         session.facts = .{
@@ -225,7 +245,9 @@ pub const Session = struct {
     /// Notes what parts of pictures of this view, by a program of this version, are to say of what
     /// they are of. Before the scene is dropped; asserts that there is a view.
     pub fn identify(session: *Session, version: []const u8) void {
-        const scene = fingerprint.ofScene(&session.scene.?);
+        const known = session.scene_fingerprint;
+        const scene = known orelse fingerprint.ofScene(&session.scene.?);
+        session.scene_fingerprint = scene;
         const is_file = session.seen.environment.source == .file;
         const around = if (is_file) fingerprint.of(session.environment.made.?.map) else 0;
         session.identity = .{
@@ -233,6 +255,14 @@ pub const Session = struct {
             .scene = fingerprint.of([2]u64{ scene, around }),
             .moment = fingerprint.of(session.posed.?.moment),
         };
+    }
+
+    /// Frees the scene and all that is made of it. Threads, film and environments stay for another.
+    pub fn drop(session: *Session) void {
+        session.dropWorld();
+        session.dropLoaded();
+        session.dropScene();
+        session.reference = null;
     }
 
     /// Frees the scene, for which there is no use after the last `view`.
@@ -365,6 +395,9 @@ pub const Session = struct {
             &session.motion,
         );
         session.times.prepare_ns += session.since(start);
+        session.weight = null;
+        const shift = session.pose_cache.?.shift;
+        const reference = if (session.reference) |first| first.view.shiftedBy(shift) else null;
         try prepare.view(&session.world.?, session.io, &session.posed.?.scene, .{
             .camera = choices.camera,
             .viewpoint = choices.viewpoint,
@@ -380,7 +413,33 @@ pub const Session = struct {
                 motion
             else
                 null,
+            .reference = if (reference) |*first| first else null,
         }, session.diagnostic, &session.times);
+    }
+
+    /// The view as what other pictures of a film go by that are rendered and written like this.
+    /// Asserts that there is a view, which is to be chosen anew before it is rendered.
+    pub fn refer(
+        session: *Session,
+        choices: settings.Render,
+        written: settings.Write,
+    ) Error!Reference {
+        session.reference = null;
+        session.rendered = choices;
+        session.metered = null;
+        try session.weighEmitters();
+        try session.dimStudio();
+        const world = &session.world.?;
+        // The file of a part says how all of the picture is exposed.
+        const is_exposed = !output.isLinear(written.format) or choices.noise != null or
+            choices.part != .whole;
+        return .{
+            .view = session.framing(),
+            .emission = session.weight,
+            .exposure_ev = if (is_exposed) try session.exposureOf(written.exposure) else 0,
+            .is_metered = session.isMetered(written.exposure),
+            .studio_scale = if (session.isStudioDimmed()) world.environment.scale[0] else null,
+        };
     }
 
     fn chooseFor(
@@ -398,6 +457,14 @@ pub const Session = struct {
             session.output,
             session.diagnostic,
         );
+    }
+
+    /// How the view is framed. Asserts that there is one.
+    pub fn framing(session: *const Session) prepare.Reference {
+        const world = &session.world.?;
+        const is_framed = world.facts.camera_is_default or
+            session.seen.viewpoint.replacesCamera();
+        return .of(world, is_framed, session.pose_cache.?.shift);
     }
 
     /// Traces the picture. Asserts that there is a view, and a tree of the variant's width.
@@ -630,6 +697,7 @@ pub const Session = struct {
             .background = chosen.background,
             .jpeg_quality = chosen.jpeg_quality,
             .exr_kind = chosen.exr_kind,
+            .frame_rate = chosen.frame_rate,
         }, target, session.diagnostic);
         session.times.output_ns = session.since(start);
         session.times.total_ns = session.since(session.start);
@@ -643,6 +711,7 @@ pub const Session = struct {
         const rendered = &session.rendered;
         return fingerprint.of(.{
             session.identity.?.moment,
+            session.reference,
             session.texture_side_max,
             seen,
             rendered.integrator,
@@ -683,6 +752,8 @@ pub const Session = struct {
             .jpeg_quality = @intCast(choices.jpeg_quality),
             .rows = session.rowsWritten(),
             .exr_kind = choices.exr_kind,
+            .frame_rate = choices.frame_rate,
+            .is_continued = choices.is_continued,
             .pool = &session.pool,
         };
     }
@@ -708,6 +779,7 @@ pub const Session = struct {
     }
 
     fn isMetered(session: *const Session, exposure: settings.Exposure) bool {
+        if (session.reference) |reference| return reference.is_metered;
         return switch (exposure) {
             .ev => false,
             .auto => true,
@@ -717,6 +789,7 @@ pub const Session = struct {
 
     /// In stops: as chosen, or metered. That time counts as tracing.
     fn exposureOf(session: *Session, exposure: settings.Exposure) trace.Error!f32 {
+        if (session.reference) |reference| return reference.exposure_ev;
         if (!session.isMetered(exposure)) return if (exposure == .ev) exposure.ev else 0;
         const start = Io.Clock.awake.now(session.io);
         const metered = try session.meter();
@@ -735,6 +808,12 @@ pub const Session = struct {
     /// scene's own lights, whichever exposure is chosen; all of it where these light next to
     /// nothing.
     fn dimStudio(session: *Session) trace.Error!void {
+        if (session.reference) |reference| {
+            const scale = reference.studio_scale orelse return;
+            const environment = &session.world.?.environment;
+            if (session.world.?.facts.environment_is_default) environment.scale = @splat(scale);
+            return;
+        }
         if (!session.isStudioDimmed()) return;
         const metered = try session.meter();
         const share: f32 = if (metered.is_black) 1 else studio_share;
@@ -793,23 +872,10 @@ pub const Session = struct {
         if (facts.emitter_count == 0) return;
         const count = facts.emitter_count;
         const all = world.lights;
-        errdefer world.lights = all;
         const others = all[0 .. all.len - count];
-        world.lights = others;
-        var besides = try session.traceSmall();
-        defer besides.deinit(session.gpa);
-        const around = world.environment;
-        errdefer world.environment = around;
-        world.environment.map = null;
-        world.environment.ambient = 0;
-        world.lights = &.{};
-        var glow = try session.traceSmall();
-        defer glow.deinit(session.gpa);
-        world.lights = all[others.len..];
-        var lit = try session.traceSmall();
-        defer lit.deinit(session.gpa);
-        world.environment = around;
-        const share = emission.weigh(besides.image.pixels, glow.image.pixels, lit.image.pixels);
+        const known = if (session.reference) |reference| reference.emission else null;
+        const share = known orelse try session.weigh(others, all[others.len..]);
+        session.weight = share;
         world.lights = if (share.shows) all else others;
         facts.emitter_count = 0;
         if (!share.prevails) return;
@@ -818,6 +884,31 @@ pub const Session = struct {
         facts.lights_are_default = false;
         world.lights = all[others.len..];
         world.environment.ambient = session.seen.ambient orelse 0;
+    }
+
+    /// Weighs some of the lights against the others, and all else that shines.
+    fn weigh(
+        session: *Session,
+        others: []const Light,
+        own: []const Light,
+    ) trace.Error!emission.Weight {
+        const world = &session.world.?;
+        const all = world.lights;
+        defer world.lights = all;
+        world.lights = others;
+        var besides = try session.traceSmall();
+        defer besides.deinit(session.gpa);
+        const around = world.environment;
+        defer world.environment = around;
+        world.environment.map = null;
+        world.environment.ambient = 0;
+        world.lights = &.{};
+        var glow = try session.traceSmall();
+        defer glow.deinit(session.gpa);
+        world.lights = own;
+        var lit = try session.traceSmall();
+        defer lit.deinit(session.gpa);
+        return emission.weigh(besides.image.pixels, glow.image.pixels, lit.image.pixels);
     }
 
     /// Says so where the picture shows next to nothing, and what may help.

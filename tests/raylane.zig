@@ -6,6 +6,7 @@
 
 const raylane = @import("tests").raylane;
 
+pub const batch = raylane.batch;
 pub const bench = raylane.bench;
 pub const builtin = raylane.builtin;
 pub const cli = raylane.cli;

@@ -20,7 +20,8 @@ const directions = [_]Row{
     .{ .part = "main", .may_import = &.{ "module:raylane", "signals", "commands" } },
     .{ .part = "commands", .may_import = &.{ "module:raylane", "signals" } },
     .{ .part = "signals", .may_import = &.{"module:raylane"} },
-    .{ .part = "cli", .may_import = &.{ "module:config", "variant" } },
+    .{ .part = "cli", .may_import = &.{ "module:config", "batch", "variant" } },
+    .{ .part = "batch", .may_import = &.{} },
     .{
         // The one that leads scenes through all stages.
         .part = "session",

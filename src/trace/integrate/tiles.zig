@@ -328,7 +328,6 @@ pub fn render(
     }
     const progress = settings.progress;
     if (integrator.shared) |shared| _ = job.doSteps(0, shared.steps_before, film, progress);
-    job.tellBegin();
     const is_whole = job.run();
     if (settings.isCancelled()) return error.Canceled;
     var total = try job.finish(is_whole);
@@ -406,6 +405,7 @@ const Job = struct {
         const settings = job.settings;
         const tiles = job.tiles;
         var done: u32 = 0;
+        job.tellBegin();
         while (done < settings.sample_count) : (done = tiles.samples_due) {
             if (done > 0 and job.isEnded()) return false;
             const until = if (settings.course) |course|
