@@ -619,13 +619,7 @@ const Parser = struct {
                 if (options.view.long_side == null and options.view.resolution == null)
                     return reader.bad(given, expected_size);
             },
-            .crop => options.render.part = .{ .crop = cropOf(given.value) orelse
-                return reader.bad(given, "four pixels, or fractions from 0.0 to 1.0, of a " ++
-                    "rectangle's left, upper, right and lower edge") },
-            .tile => options.render.part = .{ .tile = tileOf(given.value) orelse
-                return reader.bad(given, comptimePrint("I/N, N {s}, I 1 to N", .{
-                    settings.part_count.text(),
-                })) },
+            .crop, .tile => options.render.part = try parser.partOf(given),
             .threads => options.thread_count = try reader.number(given, settings.thread_count),
             .spp => options.render.sample_count = try reader.number(given, settings.sample_count),
             .noise, .time_budget, .progress_image, .partial => try parser.setSampling(given),
@@ -672,6 +666,20 @@ const Parser = struct {
             .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
         }
+    }
+
+    fn partOf(parser: *Parser, given: Reader.Given) Error!settings.Part {
+        const reader = &parser.reader;
+        return switch (given.id) {
+            .crop => .{ .crop = cropOf(given.value) orelse
+                return reader.bad(given, "four pixels, or fractions from 0.0 to 1.0, of a " ++
+                    "rectangle's left, upper, right and lower edge") },
+            .tile => .{ .tile = tileOf(given.value) orelse
+                return reader.bad(given, comptimePrint("I/N, N {s}, I 1 to N", .{
+                    settings.part_count.text(),
+                })) },
+            else => unreachable, // `set` hands over the above.
+        };
     }
 
     fn setBatch(parser: *Parser, given: Reader.Given) Error!void {
@@ -983,7 +991,11 @@ const Parser = struct {
 
 /// The format of a file called `name`: the one chosen, or by its extension; png on standard output.
 /// An error of the reader where they contradict each other, or there is neither.
-pub fn formatFor(reader: anytype, chosen: ?settings.Format, name: []const u8) Error!settings.Format {
+pub fn formatFor(
+    reader: anytype,
+    chosen: ?settings.Format,
+    name: []const u8,
+) Error!settings.Format {
     if (isStdout(name)) return chosen orelse .png;
     const extension = std.fs.path.extension(name);
     const implied = if (extension.len == 0) null else formatOf(extension[1..]);

@@ -60,9 +60,12 @@ pub const Record = struct {
     /// In what it is first unlike a part of the same picture, for messages that go on with its
     /// name; null: in nothing.
     pub fn differenceFrom(record: *const Record, other: *const Record) ?[]const u8 {
-        if (record.width != other.width or record.height != other.height) return "it is of another size than";
-        if (!std.mem.eql(u8, &record.scene, &other.scene)) return "it is of another scene than";
-        if (!std.mem.eql(u8, &record.options, &other.options)) return "it was rendered with other options than";
+        if (record.width != other.width or record.height != other.height)
+            return "it is of another size than";
+        if (!std.mem.eql(u8, &record.scene, &other.scene))
+            return "it is of another scene than";
+        if (!std.mem.eql(u8, &record.options, &other.options))
+            return "it was rendered with other options than";
         // What follows from these, unless somebody has changed it.
         const is_same = record.layerSet().eql(other.layerSet()) and
             std.mem.eql(settings.Layer, record.further, other.further) and
