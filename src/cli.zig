@@ -14,13 +14,17 @@ const merge = @import("cli/merge.zig");
 const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
+const completion = @import("cli/completion.zig");
+const man = @import("cli/man.zig");
 const settings = @import("settings.zig");
 const diagnostic_file = @import("diagnostic.zig");
 const Diagnostic = diagnostic_file.Diagnostic;
+const Page = @import("cli/page.zig").Page;
 const Section = arguments_file.Section;
 const comptimePrint = std.fmt.comptimePrint;
 const integer = arguments_file.integer;
 const namesOf = arguments_file.namesOf;
+const wordsOf = arguments_file.wordsOf;
 const nearest = @import("cli/nearest.zig").nearest;
 const quote = diagnostic_file.quote;
 const variant_file = @import("variant.zig");
@@ -44,6 +48,10 @@ pub const Command = union(enum) {
     info_help,
     merge: Merge,
     merge_help,
+    completion: Shell,
+    completion_help,
+    man,
+    man_help,
 };
 
 /// What is asked for of several pictures.
@@ -67,8 +75,57 @@ pub const Merge = merge.Merge;
 /// What `raylane merge --help` prints.
 pub const merge_help = merge.help;
 
+/// What `raylane completion` is for.
+pub const Shell = completion.Shell;
+/// Writes what `raylane completion` prints.
+pub const writeCompletion = completion.write;
+
+/// All commands, that without a word first: what completions and the manual are made of.
+pub const pages: []const Page = &.{
+    .of("", help, sections, null),
+    .of("bench", bench_help, bench.sections, null),
+    .of("compare", compare_help, compare.sections, null),
+    .of("info", info_help, info.sections, null),
+    .of("merge", merge_help, merge.sections, null),
+    .of("completion", completion_help, &.{}, wordsOf(Shell)),
+    .of("man", man_help, &.{}, &.{}),
+};
+
+/// What `raylane completion --help` prints.
+pub const completion_help: []const u8 = "raylane " ++ version ++
+    \\: prints a script that completes its options in a shell
+    \\
+    \\usage: raylane completion bash|zsh|fish
+    \\
+    \\For this shell alone, or wherever the shell looks for such files:
+    \\
+    \\  source <(raylane completion bash)
+    \\  raylane completion bash > ~/.local/share/bash-completion/completions/raylane
+    \\  raylane completion zsh > a folder of fpath, there called _raylane
+    \\  raylane completion fish > ~/.config/fish/completions/raylane.fish
+    \\
+;
+
+/// What `raylane man --help` prints.
+pub const man_help: []const u8 = "raylane " ++ version ++
+    \\: prints its manual's page, as roff
+    \\
+    \\usage: raylane man
+    \\
+    \\To read it, or to keep it where man looks:
+    \\
+    \\  raylane man | man -l -
+    \\  raylane man > ~/.local/share/man/man1/raylane.1
+    \\
+;
+
+/// Writes what `raylane man` prints.
+pub fn writeMan(writer: *std.Io.Writer) std.Io.Writer.Error!void {
+    return man.write(writer, version, pages);
+}
+
 /// Words that stand before all others, but for `render`, which may stand among flags.
-const Word = enum { bench, compare, info, merge };
+const Word = enum { bench, compare, info, merge, completion, man };
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -185,11 +242,16 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--format FORMAT",
+            .words = wordsOf(settings.Format),
             .help = "png, jpg, tga, bmp or ppm, linear: hdr, pfm or exr,\n" ++
                 "or a film: y4m",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
-        .{ .usage = "--exr KIND", .help = "half or float: colours of an EXR file (default: half)" },
+        .{
+            .usage = "--exr KIND",
+            .words = wordsOf(settings.ExrKind),
+            .help = "half or float: colours of an EXR file (default: half)",
+        },
         .{
             .usage = "-r, --resolution WxH|N",
             .help = comptimePrint("size in pixels, or of the long side in the camera's\n" ++
@@ -207,15 +269,18 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--exposure EV|auto",
+            .words = &.{"auto"},
             .help = "brighten by EV stops, or by what is seen (default:\n" ++
                 "auto for scenes with lights of their own, else 0)",
         },
         .{
             .usage = "--tonemap CURVE",
+            .words = wordsOf(settings.ToneMapping),
             .help = namesOf(settings.ToneMapping) ++ " (default: neutral)",
         },
         .{
             .usage = "--background WHAT",
+            .words = &.{ "env", "studio", "transparent" },
             .help = "env, studio, transparent, a CSS colour (red, #rrggbb)\n" ++
                 "or radiance R,G,B (default: a grey gradient)",
         },
@@ -247,11 +312,15 @@ const sections: []const Section = &.{
         .{
             .usage = "--jobs N",
             .help = "scenes side by side, " ++ settings.job_count.text() ++
-                " (default: by their number\nand the pictures' size)",
+                " (default: by their\nnumber and the pictures' size)",
         },
     } },
     .{ .title = "Camera", .options = &.{
-        .{ .usage = "--camera WHICH", .help = "name or index of a camera, or auto: all in view" },
+        .{
+            .usage = "--camera WHICH",
+            .words = &.{"auto"},
+            .help = "name or index of a camera, or auto: all in view",
+        },
         .{
             .usage = "--eye X,Y,Z",
             .help = "where the camera stands, in place of the file's",
@@ -281,6 +350,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--animation WHICH",
+            .words = &.{"all"},
             .help = "name or index of an animation, or all (default: none)",
         },
         .{
@@ -289,14 +359,17 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--up-axis AXIS",
+            .words = wordsOf(settings.UpAxis),
             .help = "y or z: which axis of the file points up (STL: z)",
         },
         .{
             .usage = "--format-in FORMAT",
+            .words = wordsOf(settings.SceneFormat),
             .help = namesOf(settings.SceneFormat) ++ ", whatever it holds",
         },
         .{
             .usage = "--env FILE",
+            .words = &.{ "studio", "none" },
             .help = "light from all around: an equirectangular image of\n" ++
                 "radiance (exr, hdr, png), studio or none (default:\n" ++
                 "the scene's, or studio, dim around its own lights)",
@@ -317,6 +390,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--floor WHAT",
+            .words = wordsOf(settings.Floor),
             .help = "shadow: a floor that shows it, or none (default)",
         },
         .{
@@ -415,17 +489,20 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--bvh QUALITY",
+            .words = wordsOf(settings.TreeQuality),
             .help = namesOf(settings.TreeQuality) ++ ": time to build the scene's tree\n" ++
                 "against time to trace; the image is always the same",
         },
         .{
             .usage = "--instances HOW",
+            .words = wordsOf(settings.Instances),
             .help = namesOf(settings.Instances) ++ ": whether a mesh is\n" ++
                 "held once for all its instances: less memory, more\n" ++
                 "time; the image is always the same",
         },
         .{
             .usage = "--integrator NAME",
+            .words = wordsOf(settings.Integrator),
             .help = namesOf(settings.Integrator) ++ " (default: whitted)",
         },
         .{
@@ -446,7 +523,7 @@ const sections: []const Section = &.{
                 "ninth of them and its neighbours' by a filter",
         },
         .{ .usage = "--denoise", .help = "filter the noise out" },
-        .{ .usage = "--variant NAME", .help = "how rays are traced; the image is always the same" },
+        .{ .usage = "--variant NAME", .words = variant_file.names, .help = "how rays are traced; the image is always the same" },
         .{
             .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
@@ -456,12 +533,14 @@ const sections: []const Section = &.{
     .{ .title = "Messages", .options = &.{
         .{
             .usage = "--stats FORM",
+            .words = wordsOf(Stats),
             .help = "report as " ++ namesOf(Stats) ++ " (default: text, or none\n" ++
                 "when the image goes to standard output); when it is\n" ++
                 "given, a report that cannot be printed is an error",
         },
         .{
             .usage = "--progress HOW",
+            .words = wordsOf(settings.ProgressForm),
             .help = "auto: a line on a terminal; json: lines for programs,\n" ++
                 "see docs/progress.md; or none",
         },
@@ -489,11 +568,13 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
     \\       raylane info SCENE [options]          (see raylane info --help)
     \\       raylane merge -o FILE PART...         (see raylane merge --help)
+    \\       raylane completion bash|zsh|fish      (a script for that shell)
+    \\       raylane man                           (the manual's page)
     \\
     \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, a folder of such, - for
-    \\standard input, or builtin:cornell, atrium, nave or handles. The image is written
-    \\to the working directory under the scene's name, as a whole or not at all, a
-    \\report to stdout. Names of several come from a template: -o DIR/ or
+    \\standard input, or builtin:cornell, atrium, nave or handles. The image goes to
+    \\the working directory under the scene's name, as a whole or not at all, a report
+    \\to stdout. Names of several come from a template: -o DIR/, or such as
     \\-o 'DIR/{model}_{frame:4}.png', of {model}, {camera}, {material_variant},
     \\{frame}, {view} and {layer}.
     \\
@@ -524,6 +605,8 @@ pub fn parse(
                 .compare => .compare_help,
                 .info => .info_help,
                 .merge => .merge_help,
+                .completion => .completion_help,
+                .man => .man_help,
             } else .help;
     }
     if (first) |word| return switch (word) {
@@ -531,12 +614,28 @@ pub fn parse(
         .compare => .{ .compare = try compare.parse(arguments[1..], diagnostic) },
         .info => .{ .info = try info.parse(arguments[1..], diagnostic) },
         .merge => .{ .merge = try merge.parse(arguments[1..], diagnostic) },
+        .completion => .{ .completion = try shellOf(arguments[1..], diagnostic) },
+        .man => if (arguments.len == 1) .man else diagnostic.fail(
+            error.UsageInvalid,
+            "'man' takes no arguments (see raylane man --help)",
+            .{},
+        ),
     };
     var parser: Parser = .{
         .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
         .variant_names = variant_names,
     };
     return parser.run();
+}
+
+fn shellOf(words: []const [:0]const u8, diagnostic: *Diagnostic) Error!Shell {
+    const name = if (words.len == 1) words[0] else "";
+    return std.meta.stringToEnum(Shell, name) orelse diagnostic.fail(
+        error.UsageInvalid,
+        "'completion' takes a shell, " ++ comptime namesOf(Shell) ++
+            " (see raylane completion --help)",
+        .{},
+    );
 }
 
 const Parser = struct {
@@ -607,9 +706,8 @@ const Parser = struct {
             .denoise => options.render.denoise = true,
             .layers => options.render.layers = layersOf(given.value) orelse
                 return reader.bad(given, comptime namesOf(settings.Layer)),
-            .jpeg_quality => {
-                options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
-            },
+            .jpeg_quality => options.write.jpeg_quality =
+                try reader.number(given, settings.jpeg_quality),
             .exr => options.write.exr_kind = try reader.choice(given, settings.ExrKind),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
@@ -644,9 +742,8 @@ const Parser = struct {
                 return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
                     settings.exposure_ev_max, settings.exposure_ev_max,
                 })),
-            .tonemap => {
-                options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
-            },
+            .tonemap => options.write.tone_mapping =
+                try reader.choice(given, settings.ToneMapping),
             .stats, .quiet, .verbose, .progress, .progress_fd => try parser.setMessages(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
@@ -959,8 +1056,7 @@ const Parser = struct {
             return parser.reader.fail("a scene from standard input has no name for the image: " ++
                 "say one by -o", .{});
         };
-        const has_no_name = options.toStdout() or std.mem.endsWith(u8, output, "/");
-        if (has_no_name) return;
+        if (options.toStdout() or std.mem.endsWith(u8, output, "/")) return;
         options.write.format = try formatFor(&parser.reader, parser.format, output);
     }
 
@@ -1675,6 +1771,54 @@ test "the help fits a screen and says what flags take and may be" {
     }) |text| try std.testing.expect(std.mem.find(u8, help, text) != null);
 }
 
+test "completions and the manual have every option of every command, and its words" {
+    for (std.enums.values(Shell)) |shell| {
+        var script: std.Io.Writer.Allocating = .init(std.testing.allocator);
+        defer script.deinit();
+        try writeCompletion(&script.writer, shell, pages);
+        var manual: std.Io.Writer.Allocating = .init(std.testing.allocator);
+        defer manual.deinit();
+        try writeMan(&manual.writer);
+        for (pages) |*page| {
+            try expectFinds(script.written(), "{s}", page.name());
+            try expectFinds(manual.written(), "raylane {s}", page.word);
+            var options = page.iterate();
+            while (options.next()) |entry| {
+                const long = entry.flag.long;
+                if (shell == .fish)
+                    try expectFinds(script.written(), " -l {s} ", long[2..])
+                else
+                    try expectFinds(script.written(), "{s}", long);
+                for (entry.option.words) |word| try expectFinds(script.written(), "{s}", word);
+                var escaped: std.Io.Writer.Allocating = .init(std.testing.allocator);
+                defer escaped.deinit();
+                for (long) |byte| try escaped.writer.print("{s}", .{
+                    if (byte == '-') "\\-" else &[_]u8{byte},
+                });
+                try expectFinds(manual.written(), "\\fB{s}\\fR", escaped.written());
+            }
+        }
+    }
+}
+
+fn expectFinds(text: []const u8, comptime format: []const u8, part: []const u8) !void {
+    const needle = try std.testing.allocator.print(format, .{part});
+    defer std.testing.allocator.free(needle);
+    errdefer std.debug.print("not found: {s}\n", .{needle});
+    try std.testing.expect(std.mem.find(u8, text, needle) != null);
+}
+
+test "completion takes a shell, the manual nothing" {
+    try std.testing.expectEqual(.zsh, (try parseForTest(&.{ "completion", "zsh" })).completion);
+    try std.testing.expectEqual(.man, try parseForTest(&.{"man"}));
+    try std.testing.expectEqual(.man_help, try parseForTest(&.{ "man", "-h" }));
+    try std.testing.expectEqual(.completion_help, try parseForTest(&.{ "completion", "--help" }));
+    const common = @import("cli/testing.zig");
+    for ([_][]const [:0]const u8{ &.{}, &.{"tcsh"}, &.{ "bash", "zsh" } }) |words|
+        try common.expectUsage("completion", shellOf, "bash, zsh or fish", words);
+    try std.testing.expectError(error.UsageInvalid, parseForTest(&.{ "man", "1" }));
+}
+
 test {
     _ = batch;
     _ = bench;
@@ -1684,6 +1828,7 @@ test {
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");
+    _ = @import("cli/page.zig");
 }
 
 test "progress: its form, its descriptor, and what contradicts it" {

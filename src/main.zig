@@ -33,6 +33,12 @@ fn run(init: std.process.Init) ExitCode {
         .compare_help => return console.print(io, cli.compare_help),
         .info_help => return console.print(io, cli.info_help),
         .merge_help => return console.print(io, cli.merge_help),
+        .completion => |shell| return console.printBy(init.gpa, io, cli.writeCompletion, .{
+            shell, cli.pages,
+        }),
+        .completion_help => return console.print(io, cli.completion_help),
+        .man => return console.printBy(init.gpa, io, cli.writeMan, .{}),
+        .man_help => return console.print(io, cli.man_help),
         .version => return console.print(io, "raylane " ++ cli.version ++ "\n"),
         .licenses => return console.print(io, raylane.licenses),
         .list_variants => return console.print(io, comptime list: {

@@ -189,16 +189,7 @@ pub fn write(
         .pfm => try target.finish(&.{
             std.mem.print(&buffer, "PF\n{d} {d}\n-1.0\n", size) catch unreachable, pixels,
         }, diagnostic),
-        .y4m => {
-            var header: [y4m.header_bytes_max]u8 = undefined;
-            const is_first = !settings.is_continued;
-            const planes = try y4m.planes(gpa, pixels);
-            defer gpa.free(planes);
-            try target.finish(&.{
-                y4m.header(&header, image.width, image.height, settings.frame_rate, is_first),
-                planes,
-            }, diagnostic);
-        },
+        .y4m => try writeFrame(gpa, size, pixels, &settings, target, diagnostic),
         inline .png, .jpg, .tga, .bmp, .hdr => |coded| {
             const file = try stb_image_write.encode(gpa, @field(
                 stb_image_write.Codec,
@@ -240,6 +231,21 @@ pub fn writeChannels(
     const file = try openexr.encode(gpa, picture);
     defer gpa.free(file);
     try target.finish(&.{file}, diagnostic);
+}
+
+fn writeFrame(
+    gpa: Allocator,
+    size: [2]u32,
+    pixels: []const u8,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const planes = try y4m.planes(gpa, pixels);
+    defer gpa.free(planes);
+    var buffer: [y4m.header_bytes_max]u8 = undefined;
+    const header = y4m.header(&buffer, size, settings.frame_rate, !settings.is_continued);
+    return target.finish(&.{ header, planes }, diagnostic);
 }
 
 const Work = struct {

@@ -242,6 +242,14 @@ pub const Session = struct {
         };
     }
 
+    /// Frees the scene and all that is made of it. Threads, film and environments stay for another.
+    pub fn drop(session: *Session) void {
+        session.dropWorld();
+        session.dropLoaded();
+        session.dropScene();
+        session.reference = null;
+    }
+
     /// Notes what parts of pictures of this view, by a program of this version, are to say of what
     /// they are of. Before the scene is dropped; asserts that there is a view.
     pub fn identify(session: *Session, version: []const u8) void {
@@ -255,14 +263,6 @@ pub const Session = struct {
             .scene = fingerprint.of([2]u64{ scene, around }),
             .moment = fingerprint.of(session.posed.?.moment),
         };
-    }
-
-    /// Frees the scene and all that is made of it. Threads, film and environments stay for another.
-    pub fn drop(session: *Session) void {
-        session.dropWorld();
-        session.dropLoaded();
-        session.dropScene();
-        session.reference = null;
     }
 
     /// Frees the scene, for which there is no use after the last `view`.

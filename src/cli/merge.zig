@@ -44,7 +44,8 @@ pub const Merge = struct {
     }
 };
 
-const sections: []const Section = &.{
+/// What it understands.
+pub const sections: []const Section = &.{
     .{ .title = "Options", .options = &.{
         .{ .usage = "-o, --output FILE", .help = "name ending in a format; - is standard output" },
         .{ .usage = "--format FORMAT", .help = "as 'raylane render' has them (default: by FILE)" },
