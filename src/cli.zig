@@ -1348,6 +1348,7 @@ const Parser = struct {
             .{part},
         );
         if (options.write.format == .exr) {
+            options.render.is_merged = true;
             if (options.progress_image == null) return;
             return reader.fail("'--progress-image' does not go with parts that are merged", .{});
         }
@@ -1355,16 +1356,16 @@ const Parser = struct {
             "'--tile' makes an exr file, not a {t} file: 'raylane merge' makes that of all parts",
             .{options.write.format},
         );
-        if (options.render.denoise) return reader.fail(
-            "'--denoise' needs all of the picture: 'raylane merge' filters exr files of parts",
-            .{},
-        );
     }
 };
 
 /// The format of a file called `name`: the one chosen, or by its extension; png on standard output.
 /// An error of the reader where they contradict each other, or there is neither.
-pub fn formatFor(reader: anytype, chosen: ?settings.Format, name: []const u8) Error!settings.Format {
+pub fn formatFor(
+    reader: anytype,
+    chosen: ?settings.Format,
+    name: []const u8,
+) Error!settings.Format {
     if (isStdout(name)) return chosen orelse .png;
     const extension = std.fs.path.extension(name);
     const implied = if (extension.len == 0) null else formatOf(extension[1..]);
@@ -2110,9 +2111,10 @@ test "parts are rectangles or shares of tiles" {
         "--tile=/",       "--tile=1/70000",  "--crop=nan.,0,1,1",
     }) |bad| try expectUsage(bad[0..6], &.{ bad, "-oa.exr", "s" });
     try expectUsage("makes an exr file", &.{ "--tile=1/2", "s" });
-    try expectUsage("'--denoise' needs all", &.{ "--crop=0,0,1,1", "--denoise", "s" });
     try expectUsage("'--time-budget'", &.{ "--crop=0,0,1,1", "--time-budget=1", "s" });
-    _ = try optionsForTest(&.{ "--crop=0,0,1,1", "--denoise", "-oa.exr" });
+    const merged = try optionsForTest(&.{ "--crop=0,0,1,1", "-oa.exr" });
+    const alone = try optionsForTest(&.{"--crop=0,0,1,1"});
+    try std.testing.expect(merged.render.is_merged and !alone.render.is_merged);
 }
 
 test "points and lines are as wide as they may be" {
