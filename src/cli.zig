@@ -10,6 +10,7 @@ const batch = @import("cli/batch.zig");
 const bench = @import("cli/bench.zig");
 const compare = @import("cli/compare.zig");
 const info = @import("cli/info.zig");
+const merge = @import("cli/merge.zig");
 const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
@@ -41,6 +42,8 @@ pub const Command = union(enum) {
     compare_help,
     info: Info,
     info_help,
+    merge: Merge,
+    merge_help,
 };
 
 /// What is asked for of several pictures.
@@ -59,9 +62,13 @@ pub const compare_help = compare.help;
 pub const Info = info.Info;
 /// What `raylane info --help` prints.
 pub const info_help = info.help;
+/// What `raylane merge` is to do.
+pub const Merge = merge.Merge;
+/// What `raylane merge --help` prints.
+pub const merge_help = merge.help;
 
 /// Words that stand before all others, but for `render`, which may stand among flags.
-const Word = enum { bench, compare, info };
+const Word = enum { bench, compare, info, merge };
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -187,6 +194,16 @@ const sections: []const Section = &.{
             .usage = "-r, --resolution WxH|N",
             .help = comptimePrint("size in pixels, or of the long side in the camera's\n" ++
                 "aspect (default: the scene's own, or {d})", .{settings.long_side.default}),
+        },
+        .{
+            .usage = "--crop X0,Y0,X1,Y1",
+            .help = "a part alone: pixels, or fractions where a dot is in\n" ++
+                "them; exr files of parts can be merged",
+        },
+        .{
+            .usage = "--tile I/N",
+            .help = "1/N of the picture in tiles all over it, an exr file;\n" ++
+                "'raylane merge' makes the picture of all I",
         },
         .{
             .usage = "--exposure EV|auto",
@@ -471,6 +488,7 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
     \\       raylane info SCENE [options]          (see raylane info --help)
+    \\       raylane merge -o FILE PART...         (see raylane merge --help)
     \\
     \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, a folder of such, - for
     \\standard input, or builtin:cornell, atrium, nave or handles. The image goes to
@@ -505,12 +523,14 @@ pub fn parse(
                 .bench => .bench_help,
                 .compare => .compare_help,
                 .info => .info_help,
+                .merge => .merge_help,
             } else .help;
     }
     if (first) |word| return switch (word) {
         .bench => .{ .bench = try bench.parse(arguments[1..], diagnostic) },
         .compare => .{ .compare = try compare.parse(arguments[1..], diagnostic) },
         .info => .{ .info = try info.parse(arguments[1..], diagnostic) },
+        .merge => .{ .merge = try merge.parse(arguments[1..], diagnostic) },
     };
     var parser: Parser = .{
         .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
@@ -553,6 +573,7 @@ const Parser = struct {
         try parser.checkViewpoint();
         try parser.settleFormat();
         try parser.checkSampling();
+        try parser.checkPart();
         try parser.settleProgress();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
@@ -597,6 +618,13 @@ const Parser = struct {
                 if (options.view.long_side == null and options.view.resolution == null)
                     return reader.bad(given, expected_size);
             },
+            .crop => options.render.part = .{ .crop = cropOf(given.value) orelse
+                return reader.bad(given, "four pixels, or fractions from 0.0 to 1.0, of a " ++
+                    "rectangle's left, upper, right and lower edge") },
+            .tile => options.render.part = .{ .tile = tileOf(given.value) orelse
+                return reader.bad(given, comptimePrint("I/N, N {s}, I 1 to N", .{
+                    settings.part_count.text(),
+                })) },
             .threads => options.thread_count = try reader.number(given, settings.thread_count),
             .spp => options.render.sample_count = try reader.number(given, settings.sample_count),
             .noise, .time_budget, .progress_image, .partial => try parser.setSampling(given),
@@ -921,26 +949,86 @@ const Parser = struct {
             return parser.reader.fail("a scene from standard input has no name for the image: " ++
                 "say one by -o", .{});
         };
-        const has_no_name = options.toStdout() or std.mem.endsWith(u8, output, "/");
-        if (has_no_name) return;
-        const extension = std.fs.path.extension(output);
-        const implied = if (extension.len == 0) null else formatOf(extension[1..]);
-        if (parser.format) |format| {
-            if (implied == null or implied == format) return;
-            return parser.reader.fail("'--format {t}' contradicts the name {f}", .{
-                format, quote(output),
-            });
+        if (options.toStdout() or std.mem.endsWith(u8, output, "/")) return;
+        options.write.format = try formatFor(&parser.reader, parser.format, output);
+    }
+
+    /// Refuses what is of whole pictures.
+    fn checkPart(parser: *Parser) Error!void {
+        const reader = &parser.reader;
+        const options = &parser.options;
+        const part = options.render.part;
+        if (part == .whole) return;
+        if (options.render.time_budget_s != null) return reader.fail(
+            "'--time-budget' does not go with '--{t}': parts have as many samples as the whole",
+            .{part},
+        );
+        if (options.write.format == .exr) {
+            if (options.progress_image == null) return;
+            return reader.fail("'--progress-image' does not go with parts that are merged", .{});
         }
-        options.write.format = implied orelse return parser.reader.fail(
-            "the name {f} ends in no image format's extension, no --format says which, and a " ++
-                "folder's ends in /",
-            .{quote(output)},
+        if (part == .tile) return reader.fail(
+            "'--tile' makes an exr file, not a {t} file: 'raylane merge' makes that of all parts",
+            .{options.write.format},
+        );
+        if (options.render.denoise) return reader.fail(
+            "'--denoise' needs all of the picture: 'raylane merge' filters exr files of parts",
+            .{},
         );
     }
 };
 
+/// The format of a file called `name`: the one chosen, or by its extension; png on standard output.
+/// An error of the reader where they contradict each other, or there is neither.
+pub fn formatFor(reader: anytype, chosen: ?settings.Format, name: []const u8) Error!settings.Format {
+    if (isStdout(name)) return chosen orelse .png;
+    const extension = std.fs.path.extension(name);
+    const implied = if (extension.len == 0) null else formatOf(extension[1..]);
+    if (chosen) |format| {
+        if (implied == null or implied == format) return format;
+        return reader.fail("'--format {t}' contradicts the name {f}", .{ format, quote(name) });
+    }
+    return implied orelse reader.fail(
+        "the name {f} ends in no image format's extension, no --format says which, and a " ++
+            "folder's ends in /",
+        .{quote(name)},
+    );
+}
+
+/// A rectangle of at least one pixel; with a dot anywhere, all are fractions.
+fn cropOf(text: []const u8) ?settings.Part.Crop {
+    const has_dot = std.mem.findScalar(u8, text, '.') != null;
+    var pixels: [4]u32 = undefined;
+    var shares: [4]f32 = undefined;
+    var numbers = std.mem.splitScalar(u8, text, ',');
+    for (&pixels, &shares) |*pixel, *share| {
+        const number = numbers.next() orelse return null;
+        if (has_dot)
+            share.* = numberWithin(number, crop_shares) orelse return null
+        else
+            pixel.* = integer(number, .{ .min = 0, .max = settings.side.max }) orelse return null;
+    }
+    if (numbers.next() != null) return null;
+    if (has_dot) {
+        const is_some = shares[0] < shares[2] and shares[1] < shares[3];
+        return if (is_some) .{ .shares = shares } else null;
+    }
+    const is_some = pixels[0] < pixels[2] and pixels[1] < pixels[3];
+    return if (is_some) .{ .pixels = pixels } else null;
+}
+
+const crop_shares: struct { min: f32, max: f32 } = .{ .min = 0, .max = 1 };
+
+/// I/N.
+fn tileOf(text: []const u8) ?settings.Part.Tile {
+    const slash = std.mem.findScalar(u8, text, '/') orelse return null;
+    const number = integer(text[0..slash], settings.part_count) orelse return null;
+    const count = integer(text[slash + 1 ..], settings.part_count) orelse return null;
+    return if (number <= count) .{ .number = number, .count = count } else null;
+}
+
 /// A format by its extension, in either case; JPEG has two.
-fn formatOf(extension: []const u8) ?settings.Format {
+pub fn formatOf(extension: []const u8) ?settings.Format {
     if (std.ascii.eqlIgnoreCase(extension, "jpeg")) return .jpg;
     for (std.enums.values(settings.Format)) |format| {
         if (std.ascii.eqlIgnoreCase(extension, @tagName(format))) return format;
@@ -949,7 +1037,7 @@ fn formatOf(extension: []const u8) ?settings.Format {
 }
 
 /// A number of bytes above 0, or of K, M, G or T, each 1024 times the one before.
-fn bytesOf(text: []const u8) ?u64 {
+pub fn bytesOf(text: []const u8) ?u64 {
     if (text.len == 0) return null;
     const units = "KMGT";
     const unit = std.mem.findScalar(u8, units, std.ascii.toUpper(text[text.len - 1]));
@@ -1533,6 +1621,26 @@ test "noise is told of path tracing alone, as the picture is exposed" {
     }
 }
 
+test "parts are rectangles or shares of tiles" {
+    const Crop = settings.Part.Crop;
+    const pixels = (try optionsForTest(&.{"--crop=0,8,16,24"})).render.part;
+    try std.testing.expectEqual(Crop{ .pixels = .{ 0, 8, 16, 24 } }, pixels.crop);
+    const shares = (try optionsForTest(&.{"--crop=0,0.25,1,1"})).render.part;
+    try std.testing.expectEqual(Crop{ .shares = .{ 0, 0.25, 1, 1 } }, shares.crop);
+    const tile = (try optionsForTest(&.{ "--tile=3/4", "-oa.exr" })).render.part.tile;
+    try std.testing.expectEqual(settings.Part.Tile{ .number = 3, .count = 4 }, tile);
+    for ([_][:0]const u8{
+        "--crop=",        "--crop=1,2,3",    "--crop=1,2,1,3",    "--crop=1,2,3,4,5",
+        "--crop=0,0,1.5", "--crop=-1,0,1,1", "--crop=0,0,1.01,1", "--crop=0.5,0,0.5,1",
+        "--tile=0/1",     "--tile=2/1",      "--tile=1",          "--tile=1/0",
+        "--tile=/",       "--tile=1/70000",  "--crop=nan.,0,1,1",
+    }) |bad| try expectUsage(bad[0..6], &.{ bad, "-oa.exr", "s" });
+    try expectUsage("makes an exr file", &.{ "--tile=1/2", "s" });
+    try expectUsage("'--denoise' needs all", &.{ "--crop=0,0,1,1", "--denoise", "s" });
+    try expectUsage("'--time-budget'", &.{ "--crop=0,0,1,1", "--time-budget=1", "s" });
+    _ = try optionsForTest(&.{ "--crop=0,0,1,1", "--denoise", "-oa.exr" });
+}
+
 test "points and lines are as wide as they may be" {
     try std.testing.expectEqual(1.5, (try optionsForTest(&.{})).view.point_size);
     const wide = try optionsForTest(&.{"--point-size=4.25"});
@@ -1557,6 +1665,7 @@ test {
     _ = bench;
     _ = compare;
     _ = info;
+    _ = merge;
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");

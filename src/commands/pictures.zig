@@ -292,8 +292,12 @@ pub const Pictures = struct {
         try session.view(pictures.viewOf(view));
         pictures.sayWarnings();
         if (pictures.begun_count == 1) facts.say(pictures.batch.io, options, session);
+        if (options.render.part != .whole) session.identify(raylane.cli.version);
         if (pictures.isAlone()) session.dropScene();
-        session.checkWrite(options.write) catch return error.OutputFailed;
+        session.checkWrite(options.write, options.render.part) catch |err| return switch (err) {
+            error.InputOutput => error.OutputFailed,
+            else => |other| other,
+        };
         session.pool.thread_count = pictures.batch.threadCount();
         try session.render(options.render);
         try pictures.sizeFilm();
