@@ -425,7 +425,8 @@ pub const Session = struct {
         try session.weighEmitters();
         try session.dimStudio();
         const world = &session.world.?;
-        const is_exposed = !output.isLinear(written.format) or choices.noise != null;
+        const is_exposed = !output.isLinear(written.format) or choices.noise != null or
+            choices.part != .whole;
         return .{
             .view = session.framing(),
             .emission = session.weight,
@@ -703,6 +704,7 @@ pub const Session = struct {
         const rendered = &session.rendered;
         return fingerprint.of(.{
             session.identity.?.moment,
+            if (session.reference) |reference| fingerprint.of(reference.*) else 0,
             session.texture_side_max,
             seen,
             rendered.integrator,
