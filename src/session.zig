@@ -714,7 +714,7 @@ pub const Session = struct {
         const rendered = &session.rendered;
         return fingerprint.of(.{
             session.identity.?.moment,
-            session.reference,
+            if (session.reference) |reference| fingerprint.of(reference.*) else 0,
             session.texture_side_max,
             seen,
             rendered.integrator,
