@@ -99,32 +99,9 @@ pub const pages: []const Page = &.{
 };
 
 /// What `raylane completion --help` prints.
-pub const completion_help: []const u8 = "raylane " ++ version ++
-    \\: prints a script that completes its options in a shell
-    \\
-    \\usage: raylane completion bash|zsh|fish
-    \\
-    \\For this shell alone, or wherever the shell looks for such files:
-    \\
-    \\  source <(raylane completion bash)
-    \\  raylane completion bash > ~/.local/share/bash-completion/completions/raylane
-    \\  raylane completion zsh > a folder of fpath, there called _raylane
-    \\  raylane completion fish > ~/.config/fish/completions/raylane.fish
-    \\
-;
-
+pub const completion_help = completion.help;
 /// What `raylane man --help` prints.
-pub const man_help: []const u8 = "raylane " ++ version ++
-    \\: prints its manual's page, as roff
-    \\
-    \\usage: raylane man
-    \\
-    \\To read it, or to keep it where man looks:
-    \\
-    \\  raylane man | man -l -
-    \\  raylane man > ~/.local/share/man/man1/raylane.1
-    \\
-;
+pub const man_help = man.help;
 
 /// Writes what `raylane man` prints.
 pub fn writeMan(writer: *std.Io.Writer) std.Io.Writer.Error!void {
@@ -575,7 +552,11 @@ const sections: []const Section = &.{
                 "ninth of them and its neighbours' by a filter",
         },
         .{ .usage = "--denoise", .help = "filter the noise out" },
-        .{ .usage = "--variant NAME", .words = variant_file.names, .help = "how rays are traced; the image is always the same" },
+        .{
+            .usage = "--variant NAME",
+            .words = variant_file.names,
+            .help = "how rays are traced; the image is always the same",
+        },
         .{
             .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
@@ -965,7 +946,8 @@ const Parser = struct {
                 })),
             .tonemap => options.write.tone_mapping =
                 try reader.choice(given, settings.ToneMapping),
-            .stats, .quiet, .verbose, .progress, .progress_fd => try parser.setMessages(given),
+            .stats, .count_tests, .quiet, .verbose => try parser.setMessages(given),
+            .progress, .progress_fd => try parser.setMessages(given),
             .scenario => try parser.setScenario(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
@@ -974,7 +956,6 @@ const Parser = struct {
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
             .virtual_lights, .sky_lights, .all_lights => try parser.setLights(given),
-            .count_tests => options.count_tests = true,
             .point_size => options.view.point_size =
                 numberWithin(given.value, settings.point_size) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
@@ -1173,6 +1154,7 @@ const Parser = struct {
         const reader = &parser.reader;
         switch (given.id) {
             .stats => options.stats = try reader.choice(given, Stats),
+            .count_tests => options.count_tests = true,
             .quiet => options.quiet = true,
             .verbose => options.verbose = true,
             .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
