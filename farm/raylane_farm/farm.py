@@ -31,6 +31,8 @@ RESULT_TIMEOUT_S = 120
 TRIES = 3
 # Exit codes that say so: files or memory, or ended by a signal.
 MACHINE_CODES = (1, *range(129, 256))
+# How the program marks what is odd but harmless; what else it says is its progress.
+WARNING = " warning: "
 
 
 class Farm:
@@ -146,9 +148,9 @@ class Farm:
         return text
 
     def _repeat(self, stderr: str) -> None:
-        """Prints what the program says, each line once."""
+        """Prints the program's warnings, each once."""
         for line in self._own_names(stderr).splitlines():
-            if line not in self._said:
+            if WARNING in line and line not in self._said:
                 self._said.add(line)
                 self._progress.say(line)
 
