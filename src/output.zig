@@ -1,6 +1,6 @@
 //! Stage 4: `Image` -> file.
 //!
-//! In: a finished picture. Out: a file in one of eight formats, whole and in its place, or nothing
+//! In: a finished picture. Out: a file in one of nine formats, whole and in its place, or nothing
 //! at all. Colours are made by all threads; the bytes depend on the picture and the settings alone.
 
 const std = @import("std");
@@ -13,6 +13,7 @@ const parallel = @import("parallel.zig");
 const layers_file = @import("output/layers.zig");
 const stb_image_write = @import("output/stb_image_write.zig");
 const target_file = @import("output/target.zig");
+const y4m = @import("output/y4m.zig");
 const encode_file = @import("output/encode.zig");
 const exposure_file = @import("output/exposure.zig");
 const assert = std.debug.assert;
@@ -28,6 +29,8 @@ pub const Picture = encode_file.Picture;
 pub const Further = layers_file.Further;
 /// Writes channels of any kind with texts beside them.
 pub const openexr = @import("output/openexr.zig");
+/// Rows of a picture that has more.
+pub const Extent = encode_file.Extent;
 /// How many pixels look like nothing.
 pub const Tally = encode_file.Tally;
 /// The exposure that suits a picture.
@@ -55,7 +58,7 @@ fn formOf(
 ) encode_file.Form {
     return switch (format) {
         .png, .tga => if (transparent) .rgba else .rgb,
-        .jpg, .bmp, .ppm => .rgb,
+        .jpg, .bmp, .ppm, .y4m => .rgb,
         .hdr => .radiance,
         .pfm => .linear,
         .exr => switch (exr_kind) {
@@ -74,10 +77,16 @@ pub const Settings = struct {
     /// Keep alpha, where the format has it.
     transparent: bool = false,
     background: Background = .none,
+    /// Which of a picture's rows these are; null: all.
+    rows: ?Extent = null,
     /// Within `settings.jpeg_quality`.
     jpeg_quality: u8 = choices.jpeg_quality.default,
     /// Of the colours in an OpenEXR file.
     exr_kind: choices.ExrKind = .half,
+    /// Of a film.
+    frame_rate: choices.FrameRate = .{},
+    /// The film has frames already.
+    is_continued: bool = false,
     /// Layers of the picture's size, each once at most; only a file in OpenEXR holds them.
     further: []const Further = &.{},
     pool: *parallel.Pool,
@@ -117,7 +126,7 @@ pub fn check(
         .{ format, sideMax(format) },
     );
     const channel_count: u64 = channelCount(formOf(format, transparent, .half));
-    const by_library = format != .ppm and format != .pfm;
+    const by_library = format != .ppm and format != .pfm and format != .y4m;
     const value_count = (width * channel_count + 1) * height;
     if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
         error.InputOutput,
@@ -162,6 +171,7 @@ pub fn write(
             .scale = exposure_file.scaleOf(settings.exposure_ev),
             .tone_mapping = settings.tone_mapping,
             .background = settings.background,
+            .extent = settings.rows orelse .{ .first = 0, .of = image.height },
         },
         .from_bottom = format == .pfm,
     };
@@ -179,6 +189,7 @@ pub fn write(
         .pfm => try target.finish(&.{
             std.mem.print(&buffer, "PF\n{d} {d}\n-1.0\n", size) catch unreachable, pixels,
         }, diagnostic),
+        .y4m => try writeFrame(gpa, size, pixels, &settings, target, diagnostic),
         inline .png, .jpg, .tga, .bmp, .hdr => |coded| {
             const file = try stb_image_write.encode(gpa, @field(
                 stb_image_write.Codec,
@@ -207,6 +218,34 @@ pub fn write(
         },
     }
     return work.tally;
+}
+
+/// Encodes channels as an OpenEXR file and moves it to its place. Closes the target in any case.
+pub fn writeChannels(
+    gpa: Allocator,
+    picture: openexr.Picture,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    defer target.abandon();
+    const file = try openexr.encode(gpa, picture);
+    defer gpa.free(file);
+    try target.finish(&.{file}, diagnostic);
+}
+
+fn writeFrame(
+    gpa: Allocator,
+    size: [2]u32,
+    pixels: []const u8,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const planes = try y4m.planes(gpa, pixels);
+    defer gpa.free(planes);
+    var buffer: [y4m.header_bytes_max]u8 = undefined;
+    const header = y4m.header(&buffer, size, settings.frame_rate, !settings.is_continued);
+    return target.finish(&.{ header, planes }, diagnostic);
 }
 
 const Work = struct {
@@ -241,6 +280,7 @@ const Work = struct {
 
 test {
     _ = openexr;
+    _ = y4m;
     _ = stb_image_write;
     _ = target_file;
     _ = @import("output/temporary.zig");

@@ -20,13 +20,15 @@ const directions = [_]Row{
     .{ .part = "main", .may_import = &.{ "module:raylane", "signals", "commands" } },
     .{ .part = "commands", .may_import = &.{ "module:raylane", "signals" } },
     .{ .part = "signals", .may_import = &.{"module:raylane"} },
-    .{ .part = "cli", .may_import = &.{ "module:config", "variant" } },
+    .{ .part = "cli", .may_import = &.{ "module:config", "batch", "variant" } },
+    .{ .part = "batch", .may_import = &.{} },
     .{
         // The one that leads scenes through all stages.
         .part = "session",
         .may_import = &.{
             "builtin", "parse",    "scene",   "prepare", "world",  "trace",
             "film",    "parallel", "variant", "output",  "report", "denoise",
+            "part",
         },
     },
     .{ .part = "kernel", .may_import = &.{ "module:config", "trace", "variant" } },
@@ -35,6 +37,11 @@ const directions = [_]Row{
     .{
         .part = "info",
         .may_import = &.{ "decode", "parse", "prepare", "report", "scene", "world" },
+    },
+    .{ .part = "part", .may_import = &.{ "film", "output" } },
+    .{
+        .part = "merge",
+        .may_import = &.{ "decode", "denoise", "film", "output", "parallel", "parse", "part" },
     },
     .{ .part = "variant", .may_import = &.{"module:config"} },
     .{ .part = "simd", .may_import = &.{"variant"} },

@@ -75,7 +75,7 @@ fn writeText(writer: *Writer, standing: *const Standing, under_way: usize) Write
 }
 
 /// `3/60 Fox.glb`, or without the number where it is the only one.
-pub fn writePlace(writer: *Writer, place: Place) Writer.Error!void {
+fn writePlace(writer: *Writer, place: Place) Writer.Error!void {
     if (place.count > 1) try writer.print("{d}/{d} ", .{ place.index, place.count });
     const name = std.fs.path.basename(place.name);
     const shown = cut(name, name_columns_max);
