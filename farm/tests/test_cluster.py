@@ -34,7 +34,9 @@ from raylane_farm.remote import program
 PROGRAM = os.environ.get("RAYLANE_PROGRAM")
 OPENJD = os.path.join(os.path.dirname(sys.executable), "openjd")
 TEMPLATES = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "openjd")
-SMALL = ["-r", "16x16", "--spp", "1"]
+SMALL = ["-r", "16x16", "--spp", "1", "--env", "none"]
+# Of several tiles.
+LARGER = ["-r", "64x48", "--spp", "1", "--env", "none"]
 WAIT_S = 60
 
 SCRIPT = """#!/bin/sh
@@ -65,8 +67,8 @@ def scene() -> str:
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3,
              "min": [0, 0, 0], "max": [1, 1, 0]},
-            {"bufferView": 0, "byteOffset": 36, "componentType": 5126, "type": "SCALAR", "count": 2,
-             "min": [0], "max": [1]},
+            {"bufferView": 0, "byteOffset": 36, "componentType": 5126, "type": "SCALAR",
+             "count": 2, "min": [0], "max": [1]},
             {"bufferView": 0, "byteOffset": 44, "componentType": 5126, "type": "VEC4", "count": 2},
         ],
         "animations": [{
@@ -134,7 +136,8 @@ class ClusterTest(unittest.TestCase):
 
     def farm(self, *arguments):
         """Exit code, and what is said."""
-        handlers = [(number, signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM)]
+        numbers = (signal.SIGINT, signal.SIGTERM)
+        handlers = [(number, signal.getsignal(number)) for number in numbers]
         said = io.StringIO()
         try:
             with contextlib.redirect_stderr(said):
@@ -194,14 +197,14 @@ class ClusterTest(unittest.TestCase):
         self.write("slow", b"0.3")
         self.when_running(2, lambda worker: os.kill(worker, signal.SIGKILL))
         name = self.path("out/turn.png")
-        size = ["-r", "64x48", "--spp", "1", "--tile-size", "8"]
-        code, said = self.farm(self.scene, "--tiles", "4", "-o", name, "--", *size)
+        code, said = self.farm(self.scene, "--tiles", "4", "-o", name, "--", *LARGER)
         self.assertEqual(0, code, said)
-        self.assertEqual(self.alone("-o", "turn.png", *size), contents(self.path("out")))
+        self.assertEqual(self.alone("-o", "turn.png", *LARGER), contents(self.path("out")))
         self.assertEqual(5, len(self.runs()))
 
     def test_views_around_the_scene(self):
-        code, said = self.farm(self.scene, "--turntable", "3", "-o", self.path("out/"), "--", *SMALL)
+        own = ["--turntable", "3", "-o", self.path("out/")]
+        code, said = self.farm(self.scene, *own, "--", *SMALL)
         self.assertEqual(0, code, said)
         expected = self.alone("--turntable", "3", "-o", "{model}_{view:3}.png", *SMALL)
         self.assertEqual(expected, contents(self.path("out")))
@@ -255,13 +258,15 @@ class ClusterTest(unittest.TestCase):
             template = os.path.join(TEMPLATES, f"{name}.yaml")
             subprocess.run([OPENJD, "check", template], check=True, capture_output=True)
             own = [f"Scene={self.scene}", f"Output={out}", f"Program={self.script}"]
-            own += given + ["Options=-r '16x16' --spp 1 --tile-size 8"]
+            own += given + ["Options=-r '64x48' --spp 1 --env none"]
             pairs = [word for parameter in own for word in ("-p", parameter)]
             run = subprocess.run([OPENJD, "run", template, *pairs], capture_output=True, text=True)
             self.assertEqual(0, run.returncode, run.stdout + run.stderr)
             self.assertGreaterEqual(len(self.runs()), 2)
-            words = ["--frames", "1-3,6", "-o", "{frame}.png"] if name == "frames" else ["-o", "turn.png"]
-            self.assertEqual(self.alone(*words, *SMALL), contents(out))
+            words = ["-o", "turn.png"]
+            if name == "frames":
+                words = ["--frames", "1-3,6", "-o", "{frame}.png"]
+            self.assertEqual(self.alone(*words, *LARGER), contents(out))
 
 
 def contents(folder):
