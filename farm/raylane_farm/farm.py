@@ -1,8 +1,8 @@
 """Leads a job: hands tasks to Dask, a few for each worker ahead, and takes their results.
 
 Dask moves the tasks of a lost worker to another one. What is left to do here: tasks that may only
-go to workers that are all lost, programs that fail on one machine (out of memory, disk full) and may
-not on another, and the end, by success, by the first error or by a signal.
+go to workers that are all lost, programs that fail on one machine (out of memory, disk full) and
+may not on another, and the end, by success, by the first error or by a signal.
 """
 
 from __future__ import annotations
