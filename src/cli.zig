@@ -301,8 +301,8 @@ const sections: []const Section = &.{
         .{ .usage = "--fps F", .help = "24 (default), 23.976 or 30000/1001, say" },
         .{
             .usage = "--reference-frame F",
-            .help = "whose exposure, framing and studio all frames have\n" ++
-                "(default: the first of --frames)",
+            .help = "whose exposure, framing and studio all frames have,\n" ++
+                "a range's first (default: the first of --frames)",
         },
         .{
             .usage = "--turntable N",
@@ -1046,8 +1046,7 @@ const Parser = struct {
             .fps => parser.options.write.frame_rate = batch.frameRateOf(given.value) orelse
                 return reader.bad(given, "a number above 0, up to 1000, or a fraction"),
             .reference_frame => chosen.reference_frame =
-                std.fmt.parseInt(i32, given.value, 10) catch
-                    return reader.bad(given, "the number of a frame"),
+                batch_plan.frames.first(try parser.rangeOf(given)),
             .turntable => chosen.view_count = try reader.number(given, settings.view_count),
             .skip_existing => chosen.skip_existing = true,
             .jobs => chosen.job_count = try reader.number(given, settings.job_count),
@@ -1620,6 +1619,8 @@ test "frames, views and names of pictures" {
     try std.testing.expectEqual(0, options.animation.which.index);
     try std.testing.expectEqual(.jpg, options.write.format);
     try std.testing.expect(options.isBatch());
+    const part = try optionsForTest(&.{ "--frames=8", "--reference-frame=5-9,4-2:-1" });
+    try std.testing.expectEqual(2, part.batch.reference_frame.?);
     const turned = try optionsForTest(&.{ "--turntable=8", "--views=0-3", "-oa/", "--jobs=2" });
     try std.testing.expectEqual(30, turned.view.viewpoint.orbit.?.theta_degrees);
     try std.testing.expectEqual(8, turned.batch.view_count.?);
@@ -1631,6 +1632,7 @@ test "frames, views and names of pictures" {
         .{ "has more than 1000000", &.{"--frames=0-1000000"} },
         .{ "both choose the time", &.{ "--frames=1", "--animation-time=2" } },
         .{ "needs '--frames'", &.{"--reference-frame=2"} },
+        .{ "'x' is not a range", &.{ "--frames=1", "--reference-frame=x" } },
         .{ "those of '--turntable'", &.{"--views=2"} },
         .{ "both place the camera", &.{ "--turntable=2", "--eye=1,2,3" } },
         .{ "'--camera' contradicts", &.{ "--turntable=2", "--camera=0" } },
