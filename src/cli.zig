@@ -123,9 +123,13 @@ const sections: []const Section = &.{
         .{ .usage = "-o, --output FILE", .help = "name ending in a format; - is standard output" },
         .{
             .usage = "--format FORMAT",
-            .help = "png, jpg, tga, bmp or ppm, or linear: hdr, pfm or exr",
+            .help = "png, jpg, webp, tga, bmp or ppm, or linear: hdr, pfm or exr",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
+        .{
+            .usage = "--webp-quality N",
+            .help = settings.webp_quality.text() ++ ", with loss (default: without)",
+        },
         .{ .usage = "--exr KIND", .help = "half or float: colours of an EXR file (default: half)" },
         .{
             .usage = "-r, --resolution WxH|N",
@@ -148,7 +152,13 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--layers LIST",
-            .help = "of an EXR file: albedo,normal,depth,variance",
+            .help = "depth,normal,albedo,uv,node,material,primitive,alpha,\n" ++
+                "position,cost,variance: channels of an EXR file, or\n" ++
+                "files of their own by {layer} in the output's name",
+        },
+        .{
+            .usage = "--shade LOOK",
+            .help = "a quick look in place of light: ao, normal, uv or cost",
         },
     } },
     .{ .title = "Camera", .options = &.{
@@ -444,6 +454,7 @@ const Parser = struct {
     scene: ?[]const u8 = null,
     /// A time is asked for.
     has_time: bool = false,
+    has_variant: bool = false,
     /// The explicit `--format`.
     format: ?settings.Format = null,
     /// The explicit `--progress`.
@@ -469,6 +480,7 @@ const Parser = struct {
         try parser.checkViewpoint();
         try parser.settleFormat();
         try parser.checkSampling();
+        try parser.checkShade();
         try parser.settleProgress();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
@@ -497,10 +509,14 @@ const Parser = struct {
             .format => parser.format = formatOf(given.value) orelse
                 return reader.bad(given, comptime namesOf(settings.Format)),
             .denoise => options.render.denoise = true,
+            .shade => options.view.shade = try reader.choice(given, settings.Shade),
             .layers => options.render.layers = layersOf(given.value) orelse
                 return reader.bad(given, comptime namesOf(settings.Layer)),
             .jpeg_quality => {
                 options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
+            },
+            .webp_quality => {
+                options.write.webp_quality = try reader.number(given, settings.webp_quality);
             },
             .exr => options.write.exr_kind = try reader.choice(given, settings.ExrKind),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
@@ -545,7 +561,10 @@ const Parser = struct {
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
-            .variant => options.render.variant = try parser.variantOf(given.value),
+            .variant => {
+                options.render.variant = try parser.variantOf(given.value);
+                parser.has_variant = true;
+            },
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
             .virtual_lights, .sky_lights, .all_lights => try parser.setLights(given),
@@ -761,9 +780,32 @@ const Parser = struct {
         try parser.findFormat();
         const options = &parser.options;
         if (options.render.layers.count() == 0 or options.write.format == .exr) return;
-        return parser.reader.fail("'--layers' has a place in an exr file, not in a {t} file", .{
-            options.write.format,
+        const output = options.output orelse "";
+        if (std.mem.find(u8, output, layer_place) != null) return;
+        return parser.reader.fail("'--layers' has a place in an exr file, not in a {t} file: " ++
+            "{s} in the output's name gives each layer one of its own", .{
+            options.write.format, layer_place,
         });
+    }
+
+    /// What some integrators alone can tell, or is told in place of them. Where rays are traced one
+    /// by one, each pixel has tests of its own: nothing else is as good for these.
+    fn checkShade(parser: *Parser) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        const is_whitted = options.render.integrator == .whitted;
+        if (options.render.layers.contains(.cost) and !is_whitted)
+            return reader.fail("'--layers cost' counts tests of '--integrator whitted'", .{});
+        const has_cost = options.render.layers.contains(.cost) or options.view.shade == .cost;
+        if (has_cost and !parser.has_variant) for (parser.variant_names, 0..) |name, index| {
+            if (std.mem.find(u8, name, "-single-") == null) continue;
+            options.render.variant = index;
+            break;
+        };
+        if (options.view.shade == null) return;
+        if (!is_whitted) return reader.fail("'--shade' contradicts '--integrator'", .{});
+        if (options.render.denoise) return reader.fail("'--shade' contradicts '--denoise'", .{});
+        if (options.count_tests) return reader.fail("'--shade' contradicts '--count-tests'", .{});
     }
 
     fn findFormat(parser: *Parser) Error!void {
@@ -789,6 +831,9 @@ const Parser = struct {
         );
     }
 };
+
+/// Where in the output's name the layer stands, of which there is a file each.
+pub const layer_place = "{layer}";
 
 /// A format by its extension, in either case; JPEG has two.
 fn formatOf(extension: []const u8) ?settings.Format {
@@ -1093,9 +1138,13 @@ test "numbers keep to their ranges" {
         .{ .flag = "--integrator", .good = &.{ "whitted", "lights", "path" }, .bad = &.{"bdpt"} },
         .{
             .flag = "--format",
-            .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },
+            .good = &.{
+                "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr", "webp",
+            },
             .bad = &.{ "tiff", "" },
         },
+        .{ .flag = "--shade", .good = &.{ "ao", "normal", "uv", "cost" }, .bad = &.{ "", "AO" } },
+        .{ .flag = "--webp-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "" } },
         .{ .flag = "--exr", .good = &.{ "half", "float" }, .bad = &.{ "Half", "double", "" } },
         .{ .flag = "--jpeg-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "", "x" } },
         .{
@@ -1288,6 +1337,18 @@ test "the format follows the name, unless said otherwise" {
         try expectUsage("albedo, normal, depth", &.{ bad, "-oa.exr", "s" });
     const layered = try optionsForTest(&.{ "--layers=depth,albedo,depth", "-oa.exr" });
     try std.testing.expectEqual(2, layered.render.layers.count());
+    const each = try optionsForTest(&.{
+        "--layers=depth,normal,albedo,uv,node,material,primitive,alpha,position,cost,variance",
+        "-oa-{layer}.png",
+    });
+    try std.testing.expectEqual(11, each.render.layers.count());
+    try expectUsage("counts", &.{ "--layers=cost", "--integrator=path", "-oa.exr", "s" });
+    const alone = try optionsForTest(&.{"--shade=cost"});
+    try std.testing.expectEqualStrings("scalar-single-4", test_names[alone.render.variant]);
+    const chosen = try optionsForTest(&.{ "--variant=vector-beam-8", "--layers=cost", "-oa.exr" });
+    try std.testing.expectEqual(0, chosen.render.variant);
+    for ([_][:0]const u8{ "--denoise", "--count-tests", "--integrator=lights" }) |other|
+        try expectUsage("'--shade' contradicts", &.{ "--shade=ao", other, "s" });
     try expectUsage("'a.tiff' ends in no image format", &.{ "-oa.tiff", "s" });
 }
 

@@ -1,6 +1,6 @@
 //! Stage 4: `Image` -> file.
 //!
-//! In: a finished picture. Out: a file in one of eight formats, whole and in its place, or nothing
+//! In: a finished picture. Out: a file in one of nine formats, whole and in its place, or nothing
 //! at all. Colours are made by all threads; the bytes depend on the picture and the settings alone.
 
 const std = @import("std");
@@ -10,8 +10,10 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Image = @import("image.zig").Image;
 const huge_pages = @import("huge_pages.zig");
 const parallel = @import("parallel.zig");
+const layer_picture = @import("output/layer_picture.zig");
 const layers_file = @import("output/layers.zig");
 const stb_image_write = @import("output/stb_image_write.zig");
+const webp = @import("output/webp.zig");
 const target_file = @import("output/target.zig");
 const encode_file = @import("output/encode.zig");
 const exposure_file = @import("output/exposure.zig");
@@ -28,6 +30,8 @@ pub const Picture = encode_file.Picture;
 pub const Further = layers_file.Further;
 /// Writes channels of any kind with texts beside them.
 pub const openexr = @import("output/openexr.zig");
+/// Makes colours of a layer.
+pub const paintLayer = layer_picture.paint;
 /// How many pixels look like nothing.
 pub const Tally = encode_file.Tally;
 /// The exposure that suits a picture.
@@ -44,6 +48,7 @@ fn sideMax(format: choices.Format) u32 {
     return switch (format) {
         .jpg, .tga => 65_535,
         .exr => openexr.width_max,
+        .webp => webp.side_max,
         else => std.math.maxInt(u31),
     };
 }
@@ -54,7 +59,7 @@ fn formOf(
     exr_kind: choices.ExrKind,
 ) encode_file.Form {
     return switch (format) {
-        .png, .tga => if (transparent) .rgba else .rgb,
+        .png, .tga, .webp => if (transparent) .rgba else .rgb,
         .jpg, .bmp, .ppm => .rgb,
         .hdr => .radiance,
         .pfm => .linear,
@@ -76,10 +81,14 @@ pub const Settings = struct {
     background: Background = .none,
     /// Within `settings.jpeg_quality`.
     jpeg_quality: u8 = choices.jpeg_quality.default,
+    /// Within `settings.webp_quality`; null: without loss.
+    webp_quality: ?u8 = null,
     /// Of the colours in an OpenEXR file.
     exr_kind: choices.ExrKind = .half,
     /// Layers of the picture's size, each once at most; only a file in OpenEXR holds them.
     further: []const Further = &.{},
+    /// Names of what layers have numbers of, for such a file; null: they have none.
+    manifest: ?[:0]const u8 = null,
     pool: *parallel.Pool,
 };
 
@@ -117,7 +126,7 @@ pub fn check(
         .{ format, sideMax(format) },
     );
     const channel_count: u64 = channelCount(formOf(format, transparent, .half));
-    const by_library = format != .ppm and format != .pfm;
+    const by_library = format != .ppm and format != .pfm and format != .webp;
     const value_count = (width * channel_count + 1) * height;
     if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
         error.InputOutput,
@@ -193,20 +202,82 @@ pub fn write(
             defer gpa.free(file);
             try target.finish(&.{file}, diagnostic);
         },
-        .exr => {
-            var channels: layers_file.Channels = .{};
-            channels.addPicture(pixels, channelCount(form), settings.exr_kind);
-            for (settings.further) |*further| channels.addLayer(further);
-            const file = try openexr.encode(gpa, .{
+        .webp => {
+            const file = try webp.encode(gpa, .{
                 .width = image.width,
                 .height = image.height,
-                .channels = channels.all(),
+                .channel_count = channelCount(form),
+                .pixels = pixels,
+                .quality = settings.webp_quality,
             });
             defer gpa.free(file);
             try target.finish(&.{file}, diagnostic);
         },
+        .exr => {
+            var channels: layers_file.Channels = .{};
+            channels.addPicture(pixels, channelCount(form), settings.exr_kind);
+            for (settings.further) |*further| channels.addLayer(further);
+            try writeExr(gpa, image, channels.all(), &settings, target, diagnostic);
+        },
     }
     return work.tally;
+}
+
+/// A file of these channels, of an image's size.
+fn writeExr(
+    gpa: Allocator,
+    image: *const Image,
+    channels: []const openexr.Channel,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const manifest: []const openexr.Attribute = if (settings.manifest) |text|
+        &.{.{ .name = layers_file.manifest_name, .text = text }}
+    else
+        &.{};
+    const file = try openexr.encode(gpa, .{
+        .width = image.width,
+        .height = image.height,
+        .channels = channels,
+        .attributes = manifest,
+    });
+    defer gpa.free(file);
+    try target.finish(&.{file}, diagnostic);
+}
+
+/// Encodes a layer alone and moves it to its place: its channels in OpenEXR, its numbers as they
+/// are in the other linear formats, else colours (`paintLayer`). Closes the target in any case.
+pub fn writeLayer(
+    gpa: Allocator,
+    further: *const Further,
+    settings: Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    defer target.abandon();
+    const from = further.image;
+    try check(settings.format, false, from.width, from.height, diagnostic);
+    if (settings.format == .exr) {
+        var channels: layers_file.Channels = .{};
+        channels.addLayer(further);
+        return writeExr(gpa, from, channels.all(), &settings, target, diagnostic);
+    }
+    var chosen = settings;
+    chosen.transparent = false;
+    chosen.background = .none;
+    var image: Image = try .init(gpa, from.width, from.height);
+    defer image.deinit(gpa);
+    if (isLinear(settings.format)) {
+        layer_picture.copy(further, &image);
+        _ = try write(gpa, .{ .image = &image }, chosen, target, diagnostic);
+        return;
+    }
+    var display: Image = try .init(gpa, from.width, from.height);
+    defer display.deinit(gpa);
+    @memset(image.pixels, .{ 0, 0, 0, 1 });
+    try layer_picture.paint(gpa, further, &display);
+    _ = try write(gpa, .{ .image = &image, .display = &display }, chosen, target, diagnostic);
 }
 
 const Work = struct {
@@ -242,6 +313,9 @@ const Work = struct {
 test {
     _ = openexr;
     _ = stb_image_write;
+    _ = webp;
+    _ = layers_file;
+    _ = layer_picture;
     _ = target_file;
     _ = @import("output/temporary.zig");
     _ = @import("output/background.zig");

@@ -43,6 +43,8 @@ pub const Report = struct {
     image_hash: u64,
     /// Null: the picture keeps radiance as it is.
     appearance: ?Appearance = null,
+    /// Names of what layers have numbers of, in JSON; null: there are no such layers.
+    manifest: ?[]const u8 = null,
     warnings: []const []const u8 = &.{},
 
     /// What images became.
@@ -239,6 +241,7 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
         },
         .memory_peak_bytes = report.memory_peak_bytes,
         .image_hash = Text{ .bytes = &hash },
+        .manifest = if (report.manifest) |text| Raw{ .text = text } else null,
         .warnings = Texts{ .list = report.warnings },
     }, .{}, writer);
     try writer.writeByte('\n');
@@ -263,6 +266,18 @@ pub const Text = struct {
             rest = rest[if (is_valid) sequence.len else 1..];
         }
         try json.writer.writeByte('"');
+        json.endWriteRaw();
+    }
+};
+
+/// What is JSON already.
+const Raw = struct {
+    text: []const u8,
+
+    /// Called by `Stringify`.
+    pub fn jsonStringify(raw: Raw, json: *Stringify) Writer.Error!void {
+        try json.beginWriteRaw();
+        try json.writer.writeAll(raw.text);
         json.endWriteRaw();
     }
 };
@@ -401,14 +416,17 @@ test "the JSON has every key and nothing else" {
         bvh: struct { nodes: u64, depth: u32, sah_cost: ?f64, bytes: u64 },
         memory_peak_bytes: u64,
         image_hash: []const u8,
+        manifest: ?struct { node: struct { @"1": []const u8 } },
         warnings: []const []const u8,
     };
     const gpa = std.testing.allocator;
     for ([_]bool{ false, true }) |is_bare| {
         var report = report_for_test;
+        report.manifest = "{\"node\":{\"1\":\"a\"}}";
         if (is_bare) {
             report.tests = null;
             report.appearance = null;
+            report.manifest = null;
             report.bvh.sah_cost = std.math.inf(f64);
             report.warnings = &.{};
         }
@@ -425,6 +443,7 @@ test "the JSON has every key and nothing else" {
         try std.testing.expectEqualStrings("0000000000000abc", value.image_hash);
         try std.testing.expectEqual(@as(?f32, if (is_bare) null else -9.31), value.exposure_ev);
         try std.testing.expectEqual(is_bare, value.tonemap == null);
+        if (!is_bare) try std.testing.expectEqualStrings("a", value.manifest.?.node.@"1");
         if (value.tonemap) |name| try std.testing.expectEqualStrings("neutral", name);
         try std.testing.expectEqual(1.5, value.time_ms.parse);
         try std.testing.expectEqual(0.000001, value.time_ms.prepare);
