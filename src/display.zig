@@ -3,8 +3,7 @@
 //! In: files that are begun and ended, and the counters of their `Progress`, which a thread of its
 //! own reads. Out: on a terminal one line, redrawn ten times a second and erased before anything
 //! else is said; for programs one JSON object a line, five a second and one for each stage that
-//! begins; of several files a line each that is done. What takes half a second shows nothing on a
-//! terminal.
+//! begins. What takes half a second shows nothing on a terminal.
 
 const std = @import("std");
 const json = @import("display/json.zig");
@@ -29,8 +28,8 @@ const draw_ms = 100;
 const tell_ms = 200;
 const quiet_ms = 500;
 
-/// How a file ended. What went wrong is said elsewhere.
-pub const Outcome = enum { done, failed };
+/// How a file ended. What went wrong is said elsewhere; one that is postponed is begun once more.
+pub const Outcome = enum { done, skipped, postponed, failed };
 
 /// Of all files of a run. Must stay where it is from `start` to `stop`.
 pub const Display = struct {
@@ -50,8 +49,7 @@ pub const Display = struct {
     /// Nobody reads what is told.
     has_failed: bool = false,
 
-    /// `ended_files`: lines of files that have ended, where there are several.
-    const Form = enum { none, ended_files, line, json };
+    const Form = enum { none, line, json };
 
     /// A file that is under way.
     const Slot = struct {
@@ -64,6 +62,9 @@ pub const Display = struct {
         /// Since the display's begin.
         begin_s: f64 = 0,
         work_begin_s: f64 = 0,
+        /// What was done when it was last looked at, and when there was first so much.
+        seen_done: usize = 0,
+        seen_s: f64 = 0,
 
         fn begun(context: *anyopaque, work: *const Work) void {
             const slot: *Slot = @ptrCast(@alignCast(context));
@@ -73,17 +74,22 @@ pub const Display = struct {
             slot.progress.restart(work);
             slot.work = work.*;
             slot.work_begin_s = display.now();
+            slot.seen_done = 0;
+            slot.seen_s = slot.work_begin_s;
             if (display.form == .json) display.tell(@tagName(work.stage), slot);
         }
 
-        fn standing(slot: *const Slot, now_s: f64) Standing {
-            return .of(
-                slot.place.?,
-                &(slot.work orelse .{ .stage = .reading }),
-                &slot.progress,
-                now_s - slot.work_begin_s,
-                now_s - slot.begin_s,
-            );
+        fn standing(slot: *Slot, now_s: f64) Standing {
+            const done = slot.progress.done.load(.monotonic);
+            if (done != slot.seen_done) {
+                slot.seen_done = done;
+                slot.seen_s = now_s;
+            }
+            return .of(slot.place.?, &(slot.work orelse .{ .stage = .reading }), &slot.progress, .{
+                .file_s = now_s - slot.begin_s,
+                .work_s = slot.seen_s - slot.work_begin_s,
+                .idle_s = now_s - slot.seen_s,
+            });
         }
     };
 
@@ -94,20 +100,23 @@ pub const Display = struct {
             .form = switch (chosen.form) {
                 .none => .none,
                 .json => .json,
-                .auto => if (isTerminal(io)) .line else .ended_files,
+                .auto => if (isTerminal(io)) .line else .none,
             },
-            .file = if (chosen.file) |handle|
-                .{ .handle = @intCast(handle), .flags = .{ .nonblocking = false } }
-            else
-                null,
+            .file = fileOf(chosen.file),
             .line = line,
             .begin = Io.Clock.awake.now(io),
         };
     }
 
+    fn fileOf(descriptor: ?u32) ?Io.File {
+        const handle: std.posix.fd_t = @intCast(descriptor orelse return null);
+        if (handle == std.posix.STDERR_FILENO) return null;
+        return .{ .handle = handle, .flags = .{ .nonblocking = false } };
+    }
+
     /// Begins to show. Where the system has no thread to spare, only what begins and ends is told.
     pub fn start(display: *Display) void {
-        if (display.form != .line and display.form != .json) return;
+        if (display.form == .none) return;
         display.thread = std.Thread.spawn(.{ .stack_size = 1 << 20 }, run, .{display}) catch null;
     }
 
@@ -143,12 +152,11 @@ pub const Display = struct {
         return &slot.progress;
     }
 
-    /// A file has ended; of several, that it is done is told in a line.
+    /// A file has ended.
     pub fn endFile(display: *Display, progress: ?*Progress, outcome: Outcome) void {
         const slot: *Slot = @alignCast(@fieldParentPtr("progress", progress orelse return));
         display.mutex.lockUncancelable(display.io);
         defer display.mutex.unlock(display.io);
-        const place = slot.place.?;
         switch (display.form) {
             .none => unreachable, // It has no progress.
             .json => {
@@ -156,8 +164,7 @@ pub const Display = struct {
                 slot.progress.restart(&.{ .stage = .writing });
                 display.tell(@tagName(outcome), slot);
             },
-            .line, .ended_files => if (outcome == .done and place.count > 1)
-                display.sayDone(place, display.now() - slot.begin_s),
+            .line => {},
         }
         slot.place = null;
     }
@@ -203,7 +210,7 @@ pub const Display = struct {
     fn draw(display: *Display) void {
         const now_s = display.now();
         if (now_s * std.time.ms_per_s < quiet_ms) return;
-        var first: ?*const Slot = null;
+        var first: ?*Slot = null;
         var count: usize = 0;
         for (&display.slots) |*slot| {
             const place = slot.place orelse continue;
@@ -219,7 +226,7 @@ pub const Display = struct {
         display.line.draw(&stderr.file_writer.interface, shown) catch return;
     }
 
-    fn tell(display: *Display, stage: []const u8, slot: *const Slot) void {
+    fn tell(display: *Display, stage: []const u8, slot: *Slot) void {
         if (display.has_failed) return;
         const standing = slot.standing(display.now());
         // Room for all but the longest names, so that a line is written in one piece.
@@ -244,27 +251,6 @@ pub const Display = struct {
         defer display.io.unlockStderr();
         try json.write(&stderr.file_writer.interface, stage, standing);
         try stderr.file_writer.interface.flush();
-    }
-
-    fn sayDone(display: *Display, place: Place, elapsed_s: f64) void {
-        var buffer: [512]u8 = undefined;
-        const stderr = display.io.lockStderr(&buffer, null) catch return;
-        defer display.io.unlockStderr();
-        const writer = &stderr.file_writer.interface;
-        display.trySayDone(writer, place, elapsed_s) catch return;
-    }
-
-    fn trySayDone(
-        display: *Display,
-        writer: *Io.Writer,
-        place: Place,
-        elapsed_s: f64,
-    ) Io.Writer.Error!void {
-        try display.line.erase(writer);
-        try writer.writeAll("raylane: ");
-        try line_file.writePlace(writer, place);
-        try writer.print(": done, {d:.1} s\n", .{elapsed_s});
-        try writer.flush();
     }
 };
 

@@ -7,6 +7,7 @@
 const std = @import("std");
 /// What layers are made of.
 pub const Image = @import("image.zig").Image;
+const settings = @import("settings.zig");
 const layout_file = @import("film/layout.zig");
 const assert = std.debug.assert;
 
@@ -40,12 +41,23 @@ pub const Layer = enum {
     /// Half of what the mean of the samples `isInFirstHalf` has more than that of the others; 0
     /// where there is but one sample.
     halves,
-    /// What a survey finds (`integrate/survey.zig`): bits of a triangle's number, `no_triangle`
-    /// where there is none; weights of its corners 1 and 2; 0. No mean, and left alone by `finish`.
-    hit,
+    /// What the first sample shows. A survey (`integrate/survey.zig`) leaves bits of a triangle's
+    /// number, `no_triangle` where there is none, weights of its corners 1 and 2, and 0; these
+    /// become bits of the file's numbers of node, material and primitive, all ones where there is
+    /// none, and 0. As the next two it is no mean, and left alone by `finish`.
+    origin,
+    /// Where that is, in the world's axes, and fourth 1; 0 where there is nothing.
+    position,
+    /// Its texture coordinates, of the first set.
+    texcoord,
     /// Tests of rays with boxes and with triangles that all samples took, by kernels that count
     /// them; of pixels that are traced together, the mean.
     cost,
+
+    /// Whether it is of the first sample alone.
+    fn isSurveyed(layer: Layer) bool {
+        return layer == .origin or layer == .position or layer == .texcoord;
+    }
 
     /// Whether it has an image of its own.
     pub fn isApart(layer: Layer) bool {
@@ -53,8 +65,21 @@ pub const Layer = enum {
     }
 };
 
-/// See `Layer.hit`.
+/// See `Layer.origin`.
 pub const no_triangle: u32 = std.math.maxInt(u32);
+
+/// The film's that has one that users choose, or some of its channels do.
+pub fn layerOf(layer: settings.Layer) Layer {
+    return switch (layer) {
+        .depth, .alpha => .depth,
+        .uv => .texcoord,
+        .node, .material, .primitive => .origin,
+        inline .normal, .albedo, .position, .cost, .variance => |same| @field(
+            Layer,
+            @tagName(same),
+        ),
+    };
+}
 
 /// See `Layer`.
 pub const Layers = std.EnumSet(Layer);
@@ -226,7 +251,7 @@ pub const Film = struct {
         number: u32,
         sample: [4]f32,
     ) void {
-        assert(layer != .variance and layer != .halves and layer != .hit);
+        assert(layer != .variance and layer != .halves and !layer.isSurveyed());
         addTo(film.apart.getPtr(layer).*.?.at(x, y), number, sample);
     }
 
@@ -302,11 +327,11 @@ pub const Film = struct {
         const count: V4 = @splat(@floatFromInt(sample_count));
         for (&film.apart.values, std.enums.values(Layer)) |*apart, layer| {
             const image = if (apart.*) |*image| image else continue;
-            if (layer == .hit) continue;
+            if (layer.isSurveyed()) continue;
             const sums: V4 = image.pixels[at];
             const means: [4]f32 = switch (layer) {
                 .color, .alpha => unreachable, // They are not apart.
-                .hit => unreachable, // See above.
+                .origin, .position, .texcoord => unreachable, // See above.
                 .cost => sums,
                 .display, .albedo, .normal => sums / count,
                 .depth => depthOf(sums, count[0]),

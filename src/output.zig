@@ -12,9 +12,11 @@ const huge_pages = @import("huge_pages.zig");
 const parallel = @import("parallel.zig");
 const layer_picture = @import("output/layer_picture.zig");
 const layers_file = @import("output/layers.zig");
+const Manifest = @import("manifest.zig").Manifest;
 const stb_image_write = @import("output/stb_image_write.zig");
 const webp = @import("output/webp.zig");
 const target_file = @import("output/target.zig");
+const y4m = @import("output/y4m.zig");
 const encode_file = @import("output/encode.zig");
 const exposure_file = @import("output/exposure.zig");
 const assert = std.debug.assert;
@@ -32,6 +34,8 @@ pub const Further = layers_file.Further;
 pub const openexr = @import("output/openexr.zig");
 /// Makes colours of a layer.
 pub const paintLayer = layer_picture.paint;
+/// Rows of a picture that has more.
+pub const Extent = encode_file.Extent;
 /// How many pixels look like nothing.
 pub const Tally = encode_file.Tally;
 /// The exposure that suits a picture.
@@ -60,7 +64,7 @@ fn formOf(
 ) encode_file.Form {
     return switch (format) {
         .png, .tga, .webp => if (transparent) .rgba else .rgb,
-        .jpg, .bmp, .ppm => .rgb,
+        .jpg, .bmp, .ppm, .y4m => .rgb,
         .hdr => .radiance,
         .pfm => .linear,
         .exr => switch (exr_kind) {
@@ -79,16 +83,22 @@ pub const Settings = struct {
     /// Keep alpha, where the format has it.
     transparent: bool = false,
     background: Background = .none,
+    /// Which of a picture's rows these are; null: all.
+    rows: ?Extent = null,
     /// Within `settings.jpeg_quality`.
     jpeg_quality: u8 = choices.jpeg_quality.default,
     /// Within `settings.webp_quality`; null: without loss.
     webp_quality: ?u8 = null,
     /// Of the colours in an OpenEXR file.
     exr_kind: choices.ExrKind = .half,
+    /// Of a film.
+    frame_rate: choices.FrameRate = .{},
+    /// The film has frames already.
+    is_continued: bool = false,
     /// Layers of the picture's size, each once at most; only a file in OpenEXR holds them.
     further: []const Further = &.{},
-    /// Names of what layers have numbers of, for such a file; null: they have none.
-    manifest: ?[:0]const u8 = null,
+    /// What such a file is to have; null: no layer has numbers.
+    manifest: ?*const Manifest = null,
     pool: *parallel.Pool,
 };
 
@@ -126,7 +136,10 @@ pub fn check(
         .{ format, sideMax(format) },
     );
     const channel_count: u64 = channelCount(formOf(format, transparent, .half));
-    const by_library = format != .ppm and format != .pfm and format != .webp;
+    const by_library = switch (format) {
+        .ppm, .pfm, .y4m, .webp => false,
+        .png, .jpg, .tga, .bmp, .hdr, .exr => true,
+    };
     const value_count = (width * channel_count + 1) * height;
     if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
         error.InputOutput,
@@ -171,6 +184,7 @@ pub fn write(
             .scale = exposure_file.scaleOf(settings.exposure_ev),
             .tone_mapping = settings.tone_mapping,
             .background = settings.background,
+            .extent = settings.rows orelse .{ .first = 0, .of = image.height },
         },
         .from_bottom = format == .pfm,
     };
@@ -188,6 +202,7 @@ pub fn write(
         .pfm => try target.finish(&.{
             std.mem.print(&buffer, "PF\n{d} {d}\n-1.0\n", size) catch unreachable, pixels,
         }, diagnostic),
+        .y4m => try writeFrame(gpa, size, pixels, &settings, target, diagnostic),
         inline .png, .jpg, .tga, .bmp, .hdr => |coded| {
             const file = try stb_image_write.encode(gpa, @field(
                 stb_image_write.Codec,
@@ -223,6 +238,34 @@ pub fn write(
     return work.tally;
 }
 
+/// Encodes channels as an OpenEXR file and moves it to its place. Closes the target in any case.
+pub fn writeChannels(
+    gpa: Allocator,
+    picture: openexr.Picture,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    defer target.abandon();
+    const file = try openexr.encode(gpa, picture);
+    defer gpa.free(file);
+    try target.finish(&.{file}, diagnostic);
+}
+
+fn writeFrame(
+    gpa: Allocator,
+    size: [2]u32,
+    pixels: []const u8,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const planes = try y4m.planes(gpa, pixels);
+    defer gpa.free(planes);
+    var buffer: [y4m.header_bytes_max]u8 = undefined;
+    const header = y4m.header(&buffer, size, settings.frame_rate, !settings.is_continued);
+    return target.finish(&.{ header, planes }, diagnostic);
+}
+
 /// A file of these channels, of an image's size.
 fn writeExr(
     gpa: Allocator,
@@ -232,18 +275,17 @@ fn writeExr(
     target: *Target,
     diagnostic: *Diagnostic,
 ) Error!void {
-    const manifest: []const openexr.Attribute = if (settings.manifest) |text|
-        &.{.{ .name = layers_file.manifest_name, .text = text }}
-    else
-        &.{};
-    const file = try openexr.encode(gpa, .{
+    const text = if (settings.manifest) |manifest| try manifest.text(gpa) else null;
+    defer if (text) |some| gpa.free(some);
+    return writeChannels(gpa, .{
         .width = image.width,
         .height = image.height,
         .channels = channels,
-        .attributes = manifest,
-    });
-    defer gpa.free(file);
-    try target.finish(&.{file}, diagnostic);
+        .attributes = if (text) |some|
+            &.{.{ .name = layers_file.manifest_name, .text = some }}
+        else
+            &.{},
+    }, target, diagnostic);
 }
 
 /// Encodes a layer alone and moves it to its place: its channels in OpenEXR, its numbers as they
@@ -312,6 +354,7 @@ const Work = struct {
 
 test {
     _ = openexr;
+    _ = y4m;
     _ = stb_image_write;
     _ = webp;
     _ = layers_file;

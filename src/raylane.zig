@@ -6,6 +6,7 @@
 
 const std = @import("std");
 
+pub const batch = @import("batch.zig");
 pub const bench = @import("bench.zig");
 pub const builtin = @import("builtin.zig");
 pub const cli = @import("cli.zig");
@@ -22,11 +23,15 @@ pub const image = @import("image.zig");
 /// The project's licence and those of what a program is made of.
 pub const licenses = @import("licenses").text;
 pub const info = @import("info.zig");
+pub const json_text = @import("json_text.zig");
+pub const manifest = @import("manifest.zig");
 pub const math = @import("math.zig");
 pub const memory_account = @import("memory_account.zig");
 pub const output = @import("output.zig");
+pub const merge = @import("merge.zig");
 pub const parallel = @import("parallel.zig");
 pub const parse = @import("parse.zig");
+pub const part = @import("part.zig");
 pub const prepare = @import("prepare.zig");
 pub const progress = @import("progress.zig");
 pub const report = @import("report.zig");

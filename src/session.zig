@@ -21,11 +21,14 @@ const trace = @import("trace.zig");
 const variant = @import("variant.zig");
 const Clay = @import("session/clay.zig");
 const Environment = @import("session/environment.zig").Environment;
-const HitLayers = @import("session/hit_layers.zig");
+const Manifest = @import("manifest.zig").Manifest;
+const hit_layers = @import("session/hit_layers.zig");
 const emission = @import("session/emission.zig");
 const course_file = @import("session/course.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
+const fingerprint = @import("session/fingerprint.zig");
+const part_file = @import("part.zig");
 const Film = film_file.Film;
 const Identity = @import("identity.zig").Identity;
 const Progress = @import("progress.zig").Progress;
@@ -33,6 +36,7 @@ const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
 const Frame = @import("world.zig").Frame;
+const Light = @import("world.zig").Light;
 const World = @import("world.zig").World;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -95,6 +99,18 @@ pub const Pose = struct {
     }
 };
 
+/// What the pictures of a film have of one of them: a film neither jumps nor flickers.
+pub const Reference = struct {
+    view: prepare.Reference,
+    /// What the light of surfaces that emit is worth; null: it was not weighed.
+    emission: ?emission.Weight,
+    /// In stops, of formats that are exposed.
+    exposure_ev: f32,
+    is_metered: bool,
+    /// What a dimmed studio is multiplied by.
+    studio_scale: ?f32,
+};
+
 /// One scene, its threads, and what has been made so far. Must stay where it is.
 pub const Session = struct {
     gpa: Allocator,
@@ -133,17 +149,32 @@ pub const Session = struct {
     /// The file that the picture is to replace.
     output: ?Identity = null,
     film: ?Film = null,
-    /// Layers beside it, of what its layer of hits says.
-    hit_layers: HitLayers = .{},
+    /// Names of what a layer of it has numbers of; the memory is that of `origins`.
+    manifest: ?Manifest = null,
+    /// Which pixels the film has.
+    layout: ?film_file.Layout = null,
+    /// What parts say of what they are of.
+    identity: ?PictureIdentity = null,
     traced: trace.Statistics = .{},
     /// What the film was traced with.
     rendered: settings.Render = .{},
     /// What the view shows, for the exposure; null: not metered yet.
     metered: ?output.Metered = null,
+    /// What `view` and `render` take from another picture; the caller's.
+    reference: ?*const Reference = null,
+    /// What the light of surfaces that emit is worth in the view; null: not weighed.
+    weight: ?emission.Weight = null,
     /// What it was written with, where that is not linear.
     appearance: ?Report.Appearance = null,
 
-    pub const Error = LoadError || prepare.Error || @import("session/environment.zig").Error;
+    pub const Error = LoadError || prepare.Error || @import("session/environment.zig").Error ||
+        PartError;
+
+    /// `PartUnknown`: the picture has no such part.
+    pub const PartError = error{ OutOfMemory, PartUnknown };
+
+    /// See `identify`.
+    const PictureIdentity = struct { version: []const u8, scene: u64, moment: u64 };
 
     /// Whether the scene is freed with the session, or only looked at: then it must live on until
     /// the last `view`.
@@ -177,7 +208,7 @@ pub const Session = struct {
         session.dropLoaded();
         session.dropScene();
         if (session.film) |*film| film.deinit(session.gpa);
-        session.hit_layers.deinit(session.gpa);
+        if (session.layout) |*layout| layout.deinit(session.gpa);
         session.environment.deinit();
         session.backdrop.deinit();
         session.pool.deinit();
@@ -227,6 +258,27 @@ pub const Session = struct {
         };
     }
 
+    /// Frees the scene and all that is made of it. Threads, film and environments stay for another.
+    pub fn drop(session: *Session) void {
+        session.dropWorld();
+        session.dropLoaded();
+        session.dropScene();
+        session.reference = null;
+    }
+
+    /// Notes what parts of pictures of this view, by a program of this version, are to say of what
+    /// they are of. Before the scene is dropped; asserts that there is a view.
+    pub fn identify(session: *Session, version: []const u8) void {
+        const scene = fingerprint.ofScene(&session.scene.?);
+        const is_file = session.seen.environment.source == .file;
+        const around = if (is_file) fingerprint.of(session.environment.made.?.map) else 0;
+        session.identity = .{
+            .version = version,
+            .scene = fingerprint.of([2]u64{ scene, around }),
+            .moment = fingerprint.of(session.posed.?.moment),
+        };
+    }
+
     /// Frees the scene, for which there is no use after the last `view`.
     pub fn dropScene(session: *Session) void {
         session.dropPosed();
@@ -252,6 +304,7 @@ pub const Session = struct {
         session.pose_cache = null;
         if (session.origins) |*origins| origins.deinit();
         session.origins = null;
+        session.manifest = null;
     }
 
     fn dropLoaded(session: *Session) void {
@@ -370,6 +423,9 @@ pub const Session = struct {
             &session.motion,
         );
         session.times.prepare_ns += session.since(start);
+        session.weight = null;
+        const shift = session.pose_cache.?.shift;
+        const reference = if (session.reference) |first| first.view.shiftedBy(shift) else null;
         try prepare.view(&session.world.?, session.io, &session.posed.?.scene, .{
             .camera = choices.camera,
             .viewpoint = choices.viewpoint,
@@ -385,7 +441,31 @@ pub const Session = struct {
                 motion
             else
                 null,
+            .reference = if (reference) |*first| first else null,
         }, session.diagnostic, &session.times);
+    }
+
+    /// The view as what other pictures of a film go by that are rendered and written like this.
+    /// Asserts that there is a view, which is to be chosen anew before it is rendered.
+    pub fn refer(
+        session: *Session,
+        choices: settings.Render,
+        written: settings.Write,
+    ) Error!Reference {
+        session.reference = null;
+        session.rendered = choices;
+        session.metered = null;
+        try session.weighEmitters();
+        try session.dimStudio();
+        const world = &session.world.?;
+        const is_exposed = !output.isLinear(written.format) or choices.noise != null;
+        return .{
+            .view = session.framing(),
+            .emission = session.weight,
+            .exposure_ev = if (is_exposed) try session.exposureOf(written.exposure) else 0,
+            .is_metered = session.isMetered(written.exposure),
+            .studio_scale = if (session.isStudioDimmed()) world.environment.scale[0] else null,
+        };
     }
 
     fn chooseFor(
@@ -405,6 +485,14 @@ pub const Session = struct {
         );
     }
 
+    /// How the view is framed. Asserts that there is one.
+    pub fn framing(session: *const Session) prepare.Reference {
+        const world = &session.world.?;
+        const is_framed = world.facts.camera_is_default or
+            session.seen.viewpoint.replacesCamera();
+        return .of(world, is_framed, session.pose_cache.?.shift);
+    }
+
     /// Traces the picture. Asserts that there is a view, and a tree of the variant's width.
     pub fn render(session: *Session, choices: settings.Render) Error!void {
         const film = try session.sizedFilm(choices);
@@ -413,6 +501,7 @@ pub const Session = struct {
         session.appearance = null;
         session.metered = null;
         session.times.denoise_ns = 0;
+        session.manifest = null;
         const shade = session.seen.shade;
         if (shade == null) {
             try session.weighEmitters();
@@ -427,29 +516,45 @@ pub const Session = struct {
         defer if (lights) |*made| made.deinit();
         if (lights) |*made| frame.light_sampler = &made.sampler;
         try session.traceInRounds(&frame, film, choices);
-        if (film.layers.contains(.hit)) try session.survey(&frame, film);
+        if (film.layers.contains(.origin)) try session.survey(&frame, film);
+        try session.cutFilm();
         if (shade == .cost) try session.paintCost();
         session.times.trace_ns = session.since(start);
         if (session.traced.non_finite_count > 0) session.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
-        if (choices.denoise) try session.denoiseFilm();
+        if (choices.denoise and choices.part == .whole) try session.denoiseFilm();
+    }
+
+    /// Leaves of the film what was asked for.
+    fn cutFilm(session: *Session) error{OutOfMemory}!void {
+        const layout = &session.layout.?;
+        if (!layout.hasSurroundings()) return;
+        const cut = try session.film.?.cut(session.gpa, layout);
+        session.film.?.deinit(session.gpa);
+        session.film = cut;
+        layout.* = layout.bare();
     }
 
     /// Makes layers of what the picture's first samples see.
     fn survey(session: *Session, frame: *const Frame, film: *Film) trace.Error!void {
-        const gpa = session.gpa;
         const choices = &session.rendered;
         var chosen = session.traceSettings(choices.*);
         chosen.sample_count = @max(session.traced.sample_count, 1);
-        try trace.fillHits(gpa, choices.variant, frame, film, chosen);
-        session.hit_layers.deinit(gpa);
-        session.hit_layers = try .make(gpa, &session.pool, film.imageOf(.hit).?, .{
+        chosen.layout = &session.layout.?;
+        try trace.fillHits(session.gpa, choices.variant, frame, film, chosen);
+        const origins = if (session.origins) |*origins| origins else null;
+        if (origins) |made| {
+            const arena = made.arena.allocator();
+            session.manifest =
+                try hit_layers.manifestOf(arena, film.imageOf(.origin).?, made);
+        }
+        try hit_layers.fill(film, .{
             .geometry = frame.geometry,
             .shift = session.pose_cache.?.shift,
-            .origins = if (session.origins) |*origins| origins else null,
-        }, choices.layers);
+            .origins = origins,
+        }, &session.pool);
     }
 
     /// Makes the picture a map of what it took.
@@ -461,8 +566,8 @@ pub const Session = struct {
     }
 
     fn denoiseFilm(session: *Session) denoise.Error!void {
-        if (session.traced.sample_count < denoise.sample_count_min) return session
-            .diagnostic.warn("it is not denoised: one sample a pixel does not tell its noise", .{});
+        if (session.traced.sample_count < denoise.sample_count_min)
+            return session.diagnostic.warn(denoise.too_few_samples, .{});
         const start = Io.Clock.awake.now(session.io);
         try denoise.run(session.gpa, &session.film.?, &session.pool);
         session.times.denoise_ns = session.since(start);
@@ -476,6 +581,7 @@ pub const Session = struct {
     ) trace.Error!void {
         var chosen = session.traceSettings(choices);
         chosen.stop = session.stop;
+        chosen.layout = &session.layout.?;
         if (choices.noise) |noise| chosen.noise = .{
             .error_max = noise.error_max,
             .exposure_scale = output.exposureScale(try session.exposureOf(noise.exposure)),
@@ -550,7 +656,12 @@ pub const Session = struct {
         standing.copyTo(&image.film.?) catch return;
         const appearance = session.appearanceOf(image.choices) catch return;
         const chosen = session.outputSettings(image.choices, appearance);
-        image.write(session.gpa, chosen, session.diagnostic);
+        const layout = &session.layout.?;
+        if (!layout.hasSurroundings())
+            return image.write(session.gpa, &image.film.?, chosen, session.diagnostic);
+        var cut = image.film.?.cut(session.gpa, layout) catch return;
+        defer cut.deinit(session.gpa);
+        image.write(session.gpa, &cut, chosen, session.diagnostic);
     }
 
     /// The list of an integrator that chooses lights at random; null for others.
@@ -568,6 +679,7 @@ pub const Session = struct {
     pub fn countTests(session: *Session, choices: settings.Render) Error!statistics.TestCounts {
         var chosen = session.traceSettings(choices);
         chosen.sample_count = session.traced.sample_count;
+        chosen.layout = &session.layout.?;
         const counted = try trace.traceCounting(
             session.gpa,
             choices.variant,
@@ -579,33 +691,47 @@ pub const Session = struct {
         return counted.tests.?;
     }
 
-    /// Refuses what a file cannot hold of the view; best asked before `render`.
-    pub fn checkWrite(session: *Session, choices: settings.Write) error{InputOutput}!void {
+    /// Refuses a part that the view does not have, and what a file cannot hold of it; best asked
+    /// before `render`.
+    pub fn checkWrite(
+        session: *Session,
+        choices: settings.Write,
+        part: settings.Part,
+    ) (error{InputOutput} || PartError)!void {
         const seen = &session.world.?.view;
+        var layout: film_file.Layout =
+            try .init(session.gpa, seen.width, seen.height, part, .{}, session.diagnostic);
+        defer layout.deinit(session.gpa);
         return output.check(
             choices.format,
             session.seen.background == .transparent,
-            seen.width,
-            seen.height,
+            layout.film_width,
+            layout.film_height,
             session.diagnostic,
         );
     }
 
-    /// Encodes the picture and moves it to its place. Closes the target in any case. Asserts that
-    /// there is a picture.
+    /// Encodes the picture and moves it to its place; a part of one in OpenEXR as `merge` takes it.
+    /// Closes the target in any case. Asserts that there is a picture, that tiles are a file in
+    /// OpenEXR, and that `identify` has been called for it.
     pub fn write(
         session: *Session,
         target: *output.Target,
         choices: settings.Write,
     ) output.Error!void {
         defer target.abandon();
+        const part = session.rendered.part;
+        if (part != .whole and choices.format == .exr) return session.writePart(target, choices);
+        assert(part != .tile);
         session.appearance = try session.appearanceOf(choices);
         const start = Io.Clock.awake.now(session.io);
         const film = &session.film.?;
         var further: [std.enums.values(settings.Layer).len]output.Further = undefined;
         var chosen = session.outputSettings(choices, session.appearance);
-        chosen.further = session.furtherLayers(&further);
-        chosen.manifest = session.hit_layers.manifest;
+        if (!choices.layers_apart) {
+            chosen.further = session.furtherLayers(&further);
+            chosen.manifest = if (session.manifest) |*manifest| manifest else null;
+        }
         Progress.begin(session.pool.progress, .{ .stage = .writing });
         const tally = try output.write(session.gpa, .{
             .image = &film.image,
@@ -613,7 +739,73 @@ pub const Session = struct {
         }, chosen, target, session.diagnostic);
         session.times.output_ns = session.since(start);
         session.times.total_ns = session.since(session.start);
-        session.hint(tally);
+        if (part == .whole) session.hint(tally);
+    }
+
+    fn writePart(
+        session: *Session,
+        target: *output.Target,
+        choices: settings.Write,
+    ) output.Error!void {
+        const film = &session.film.?;
+        const layout = &session.layout.?;
+        const ev = try session.exposureOf(choices.exposure);
+        const start = Io.Clock.awake.now(session.io);
+        const chosen = session.outputSettings(choices, null);
+        var layers: [std.enums.values(film_file.Layer).len]film_file.Layer = undefined;
+        var further: [std.enums.values(settings.Layer).len]settings.Layer = undefined;
+        const identity = &session.identity.?;
+        try part_file.write(session.gpa, film, layout, &.{
+            .version = identity.version,
+            .width = layout.width,
+            .height = layout.height,
+            .part = switch (layout.form) {
+                .window => |own| .{ .crop = .{ .pixels = own } },
+                .share => session.rendered.part,
+            },
+            .scene = part_file.hexOf(identity.scene),
+            .options = part_file.hexOf(session.optionsFingerprint(choices)),
+            .sample_count = session.traced.sample_count,
+            .is_partial = session.traced.is_partial,
+            .layers = listOf(film_file.Layer, film.layers, &layers),
+            .further = listOf(settings.Layer, session.rendered.layers, &further),
+            .denoise = session.rendered.denoise,
+            .exposure_ev = ev,
+            .tone_mapping = chosen.tone_mapping,
+            .transparent = chosen.transparent,
+            .background = chosen.background,
+            .manifest = if (session.manifest) |*manifest| .of(manifest) else null,
+            .jpeg_quality = chosen.jpeg_quality,
+            .webp_quality = chosen.webp_quality,
+            .exr_kind = chosen.exr_kind,
+        }, target, session.diagnostic);
+        session.times.output_ns = session.since(start);
+        session.times.total_ns = session.since(session.start);
+    }
+
+    /// Of all that the picture depends on besides what was read.
+    fn optionsFingerprint(session: *const Session, choices: settings.Write) u64 {
+        var seen = session.seen;
+        // A file's contents count, not its name.
+        if (seen.environment.source == .file) seen.environment.source = .{ .file = "" };
+        const rendered = &session.rendered;
+        return fingerprint.of(.{
+            session.identity.?.moment,
+            session.texture_side_max,
+            seen,
+            rendered.integrator,
+            rendered.lights,
+            session.sampleCount(rendered.*),
+            rendered.noise,
+            session.depthOf(rendered.*),
+            rendered.denoise,
+            rendered.layers,
+            choices.exposure,
+            choices.tone_mapping,
+            choices.jpeg_quality,
+            choices.webp_quality,
+            choices.exr_kind,
+        });
     }
 
     /// Encodes a layer alone, as numbers or as colours, whichever the format holds, and moves it to
@@ -627,7 +819,7 @@ pub const Session = struct {
         defer target.abandon();
         const start = Io.Clock.awake.now(session.io);
         var chosen = session.outputSettings(choices, null);
-        chosen.manifest = session.hit_layers.manifest;
+        chosen.manifest = if (session.manifest) |*manifest| manifest else null;
         const further = session.furtherOf(layer);
         try output.writeLayer(session.gpa, &further, chosen, target, session.diagnostic);
         session.times.output_ns += session.since(start);
@@ -653,13 +845,25 @@ pub const Session = struct {
         return .{
             .format = choices.format,
             .exposure_ev = if (appearance) |chosen| chosen.exposure_ev else 0,
-            .tone_mapping = if (appearance) |chosen| chosen.tone_mapping else .linear,
+            .tone_mapping = if (session.seen.shade == null) choices.tone_mapping else .linear,
             .transparent = session.seen.background == .transparent,
             .background = session.behind(),
             .jpeg_quality = @intCast(choices.jpeg_quality),
             .webp_quality = if (choices.webp_quality) |quality| @intCast(quality) else null,
+            .rows = session.rowsWritten(),
             .exr_kind = choices.exr_kind,
+            .frame_rate = choices.frame_rate,
+            .is_continued = choices.is_continued,
             .pool = &session.pool,
+        };
+    }
+
+    /// Null: all.
+    fn rowsWritten(session: *const Session) ?output.Extent {
+        const layout = &session.layout.?;
+        return switch (layout.form) {
+            .window => |own| .{ .first = own[1], .of = layout.height },
+            .share => null,
         };
     }
 
@@ -672,16 +876,12 @@ pub const Session = struct {
     }
 
     fn furtherOf(session: *const Session, layer: settings.Layer) output.Further {
-        return .{
-            .layer = layer,
-            .image = if (HitLayers.isMadeOfHits(layer))
-                session.hit_layers.imageOf(layer)
-            else
-                session.film.?.imageOf(layerOf(layer)).?,
-        };
+        const image = session.film.?.imageOf(film_file.layerOf(layer)).?;
+        return .{ .layer = layer, .image = image };
     }
 
     fn isMetered(session: *const Session, exposure: settings.Exposure) bool {
+        if (session.reference) |reference| return reference.is_metered;
         return switch (exposure) {
             .ev => false,
             .auto => true,
@@ -691,6 +891,8 @@ pub const Session = struct {
 
     /// In stops: as chosen, or metered. That time counts as tracing.
     fn exposureOf(session: *Session, exposure: settings.Exposure) trace.Error!f32 {
+        if (session.seen.shade != null) return 0;
+        if (session.reference) |reference| return reference.exposure_ev;
         if (!session.isMetered(exposure)) return if (exposure == .ev) exposure.ev else 0;
         const start = Io.Clock.awake.now(session.io);
         const metered = try session.meter();
@@ -709,6 +911,12 @@ pub const Session = struct {
     /// scene's own lights, whichever exposure is chosen; all of it where these light next to
     /// nothing.
     fn dimStudio(session: *Session) trace.Error!void {
+        if (session.reference) |reference| {
+            const scale = reference.studio_scale orelse return;
+            const environment = &session.world.?.environment;
+            if (session.world.?.facts.environment_is_default) environment.scale = @splat(scale);
+            return;
+        }
         if (!session.isStudioDimmed()) return;
         const metered = try session.meter();
         const share: f32 = if (metered.is_black) 1 else studio_share;
@@ -767,23 +975,10 @@ pub const Session = struct {
         if (facts.emitter_count == 0) return;
         const count = facts.emitter_count;
         const all = world.lights;
-        errdefer world.lights = all;
         const others = all[0 .. all.len - count];
-        world.lights = others;
-        var besides = try session.traceSmall();
-        defer besides.deinit(session.gpa);
-        const around = world.environment;
-        errdefer world.environment = around;
-        world.environment.map = null;
-        world.environment.ambient = 0;
-        world.lights = &.{};
-        var glow = try session.traceSmall();
-        defer glow.deinit(session.gpa);
-        world.lights = all[others.len..];
-        var lit = try session.traceSmall();
-        defer lit.deinit(session.gpa);
-        world.environment = around;
-        const share = emission.weigh(besides.image.pixels, glow.image.pixels, lit.image.pixels);
+        const known = if (session.reference) |reference| reference.emission else null;
+        const share = known orelse try session.weigh(others, all[others.len..]);
+        session.weight = share;
         world.lights = if (share.shows) all else others;
         facts.emitter_count = 0;
         if (!share.prevails) return;
@@ -792,6 +987,31 @@ pub const Session = struct {
         facts.lights_are_default = false;
         world.lights = all[others.len..];
         world.environment.ambient = session.seen.ambient orelse 0;
+    }
+
+    /// Weighs some of the lights against the others, and all else that shines.
+    fn weigh(
+        session: *Session,
+        others: []const Light,
+        own: []const Light,
+    ) trace.Error!emission.Weight {
+        const world = &session.world.?;
+        const all = world.lights;
+        defer world.lights = all;
+        world.lights = others;
+        var besides = try session.traceSmall();
+        defer besides.deinit(session.gpa);
+        const around = world.environment;
+        defer world.environment = around;
+        world.environment.map = null;
+        world.environment.ambient = 0;
+        world.lights = &.{};
+        var glow = try session.traceSmall();
+        defer glow.deinit(session.gpa);
+        world.lights = own;
+        var lit = try session.traceSmall();
+        defer lit.deinit(session.gpa);
+        return emission.weigh(besides.image.pixels, glow.image.pixels, lit.image.pixels);
     }
 
     /// Says so where the picture shows next to nothing, and what may help.
@@ -846,17 +1066,16 @@ pub const Session = struct {
 
     /// What the picture took; what the user called things is the caller's to fill in.
     pub fn report(session: *const Session, choices: settings.Render) Report {
-        const image = &session.film.?.image;
+        const layout = &session.layout.?;
         const tree = &session.world.?.facts.tree;
         const textures = &session.loaded.?.textures;
         return .{
             .triangle_count = session.facts.triangle_count +
                 session.world.?.facts.stroke_triangle_count,
-            .width = image.width,
-            .height = image.height,
+            .width = if (layout.form == .window) layout.film_width else layout.width,
+            .height = if (layout.form == .window) layout.film_height else layout.height,
             .sample_count = session.traced.sample_count,
-            .sample_mean = float(session.traced.sample_sum) /
-                float(@as(u64, image.width) * image.height),
+            .sample_mean = float(session.traced.sample_sum) / float(session.traced.pixel_count),
             .is_partial = session.traced.is_partial,
             .is_timed = choices.time_budget_s != null,
             .depth = session.depthOf(choices),
@@ -878,7 +1097,7 @@ pub const Session = struct {
             .memory_peak_bytes = memoryPeakBytes(),
             .image_hash = session.film.?.hash(),
             .appearance = session.appearance,
-            .manifest = session.hit_layers.manifest,
+            .manifest = session.manifest,
         };
     }
 
@@ -949,19 +1168,34 @@ pub const Session = struct {
     }
 
     /// A film of the view's size.
-    fn sizedFilm(session: *Session, choices: settings.Render) error{OutOfMemory}!*Film {
+    fn sizedFilm(session: *Session, choices: settings.Render) PartError!*Film {
         const view_size = &session.world.?.view;
         var layers = session.layersOf();
         if (choices.denoise) layers.setUnion(denoise.needed);
         var further = choices.layers.iterator();
-        while (further.next()) |layer| layers.insert(layerOf(layer));
+        while (further.next()) |layer| layers.insert(film_file.layerOf(layer));
+        // Where hits are before they become numbers.
+        if (layers.contains(.position) or layers.contains(.texcoord)) layers.insert(.origin);
         if (session.seen.shade == .cost) layers.insert(.cost);
+        const layout: film_file.Layout = try .init(
+            session.gpa,
+            view_size.width,
+            view_size.height,
+            choices.part,
+            trace.surroundingsOf(&choices),
+            session.diagnostic,
+        );
+        if (session.layout) |*before| before.deinit(session.gpa);
+        session.layout = layout;
+        const width, const height = .{ layout.film_width, layout.film_height };
         if (session.film) |*film| {
-            if (film.become(view_size.width, view_size.height, layers)) return film;
+            if (film.become(width, height, layers)) return film;
             film.deinit(session.gpa);
             session.film = null;
         }
-        session.film = try .init(session.gpa, view_size.width, view_size.height, layers);
+        session.film = try .init(session.gpa, width, height, layers);
+        // Between tiles that the picture's edge cuts there are pixels that nobody writes.
+        if (layout.form == .share) session.film.?.clear();
         return &session.film.?;
     }
 
@@ -970,20 +1204,17 @@ pub const Session = struct {
     }
 };
 
-/// The film's that has it, or what it is made of.
-fn layerOf(layer: settings.Layer) film_file.Layer {
-    return switch (layer) {
-        .depth, .alpha => .depth,
-        .uv, .node, .material, .primitive, .position => .hit,
-        inline .normal, .albedo, .cost, .variance => |same| @field(
-            film_file.Layer,
-            @tagName(same),
-        ),
-    };
-}
-
 fn float(count: u64) f64 {
     return @floatFromInt(count);
+}
+
+/// The members of a set, in `room`.
+fn listOf(comptime T: type, set: std.EnumSet(T), room: []T) []const T {
+    var count: usize = 0;
+    var all = set;
+    var members = all.iterator();
+    while (members.next()) |member| : (count += 1) room[count] = member;
+    return room[0..count];
 }
 
 /// Threads where nobody says how many.
@@ -1089,7 +1320,7 @@ test "layers leave the picture as it is, and places are as far away as depths sa
     const forward = math.vec3.normalize(camera.forward).?;
     const alpha = session.furtherOf(.alpha);
     var hit_count: usize = 0;
-    for (session.hit_layers.imageOf(.position).pixels, 0..) |place, at| {
+    for (session.film.?.imageOf(.position).?.pixels, 0..) |place, at| {
         if (place[3] == 0) continue;
         // Depths of other samples of the pixel are much the same.
         const shifted = math.vec3.sub(place[0..3].*, camera.origin);

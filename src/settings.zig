@@ -67,6 +67,12 @@ pub const long_side: Range = .{ .min = 1, .max = 1 << 14, .default = side.defaul
 pub const part_count: Range = .{ .min = 1, .max = 1 << 16 };
 /// Quality of a WebP that loses information.
 pub const webp_quality: Range = .{ .min = 1, .max = 100 };
+/// Frames of a film, and pictures that are numbered.
+pub const frame_count_max = 1_000_000;
+/// Files that are rendered side by side.
+pub const job_count: Range = .{ .min = 1, .max = 64 };
+/// Views around a scene.
+pub const view_count: Range = .{ .min = 1, .max = 36_000 };
 /// Quality of a JPEG.
 pub const jpeg_quality: Range = .{ .min = 1, .max = 100, .default = 90 };
 /// Largest exposure either way, in stops.
@@ -109,6 +115,8 @@ pub const Format = enum {
     webp,
     /// OpenEXR: linear, halves or floats, with alpha where the background is transparent.
     exr,
+    /// YUV4MPEG2: frames of a film, one after the other.
+    y4m,
 };
 
 /// What colours are in an OpenEXR file.
@@ -204,6 +212,9 @@ pub const Orbit = struct {
         pub const default: Radius = .{ .share = 1 };
     };
 };
+
+/// Where a turntable begins: as the automatic view does of what has no better front.
+pub const orbit_turntable: Orbit = .{ .theta_degrees = 30, .phi_degrees = 70 };
 
 /// A camera of the user's own; what is null follows from a framing of the scene. Numbers are
 /// finite; not both `eye` and `orbit`; `orthographic` without `fov_degrees`.
@@ -520,9 +531,26 @@ pub const Render = struct {
     layers: std.EnumSet(Layer) = .empty,
 };
 
+/// Frames of a film a second, as a fraction of numbers of 1 or more.
+pub const FrameRate = struct {
+    numerator: u32 = 24,
+    denominator: u32 = 1,
+
+    /// When a frame is seen, in seconds.
+    pub fn timeOf(rate: FrameRate, frame: i32) f32 {
+        const numerator: f64 = @floatFromInt(rate.numerator);
+        const denominator: f64 = @floatFromInt(rate.denominator);
+        return @floatCast(@as(f64, @floatFromInt(frame)) * denominator / numerator);
+    }
+};
+
 /// How a picture is encoded.
 pub const Write = struct {
     format: Format = .png,
+    /// Of a format that holds a film.
+    frame_rate: FrameRate = .{},
+    /// The film has frames already.
+    is_continued: bool = false,
     exposure: Exposure = .default,
     tone_mapping: ToneMapping = .neutral,
     /// Within `jpeg_quality`.
@@ -530,7 +558,15 @@ pub const Write = struct {
     /// Within `webp_quality`; null: without loss.
     webp_quality: ?u32 = null,
     exr_kind: ExrKind = .half,
+    /// Layers are in files of their own.
+    layers_apart: bool = false,
 };
+
+test FrameRate {
+    const film: FrameRate = .{ .numerator = 24_000, .denominator = 1001 };
+    try std.testing.expectEqual(1.001, film.timeOf(24));
+    try std.testing.expectEqual(-0.5, (FrameRate{}).timeOf(-12));
+}
 
 test Range {
     try std.testing.expect(depth.holds(0) and depth.holds(32) and !depth.holds(33));

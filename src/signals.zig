@@ -50,7 +50,8 @@ pub const Outcome = struct {
         if (current == 0) return;
         var line: [raylane.diagnostic.message_bytes_max + 64]u8 = undefined;
         var length: usize = 0;
-        for ([_][]const u8{ "raylane: ", verbOf(signal), ": ", chosen.texts[current - 1].text(), "\n" }) |part| {
+        const text = chosen.texts[current - 1].text();
+        for ([_][]const u8{ "raylane: ", verbOf(signal), ": ", text, "\n" }) |part| {
             @memcpy(line[length..][0..part.len], part);
             length += part.len;
         }

@@ -122,7 +122,7 @@ pub fn traceCounting(
     return run(true, gpa, variant_index, frame, film, &settings);
 }
 
-/// Fills in the film's layer of hits, see `tiles.fillHits`.
+/// Leaves hits on the film's layer of origins, see `tiles.fillHits`.
 pub fn fillHits(
     gpa: Allocator,
     variant_index: usize,

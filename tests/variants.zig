@@ -164,11 +164,10 @@ test "colours of the display and what is seen are the same by every variant, and
         try std.testing.expectEqual(first orelse film.hash(), film.hash());
         first = film.hash();
         var hash: u64 = 0;
-        for ([_]raylane.film.Layer{ .albedo, .normal, .depth, .variance }) |layer| {
+        for ([_]raylane.film.Layer{
+            .albedo, .normal, .depth, .variance, .origin, .position, .texcoord,
+        }) |layer| {
             hash = hash *% 31 +% film.imageOf(layer).?.hash();
-        }
-        for ([_]raylane.settings.Layer{ .node, .position, .uv }) |layer| {
-            hash = hash *% 31 +% session.hit_layers.imageOf(layer).hash();
         }
         try std.testing.expectEqual(features orelse hash, hash);
         features = hash;
@@ -193,8 +192,8 @@ test "colours of the display and what is seen are the same by every variant, and
         const before_mirror = film.imageOf(.display).?.at(9, 7).*;
         try std.testing.expectEqual([4]f32{ 0.05, 0.1, 0.2, 0.25 }, before_mirror);
         // What most is seen of is behind it.
-        const places = session.hit_layers.imageOf(.position);
-        const numbers = session.hit_layers.imageOf(.material);
+        const places = film.imageOf(.position).?;
+        const numbers = film.imageOf(.origin).?;
         for ([_][2]u32{ .{ 9, 7 }, .{ 11, 7 } }, [_][2]u32{ .{ 3, 2 }, .{ 17, 2 } }) |at, same| {
             try std.testing.expectApproxEqAbs(-3, places.at(at[0], at[1])[2], 1e-5);
             const number: [4]u32 = @bitCast(numbers.at(at[0], at[1]).*);

@@ -6,6 +6,7 @@ const raylane = @import("raylane");
 const signals = @import("../signals.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = raylane.diagnostic.Diagnostic;
+const Display = raylane.display.Display;
 const ExitCode = @import("exit_code.zig").ExitCode;
 const Io = std.Io;
 const Target = raylane.output.Target;
@@ -39,7 +40,7 @@ pub fn run(init: std.process.Init, options: *const cli.Bench, diagnostic: *Diagn
     defer target.abandon();
     settings.output = target.replaces;
     const shown: raylane.settings.Progress = .{ .form = if (options.quiet) .none else .auto };
-    var display: raylane.display.Display = .init(io, shown, &signals.progress_line);
+    var display: Display = .init(io, shown, &signals.progress_line);
     display.start();
     var run_of: raylane.bench.Bench = .{
         .arena = init.arena.allocator(),

@@ -22,6 +22,13 @@ pub fn print(io: Io, text: []const u8) ExitCode {
     return .ok;
 }
 
+/// Whether standard output is a terminal: nobody wants a picture there, and this says so.
+pub fn isTerminal(io: Io) bool {
+    if (!(Io.File.stdout().isTty(io) catch false)) return false;
+    say(io, "raylane: standard output is a terminal, where no picture goes; see -o\n", .{});
+    return true;
+}
+
 /// Writes all of a text to standard output; the diagnostic says why it cannot.
 pub fn writeToStdout(
     io: Io,

@@ -23,7 +23,7 @@ pub const ExitCode = enum(u8) {
         return switch (err) {
             error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
             error.CameraUnknown, error.SceneUnknown => .usage,
-            error.MaterialVariantUnknown, error.AnimationUnknown => .usage,
+            error.MaterialVariantUnknown, error.AnimationUnknown, error.PartUnknown => .usage,
             error.InvalidInput, error.SceneTooLarge => .invalid,
             error.ImagesDiffer => .differ,
             error.Canceled => unreachable, // Nobody asks for it here.

@@ -1,23 +1,26 @@
-//! `raylane`: one scene led through a session's stages to a picture and its report.
+//! `raylane`: one scene led through a session's stages to a picture and its report; several are a
+//! batch.
 
 const std = @import("std");
+const batch = @import("batch.zig");
 const console = @import("console.zig");
+const facts = @import("facts.zig");
 const raylane = @import("raylane");
 const signals = @import("../signals.zig");
 const Account = raylane.memory_account.Account;
 const Allocator = std.mem.Allocator;
 const Diagnostic = raylane.diagnostic.Diagnostic;
+const Display = raylane.display.Display;
 const ExitCode = @import("exit_code.zig").ExitCode;
 const Io = std.Io;
 const Options = raylane.cli.Options;
 const Report = raylane.report.Report;
 const Session = raylane.session.Session;
 const Target = raylane.output.Target;
-const World = raylane.world.World;
 const cli = raylane.cli;
 const printable = raylane.diagnostic.printable;
 
-/// Renders one scene, then says what it cost or why it failed.
+/// Renders, then says what it cost or why it failed.
 pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnostic) ExitCode {
     const chosen = &options.render;
     const names = raylane.variant.names;
@@ -27,8 +30,16 @@ pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnos
         });
         return .usage;
     }
+    if (options.toStdout() and console.isTerminal(io)) return .usage;
+    if (options.isBatch() or isFolder(io, options.scene))
+        return batch.run(gpa, io, options, diagnostic);
     var account: Account = .init(gpa, options.memory_max);
     return renderAndReport(&account, io, options, diagnostic);
+}
+
+fn isFolder(io: Io, path: []const u8) bool {
+    const stat = Io.Dir.cwd().statFile(io, path, .{}) catch return false;
+    return stat.kind == .directory;
 }
 
 fn renderAndReport(
@@ -57,8 +68,7 @@ fn renderAndReport(
         ),
     };
     defer job.session.deinit();
-    const shown: raylane.settings.Progress = options.progress;
-    var display: raylane.display.Display = .init(io, shown, &signals.progress_line);
+    var display: Display = .init(io, options.progress, &signals.progress_line);
     display.start();
     const progress = display.beginFile(.{ .index = 1, .count = 1, .name = options.scene });
     job.session.pool.progress = progress;
@@ -77,7 +87,7 @@ fn renderAndReport(
     const exit_code = job.printReport(&report);
     if (exit_code != .ok or !report.is_partial) return exit_code;
     const signal = signals.stop.signal.load(.monotonic);
-    if (!options.quiet) console.say(io, "raylane: {s}: {f} has {d} of {d} samples a pixel\n", .{
+    if (!options.quiet) console.say(io, "raylane: {s}: {f} written with {d} of {d} samples\n", .{
         signals.verbOf(@fromBackingInt(signal)), printable(job.outputTitle()),
         report.sample_count,                     job.session.sampleCount(options.render),
     });
@@ -123,12 +133,14 @@ const Job = struct {
         });
         try session.view(options.view);
         job.sayWarnings();
-        job.sayVariants(session.scene.?.material_variants);
-        job.sayAnimations();
+        facts.say(job.io, options, session);
+        if (options.render.part != .whole) session.identify(cli.version);
         session.dropScene();
         signals.stop.is_awaited.store(options.partial, .release);
-        job.sayFacts(&session.world.?);
-        session.checkWrite(options.write) catch return error.OutputFailed;
+        session.checkWrite(options.write, options.render.part) catch |err| return switch (err) {
+            error.InputOutput => error.OutputFailed,
+            else => |other| other,
+        };
         try session.render(options.render);
         signals.stop.is_awaited.store(false, .release);
         session.write(&target, options.write) catch |err| return switch (err) {
@@ -149,9 +161,9 @@ const Job = struct {
         if (job.options.quiet) return;
         const title = printable(job.outputTitle());
         if (target.replaces != null)
-            signals.outcome.set("{f} is as it was", .{title})
+            signals.outcome.set("{f} kept as it was", .{title})
         else
-            signals.outcome.set("{f} is not written", .{title});
+            signals.outcome.set("{f} not written", .{title});
     }
 
     /// What messages call the image's place.
@@ -185,54 +197,6 @@ const Job = struct {
             job.sayOfScene("warning: {s}", .{warning.text()});
         };
         job.warning_count = warnings.len;
-    }
-
-    /// With `--verbose`: what was chosen where the user did not.
-    fn sayFacts(job: *Job, world: *const World) void {
-        if (!job.options.verbose) return;
-        if (world.facts.camera_is_default) job.sayOfScene("view: framed on all there is", .{});
-        if (world.facts.environment_is_default) {
-            const dimmed = if (world.facts.own_light_count > 0) ", dimmed" else "";
-            job.sayOfScene("environment: the studio{s}", .{dimmed});
-        }
-        if (world.facts.lights_are_default) {
-            job.sayOfScene("lights: three directional ones fixed to the camera", .{});
-        } else {
-            job.sayOfScene("lights: {d}", .{world.lights.len});
-        }
-        job.sayOfScene("ambient radiance: {d}", .{world.environment.ambient});
-        job.sayOfScene("tracer: {s}, {d} threads", .{
-            raylane.variant.names[job.options.render.variant], job.session.pool.thread_count,
-        });
-        if (world.facts.degenerate_count > 0) {
-            job.sayOfScene("{d} triangles without area left out", .{world.facts.degenerate_count});
-        }
-    }
-
-    /// The same of what the file offers besides.
-    fn sayVariants(job: *Job, names: []const []const u8) void {
-        if (!job.options.verbose or job.options.load.material_variant != .default) return;
-        for (names, 0..) |name, index| {
-            const quoted = raylane.diagnostic.quote(name);
-            job.sayOfScene("material variant {d}: {f}, not chosen", .{ index, quoted });
-        }
-    }
-
-    /// And of its animations; which one is shown where nobody asked for it.
-    fn sayAnimations(job: *Job) void {
-        if (!job.options.verbose or job.options.animation.which != .default) return;
-        const moment = job.session.posed.?.moment;
-        for (job.session.scene.?.animations, 0..) |*animation, index| {
-            const quoted = raylane.diagnostic.quote(animation.name);
-            const span = animation.span() orelse continue;
-            if (moment.running == .one and moment.running.one == index) {
-                job.sayOfScene("animation {d}: {f} at {d} s, for at rest not all is seen", .{
-                    index, quoted, moment.time_s,
-                });
-            } else job.sayOfScene("animation {d}: {f}, {d} to {d} s, not chosen", .{
-                index, quoted, span[0], span[1],
-            });
-        }
     }
 
     fn sayOfScene(job: *Job, comptime format: []const u8, arguments: anytype) void {

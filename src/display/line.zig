@@ -67,11 +67,15 @@ fn writeText(writer: *Writer, standing: *const Standing, under_way: usize) Write
         try writeDuration(writer, left_s);
         try writer.writeAll(" left");
     }
-    if (standing.rays_per_s) |rate| try writer.print(", {d:.1} Mrays/s", .{rate / 1e6});
+    const rate = (standing.rays_per_s orelse return) / 1e6;
+    try if (rate < 1)
+        writer.print(", {d:.2} Mrays/s", .{rate})
+    else
+        writer.print(", {d:.1} Mrays/s", .{rate});
 }
 
 /// `3/60 Fox.glb`, or without the number where it is the only one.
-pub fn writePlace(writer: *Writer, place: Place) Writer.Error!void {
+fn writePlace(writer: *Writer, place: Place) Writer.Error!void {
     if (place.count > 1) try writer.print("{d}/{d} ", .{ place.index, place.count });
     const name = std.fs.path.basename(place.name);
     const shown = cut(name, name_columns_max);

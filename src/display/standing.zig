@@ -1,7 +1,8 @@
 //! Where the work on one file stands: counters and a clock -> fractions, times and rates.
 //!
 //! In: what was begun and when, and the counters of its progress. Out: the numbers that are shown.
-//! What is left of a stage is told by what has been done of it, as if it went on at that rate.
+//! What is left of a stage is told by what had been done of it when a piece was last finished, as
+//! if it went on at that rate: pieces may take seconds.
 
 const std = @import("std");
 const progress_file = @import("../progress.zig");
@@ -14,6 +15,16 @@ pub const Place = struct {
     index: usize,
     count: usize,
     name: []const u8,
+};
+
+/// Until now.
+pub const Times = struct {
+    /// Since the file was begun.
+    file_s: f64,
+    /// From the begin of the work to the last time that something of it was done.
+    work_s: f64,
+    /// Since then.
+    idle_s: f64 = 0,
 };
 
 /// At one moment.
@@ -33,13 +44,11 @@ pub const Standing = struct {
     /// Since the stage began; null: it traces none.
     rays_per_s: ?f64,
 
-    /// `stage_s` since the work began, `elapsed_s` since the file was.
     pub fn of(
         place: Place,
         work: *const Work,
         progress: *const Progress,
-        stage_s: f64,
-        elapsed_s: f64,
+        times: Times,
     ) Standing {
         const done = progress.done.load(.monotonic);
         const total = progress.total.load(.monotonic);
@@ -50,21 +59,27 @@ pub const Standing = struct {
             .done = if (done > 0 or total > 0) done / work.pieces_per_unit else null,
             .total = null,
             .fraction = null,
-            .elapsed_s = elapsed_s,
+            .elapsed_s = times.file_s,
             .left_s = null,
-            .rays_per_s = if (rays > 0 and stage_s > 0) float(rays) / stage_s else null,
+            .rays_per_s = if (rays > 0 and times.work_s > 0)
+                float(rays) / times.work_s
+            else
+                null,
         };
         if (total > 0) {
             const fraction = @min(1, float(done) / float(total));
             standing.fraction = fraction;
             // Before, the first of many pieces would make it hours.
-            if (fraction >= fraction_min) standing.left_s = stage_s * (1 - fraction) / fraction;
+            if (fraction >= fraction_min) {
+                const left_s = times.work_s * (1 - fraction) / fraction;
+                standing.left_s = @max(@min(1, left_s), left_s - times.idle_s);
+            }
             // With a time for all of it, few expect to do as much as they may.
             if (work.budget_ns == null) standing.total = total / work.pieces_per_unit;
         }
         if (work.budget_ns) |budget_ns| {
             const budget_s = float(budget_ns) / std.time.ns_per_s;
-            const left_s = @max(0, budget_s - stage_s);
+            const left_s = @max(0, budget_s - times.work_s - times.idle_s);
             standing.fraction = @max(standing.fraction orelse 0, 1 - left_s / budget_s);
             standing.left_s = @min(standing.left_s orelse left_s, left_s);
         }
@@ -81,60 +96,62 @@ fn float(number: anytype) f64 {
 
 const testing = std.testing;
 
-/// `done` of `total` pieces and some rays, for tests.
-fn progressOf(done: usize, total: usize, rays: usize) Progress {
-    return .{
-        .done = .init(done),
-        .total = .init(total),
-        .rays = .init(rays),
+/// With so many pieces done, pieces in all, and rays.
+fn ofForTest(work: *const Work, counts: [3]usize, times: Times) Standing {
+    return .of(.{ .index = 1, .count = 1, .name = "a.glb" }, work, &.{
+        .done = .init(counts[0]),
+        .total = .init(counts[1]),
+        .rays = .init(counts[2]),
         .context = undefined,
         .begun = undefined,
-    };
+    }, times);
 }
 
-const place_for_test: Place = .{ .index = 1, .count = 1, .name = "a.glb" };
+const recently: Times = .{ .file_s = 3, .work_s = 2 };
 
 test "a quarter is done in 2 s, so 6 s are left" {
     const work: Work = .{ .stage = .tracing, .total = 64, .pieces_per_unit = 16 };
-    const standing: Standing =
-        .of(place_for_test, &work, &progressOf(16, 64, 4_000_000), 2, 3);
+    const standing = ofForTest(&work, .{ 16, 64, 4_000_000 }, recently);
     try testing.expectEqual(1, standing.done.?);
     try testing.expectEqual(4, standing.total.?);
     try testing.expectEqual(0.25, standing.fraction.?);
     try testing.expectEqual(6, standing.left_s.?);
     try testing.expectEqual(3, standing.elapsed_s);
     try testing.expectEqual(2e6, standing.rays_per_s.?);
+    // Nothing was finished since; what is overdue is about to be.
+    for ([_][2]f64{ .{ 4, 2 }, .{ 9, 1 } }) |case| {
+        const times: Times = .{ .file_s = 3, .work_s = 2, .idle_s = case[0] };
+        const later = ofForTest(&work, .{ 16, 64, 0 }, times);
+        try testing.expectEqual(case[1], later.left_s.?);
+    }
 }
 
 test "what is not known is not told" {
-    const standing: Standing =
-        .of(place_for_test, &.{ .stage = .writing }, &progressOf(0, 0, 0), 2, 3);
+    const standing = ofForTest(&.{ .stage = .writing }, .{ 0, 0, 0 }, recently);
     try testing.expectEqual(null, standing.done);
     try testing.expectEqual(null, standing.total);
     try testing.expectEqual(null, standing.fraction);
     try testing.expectEqual(null, standing.left_s);
     try testing.expectEqual(null, standing.rays_per_s);
-    const reading: Standing =
-        .of(place_for_test, &.{ .stage = .reading }, &progressOf(7, 0, 0), 2, 3);
+    const reading = ofForTest(&.{ .stage = .reading }, .{ 7, 0, 0 }, recently);
     try testing.expectEqual(7, reading.done.?);
     try testing.expectEqual(null, reading.fraction);
-    const begun: Standing =
-        .of(place_for_test, &.{ .stage = .tree, .total = 10_000 }, &progressOf(1, 10_000, 0), 2, 3);
+    const begun = ofForTest(&.{ .stage = .tree, .total = 10_000 }, .{ 1, 10_000, 0 }, recently);
     try testing.expectEqual(null, begun.left_s);
     // More than was announced: files name others.
-    const more: Standing =
-        .of(place_for_test, &.{ .stage = .tree, .total = 2 }, &progressOf(3, 2, 0), 2, 3);
+    const more = ofForTest(&.{ .stage = .tree, .total = 2 }, .{ 3, 2, 0 }, recently);
     try testing.expectEqual(1, more.fraction.?);
     try testing.expectEqual(0, more.left_s.?);
 }
 
 test "a time for the work ends it, or its pieces do" {
     const work: Work = .{ .stage = .tracing, .total = 100, .budget_ns = 10 * std.time.ns_per_s };
-    const by_time: Standing = .of(place_for_test, &work, &progressOf(10, 100, 0), 4, 4);
+    const times: Times = .{ .file_s = 4, .work_s = 4 };
+    const by_time = ofForTest(&work, .{ 10, 100, 0 }, times);
     try testing.expectEqual(null, by_time.total);
     try testing.expectApproxEqAbs(0.4, by_time.fraction.?, 1e-9);
     try testing.expectApproxEqAbs(6, by_time.left_s.?, 1e-9);
-    const by_pieces: Standing = .of(place_for_test, &work, &progressOf(80, 100, 0), 4, 4);
+    const by_pieces = ofForTest(&work, .{ 80, 100, 0 }, times);
     try testing.expectApproxEqAbs(0.8, by_pieces.fraction.?, 1e-9);
     try testing.expectApproxEqAbs(1, by_pieces.left_s.?, 1e-9);
 }

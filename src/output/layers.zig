@@ -29,7 +29,7 @@ pub fn isNumber(layer: settings.Layer) bool {
 }
 
 /// What stands for no thing.
-pub const none: u32 = std.math.maxInt(u32);
+pub const none = @import("../manifest.zig").none;
 
 /// The text in a file that has the names of the things with numbers.
 pub const manifest_name = "raylane/manifest";

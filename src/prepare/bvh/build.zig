@@ -442,9 +442,7 @@ fn Builder(comptime pack_size: u32) type {
             stretches: []Tree.Stretch,
 
             fn run(work: *TaskWork, index: usize, _: usize) void {
-                const task = &work.builder.tasks.items[index];
-                work.stretches[index] = work.cutTask(task);
-                Progress.add(work.builder.input.pool.progress, task.end - task.begin);
+                work.stretches[index] = work.cutTask(&work.builder.tasks.items[index]);
             }
 
             /// Cuts the sets of a task down to leaves. Returns its pairs.
@@ -453,6 +451,7 @@ fn Builder(comptime pack_size: u32) type {
                 var pair = task.pair;
                 for (sets) |*set| pair = work.cut(set.*, pair);
                 assert(pair <= task.end);
+                Progress.add(work.builder.input.pool.progress, task.end - task.begin);
                 return .{ .begin = task.begin + 1, .end = pair };
             }
 

@@ -186,11 +186,7 @@ fn Optimizer(comptime pack_size: u32) type {
         fn pass(optimizer: *Self, gpa: Allocator, pool: *parallel.Pool) bvh_input.Error!void {
             const moves = try gpa.alloc(Move, optimizer.nodes.len);
             defer gpa.free(moves);
-            var work: SearchWork = .{
-                .optimizer = optimizer,
-                .moves = moves,
-                .progress = pool.progress,
-            };
+            var work: SearchWork = .{ .optimizer = optimizer, .moves = moves, .pool = pool };
             try pool.forEach(@divCeil(moves.len, chunk_size), &work, SearchWork.run);
             var count: usize = 0;
             for (moves) |move| {
@@ -207,7 +203,7 @@ fn Optimizer(comptime pack_size: u32) type {
         const SearchWork = struct {
             optimizer: *const Self,
             moves: []Move,
-            progress: ?*Progress,
+            pool: *const parallel.Pool,
 
             fn run(work: *SearchWork, chunk: usize, _: usize) void {
                 const begin = chunk_size * chunk;
@@ -215,7 +211,7 @@ fn Optimizer(comptime pack_size: u32) type {
                 for (work.moves[begin..end], begin..) |*move, index| {
                     move.* = work.optimizer.search(@intCast(index));
                 }
-                Progress.add(work.progress, (end - begin) / 2);
+                Progress.add(work.pool.progress, (end - begin) / 2);
             }
         };
 

@@ -1,9 +1,9 @@
 //! What primary rays see, without any light: which triangle, and where on it; or a quick look at
 //! normals or texture coordinates.
 //!
-//! In: the frame, a bundle's place in the picture. Out: on the film's layer `hit`, of all surfaces
-//! that the first sample's ray goes through, the one that it sees the largest share of, the nearest
-//! of those alike; or samples of colours of the display.
+//! In: the frame, a bundle's place in the picture. Out: on the film's layer of origins, of all
+//! surfaces that the first sample's ray goes through, the one that it sees the largest share of, the
+//! nearest of those alike; or samples of colours of the display.
 
 const std = @import("std");
 const film_file = @import("../../film.zig");
@@ -24,7 +24,7 @@ const Rectangle = film_file.Rectangle;
 
 /// What a survey makes.
 pub const Look = enum {
-    /// The layer of hits, by the first sample alone.
+    /// Hits, by the first sample alone.
     hits,
     /// A picture of unit normals in the world's axes: code 128 is 0, 255 is 1.
     normals,
@@ -228,7 +228,7 @@ pub fn Survey(comptime Kernel: type) type {
         }
 
         fn exposeHits(survey: *const Self, film: *Film, rectangle: Rectangle) void {
-            const image = film.imageOf(.hit).?;
+            const image = film.imageOf(.origin).?;
             for (&survey.primitive, &survey.weights, 0..) |*primitive, *weights, group| {
                 const numbers = primitive.toArray();
                 const second = weights[0].toArray();
