@@ -1639,7 +1639,7 @@ test "the format follows the name, unless said otherwise" {
     try expectUsage("contradicts", &.{ "--format=pfm", "-oa.png", "s" });
     try expectUsage("not in a png file", &.{ "--layers=depth", "s" });
     for ([_][:0]const u8{ "--layers=", "--layers=depht", "--layers=depth,", "--layers=a b" }) |bad|
-        try expectUsage("albedo, normal, depth", &.{ bad, "-oa.exr", "s" });
+        try expectUsage("depth, normal, albedo", &.{ bad, "-oa.exr", "s" });
     const layered = try optionsForTest(&.{ "--layers=depth,albedo,depth", "-oa.exr" });
     try std.testing.expectEqual(2, layered.render.layers.count());
     const each = try optionsForTest(&.{

@@ -217,17 +217,7 @@ pub fn write(
             defer gpa.free(file);
             try target.finish(&.{file}, diagnostic);
         },
-        .webp => {
-            const file = try webp.encode(gpa, .{
-                .width = image.width,
-                .height = image.height,
-                .channel_count = channelCount(form),
-                .pixels = pixels,
-                .quality = settings.webp_quality,
-            });
-            defer gpa.free(file);
-            try target.finish(&.{file}, diagnostic);
-        },
+        .webp => try writeWebp(gpa, size, pixels, &settings, target, diagnostic),
         .exr => {
             var channels: layers_file.Channels = .{};
             channels.addPicture(pixels, channelCount(form), settings.exr_kind);
@@ -236,6 +226,25 @@ pub fn write(
         },
     }
     return work.tally;
+}
+
+fn writeWebp(
+    gpa: Allocator,
+    size: [2]u32,
+    pixels: []const u8,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const file = try webp.encode(gpa, .{
+        .width = size[0],
+        .height = size[1],
+        .channel_count = channelCount(formOf(.webp, settings.transparent, .half)),
+        .pixels = pixels,
+        .quality = settings.webp_quality,
+    });
+    defer gpa.free(file);
+    return target.finish(&.{file}, diagnostic);
 }
 
 /// Encodes channels as an OpenEXR file and moves it to its place. Closes the target in any case.

@@ -150,10 +150,9 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
             }
             tree.sample.expose(film, rectangle);
             tree.lighting.expose(rectangle, sample);
-            if (Kernel.counts_tests and film.layers.contains(.cost)) {
-                const place: camera.Place = .{ .rectangle = rectangle, .sample = sample };
+            const place: camera.Place = .{ .rectangle = rectangle, .sample = sample };
+            if (Kernel.counts_tests and film.layers.contains(.cost))
                 camera.exposeCost(Kernel, film, place, before, tree.visibility.tests);
-            }
         }
 
         fn pushPrimary(tree: *Self, rectangle: Rectangle) void {

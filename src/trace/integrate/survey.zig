@@ -2,8 +2,8 @@
 //! normals or texture coordinates.
 //!
 //! In: the frame, a bundle's place in the picture. Out: on the film's layer of origins, of all
-//! surfaces that the first sample's ray goes through, the one that it sees the largest share of, the
-//! nearest of those alike; or samples of colours of the display.
+//! surfaces that the first sample's ray goes through, the one that it sees the largest share of,
+//! the nearest of those alike; or samples of colours of the display.
 
 const std = @import("std");
 const film_file = @import("../../film.zig");

@@ -353,8 +353,8 @@ fn withSamples(chosen: *const Settings, offsets: []sampler.Offset) Settings {
     return shown;
 }
 
-/// Has a survey leave hits on the film's layer of origins, of the first sample of those that the picture has
-/// by these settings; all else of the film stays.
+/// Has a survey leave hits on the film's layer of origins, of the first sample of those that the
+/// picture has by these settings; all else of the film stays.
 pub fn fillHits(
     survey: *const Integrator,
     gpa: Allocator,
