@@ -10,6 +10,7 @@ const manifest = @import("build.zig.zon");
 const Package = @import("build/package.zig");
 const Tests = @import("build/tests.zig");
 const libraries = @import("build/libraries.zig");
+const release = @import("build/release.zig");
 const variants = @import("build/variants.zig");
 const Compile = std.Build.Step.Compile;
 const Run = std.Build.Step.Run;
@@ -44,6 +45,7 @@ pub fn build(b: *std.Build) void {
         .bench_light = b.step("bench:light", "Rays by bounce and traversal: -- SCENE [options]"),
         .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
+        .release = b.step("release", "Build programs for all processors, and packages of them"),
         .vendor = b.step("vendor", "Fetch and check the third-party files"),
     };
     const query = b.standardTargetOptionsQueryOnly(.{});
@@ -87,6 +89,16 @@ pub fn build(b: *std.Build) void {
     tests.addReport(steps.test_report);
     tests.addCheck(steps.check, targets[0]);
     steps.check.dependOn(&package.program().step);
+
+    const released: libraries.Optional = .{ .draco = true };
+    release.add(steps.release, addVendor(b, released).headers, .{
+        .backend = .vector,
+        .traversal = .beam,
+        .lanes = null,
+        .extent = .few,
+        .is_stripped = true,
+        .optional = released,
+    });
 
     const here: Package = .init(b, resolve(b, .{}), .safe, vendor.headers, options);
     addScenes(steps.scenes, here);

@@ -27,6 +27,7 @@ pub const output = @import("output.zig");
 pub const parallel = @import("parallel.zig");
 pub const parse = @import("parse.zig");
 pub const prepare = @import("prepare.zig");
+pub const processor = @import("processor.zig");
 pub const report = @import("report.zig");
 pub const scene = @import("scene.zig");
 pub const session = @import("session.zig");
@@ -38,7 +39,7 @@ pub const variant = @import("variant.zig");
 pub const world = @import("world.zig");
 
 comptime {
-    @export(&trace.link.panicOfKernel, .{ .name = "rl_kernel_panic" });
+    @export(&trace.link.panicOfKernel, .{ .name = trace.link.panic_symbol });
 }
 
 test {
