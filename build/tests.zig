@@ -54,7 +54,11 @@ pub fn addAll(tests: Tests, step: *std.Build.Step, targets: []const Target) void
     var logs: std.ArrayList(LazyPath) = .empty;
     const arena = tests.owner.allocator;
     logs.appendSlice(arena, &.{
-        tests.format(), tests.tidy(), tests.machinery(), tests.report(), tests.fetcher(),
+        tests.format(),          tests.tidy(), tests.machinery(), tests.report(), tests.fetcher(),
+        tests.packages("Layout", null),
+    }) catch @panic("OOM");
+    if (targets[0].emulator.len == 0) logs.appendSlice(arena, &.{
+        tests.packages("Deb", targets[0]), tests.packages("Wheel", targets[0]),
     }) catch @panic("OOM");
     for (targets) |target| {
         const tested = tests.ofLibrary(target.package, null);
@@ -91,9 +95,11 @@ pub fn addTidy(tests: Tests, step: *std.Build.Step) void {
     tests.close(step, &.{tests.tidy()}, .logs_only);
 }
 
-/// Makes `step` test the tools in Python: the report of the benchmark, and vendor/fetch.
+/// Makes `step` test the tools in Python: of the benchmark, of vendoring, of packages.
 pub fn addReport(tests: Tests, step: *std.Build.Step) void {
-    tests.close(step, &.{ tests.report(), tests.fetcher() }, .logs_only);
+    tests.close(step, &.{
+        tests.report(), tests.fetcher(), tests.packages("Layout", null),
+    }, .logs_only);
 }
 
 /// Makes `step` compile the test programs of `target` without a file as the result.
@@ -128,6 +134,19 @@ fn fetcher(tests: Tests) LazyPath {
     const run, const log = tests.start("fetch", "sources");
     run.addArgs(&.{ "--one", "--needs=python3", "--", "python3", "-m", "unittest", "discover" });
     run.addArgs(&.{ "-s", "vendor" });
+    return log;
+}
+
+/// What wraps programs up, and packages of this machine's program, installed where nothing else is.
+fn packages(tests: Tests, class: []const u8, target: ?Target) LazyPath {
+    const name = std.ascii.allocLowerString(tests.owner.allocator, class) catch @panic("OOM");
+    const run, const log = tests.start(name, if (target) |one| one.name else "sources");
+    run.addArgs(&.{ "--one", "--needs=python3" });
+    if (target) |one| run.addArtifactArg2(one.package.program(), .{
+        .prefix = "--env=RAYLANE_PROGRAM=",
+        .make_absolute = true,
+    });
+    run.addArgs(&.{ "--", "python3", "-B", "build/test_packages.py", class });
     return log;
 }
 
