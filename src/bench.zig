@@ -18,7 +18,9 @@ const statistics = @import("bench/statistics.zig");
 const tables = @import("bench/tables.zig");
 const variant_file = @import("variant.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const Display = @import("display.zig").Display;
 const Identity = @import("identity.zig").Identity;
+const Progress = @import("progress.zig").Progress;
 const printable = @import("diagnostic.zig").printable;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -82,7 +84,8 @@ pub const Bench = struct {
     io: Io,
     settings: *const Settings,
     diagnostic: *Diagnostic,
-    progress: std.Progress.Node,
+    /// Told of the scenes; null: nobody is.
+    display: ?*Display = null,
     /// What is being measured: for the message of an error.
     scene: []const u8 = "",
     /// The reference first, then as a reader would sort them.
@@ -244,8 +247,8 @@ pub const Bench = struct {
     ) Error!results_file.Scene {
         const settings = bench.settings;
         const title = try bench.arena.print("{f}", .{printable(name)});
-        const progress = bench.progress.start(title, 0);
-        defer progress.end();
+        const progress = bench.beginScene(name, deadline_ns);
+        errdefer if (bench.display) |display| display.endFile(progress, .failed);
         var stages: Stages = .init(
             bench.gpa,
             bench.io,
@@ -270,6 +273,8 @@ pub const Bench = struct {
         if (scaling_deadline_ns) |scaling_ns| if (settings.thread_count > 1) {
             results.scaling = try bench.scale(&rounds, title, variants, scaling_ns);
         };
+        const by_bounce = try bench.bouncesOf(&stages, deadline_ns);
+        if (bench.display) |display| display.endFile(progress, .done);
         return .{
             .scene = title,
             .triangles = stages.session.facts.triangle_count,
@@ -278,8 +283,23 @@ pub const Bench = struct {
             .rounds = rounds.round_count,
             .ended_by = rounds.end,
             .variants = variants,
-            .bounces = try bench.bouncesOf(&stages, deadline_ns),
+            .bounces = by_bounce,
         };
+    }
+
+    fn beginScene(bench: *const Bench, name: []const u8, deadline_ns: u64) ?*Progress {
+        const display = bench.display orelse return null;
+        const names = bench.settings.scenes;
+        const index = for (names, 1..) |*other, number| {
+            if (other.ptr == name.ptr) break number;
+        } else unreachable; // It is one of them.
+        const progress = display.beginFile(.{ .index = index, .count = names.len, .name = name });
+        const now_ns: u64 = @intCast(Io.Clock.awake.now(bench.io).nanoseconds);
+        Progress.begin(progress, .{
+            .stage = .measuring,
+            .budget_ns = @max(1, deadline_ns -| now_ns),
+        });
+        return progress;
     }
 
     /// What a scene is rendered with. The thesis's light is that of lamps alone.
@@ -433,7 +453,6 @@ test "the built-in scene by all variants, with energy of a constant load" {
         .io = testing.io,
         .settings = &settings,
         .diagnostic = &diagnostic,
-        .progress = .none,
     };
     const results = try bench.run();
     const joules = results.scenes[0].variants[0].energy.?;
@@ -465,7 +484,6 @@ test "a scene that is not there is named, and the meter ends" {
         .io = testing.io,
         .settings = &settings,
         .diagnostic = &diagnostic,
-        .progress = .none,
     };
     try testing.expectError(error.InvalidInput, bench.run());
     try testing.expectEqualStrings("builtin:absent", bench.scene);

@@ -5,7 +5,10 @@
 //! `output` reads.
 
 const std = @import("std");
-const Image = @import("image.zig").Image;
+/// Of a layer.
+pub const Image = @import("image.zig").Image;
+const settings = @import("settings.zig");
+const layout_file = @import("film/layout.zig");
 const assert = std.debug.assert;
 
 /// Radiance of a sample at most, so that sums and exposure stay finite.
@@ -45,6 +48,13 @@ pub const Layer = enum {
     }
 };
 
+/// The film's, of those that users choose.
+pub fn layerOf(layer: settings.Layer) Layer {
+    return switch (layer) {
+        inline else => |same| @field(Layer, @tagName(same)),
+    };
+}
+
 /// See `Layer`.
 pub const Layers = std.EnumSet(Layer);
 
@@ -64,8 +74,52 @@ fn firstHalfCount(count: u32) u32 {
     return power / 2 + @min(count - power, power / 2);
 }
 
-/// Pixels x0 <= x < x1, y0 <= y < y1; of a bundle's every `step`th in either direction.
-pub const Rectangle = struct { x0: u32, y0: u32, x1: u32, y1: u32, step: u32 = 1 };
+/// Pixels x0 <= x < x1, y0 <= y < y1 of a picture; of a bundle's every `step`th in either direction.
+pub const Rectangle = struct {
+    x0: u32,
+    y0: u32,
+    x1: u32,
+    y1: u32,
+    step: u32 = 1,
+    /// What is added to a pixel's column and row, modulo 2^32, for where it is on the film.
+    shift: [2]u32 = .{ 0, 0 },
+
+    /// Column and row of a pixel on the film.
+    pub inline fn placeOf(rectangle: *const Rectangle, x: u32, y: u32) [2]u32 {
+        return .{ x +% rectangle.shift[0], y +% rectangle.shift[1] };
+    }
+
+    /// The same pixels by their places on the film.
+    pub fn onFilm(rectangle: *const Rectangle) Rectangle {
+        const x0, const y0 = rectangle.placeOf(rectangle.x0, rectangle.y0);
+        const x1, const y1 = rectangle.placeOf(rectangle.x1, rectangle.y1);
+        return .{ .x0 = x0, .y0 = y0, .x1 = x1, .y1 = y1, .step = rectangle.step };
+    }
+
+    /// A part of it, given by places on the film, by its pixels of the picture.
+    pub fn ofFilm(rectangle: *const Rectangle, part: Rectangle) Rectangle {
+        return .{
+            .x0 = part.x0 -% rectangle.shift[0],
+            .y0 = part.y0 -% rectangle.shift[1],
+            .x1 = part.x1 -% rectangle.shift[0],
+            .y1 = part.y1 -% rectangle.shift[1],
+            .step = part.step,
+            .shift = rectangle.shift,
+        };
+    }
+
+    /// How many pixels are within it.
+    pub fn pixelCount(rectangle: *const Rectangle) u64 {
+        return @as(u64, rectangle.x1 - rectangle.x0) * (rectangle.y1 - rectangle.y0);
+    }
+};
+
+/// Which pixels of a picture a film has.
+pub const Layout = layout_file.Layout;
+/// See `Layout`.
+pub const Surroundings = layout_file.Surroundings;
+/// See `Layout`.
+pub const Window = layout_file.Window;
 
 /// Sums of samples.
 pub const Film = struct {
@@ -125,6 +179,32 @@ pub const Film = struct {
     pub fn imageOf(film: *const Film, layer: Layer) ?*const Image {
         assert(layer.isApart());
         return if (film.apart.getPtrConst(layer).*) |*image| image else null;
+    }
+
+    /// A film of the same part of the picture without what is around it; to be freed as this one.
+    pub fn cut(
+        film: *const Film,
+        gpa: std.mem.Allocator,
+        layout: *const Layout,
+    ) error{OutOfMemory}!Film {
+        const bare = layout.bare();
+        var result: Film = try .init(gpa, bare.film_width, bare.film_height, film.layers);
+        result.clear();
+        for (0..layout.count()) |number| {
+            const from = layout.windowAt(@intCast(number)).own.onFilm();
+            const to = bare.windowAt(@intCast(number)).own.onFilm();
+            copyPixels(&film.image, from, &result.image, to);
+            for (&film.apart.values, &result.apart.values) |*source, *target| {
+                if (source.*) |*image| copyPixels(image, from, &target.*.?, to);
+            }
+        }
+        return result;
+    }
+
+    /// Makes all pixels of all layers 0.
+    pub fn clear(film: *Film) void {
+        @memset(film.image.pixels, @splat(0));
+        for (&film.apart.values) |*apart| if (apart.*) |*image| @memset(image.pixels, @splat(0));
     }
 
     /// Adds a sample to a pixel: its radiance and, fourth, the share of it that saw nothing. The
@@ -277,6 +357,22 @@ pub const Film = struct {
         return std.hash.XxHash64.hash(of_image, std.mem.sliceAsBytes(display.pixels));
     }
 };
+
+/// Makes pixels of an image those of another; both rectangles are of one size.
+pub fn copyPixels(from: *const Image, source: Rectangle, to: *Image, target: Rectangle) void {
+    const width = source.x1 - source.x0;
+    assert(target.x1 - target.x0 == width);
+    assert(target.y1 - target.y0 == source.y1 - source.y0);
+    for (source.y0..source.y1, target.y0..target.y1) |from_row, to_row| {
+        const from_start = from_row * from.width + source.x0;
+        const to_start = to_row * to.width + target.x0;
+        @memcpy(to.pixels[to_start..][0..width], from.pixels[from_start..][0..width]);
+    }
+}
+
+test {
+    _ = layout_file;
+}
 
 test "means of samples, alpha where it is wanted, black for what is not a number" {
     const nan = std.math.nan(f32);

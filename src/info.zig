@@ -245,6 +245,7 @@ test "the JSON has every key, and what another scene draws" {
         version: []const u8,
         file: []const u8,
         bytes: u64,
+        files: []const struct { path: []const u8, bytes: u64 },
         format: []const u8,
         format_version: ?[]const u8,
         generator: ?[]const u8,

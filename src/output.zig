@@ -1,6 +1,6 @@
 //! Stage 4: `Image` -> file.
 //!
-//! In: a finished picture. Out: a file in one of eight formats, whole and in its place, or nothing
+//! In: a finished picture. Out: a file in one of nine formats, whole and in its place, or nothing
 //! at all. Colours are made by all threads; the bytes depend on the picture and the settings alone.
 
 const std = @import("std");
@@ -10,9 +10,10 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Image = @import("image.zig").Image;
 const huge_pages = @import("huge_pages.zig");
 const parallel = @import("parallel.zig");
-const openexr = @import("output/openexr.zig");
+const layers_file = @import("output/layers.zig");
 const stb_image_write = @import("output/stb_image_write.zig");
 const target_file = @import("output/target.zig");
+const y4m = @import("output/y4m.zig");
 const encode_file = @import("output/encode.zig");
 const exposure_file = @import("output/exposure.zig");
 const assert = std.debug.assert;
@@ -25,7 +26,11 @@ pub const Background = @import("output/background.zig").Background;
 /// What is written: the layers of a film.
 pub const Picture = encode_file.Picture;
 /// What a file may hold besides the picture.
-pub const Further = openexr.Further;
+pub const Further = layers_file.Further;
+/// Writes channels of any kind with texts beside them.
+pub const openexr = @import("output/openexr.zig");
+/// Rows of a picture that has more.
+pub const Extent = encode_file.Extent;
 /// How many pixels look like nothing.
 pub const Tally = encode_file.Tally;
 /// The exposure that suits a picture.
@@ -46,13 +51,20 @@ fn sideMax(format: choices.Format) u32 {
     };
 }
 
-fn formOf(format: choices.Format, transparent: bool) encode_file.Form {
+fn formOf(
+    format: choices.Format,
+    transparent: bool,
+    exr_kind: choices.ExrKind,
+) encode_file.Form {
     return switch (format) {
         .png, .tga => if (transparent) .rgba else .rgb,
-        .jpg, .bmp, .ppm => .rgb,
+        .jpg, .bmp, .ppm, .y4m => .rgb,
         .hdr => .radiance,
         .pfm => .linear,
-        .exr => if (transparent) .half_alpha else .half,
+        .exr => switch (exr_kind) {
+            .half => if (transparent) .half_alpha else .half,
+            .float => if (transparent) .linear_alpha else .linear,
+        },
     };
 }
 
@@ -65,8 +77,16 @@ pub const Settings = struct {
     /// Keep alpha, where the format has it.
     transparent: bool = false,
     background: Background = .none,
+    /// Which of a picture's rows these are; null: all.
+    rows: ?Extent = null,
     /// Within `settings.jpeg_quality`.
     jpeg_quality: u8 = choices.jpeg_quality.default,
+    /// Of the colours in an OpenEXR file.
+    exr_kind: choices.ExrKind = .half,
+    /// Of a film.
+    frame_rate: choices.FrameRate = .{},
+    /// The film has frames already.
+    is_continued: bool = false,
     /// Layers of the picture's size, each once at most; only a file in OpenEXR holds them.
     further: []const Further = &.{},
     pool: *parallel.Pool,
@@ -105,8 +125,8 @@ pub fn check(
         "a {t} file has {d} pixels on a side at most",
         .{ format, sideMax(format) },
     );
-    const channel_count: u64 = channelCount(formOf(format, transparent));
-    const by_library = format != .ppm and format != .pfm;
+    const channel_count: u64 = channelCount(formOf(format, transparent, .half));
+    const by_library = format != .ppm and format != .pfm and format != .y4m;
     const value_count = (width * channel_count + 1) * height;
     if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
         error.InputOutput,
@@ -117,15 +137,15 @@ pub fn check(
 
 fn channelCount(form: encode_file.Form) u8 {
     return switch (form) {
-        .rgba, .half_alpha => 4,
+        .rgba, .half_alpha, .linear_alpha => 4,
         .rgb, .linear, .radiance, .half => 3,
     };
 }
 
 /// Whether a format keeps radiance as it is, without exposure and tone mapping.
 pub fn isLinear(format: choices.Format) bool {
-    return switch (formOf(format, false)) {
-        .linear, .radiance, .half, .half_alpha => true,
+    return switch (formOf(format, false, .half)) {
+        .linear, .linear_alpha, .radiance, .half, .half_alpha => true,
         .rgb, .rgba => false,
     };
 }
@@ -143,7 +163,7 @@ pub fn write(
     const format = settings.format;
     const image = picture.image;
     try check(format, settings.transparent, image.width, image.height, diagnostic);
-    const form = formOf(format, settings.transparent);
+    const form = formOf(format, settings.transparent, settings.exr_kind);
     var work: Work = .{
         .rows = .{
             .picture = picture,
@@ -151,6 +171,7 @@ pub fn write(
             .scale = exposure_file.scaleOf(settings.exposure_ev),
             .tone_mapping = settings.tone_mapping,
             .background = settings.background,
+            .extent = settings.rows orelse .{ .first = 0, .of = image.height },
         },
         .from_bottom = format == .pfm,
     };
@@ -168,6 +189,7 @@ pub fn write(
         .pfm => try target.finish(&.{
             std.mem.print(&buffer, "PF\n{d} {d}\n-1.0\n", size) catch unreachable, pixels,
         }, diagnostic),
+        .y4m => try writeFrame(gpa, size, pixels, &settings, target, diagnostic),
         inline .png, .jpg, .tga, .bmp, .hdr => |coded| {
             const file = try stb_image_write.encode(gpa, @field(
                 stb_image_write.Codec,
@@ -183,18 +205,47 @@ pub fn write(
             try target.finish(&.{file}, diagnostic);
         },
         .exr => {
+            var channels: layers_file.Channels = .{};
+            channels.addPicture(pixels, channelCount(form), settings.exr_kind);
+            for (settings.further) |*further| channels.addLayer(further);
             const file = try openexr.encode(gpa, .{
                 .width = image.width,
                 .height = image.height,
-                .channel_count = channelCount(form),
-                .pixels = pixels,
-                .further = settings.further,
+                .channels = channels.all(),
             });
             defer gpa.free(file);
             try target.finish(&.{file}, diagnostic);
         },
     }
     return work.tally;
+}
+
+/// Encodes channels as an OpenEXR file and moves it to its place. Closes the target in any case.
+pub fn writeChannels(
+    gpa: Allocator,
+    picture: openexr.Picture,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    defer target.abandon();
+    const file = try openexr.encode(gpa, picture);
+    defer gpa.free(file);
+    try target.finish(&.{file}, diagnostic);
+}
+
+fn writeFrame(
+    gpa: Allocator,
+    size: [2]u32,
+    pixels: []const u8,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const planes = try y4m.planes(gpa, pixels);
+    defer gpa.free(planes);
+    var buffer: [y4m.header_bytes_max]u8 = undefined;
+    const header = y4m.header(&buffer, size, settings.frame_rate, !settings.is_continued);
+    return target.finish(&.{ header, planes }, diagnostic);
 }
 
 const Work = struct {
@@ -229,6 +280,7 @@ const Work = struct {
 
 test {
     _ = openexr;
+    _ = y4m;
     _ = stb_image_write;
     _ = target_file;
     _ = @import("output/temporary.zig");

@@ -6,6 +6,7 @@
 
 const std = @import("std");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const File = @import("scene.zig").File;
 const Scene = @import("scene.zig").Scene;
 const gzip = @import("decode.zig").gzip;
 const format_file = @import("parse/format.zig");
@@ -76,6 +77,13 @@ pub fn parseNamed(
 /// Reads what has been opened, by its contents.
 fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Error!Scene {
     diagnostic.strict = opened.resources.settings.strict;
+    const gpa = opened.resources.gpa;
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    defer arena.deinit();
+    var listing: Resources.Listing = .{ .arena = arena.allocator() };
+    opened.resources.listing = &listing;
+    defer opened.resources.listing = null;
+    try listing.add(std.fs.path.basename(path), opened.main.bytes.len);
     try unpack(opened, path, diagnostic);
     const main = &opened.main;
     const resources = &opened.resources;
@@ -92,7 +100,21 @@ fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Err
     errdefer scene.deinit();
     try diagnostic.failIfRefused();
     scene.file.byte_count = resources.bytes_read;
+    scene.file.files = try filesOf(scene.arena.allocator(), &listing);
     return scene;
+}
+
+/// What was read, in memory from `arena`.
+fn filesOf(
+    arena: Allocator,
+    listing: *const Resources.Listing,
+) Allocator.Error![]const File.Source {
+    const files = try arena.alloc(File.Source, listing.byte_counts.count());
+    const paths = listing.byte_counts.keys();
+    for (files, paths, listing.byte_counts.values()) |*file, path, byte_count| {
+        file.* = .{ .path = try arena.dupe(u8, path), .byte_count = byte_count };
+    }
+    return files;
 }
 
 /// Puts what a gzip file holds in its place.

@@ -34,6 +34,7 @@ const light_sampler = @import("prepare/light_sampler.zig");
 const material = @import("prepare/material.zig");
 const motion_file = @import("prepare/motion.zig");
 const place_file = @import("prepare/pose.zig");
+const reference_file = @import("prepare/reference.zig");
 const tangents = @import("prepare/tangents.zig");
 const texture = @import("prepare/texture.zig");
 const strokes = @import("prepare/strokes.zig");
@@ -41,6 +42,7 @@ const view_file = @import("prepare/view.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Clock = std.Io.Clock;
+const Progress = @import("progress.zig").Progress;
 const Scene = scene.Scene;
 const StageTimes = statistics.StageTimes;
 const TreeQuality = choices.TreeQuality;
@@ -130,6 +132,8 @@ pub const ViewSettings = struct {
     backdrop: ?light.EnvironmentSettings = null,
     /// What is framed in place of the world.
     motion: ?*const Motion = null,
+    /// Of an earlier view, with the shift of this pose.
+    reference: ?*const Reference = null,
 };
 
 /// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
@@ -149,6 +153,8 @@ pub const AnimatedScene = animate.Posed;
 pub const animateScene = animate.pose;
 /// All moments of animations at once.
 pub const Motion = motion_file;
+/// What the pictures of a film have of one of them.
+pub const Reference = reference_file;
 
 /// Makes what does not depend on where things are: textures, and tangents for them. The memory is
 /// the result's and comes from `gpa`. Fills `texture_ns` of `times`.
@@ -422,6 +428,7 @@ fn placeAll(
     const mode = simd.setFlushToZero();
     defer simd.setFloatControl(mode);
     const start = Clock.awake.now(io);
+    Progress.begin(settings.pool.progress, .{ .stage = .geometry });
     const gpa = cache.gpa;
     const arena = posed.pose_arena.allocator();
     const place = &snapshot.place;
@@ -559,27 +566,10 @@ noinline fn chooseView(
     seen.lights = &.{};
     _ = seen.view_arena.reset(.retain_capacity);
     const arena = seen.view_arena.allocator();
-    // The scene as triangles refer to it: with a material for each of the world's.
-    const sources = seen.materials.sources;
-    var shown = from.*;
-    const materials = try gpa.alloc(scene.Material, sources.len);
-    defer gpa.free(materials);
-    for (materials, sources) |*to, source| to.* = from.materials[source];
-    shown.materials = materials;
-    const framed = framedOf(&seen.geometry, settings.motion);
-    const chosen = try view_file.choose(
-        gpa,
-        &shown,
-        seen.node_maps,
-        &framed,
-        &.{
-            .camera = settings.camera,
-            .viewpoint = settings.viewpoint,
-            .resolution = settings.resolution,
-            .long_side = settings.long_side,
-        },
-        diagnostic,
-    );
+    const reference = settings.reference;
+    const kept = if (reference) |first| first.view else null;
+    const chosen = kept orelse try chooseCamera(seen, from, &settings, diagnostic);
+    const facing = if (reference) |first| &first.facing else &chosen.camera;
     seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };
     seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
     const shining = if (settings.emitters or from.has_area_lights)
@@ -593,7 +583,7 @@ noinline fn chooseView(
     seen.facts.own_light_count = seen.lights.len;
     const has_map = settings.environment.map != null;
     const lights_are_default = seen.lights.len == 0 and from.ambient == null and !has_map;
-    if (lights_are_default) seen.lights = try light.placeRig(arena, &seen.view.camera);
+    if (lights_are_default) seen.lights = try light.placeRig(arena, facing);
     seen.facts.emitter_count = if (from.has_area_lights) 0 else shining.len;
     if (seen.facts.emitter_count > 0) seen.lights = try std.mem.concat(arena, world.Light, &.{
         seen.lights, shining,
@@ -604,17 +594,44 @@ noinline fn chooseView(
         settings.ambient,
         settings.background orelse from.background,
     );
-    light.addMap(&seen.environment, &settings.environment, &seen.view.camera);
-    if (settings.floor == .shadow) seen.environment.floor_height = light.floorOf(&seen.geometry);
+    light.addMap(&seen.environment, &settings.environment, facing);
+    if (settings.floor == .shadow) seen.environment.floor_height = if (reference) |first|
+        first.floor_height
+    else
+        light.floorOf(&seen.geometry);
     if (settings.backdrop) |*chosen_backdrop| {
         const backdrop = try arena.create(world.Environment);
         backdrop.* = .{ .ambient = 0, .background = @splat(0) };
-        light.addMap(backdrop, chosen_backdrop, &seen.view.camera);
+        light.addMap(backdrop, chosen_backdrop, facing);
         seen.environment.backdrop = backdrop;
     }
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
     seen.facts.environment_is_default = settings.environment.is_default;
+}
+
+fn chooseCamera(
+    seen: *const World,
+    from: *const Scene,
+    settings: *const ViewSettings,
+    diagnostic: *Diagnostic,
+) ViewError!view_file.View {
+    const gpa = seen.view_arena.child_allocator;
+    // The scene as triangles refer to it: with a material for each of the world's.
+    const sources = seen.materials.sources;
+    var shown = from.*;
+    const materials = try gpa.alloc(scene.Material, sources.len);
+    defer gpa.free(materials);
+    for (materials, sources) |*to, source| to.* = from.materials[source];
+    shown.materials = materials;
+    const framed = framedOf(&seen.geometry, settings.motion);
+    const wanted: view_file.Wanted = .{
+        .camera = settings.camera,
+        .viewpoint = settings.viewpoint,
+        .resolution = settings.resolution,
+        .long_side = settings.long_side,
+    };
+    return view_file.choose(gpa, &shown, seen.node_maps, &framed, &wanted, diagnostic);
 }
 
 fn framedOf(geometry: *const world.Geometry, motion: ?*const Motion) world.Geometry {
@@ -725,6 +742,7 @@ noinline fn growTree(
     const kept = if (geometry.dropped_count > 0) try listKept(gpa, geometry) else null;
     defer if (kept) |numbers| gpa.free(numbers);
     const input = inputOf(geometry, settings, kept);
+    Progress.begin(settings.pool.progress, bvh_wide.workOf(input.count(), input.quality));
     return switch (settings.lanes) {
         4 => .{ .w4 = .{ .built = try bvh_wide.build(gpa, arena, &input, 4) } },
         8 => .{ .w8 = .{ .built = try bvh_wide.build(gpa, arena, &input, 8) } },
@@ -1629,6 +1647,7 @@ test "memory that runs out when a scene is posed again is an error that leaks no
 
 test {
     _ = animate;
+    _ = reference_file;
     _ = Drawn;
     _ = motion_file;
     _ = environment;

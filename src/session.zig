@@ -24,12 +24,16 @@ const emission = @import("session/emission.zig");
 const course_file = @import("session/course.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
+const fingerprint = @import("session/fingerprint.zig");
+const part_file = @import("part.zig");
 const Film = film_file.Film;
 const Identity = @import("identity.zig").Identity;
+const Progress = @import("progress.zig").Progress;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
 const Frame = @import("world.zig").Frame;
+const Light = @import("world.zig").Light;
 const World = @import("world.zig").World;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -80,6 +84,18 @@ pub const Pose = struct {
     view: settings.View = .{},
 };
 
+/// What the pictures of a film have of one of them: a film neither jumps nor flickers.
+pub const Reference = struct {
+    view: prepare.Reference,
+    /// What the light of surfaces that emit is worth; null: it was not weighed.
+    emission: ?emission.Weight,
+    /// In stops, of formats that are exposed.
+    exposure_ev: f32,
+    is_metered: bool,
+    /// What a dimmed studio is multiplied by.
+    studio_scale: ?f32,
+};
+
 /// One scene, its threads, and what has been made so far. Must stay where it is.
 pub const Session = struct {
     gpa: Allocator,
@@ -87,8 +103,6 @@ pub const Session = struct {
     /// What the stages have to say: the line of an error, and warnings.
     diagnostic: *Diagnostic,
     pool: parallel.Pool,
-    /// Told of every finished tile.
-    progress: std.Progress.Node = .none,
     /// Where pictures are shown on which `render` is at work; the caller's.
     progress_image: ?*ProgressImage = null,
     /// Set, it ends what `render` traces when every pixel has a sample.
@@ -118,15 +132,30 @@ pub const Session = struct {
     /// The file that the picture is to replace.
     output: ?Identity = null,
     film: ?Film = null,
+    /// Which pixels the film has.
+    layout: ?film_file.Layout = null,
+    /// What parts say of what they are of.
+    identity: ?PictureIdentity = null,
     traced: trace.Statistics = .{},
     /// What the film was traced with.
     rendered: settings.Render = .{},
     /// What the view shows, for the exposure; null: not metered yet.
     metered: ?output.Metered = null,
+    /// What `view` and `render` take from another picture; the caller's.
+    reference: ?*const Reference = null,
+    /// What the light of surfaces that emit is worth in the view; null: not weighed.
+    weight: ?emission.Weight = null,
     /// What it was written with, where that is not linear.
     appearance: ?Report.Appearance = null,
 
-    pub const Error = LoadError || prepare.Error || @import("session/environment.zig").Error;
+    pub const Error = LoadError || prepare.Error || @import("session/environment.zig").Error ||
+        PartError;
+
+    /// `PartUnknown`: the picture has no such part.
+    pub const PartError = error{ OutOfMemory, PartUnknown };
+
+    /// See `identify`.
+    const PictureIdentity = struct { version: []const u8, scene: u64, moment: u64 };
 
     /// Whether the scene is freed with the session, or only looked at: then it must live on until
     /// the last `view`.
@@ -160,6 +189,7 @@ pub const Session = struct {
         session.dropLoaded();
         session.dropScene();
         if (session.film) |*film| film.deinit(session.gpa);
+        if (session.layout) |*layout| layout.deinit(session.gpa);
         session.environment.deinit();
         session.backdrop.deinit();
         session.pool.deinit();
@@ -177,7 +207,10 @@ pub const Session = struct {
         session.dropWorld();
         session.dropScene();
         const start = Io.Clock.awake.now(session.io);
-        const scene = try loadScene(session.gpa, session.io, name, choices, session.diagnostic);
+        Progress.begin(session.pool.progress, .{ .stage = .reading });
+        var told = choices;
+        told.progress = session.pool.progress;
+        const scene = try loadScene(session.gpa, session.io, name, told, session.diagnostic);
         session.adopt(scene, .owned);
         session.output = choices.output;
         session.texture_side_max = choices.texture_side_max;
@@ -203,6 +236,27 @@ pub const Session = struct {
             .has_unlit = for (scene.instances) |instance| {
                 if (scene.materials[scene.meshes[instance.mesh].material].unlit) break true;
             } else false,
+        };
+    }
+
+    /// Frees the scene and all that is made of it. Threads, film and environments stay for another.
+    pub fn drop(session: *Session) void {
+        session.dropWorld();
+        session.dropLoaded();
+        session.dropScene();
+        session.reference = null;
+    }
+
+    /// Notes what parts of pictures of this view, by a program of this version, are to say of what
+    /// they are of. Before the scene is dropped; asserts that there is a view.
+    pub fn identify(session: *Session, version: []const u8) void {
+        const scene = fingerprint.ofScene(&session.scene.?);
+        const is_file = session.seen.environment.source == .file;
+        const around = if (is_file) fingerprint.of(session.environment.made.?.map) else 0;
+        session.identity = .{
+            .version = version,
+            .scene = fingerprint.of([2]u64{ scene, around }),
+            .moment = fingerprint.of(session.posed.?.moment),
         };
     }
 
@@ -315,6 +369,7 @@ pub const Session = struct {
         session.world.?.environment.map = null;
         session.world.?.environment.backdrop = null;
         const start = Io.Clock.awake.now(session.io);
+        Progress.begin(session.pool.progress, .{ .stage = .view });
         var environment = try session.chooseFor(&session.environment, &choices.environment);
         environment.is_seen = background == .env or background == .studio;
         environment.shadow_count = choices.shadowCount();
@@ -335,6 +390,9 @@ pub const Session = struct {
             &session.motion,
         );
         session.times.prepare_ns += session.since(start);
+        session.weight = null;
+        const shift = session.pose_cache.?.shift;
+        const reference = if (session.reference) |first| first.view.shiftedBy(shift) else null;
         try prepare.view(&session.world.?, session.io, &session.posed.?.scene, .{
             .camera = choices.camera,
             .viewpoint = choices.viewpoint,
@@ -350,7 +408,31 @@ pub const Session = struct {
                 motion
             else
                 null,
+            .reference = if (reference) |*first| first else null,
         }, session.diagnostic, &session.times);
+    }
+
+    /// The view as what other pictures of a film go by that are rendered and written like this.
+    /// Asserts that there is a view, which is to be chosen anew before it is rendered.
+    pub fn refer(
+        session: *Session,
+        choices: settings.Render,
+        written: settings.Write,
+    ) Error!Reference {
+        session.reference = null;
+        session.rendered = choices;
+        session.metered = null;
+        try session.weighEmitters();
+        try session.dimStudio();
+        const world = &session.world.?;
+        const is_exposed = !output.isLinear(written.format) or choices.noise != null;
+        return .{
+            .view = session.framing(),
+            .emission = session.weight,
+            .exposure_ev = if (is_exposed) try session.exposureOf(written.exposure) else 0,
+            .is_metered = session.isMetered(written.exposure),
+            .studio_scale = if (session.isStudioDimmed()) world.environment.scale[0] else null,
+        };
     }
 
     fn chooseFor(
@@ -370,6 +452,14 @@ pub const Session = struct {
         );
     }
 
+    /// How the view is framed. Asserts that there is one.
+    pub fn framing(session: *const Session) prepare.Reference {
+        const world = &session.world.?;
+        const is_framed = world.facts.camera_is_default or
+            session.seen.viewpoint.replacesCamera();
+        return .of(world, is_framed, session.pose_cache.?.shift);
+    }
+
     /// Traces the picture. Asserts that there is a view, and a tree of the variant's width.
     pub fn render(session: *Session, choices: settings.Render) Error!void {
         const film = try session.sizedFilm(choices);
@@ -385,17 +475,28 @@ pub const Session = struct {
         defer if (lights) |*made| made.deinit();
         if (lights) |*made| frame.light_sampler = &made.sampler;
         try session.traceInRounds(&frame, film, choices);
+        try session.cutFilm();
         session.times.trace_ns = session.since(start);
         if (session.traced.non_finite_count > 0) session.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
-        if (choices.denoise) try session.denoiseFilm();
+        if (choices.denoise and choices.part == .whole) try session.denoiseFilm();
+    }
+
+    /// Leaves of the film what was asked for.
+    fn cutFilm(session: *Session) error{OutOfMemory}!void {
+        const layout = &session.layout.?;
+        if (!layout.hasSurroundings()) return;
+        const cut = try session.film.?.cut(session.gpa, layout);
+        session.film.?.deinit(session.gpa);
+        session.film = cut;
+        layout.* = layout.bare();
     }
 
     fn denoiseFilm(session: *Session) denoise.Error!void {
-        if (session.traced.sample_count < denoise.sample_count_min) return session
-            .diagnostic.warn("it is not denoised: one sample a pixel does not tell its noise", .{});
+        if (session.traced.sample_count < denoise.sample_count_min)
+            return session.diagnostic.warn(denoise.too_few_samples, .{});
         const start = Io.Clock.awake.now(session.io);
         try denoise.run(session.gpa, &session.film.?, &session.pool);
         session.times.denoise_ns = session.since(start);
@@ -409,6 +510,7 @@ pub const Session = struct {
     ) trace.Error!void {
         var chosen = session.traceSettings(choices);
         chosen.stop = session.stop;
+        chosen.layout = &session.layout.?;
         if (choices.noise) |noise| chosen.noise = .{
             .error_max = noise.error_max,
             .exposure_scale = output.exposureScale(try session.exposureOf(noise.exposure)),
@@ -471,7 +573,12 @@ pub const Session = struct {
         standing.copyTo(&image.film.?) catch return;
         const appearance = session.appearanceOf(image.choices) catch return;
         const chosen = session.outputSettings(image.choices, appearance);
-        image.write(session.gpa, chosen, session.diagnostic);
+        const layout = &session.layout.?;
+        if (!layout.hasSurroundings())
+            return image.write(session.gpa, &image.film.?, chosen, session.diagnostic);
+        var cut = image.film.?.cut(session.gpa, layout) catch return;
+        defer cut.deinit(session.gpa);
+        image.write(session.gpa, &cut, chosen, session.diagnostic);
     }
 
     /// The list of an integrator that chooses lights at random; null for others.
@@ -489,6 +596,7 @@ pub const Session = struct {
     pub fn countTests(session: *Session, choices: settings.Render) Error!statistics.TestCounts {
         var chosen = session.traceSettings(choices);
         chosen.sample_count = session.traced.sample_count;
+        chosen.layout = &session.layout.?;
         const counted = try trace.traceCounting(
             session.gpa,
             choices.variant,
@@ -500,39 +608,115 @@ pub const Session = struct {
         return counted.tests.?;
     }
 
-    /// Refuses what a file cannot hold of the view; best asked before `render`.
-    pub fn checkWrite(session: *Session, choices: settings.Write) error{InputOutput}!void {
+    /// Refuses a part that the view does not have, and what a file cannot hold of it; best asked
+    /// before `render`.
+    pub fn checkWrite(
+        session: *Session,
+        choices: settings.Write,
+        part: settings.Part,
+    ) (error{InputOutput} || PartError)!void {
         const seen = &session.world.?.view;
+        var layout: film_file.Layout =
+            try .init(session.gpa, seen.width, seen.height, part, .{}, session.diagnostic);
+        defer layout.deinit(session.gpa);
         return output.check(
             choices.format,
             session.seen.background == .transparent,
-            seen.width,
-            seen.height,
+            layout.film_width,
+            layout.film_height,
             session.diagnostic,
         );
     }
 
-    /// Encodes the picture and moves it to its place. Closes the target in any case. Asserts that
-    /// there is a picture.
+    /// Encodes the picture and moves it to its place; a part of one in OpenEXR as `merge` takes it.
+    /// Closes the target in any case. Asserts that there is a picture, that tiles are a file in
+    /// OpenEXR, and that `identify` has been called for it.
     pub fn write(
         session: *Session,
         target: *output.Target,
         choices: settings.Write,
     ) output.Error!void {
         defer target.abandon();
+        const part = session.rendered.part;
+        if (part != .whole and choices.format == .exr) return session.writePart(target, choices);
+        assert(part != .tile);
         session.appearance = try session.appearanceOf(choices);
         const start = Io.Clock.awake.now(session.io);
         const film = &session.film.?;
         var further: [std.enums.values(settings.Layer).len]output.Further = undefined;
         var chosen = session.outputSettings(choices, session.appearance);
         chosen.further = session.furtherLayers(&further);
+        Progress.begin(session.pool.progress, .{ .stage = .writing });
         const tally = try output.write(session.gpa, .{
             .image = &film.image,
             .display = film.imageOf(.display),
         }, chosen, target, session.diagnostic);
         session.times.output_ns = session.since(start);
         session.times.total_ns = session.since(session.start);
-        session.hint(tally);
+        if (part == .whole) session.hint(tally);
+    }
+
+    fn writePart(
+        session: *Session,
+        target: *output.Target,
+        choices: settings.Write,
+    ) output.Error!void {
+        const film = &session.film.?;
+        const layout = &session.layout.?;
+        const ev = try session.exposureOf(choices.exposure);
+        const start = Io.Clock.awake.now(session.io);
+        const chosen = session.outputSettings(choices, null);
+        var layers: [std.enums.values(film_file.Layer).len]film_file.Layer = undefined;
+        var further: [std.enums.values(settings.Layer).len]settings.Layer = undefined;
+        const identity = &session.identity.?;
+        try part_file.write(session.gpa, film, layout, &.{
+            .version = identity.version,
+            .width = layout.width,
+            .height = layout.height,
+            .part = switch (layout.form) {
+                .window => |own| .{ .crop = .{ .pixels = own } },
+                .share => session.rendered.part,
+            },
+            .scene = part_file.hexOf(identity.scene),
+            .options = part_file.hexOf(session.optionsFingerprint(choices)),
+            .sample_count = session.traced.sample_count,
+            .is_partial = session.traced.is_partial,
+            .layers = listOf(film_file.Layer, film.layers, &layers),
+            .further = listOf(settings.Layer, session.rendered.layers, &further),
+            .denoise = session.rendered.denoise,
+            .exposure_ev = ev,
+            .tone_mapping = chosen.tone_mapping,
+            .transparent = chosen.transparent,
+            .background = chosen.background,
+            .jpeg_quality = chosen.jpeg_quality,
+            .exr_kind = chosen.exr_kind,
+        }, target, session.diagnostic);
+        session.times.output_ns = session.since(start);
+        session.times.total_ns = session.since(session.start);
+    }
+
+    /// Of all that the picture depends on besides what was read.
+    fn optionsFingerprint(session: *const Session, choices: settings.Write) u64 {
+        var seen = session.seen;
+        // A file's contents count, not its name.
+        if (seen.environment.source == .file) seen.environment.source = .{ .file = "" };
+        const rendered = &session.rendered;
+        return fingerprint.of(.{
+            session.identity.?.moment,
+            session.texture_side_max,
+            seen,
+            rendered.integrator,
+            rendered.lights,
+            session.sampleCount(rendered.*),
+            rendered.noise,
+            session.depthOf(rendered.*),
+            rendered.denoise,
+            rendered.layers,
+            choices.exposure,
+            choices.tone_mapping,
+            choices.jpeg_quality,
+            choices.exr_kind,
+        });
     }
 
     /// Null: the format keeps radiance as it is.
@@ -557,7 +741,20 @@ pub const Session = struct {
             .transparent = session.seen.background == .transparent,
             .background = session.behind(),
             .jpeg_quality = @intCast(choices.jpeg_quality),
+            .rows = session.rowsWritten(),
+            .exr_kind = choices.exr_kind,
+            .frame_rate = choices.frame_rate,
+            .is_continued = choices.is_continued,
             .pool = &session.pool,
+        };
+    }
+
+    /// Null: all.
+    fn rowsWritten(session: *const Session) ?output.Extent {
+        const layout = &session.layout.?;
+        return switch (layout.form) {
+            .window => |own| .{ .first = own[1], .of = layout.height },
+            .share => null,
         };
     }
 
@@ -567,12 +764,13 @@ pub const Session = struct {
         var chosen = session.rendered.layers.iterator();
         while (chosen.next()) |layer| : (count += 1) room[count] = .{
             .layer = layer,
-            .image = session.film.?.imageOf(layerOf(layer)).?,
+            .image = session.film.?.imageOf(film_file.layerOf(layer)).?,
         };
         return room[0..count];
     }
 
     fn isMetered(session: *const Session, exposure: settings.Exposure) bool {
+        if (session.reference) |reference| return reference.is_metered;
         return switch (exposure) {
             .ev => false,
             .auto => true,
@@ -582,6 +780,7 @@ pub const Session = struct {
 
     /// In stops: as chosen, or metered. That time counts as tracing.
     fn exposureOf(session: *Session, exposure: settings.Exposure) trace.Error!f32 {
+        if (session.reference) |reference| return reference.exposure_ev;
         if (!session.isMetered(exposure)) return if (exposure == .ev) exposure.ev else 0;
         const start = Io.Clock.awake.now(session.io);
         const metered = try session.meter();
@@ -600,6 +799,12 @@ pub const Session = struct {
     /// scene's own lights, whichever exposure is chosen; all of it where these light next to
     /// nothing.
     fn dimStudio(session: *Session) trace.Error!void {
+        if (session.reference) |reference| {
+            const scale = reference.studio_scale orelse return;
+            const environment = &session.world.?.environment;
+            if (session.world.?.facts.environment_is_default) environment.scale = @splat(scale);
+            return;
+        }
         if (!session.isStudioDimmed()) return;
         const metered = try session.meter();
         const share: f32 = if (metered.is_black) 1 else studio_share;
@@ -643,7 +848,7 @@ pub const Session = struct {
         var chosen = session.traceSettings(session.rendered);
         chosen.integrator = .whitted;
         chosen.sample_count = 1;
-        chosen.progress = .none;
+        chosen.progress = null;
         const variant_index = session.rendered.variant;
         _ = try trace.trace(session.gpa, variant_index, &world.frame(), &film, chosen);
         return film;
@@ -658,23 +863,10 @@ pub const Session = struct {
         if (facts.emitter_count == 0) return;
         const count = facts.emitter_count;
         const all = world.lights;
-        errdefer world.lights = all;
         const others = all[0 .. all.len - count];
-        world.lights = others;
-        var besides = try session.traceSmall();
-        defer besides.deinit(session.gpa);
-        const around = world.environment;
-        errdefer world.environment = around;
-        world.environment.map = null;
-        world.environment.ambient = 0;
-        world.lights = &.{};
-        var glow = try session.traceSmall();
-        defer glow.deinit(session.gpa);
-        world.lights = all[others.len..];
-        var lit = try session.traceSmall();
-        defer lit.deinit(session.gpa);
-        world.environment = around;
-        const share = emission.weigh(besides.image.pixels, glow.image.pixels, lit.image.pixels);
+        const known = if (session.reference) |reference| reference.emission else null;
+        const share = known orelse try session.weigh(others, all[others.len..]);
+        session.weight = share;
         world.lights = if (share.shows) all else others;
         facts.emitter_count = 0;
         if (!share.prevails) return;
@@ -683,6 +875,31 @@ pub const Session = struct {
         facts.lights_are_default = false;
         world.lights = all[others.len..];
         world.environment.ambient = session.seen.ambient orelse 0;
+    }
+
+    /// Weighs some of the lights against the others, and all else that shines.
+    fn weigh(
+        session: *Session,
+        others: []const Light,
+        own: []const Light,
+    ) trace.Error!emission.Weight {
+        const world = &session.world.?;
+        const all = world.lights;
+        defer world.lights = all;
+        world.lights = others;
+        var besides = try session.traceSmall();
+        defer besides.deinit(session.gpa);
+        const around = world.environment;
+        defer world.environment = around;
+        world.environment.map = null;
+        world.environment.ambient = 0;
+        world.lights = &.{};
+        var glow = try session.traceSmall();
+        defer glow.deinit(session.gpa);
+        world.lights = own;
+        var lit = try session.traceSmall();
+        defer lit.deinit(session.gpa);
+        return emission.weigh(besides.image.pixels, glow.image.pixels, lit.image.pixels);
     }
 
     /// Says so where the picture shows next to nothing, and what may help.
@@ -736,17 +953,16 @@ pub const Session = struct {
 
     /// What the picture took; what the user called things is the caller's to fill in.
     pub fn report(session: *const Session, choices: settings.Render) Report {
-        const image = &session.film.?.image;
+        const layout = &session.layout.?;
         const tree = &session.world.?.facts.tree;
         const textures = &session.loaded.?.textures;
         return .{
             .triangle_count = session.facts.triangle_count +
                 session.world.?.facts.stroke_triangle_count,
-            .width = image.width,
-            .height = image.height,
+            .width = if (layout.form == .window) layout.film_width else layout.width,
+            .height = if (layout.form == .window) layout.film_height else layout.height,
             .sample_count = session.traced.sample_count,
-            .sample_mean = float(session.traced.sample_sum) /
-                float(@as(u64, image.width) * image.height),
+            .sample_mean = float(session.traced.sample_sum) / float(session.traced.pixel_count),
             .is_partial = session.traced.is_partial,
             .is_timed = choices.time_budget_s != null,
             .depth = session.depthOf(choices),
@@ -771,7 +987,8 @@ pub const Session = struct {
         };
     }
 
-    fn sampleCount(session: *const Session, choices: settings.Render) u32 {
+    /// Samples a pixel that `render` takes at most. Asserts that there is a view.
+    pub fn sampleCount(session: *const Session, choices: settings.Render) u32 {
         if (choices.sample_count) |count| return count;
         if (choices.noise != null) return settings.noise_sample_count;
         if (choices.time_budget_s != null) return settings.sample_count.max;
@@ -793,7 +1010,7 @@ pub const Session = struct {
             .sample_count = session.sampleCount(choices),
             .depth_max = session.depthOf(choices),
             .tile_size = choices.tile_size,
-            .progress = session.progress,
+            .progress = session.pool.progress,
             .cancel = &session.pool.cancelled,
         };
     }
@@ -835,18 +1052,31 @@ pub const Session = struct {
     }
 
     /// A film of the view's size.
-    fn sizedFilm(session: *Session, choices: settings.Render) error{OutOfMemory}!*Film {
+    fn sizedFilm(session: *Session, choices: settings.Render) PartError!*Film {
         const view_size = &session.world.?.view;
         var layers = session.layersOf();
         if (choices.denoise) layers.setUnion(denoise.needed);
         var further = choices.layers.iterator();
-        while (further.next()) |layer| layers.insert(layerOf(layer));
+        while (further.next()) |layer| layers.insert(film_file.layerOf(layer));
+        const layout: film_file.Layout = try .init(
+            session.gpa,
+            view_size.width,
+            view_size.height,
+            choices.part,
+            trace.surroundingsOf(&choices),
+            session.diagnostic,
+        );
+        if (session.layout) |*before| before.deinit(session.gpa);
+        session.layout = layout;
+        const width, const height = .{ layout.film_width, layout.film_height };
         if (session.film) |*film| {
-            if (film.become(view_size.width, view_size.height, layers)) return film;
+            if (film.become(width, height, layers)) return film;
             film.deinit(session.gpa);
             session.film = null;
         }
-        session.film = try .init(session.gpa, view_size.width, view_size.height, layers);
+        session.film = try .init(session.gpa, width, height, layers);
+        // Between tiles that the picture's edge cuts there are pixels that nobody writes.
+        if (layout.form == .share) session.film.?.clear();
         return &session.film.?;
     }
 
@@ -855,15 +1085,17 @@ pub const Session = struct {
     }
 };
 
-/// The film's, as users choose them.
-fn layerOf(layer: settings.Layer) film_file.Layer {
-    return switch (layer) {
-        inline else => |same| @field(film_file.Layer, @tagName(same)),
-    };
-}
-
 fn float(count: u64) f64 {
     return @floatFromInt(count);
+}
+
+/// The members of a set, in `room`.
+fn listOf(comptime T: type, set: std.EnumSet(T), room: []T) []const T {
+    var count: usize = 0;
+    var all = set;
+    var members = all.iterator();
+    while (members.next()) |member| : (count += 1) room[count] = member;
+    return room[0..count];
 }
 
 /// Threads where nobody says how many.

@@ -8,8 +8,11 @@ const std = @import("std");
 const choices = @import("settings.zig");
 const world_file = @import("world.zig");
 const variant_file = @import("variant.zig");
+const adaptive = @import("trace/integrate/adaptive.zig");
+const interleave = @import("trace/integrate/interleave.zig");
 const tiles = @import("trace/integrate/tiles.zig");
 const Film = @import("film.zig").Film;
+const Surroundings = @import("film.zig").Surroundings;
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Frame = world_file.Frame;
@@ -81,8 +84,17 @@ pub const Standing = tiles.Standing;
 pub const Statistics = tiles.Statistics;
 pub const Error = tiles.Error;
 
+/// What has to be traced around the pixels that are asked for.
+pub fn surroundingsOf(render: *const choices.Render) Surroundings {
+    const is_filtered = render.integrator == .lights and render.lights.is_interleaved;
+    return .{
+        .margin = if (is_filtered) interleave.reach else 0,
+        .step = if (render.noise != null) adaptive.block_side else 1,
+    };
+}
+
 /// Traces the picture with variant `variant_index` of `variant.compiled`. Asserts that the film has
-/// the view's size, the tree the variant's width, and that the variant holds the integrator. The
+/// the layout's size, without one the view's, the tree the variant's width, and that the variant holds the integrator. The
 /// film may hold an earlier picture.
 pub fn trace(
     gpa: Allocator,
@@ -114,7 +126,11 @@ fn run(
     film: *Film,
     settings: *const Settings,
 ) Error!Statistics {
-    assert(film.image.width == frame.view.width and film.image.height == frame.view.height);
+    const view = frame.view;
+    if (settings.layout) |layout|
+        assert(layout.width == view.width and layout.height == view.height)
+    else
+        assert(film.image.width == view.width and film.image.height == view.height);
     assert(settings.sample_count >= 1 and choices.depth.holds(settings.depth_max));
     const whitted = comptime integratorsOf(if (counting) "counting" else "whitted", list: {
         var list: [variant_file.compiled.len]Variant = variant_file.compiled[0..].*;
@@ -162,7 +178,7 @@ test {
     _ = bundle;
     _ = dispatch;
     _ = @import("trace/integrate/environment_lights.zig");
-    _ = @import("trace/integrate/interleave.zig");
+    _ = interleave;
     _ = @import("trace/integrate/light_emission.zig");
     _ = @import("trace/integrate/virtual_lights.zig");
     _ = @import("trace/integrate/camera.zig");
@@ -170,7 +186,7 @@ test {
     _ = @import("trace/integrate/path.zig");
     _ = @import("trace/integrate/path_records.zig");
     _ = tiles;
-    _ = @import("trace/integrate/adaptive.zig");
+    _ = adaptive;
     _ = @import("trace/traverse/beam/budget.zig");
     _ = @import("trace/traverse/beam/tile_depth_buffer.zig");
     _ = @import("trace/traverse/beam/grid.zig");

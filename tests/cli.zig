@@ -600,6 +600,70 @@ test "-o - puts the image and nothing else on stdout" {
     try sandbox.expectEmpty();
 }
 
+test "of several scenes each is a picture, is there already, or is a line" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const scene = try triangleScene(sandbox.arena_state.allocator());
+    try sandbox.folder.dir.createDirPath(io, "in/more");
+    try sandbox.folder.dir.createDirPath(io, "out");
+    for ([_][2][]const u8{
+        .{ "in/a.glb", scene },   .{ "in/b.gltf", "no" },  .{ "in/c.GLB", scene },
+        .{ "in/d.txt", "notes" }, .{ "out/c.png", "old" },
+    }) |file| try sandbox.write(file[0], file[1]);
+    const ending = try sandbox.expectExit(3, &.{
+        "in", "--skip-existing", "-oout/", "-r4", dark, "--jobs=2", "in/none.ply",
+    });
+    try testing.expectEqualStrings("", ending.stdout);
+    for ([_][]const u8{
+        "raylane: in: warning: not looked into 1 folder in it\n",
+        "raylane: in/b.gltf: ",
+        "raylane: in/none.ply: no such file or directory\n",
+        " a.glb: done, ",
+        "raylane: 1 picture in ",
+        ", 1 kept, 2 failures\n",
+    }) |part| {
+        errdefer std.debug.print("{s}\n", .{ending.stderr});
+        try testing.expect(std.mem.find(u8, ending.stderr, part) != null);
+    }
+    try testing.expectEqualStrings("old", try sandbox.read("out/c.png"));
+    try testing.expectEqualStrings("\x89PNG", (try sandbox.read("out/a.png"))[0..4]);
+}
+
+/// A triangle that moves along x by one in a second.
+const moving_scene =
+    \\{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+    \\"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"bufferViews":[{"buffer":0,
+    \\"byteLength":68}],"accessors":[{"bufferView":0,"count":3,"componentType":5126,"type":"VEC3",
+    \\"min":[0,0,0],"max":[1,1,0]},{"bufferView":0,"byteOffset":36,"count":2,"min":[0],"max":[1],
+    \\"componentType":5126,"type":"SCALAR"},{"bufferView":0,"byteOffset":44,"count":2,
+    \\"componentType":5126,"type":"VEC3"}],"animations":[{"channels":[{"sampler":0,"target":
+    \\{"node":0,"path":"translation"}}],"samplers":[{"input":1,"output":2}]}],"buffers":[{
+    \\"byteLength":68,"uri":"data:application/octet-stream;base64,
+++ "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAA" ++
+    \\AAA="}]}
+;
+
+test "frames are the pictures of their moments, and a film has them in a row" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("m.gltf", moving_scene);
+    const place = [_][]const u8{ "m.gltf", "-q", "-r4x4", dark, "--eye=0,0,4", "--target=0,0,0" };
+    _ = try sandbox.expectExit(0, &place ++ [_][]const u8{
+        "--frames=0,6", "--fps=12", "-omade/{model}_{frame:2}.ppm",
+    });
+    _ = try sandbox.expectExit(0, &place ++ [_][]const u8{ "--animation-time=0.5", "-oone.ppm" });
+    const later = try sandbox.read("made/m_06.ppm");
+    try testing.expectEqualStrings(try sandbox.read("one.ppm"), later);
+    const first = try sandbox.read("made/m_00.ppm");
+    try testing.expect(!std.mem.eql(u8, first, later));
+    const film = try sandbox.expectExit(0, &.{
+        "m.gltf", "--turntable=2", "--format=y4m", "-o-", "-r4x4", dark,
+    });
+    const header = "YUV4MPEG2 W4 H4 F24:1 Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
+    try testing.expectEqual(header.len + 2 * ("FRAME\n".len + 3 * 16), film.stdout.len);
+    try testing.expect(std.mem.startsWith(u8, film.stdout, header ++ "FRAME\n"));
+}
+
 test "every format by its name or by --format, JPEG smaller with less quality" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
@@ -1490,17 +1554,29 @@ test "info: text, JSON, and the line that rendering ends with" {
         "file         builtin:cornell\nformat       built in\n",
     );
     try testing.expectEqualStrings("", text.stderr);
-    const document = "{\"asset\":{\"version\":\"2.0\"},\"extensionsUsed\":[\"A_b\"]}";
+    const document = "{\"asset\":{\"version\":\"2.0\"},\"extensionsUsed\":[\"A_b\"]," ++
+        "\"buffers\":[{\"byteLength\":3,\"uri\":\"b%20c.bin\"}]}";
     try sandbox.write("a.gltf", document);
+    try sandbox.write("b c.bin", "four");
     const json = try sandbox.expectExit(0, &.{ "info", "a.gltf", "--json" });
     const found = try std.json.parseFromSliceLeaky(
-        struct { file: []const u8, bytes: u64, warnings: []const []const u8 },
+        struct {
+            file: []const u8,
+            bytes: u64,
+            files: []const struct { path: []const u8, bytes: u64 },
+            warnings: []const []const u8,
+        },
         sandbox.arena_state.allocator(),
         json.stdout,
         .{ .ignore_unknown_fields = true },
     );
     try testing.expectEqualStrings("a.gltf", found.file);
-    try testing.expectEqual(document.len, found.bytes);
+    try testing.expectEqual(document.len + 4, found.bytes);
+    try testing.expectEqual(2, found.files.len);
+    try testing.expectEqualStrings("a.gltf", found.files[0].path);
+    try testing.expectEqual(document.len, found.files[0].bytes);
+    try testing.expectEqualStrings("b c.bin", found.files[1].path);
+    try testing.expectEqual(4, found.files[1].bytes);
     try testing.expectEqual(2, found.warnings.len);
     try testing.expectStringStartsWith(
         json.stderr,
@@ -1509,7 +1585,7 @@ test "info: text, JSON, and the line that rendering ends with" {
     const absent = try sandbox.expectExit(1, &.{ "info", "b.gltf" });
     try testing.expectEqualStrings("raylane: b.gltf: does not exist\n", absent.stderr);
     _ = try sandbox.expectExit(2, &.{ "info", "a.gltf", "--scene=7" });
-    try sandbox.expectFiles(&.{"a.gltf"});
+    try sandbox.expectFiles(&.{ "a.gltf", "b c.bin" });
 }
 
 test "compare: figures, a map, thresholds, and images that cannot be compared" {

@@ -21,6 +21,9 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
         .version = Text{ .bytes = info.version },
         .file = Text{ .bytes = info.name },
         .bytes = file.byte_count,
+    });
+    try writeFiles(&json, file.files);
+    try writeFields(&json, .{
         .format = file.format,
         .format_version = optional(file.version),
         .generator = optional(file.generator),
@@ -72,6 +75,16 @@ fn writeFields(json: *Stringify, fields: anytype) Writer.Error!void {
 
 fn optional(text: []const u8) ?Text {
     return if (text.len > 0) .{ .bytes = text } else null;
+}
+
+fn writeFiles(json: *Stringify, files: []const scene_data.File.Source) Writer.Error!void {
+    try json.objectField("files");
+    try json.beginArray();
+    for (files) |*source| try json.write(.{
+        .path = Text{ .bytes = source.path },
+        .bytes = source.byte_count,
+    });
+    try json.endArray();
 }
 
 fn writeScenes(json: *Stringify, file: *const scene_data.File) Writer.Error!void {

@@ -75,10 +75,11 @@ pub fn expose(
             const y = rectangle.y0 + rectangle.step * Kernel.pixelY(group, lane);
             if (x >= rectangle.x1 or y >= rectangle.y1) continue;
             const value = .{ red[lane], green[lane], blue[lane], fourth[lane] };
+            const column, const row = rectangle.placeOf(x, y);
             if (layer == .color)
-                film.add(x, y, place.sample, value)
+                film.add(column, row, place.sample, value)
             else
-                film.addApart(layer, x, y, place.sample, value);
+                film.addApart(layer, column, row, place.sample, value);
         }
     }
 }

@@ -27,6 +27,7 @@ const EnvironmentLights = environment_lights.EnvironmentLights;
 const Film = @import("../../film.zig").Film;
 const Frame = world_file.Frame;
 const Layers = interleave.Layers;
+const Layout = @import("../../film.zig").Layout;
 const RayTree = @import("ray_tree.zig").RayTree;
 const Rectangle = @import("../../film.zig").Rectangle;
 
@@ -170,7 +171,7 @@ fn Lighting(comptime Kernel: type) type {
                     const column = rectangle.x0 + rectangle.step * Kernel.pixelX(group, lane);
                     const row = rectangle.y0 + rectangle.step * Kernel.pixelY(group, lane);
                     if (column >= rectangle.x1 or row >= rectangle.y1) continue;
-                    const at = @as(usize, row) * layers.width + column;
+                    const at = layers.indexOf(&rectangle, column, row);
                     Layers.add(layer, at, sample, .{ x[lane], y[lane], z[lane], w[lane] });
                 }
             }
@@ -253,9 +254,8 @@ fn SharedOf(comptime Kernel: type) type {
             if (has_map_shadows or has_even_sky)
                 shared.sky = try gpa.alloc(EnvironmentLight, shared.sky_sets.count());
             try shared.placeStarts();
-            const view = frame.view;
             const has_sky = shared.sky.len > 0;
-            shared.layers = try .init(gpa, view, has_sky, lights.is_interleaved);
+            shared.layers = try .init(gpa, settings.layout.?, has_sky, lights.is_interleaved);
             return shared;
         }
 
@@ -328,7 +328,7 @@ fn SharedOf(comptime Kernel: type) type {
                 .see, .gather, .sum, .choose => 1,
                 .trace => @divCeil(shared.path_count, light_paths.piece_paths),
                 .weigh, .finish => shared.weighedPieces(),
-                .place, .filter => @divCeil(shared.layers.height, band_rows),
+                .place, .filter => bandCount(shared.settings.layout.?),
             };
         }
 
@@ -405,19 +405,36 @@ fn SharedOf(comptime Kernel: type) type {
         }
 
         fn place(shared: *Self, band: u32) void {
-            const first = band * band_rows;
-            for (first..@min(first + band_rows, shared.layers.height)) |y| {
-                shared.layers.placeRow(shared.frame.view, @intCast(y));
-            }
+            const part = bandOf(shared.settings.layout.?, band);
+            shared.layers.placeAll(shared.frame.view, part.traced);
         }
 
         fn filter(shared: *Self, band: u32, film: *Film) u64 {
-            const first = band * band_rows;
-            var non_finite_count: u64 = 0;
-            for (first..@min(first + band_rows, shared.layers.height)) |y| {
-                non_finite_count += shared.layers.finishRow(film, shared.frame.view, @intCast(y));
-            }
-            return non_finite_count;
+            const part = bandOf(shared.settings.layout.?, band);
+            const view = shared.frame.view;
+            return shared.layers.finish(film, view, &part.window, part.own);
         }
     };
+}
+
+/// How many pieces what is filtered is cut into: windows, or bands of rows where there is but one.
+fn bandCount(layout: *const Layout) u32 {
+    return switch (layout.form) {
+        .window => @divCeil(layout.film_height, band_rows),
+        .share => layout.count(),
+    };
+}
+
+/// A piece: its window, and the pixels of it that are traced and those that are asked for.
+const Band = struct { window: Rectangle, traced: Rectangle, own: Rectangle };
+
+fn bandOf(layout: *const Layout, number: u32) Band {
+    const window = layout.windowAt(if (layout.form == .share) number else 0);
+    var band: Band = .{ .window = window.traced, .traced = window.traced, .own = window.own };
+    if (layout.form == .share) return band;
+    band.traced.y0 += number * band_rows;
+    band.traced.y1 = @min(band.traced.y0 + band_rows, band.traced.y1);
+    band.own.y0 = @max(band.own.y0, band.traced.y0);
+    band.own.y1 = @max(band.own.y0, @min(band.own.y1, band.traced.y1));
+    return band;
 }
