@@ -34,6 +34,7 @@ pub fn build(b: *std.Build) void {
         .test_fmt = b.step("test:fmt", "Check the formatting"),
         .test_tidy = b.step("test:tidy", "Check the style of the source tree"),
         .test_report = b.step("test:report", "Test the tools in Python"),
+        .test_release = b.step("test:release", "Test what is released on old and new processors"),
         .check = b.step("check", "Compile the program, its benchmarks and tests, write nothing"),
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
@@ -91,7 +92,7 @@ pub fn build(b: *std.Build) void {
     steps.check.dependOn(&package.program().step);
 
     const released: libraries.Optional = .{ .draco = true };
-    release.add(steps.release, addVendor(b, released).headers, .{
+    release.add(steps.release, steps.test_release, addVendor(b, released).headers, .{
         .backend = .vector,
         .traversal = .beam,
         .lanes = null,

@@ -38,8 +38,14 @@ const architectures = [_]Architecture{
     } },
 };
 
-/// Makes `step` build what is released into zig-out/release; a step for each program alone.
-pub fn add(step: *std.Build.Step, headers: LazyPath, options: Package.Options) void {
+/// Makes `step` build what is released into zig-out/release, and `test_step` test it under qemu; a
+/// step for each program alone.
+pub fn add(
+    step: *std.Build.Step,
+    test_step: *std.Build.Step,
+    headers: LazyPath,
+    options: Package.Options,
+) void {
     const b = step.owner;
     const wrap = b.addSystemCommand(&.{ "python3", "-B" });
     wrap.setName("build/packages.py");
@@ -68,6 +74,11 @@ pub fn add(step: *std.Build.Step, headers: LazyPath, options: Package.Options) v
         .install_dir = .{ .custom = "release" },
         .install_subdir = "",
     }).step);
+    const tests = b.addSystemCommand(&.{ "python3", "-B" });
+    tests.addFileArg(b.path("build/test_release.py"));
+    tests.has_side_effects = true;
+    tests.addDirectoryArg(packages);
+    test_step.dependOn(&tests.step);
 }
 
 fn programOf(
