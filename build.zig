@@ -72,8 +72,7 @@ pub fn build(b: *std.Build) void {
         addBenchmark(steps.check, @field(steps, "bench_" ++ name), benchmark);
     }
     addBenchmark(steps.check, steps.bench_frames, package.renderer("frames", "bench/frames.zig"));
-    const full: Package = .init(b, target, optimize orelse .fast, vendor.headers, all);
-    addCompare(steps.compare, full, vendor.headers);
+    addCompare(steps.compare, .init(b, target, optimize orelse .fast, vendor.headers, all));
 
     const tests: Tests = .init(b, resolve(b, .{}), filters orelse &.{});
     const test_packages: TestPackages = .{
@@ -91,18 +90,8 @@ pub fn build(b: *std.Build) void {
     tests.addCheck(steps.check, targets[0]);
     steps.check.dependOn(&package.program().step);
 
-    const released: libraries.Optional = .{ .draco = true };
-    release.add(steps.release, steps.test_release, addVendor(b, released).headers, .{
-        .backend = .vector,
-        .traversal = .beam,
-        .lanes = null,
-        .extent = .few,
-        .is_stripped = true,
-        .optional = released,
-    });
-
-    const here: Package = .init(b, resolve(b, .{}), .safe, vendor.headers, options);
-    addScenes(steps.scenes, here);
+    release.add(steps.release, steps.test_release, addVendor(b, release.optional).headers);
+    addScenes(steps.scenes, .init(b, resolve(b, .{}), .safe, vendor.headers, options));
     addLowering(steps.lowering);
 }
 
@@ -137,7 +126,7 @@ fn addScenes(step: *std.Build.Step, package: Package) void {
 
 /// Makes `step` build a program for each variant and compare them with the one that holds all, on
 /// the scene that follows `--`.
-fn addCompare(step: *std.Build.Step, package: Package, headers: std.Build.LazyPath) void {
+fn addCompare(step: *std.Build.Step, package: Package) void {
     const b = step.owner;
     const run = b.addSystemCommand(&.{"python3"});
     run.addFileArg(b.path("bench/compare.py"));
@@ -149,7 +138,7 @@ fn addCompare(step: *std.Build.Step, package: Package, headers: std.Build.LazyPa
     for (package.held) |variant| {
         const name = variant.name(b.allocator);
         if (std.mem.find(u8, name, wanted) == null) continue;
-        const single: Package = .init(b, package.target, package.optimize, headers, .{
+        const single: Package = .init(b, package.target, package.optimize, package.headers, .{
             .backend = variant.backend,
             .traversal = variant.traversal,
             .lanes = variant.lanes,

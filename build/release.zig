@@ -7,6 +7,7 @@
 const std = @import("std");
 const manifest = @import("../build.zig.zon");
 const Package = @import("package.zig");
+const libraries = @import("libraries.zig");
 const LazyPath = std.Build.LazyPath;
 const Model = std.Target.Cpu.Model;
 const Compile = std.Build.Step.Compile;
@@ -38,15 +39,25 @@ const architectures = [_]Architecture{
     } },
 };
 
+/// What released programs hold besides what every program does.
+pub const optional: libraries.Optional = .{ .draco = true };
+
 /// Makes `step` build what is released into zig-out/release, and `test_step` test it under qemu; a
 /// step for each program alone.
 pub fn add(
     step: *std.Build.Step,
     test_step: *std.Build.Step,
     headers: LazyPath,
-    options: Package.Options,
 ) void {
     const b = step.owner;
+    const options: Package.Options = .{
+        .backend = .vector,
+        .traversal = .beam,
+        .lanes = null,
+        .extent = .few,
+        .is_stripped = true,
+        .optional = optional,
+    };
     const wrap = b.addSystemCommand(&.{ "python3", "-B" });
     wrap.setName("build/packages.py");
     wrap.addFileArg(b.path("build/packages.py"));
