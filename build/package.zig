@@ -289,8 +289,8 @@ pub fn program(package: Package) *Compile {
     return package.renderer("raylane", "src/main.zig");
 }
 
-/// A program of `levels`, the lowest first, and what they share; it chooses among them at start. All
-/// else in it is compiled for `target`.
+/// A program of `levels`, the lowest first, and what they share; it chooses among them at start.
+/// All else in it is compiled for `target`.
 pub fn dispatcher(
     shared: Package,
     target: std.Build.ResolvedTarget,

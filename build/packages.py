@@ -3,9 +3,9 @@
 
     build/packages.py --version VERSION --output FOLDER --native PROGRAM [--fast] ARCH=PROGRAM...
 
-ARCH is x86_64, aarch64 or arm; `--native` is the one of these programs that runs here: it writes the
-manual's page, the completions and the notices. The same programs make the same bytes, for nothing
-that is written tells when, by whom or where. `--fast` does without compression.
+ARCH is x86_64, aarch64 or arm; `--native` is the one of these programs that runs here: it writes
+the manual's page, the completions and the notices. The same programs make the same bytes, for
+nothing that is written tells when, by whom or where. `--fast` does without compression.
 
 Formats: deb(5), ar and ustar; wheels by the "Binary distribution format" of Python's packaging
 specifications; .thumbnailer files as gnome-desktop reads them; the shared MIME-info specification.
@@ -215,7 +215,8 @@ def wheel(version, architecture, program, texts, fast):
             entry.create_system = 3  # Unix: the mode counts.
             mode = 0o755 if "/scripts/" in path else 0o644
             entry.external_attr = (stat.S_IFREG | mode) << 16
-            file.writestr(entry, files[path], zipfile.ZIP_STORED if fast else zipfile.ZIP_DEFLATED, 9)
+            method = zipfile.ZIP_STORED if fast else zipfile.ZIP_DEFLATED
+            file.writestr(entry, files[path], method, 9)
     return f"raylane-{version}-py3-none-{'.'.join(platforms)}.whl", out.getvalue()
 
 

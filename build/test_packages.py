@@ -102,7 +102,7 @@ class Layout(unittest.TestCase):
 
 
 class OfProgram(unittest.TestCase):
-    """What needs the program: a folder, and the picture that it makes where nothing is installed."""
+    """What needs the program: a folder, and the picture that it makes before it is installed."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()

@@ -54,12 +54,15 @@ pub fn addAll(tests: Tests, step: *std.Build.Step, targets: []const Target) void
     var logs: std.ArrayList(LazyPath) = .empty;
     const arena = tests.owner.allocator;
     logs.appendSlice(arena, &.{
-        tests.format(),                 tests.tidy(), tests.machinery(), tests.report(), tests.fetcher(),
-        tests.packages("Layout", null),
+        tests.format(), tests.tidy(),    tests.machinery(),
+        tests.report(), tests.fetcher(), tests.packages("Layout", null),
     }) catch @panic("OOM");
-    if (targets[0].emulator.len == 0) logs.appendSlice(arena, &.{
-        tests.packages("Deb", targets[0]), tests.packages("Wheel", targets[0]),
-    }) catch @panic("OOM");
+    if (targets[0].emulator.len == 0) {
+        const own = targets[0].package.program();
+        logs.appendSlice(arena, &.{
+            tests.packages("Deb", own), tests.packages("Wheel", own),
+        }) catch @panic("OOM");
+    }
     for (targets) |target| {
         const tested = tests.ofLibrary(target.package, null);
         logs.appendSlice(arena, &.{
@@ -138,11 +141,11 @@ fn fetcher(tests: Tests) LazyPath {
 }
 
 /// What wraps programs up, and packages of this machine's program, installed where nothing else is.
-fn packages(tests: Tests, class: []const u8, target: ?Target) LazyPath {
+fn packages(tests: Tests, class: []const u8, packaged: ?*Compile) LazyPath {
     const name = std.ascii.allocLowerString(tests.owner.allocator, class) catch @panic("OOM");
-    const run, const log = tests.start(name, if (target) |one| one.name else "sources");
+    const run, const log = tests.start(name, if (packaged == null) "sources" else "native");
     run.addArgs(&.{ "--one", "--needs=python3" });
-    if (target) |one| run.addArtifactArg2(one.package.program(), .{
+    if (packaged) |one| run.addArtifactArg2(one, .{
         .prefix = "--env=RAYLANE_PROGRAM=",
         .make_absolute = true,
     });
