@@ -261,8 +261,9 @@ pub const Batch = struct {
     /// What a signal says that ends the program.
     fn foretell(batch: *const Batch) void {
         if (batch.options.quiet) return;
-        const format = "{d} pictures are written, those under way are not";
-        signals.outcome.set(format, .{batch.written_count});
+        const count = batch.written_count;
+        const format = "{d} picture{s} written, those under way are not";
+        signals.outcome.set(format, .{ count, plural(count) });
     }
 
     /// Prints the report of a picture, one at a time.
