@@ -155,7 +155,7 @@ pub const Batch = struct {
                 "a y4m film on standard output is one of a single scene, not of {d}",
                 .{file_count},
             ),
-            .tga, .bmp, .hdr, .pfm, .exr => return diagnostic.fail(
+            .tga, .bmp, .hdr, .pfm, .webp, .exr => return diagnostic.fail(
                 error.UsageInvalid,
                 "several {t} pictures in one stream cannot be told apart; " ++
                     "ppm, png, jpg and y4m can",
