@@ -222,8 +222,8 @@ fn isWithinLimits(record: *const Record) bool {
         settings.sample_count.holds(record.sample_count) and
         @abs(record.exposure_ev) <= settings.exposure_ev_max and
         settings.jpeg_quality.holds(record.jpeg_quality) and
-        record.frame_rate.numerator > 0 and record.frame_rate.denominator > 0 and
-        (record.webp_quality == null or settings.webp_quality.holds(record.webp_quality.?));
+        (record.webp_quality == null or settings.webp_quality.holds(record.webp_quality.?)) and
+        record.frame_rate.numerator > 0 and record.frame_rate.denominator > 0;
 }
 
 const testing = std.testing;

@@ -292,6 +292,11 @@ pub const Session = struct {
         session.scene = null;
     }
 
+    /// Has the next view read its environment's file again.
+    pub fn forgetEnvironment(session: *Session) void {
+        session.environment.deinit();
+    }
+
     fn dropPosed(session: *Session) void {
         if (session.posed) |*posed| posed.deinit();
         session.posed = null;
@@ -801,7 +806,7 @@ pub const Session = struct {
         const rendered = &session.rendered;
         return fingerprint.of(.{
             session.identity.?.moment,
-            session.reference,
+            if (session.reference) |reference| fingerprint.of(reference.*) else 0,
             session.texture_side_max,
             seen,
             rendered.integrator,

@@ -30,6 +30,10 @@ pub const Range = struct {
     }
 };
 
+/// Longest line of a job, in bytes.
+pub const job_bytes_max = 1 << 20;
+/// Pixels on the side of one that a size is given in.
+pub const pixel_ratio: Range = .{ .min = 1, .max = 8, .default = 1 };
 /// Threads; by default as many as there are processors.
 pub const thread_count: Range = .{ .min = 1, .max = 256 };
 /// Samples a pixel; in small pictures each pixel has more to show.
