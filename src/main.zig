@@ -25,14 +25,31 @@ fn run(init: std.process.Init) ExitCode {
     const names = raylane.variant.names;
     const command = cli.parse(own_arguments, names, &diagnostic) catch {
         console.say(io, "raylane: {s}\n", .{diagnostic.message.text()});
+        if (cli.wantsJson(own_arguments)) console.printFailure(init.gpa, io, &.{
+            .version = cli.version,
+            .problem = .of(&diagnostic, "", @backingInt(ExitCode.usage)),
+        }, false);
         return .usage;
     };
     switch (command) {
         .help => return console.print(io, cli.help),
+        .beginning => {
+            console.say(io, "{s}", .{cli.beginning});
+            return .usage;
+        },
+        .scenario => |*call| return commands.scenario.run(init, call, &diagnostic),
+        .serve => |defaults| return commands.serve.run(init.gpa, io, defaults),
+        .serve_help => return console.print(io, cli.serve_help),
         .bench_help => return console.print(io, cli.bench_help),
         .compare_help => return console.print(io, cli.compare_help),
         .info_help => return console.print(io, cli.info_help),
         .merge_help => return console.print(io, cli.merge_help),
+        .completion => |shell| return console.printBy(init.gpa, io, cli.writeCompletion, .{
+            shell, cli.pages,
+        }),
+        .completion_help => return console.print(io, cli.completion_help),
+        .man => return console.printBy(init.gpa, io, cli.writeMan, .{}),
+        .man_help => return console.print(io, cli.man_help),
         .version => return console.print(io, "raylane " ++ cli.version ++ "\n"),
         .licenses => return console.print(io, raylane.licenses),
         .list_variants => return console.print(io, comptime list: {

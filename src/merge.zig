@@ -101,6 +101,7 @@ pub const Merged = struct {
             .webp_quality = record.webp_quality,
             .manifest = if (merged.manifest) |*manifest| manifest else null,
             .exr_kind = record.exr_kind,
+            .frame_rate = record.frame_rate,
             .further = further,
             .pool = pool,
         }, target, diagnostic);

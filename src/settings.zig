@@ -30,6 +30,10 @@ pub const Range = struct {
     }
 };
 
+/// Longest line of a job, in bytes.
+pub const job_bytes_max = 1 << 20;
+/// Pixels on the side of one that a size is given in.
+pub const pixel_ratio: Range = .{ .min = 1, .max = 8, .default = 1 };
 /// Threads; by default as many as there are processors.
 pub const thread_count: Range = .{ .min = 1, .max = 256 };
 /// Samples a pixel; in small pictures each pixel has more to show.
@@ -511,6 +515,9 @@ pub const Part = union(enum) {
 /// How rays are traced.
 pub const Render = struct {
     part: Part = .whole,
+    /// It is to be merged with the others: what needs all of the picture is left to that. Of tiles
+    /// always.
+    is_merged: bool = false,
     integrator: Integrator = .whitted,
     lights: Lights = .{},
     /// Index into `variant.compiled`.

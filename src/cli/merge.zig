@@ -20,7 +20,10 @@ pub const Merge = struct {
     memory_max: ?u64 = null,
 
     /// Names of the parts, as given; the caller frees the list.
-    pub fn parts(merge: *const Merge, gpa: std.mem.Allocator) error{OutOfMemory}![]const []const u8 {
+    pub fn parts(
+        merge: *const Merge,
+        gpa: std.mem.Allocator,
+    ) error{OutOfMemory}![]const []const u8 {
         const list = try gpa.alloc([]const u8, merge.part_count);
         var diagnostic: Diagnostic = .{};
         var reader = readerOf(merge.arguments, &diagnostic);
@@ -41,7 +44,8 @@ pub const Merge = struct {
     }
 };
 
-const sections: []const Section = &.{
+/// What it understands.
+pub const sections: []const Section = &.{
     .{ .title = "Options", .options = &.{
         .{ .usage = "-o, --output FILE", .help = "name ending in a format; - is standard output" },
         .{ .usage = "--format FORMAT", .help = "as 'raylane render' has them (default: by FILE)" },

@@ -40,6 +40,10 @@ pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnos
         error.OutOfMemory => return console.outOfMemory(io),
         error.UsageInvalid => {
             console.say(io, "raylane: {s} (see --help)\n", .{diagnostic.message.text()});
+            batch.printFailure(&.{
+                .version = cli.version,
+                .problem = .of(diagnostic, "", @backingInt(ExitCode.usage)),
+            });
             return .usage;
         },
     };
@@ -128,6 +132,15 @@ pub const Batch = struct {
             .unreadable => |reason| {
                 console.say(batch.io, "raylane: {f}: {s}\n", .{ name, reason });
                 batch.note(.failed);
+                batch.printFailure(&.{
+                    .version = cli.version,
+                    .scene = input,
+                    .problem = .{
+                        .message = reason,
+                        .file = input,
+                        .exit_code = @backingInt(ExitCode.failed),
+                    },
+                });
             },
             .folder => |folder| if (folder.file_count == 0) {
                 const count = folder.folder_count;
@@ -273,6 +286,14 @@ pub const Batch = struct {
         if (code != .ok) batch.note(code);
     }
 
+    /// The same in place of the report of a picture that there is not.
+    fn printFailure(batch: *Batch, failure: *const raylane.report.Failure) void {
+        if (batch.options.stats != .json) return;
+        batch.mutex.lockUncancelable(batch.io);
+        defer batch.mutex.unlock(batch.io);
+        console.printFailure(batch.gpa, batch.io, failure, batch.options.toStdout());
+    }
+
     /// Counts a failure.
     fn note(batch: *Batch, code: ExitCode) void {
         batch.mutex.lockUncancelable(batch.io);
@@ -355,7 +376,17 @@ const Worker = struct {
                 pictures.place()
             else
                 console.placeOf(&worker.diagnostic, path);
-            batch.note(console.fail(batch.account, batch.io, place, err, &worker.diagnostic));
+            const code = console.fail(batch.account, batch.io, place, err, &worker.diagnostic);
+            batch.note(code);
+            const output = pictures.place();
+            var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
+            batch.printFailure(&.{
+                .version = cli.version,
+                .scene = path,
+                .output = if (output.len > 0) output else null,
+                .problem = .of(&worker.diagnostic, place, @backingInt(code)),
+                .warnings = worker.diagnostic.warningTexts(&warnings),
+            });
         };
     }
 };

@@ -460,10 +460,9 @@ pub const Pictures = struct {
         const taken_ns: u64 = @intCast(pictures.start.durationTo(now).toNanoseconds());
         pictures.start = now;
         const seconds = @as(f64, @floatFromInt(taken_ns)) / std.time.ns_per_s;
-        // Where it is the only one, the line of the file says it.
-        const is_said = !options.quiet and options.progress.form == .auto;
-        const is_only = batch.plan.files.len > 1 and pictures.isAlone();
-        if (is_said and !is_only) console.say(batch.io, "raylane: {f}: {f}, {d}x{d}, {d:.2} s\n", .{
+        // Not among lines for programs.
+        const is_told = options.progress.form == .json and options.progress.file == null;
+        if (!options.quiet and !is_told) console.say(batch.io, "raylane: {f}: {f}, {d}x{d}, {d:.2} s\n", .{
             printable(raylane.parse.title(options.scene)),
             printable(measured.output),
             measured.width,
