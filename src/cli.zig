@@ -259,8 +259,8 @@ const sections: []const Section = &.{
         .{
             .usage = "--format FORMAT",
             .words = wordsOf(settings.Format),
-            .help = "png, jpg, webp, tga, bmp or ppm, linear: hdr, pfm or exr,\n" ++
-                "or a film: y4m",
+            .help = "png, jpg, webp, tga, bmp or ppm, linear: hdr, pfm or\n" ++
+                "exr, or a film: y4m",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
         .{
