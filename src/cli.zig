@@ -99,32 +99,9 @@ pub const pages: []const Page = &.{
 };
 
 /// What `raylane completion --help` prints.
-pub const completion_help: []const u8 = "raylane " ++ version ++
-    \\: prints a script that completes its options in a shell
-    \\
-    \\usage: raylane completion bash|zsh|fish
-    \\
-    \\For this shell alone, or wherever the shell looks for such files:
-    \\
-    \\  source <(raylane completion bash)
-    \\  raylane completion bash > ~/.local/share/bash-completion/completions/raylane
-    \\  raylane completion zsh > a folder of fpath, there called _raylane
-    \\  raylane completion fish > ~/.config/fish/completions/raylane.fish
-    \\
-;
-
+pub const completion_help = completion.help;
 /// What `raylane man --help` prints.
-pub const man_help: []const u8 = "raylane " ++ version ++
-    \\: prints its manual's page, as roff
-    \\
-    \\usage: raylane man
-    \\
-    \\To read it, or to keep it where man looks:
-    \\
-    \\  raylane man | man -l -
-    \\  raylane man > ~/.local/share/man/man1/raylane.1
-    \\
-;
+pub const man_help = man.help;
 
 /// Writes what `raylane man` prints.
 pub fn writeMan(writer: *std.Io.Writer) std.Io.Writer.Error!void {
@@ -336,8 +313,8 @@ const sections: []const Section = &.{
         .{ .usage = "--fps F", .help = "24 (default), 23.976 or 30000/1001, say" },
         .{
             .usage = "--reference-frame F",
-            .help = "whose exposure, framing and studio all frames have\n" ++
-                "(default: the first of --frames)",
+            .help = "whose exposure, framing and studio all frames have,\n" ++
+                "a range's first (default: the first of --frames)",
         },
         .{
             .usage = "--turntable N",
@@ -587,7 +564,11 @@ const sections: []const Section = &.{
                 "ninth of them and its neighbours' by a filter",
         },
         .{ .usage = "--denoise", .help = "filter the noise out" },
-        .{ .usage = "--variant NAME", .words = variant_file.names, .help = "how rays are traced; the image is always the same" },
+        .{
+            .usage = "--variant NAME",
+            .words = variant_file.names,
+            .help = "how rays are traced; the image is always the same",
+        },
         .{
             .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
@@ -971,7 +952,8 @@ const Parser = struct {
             .floor => options.view.floor = try reader.choice(given, settings.Floor),
             .ambient => options.view.ambient = radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
-            .stats, .quiet, .verbose, .progress, .progress_fd => try parser.setMessages(given),
+            .stats, .count_tests, .quiet, .verbose => try parser.setMessages(given),
+            .progress, .progress_fd => try parser.setMessages(given),
             .scenario => try parser.setScenario(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
@@ -983,7 +965,6 @@ const Parser = struct {
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
             .virtual_lights, .sky_lights, .all_lights => try parser.setLights(given),
-            .count_tests => options.count_tests = true,
             .point_size => options.view.point_size =
                 numberWithin(given.value, settings.point_size) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
@@ -1074,8 +1055,7 @@ const Parser = struct {
             .fps => parser.options.write.frame_rate = batch.frameRateOf(given.value) orelse
                 return reader.bad(given, "a number above 0, up to 1000, or a fraction"),
             .reference_frame => chosen.reference_frame =
-                std.fmt.parseInt(i32, given.value, 10) catch
-                    return reader.bad(given, "the number of a frame"),
+                batch_plan.frames.first(try parser.rangeOf(given)),
             .turntable => chosen.view_count = try reader.number(given, settings.view_count),
             .skip_existing => chosen.skip_existing = true,
             .jobs => chosen.job_count = try reader.number(given, settings.job_count),
@@ -1202,6 +1182,7 @@ const Parser = struct {
         const reader = &parser.reader;
         switch (given.id) {
             .stats => options.stats = try reader.choice(given, Stats),
+            .count_tests => options.count_tests = true,
             .quiet => options.quiet = true,
             .verbose => options.verbose = true,
             .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
@@ -1698,6 +1679,8 @@ test "frames, views and names of pictures" {
     try std.testing.expectEqual(0, options.animation.which.index);
     try std.testing.expectEqual(.jpg, options.write.format);
     try std.testing.expect(options.isBatch());
+    const part = try optionsForTest(&.{ "--frames=8", "--reference-frame=5-9,4-2:-1" });
+    try std.testing.expectEqual(2, part.batch.reference_frame.?);
     const turned = try optionsForTest(&.{ "--turntable=8", "--views=0-3", "-oa/", "--jobs=2" });
     try std.testing.expectEqual(30, turned.view.viewpoint.orbit.?.theta_degrees);
     try std.testing.expectEqual(8, turned.batch.view_count.?);
@@ -1709,6 +1692,7 @@ test "frames, views and names of pictures" {
         .{ "has more than 1000000", &.{"--frames=0-1000000"} },
         .{ "both choose the time", &.{ "--frames=1", "--animation-time=2" } },
         .{ "needs '--frames'", &.{"--reference-frame=2"} },
+        .{ "'x' is not a range", &.{ "--frames=1", "--reference-frame=x" } },
         .{ "those of '--turntable'", &.{"--views=2"} },
         .{ "both place the camera", &.{ "--turntable=2", "--eye=1,2,3" } },
         .{ "'--camera' contradicts", &.{ "--turntable=2", "--camera=0" } },

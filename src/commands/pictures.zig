@@ -15,6 +15,7 @@ const Allocator = std.mem.Allocator;
 const Batch = batch_file.Batch;
 const Io = std.Io;
 const Options = raylane.cli.Options;
+const Progress = raylane.progress.Progress;
 const Report = raylane.report.Report;
 const Session = raylane.session.Session;
 const Target = raylane.output.Target;
@@ -203,6 +204,9 @@ pub const Pictures = struct {
         for (plan.frames) |frame| for (plan.views, 0..) |view, index| {
             if (pictures.batch.isStopped()) return;
             defer pictures.number += 1;
+            const count = plan.pictureCount();
+            const progress = pictures.session.pool.progress;
+            Progress.beginPicture(progress, pictures.number % count + 1, count);
             try pictures.setName(frame, view);
             if (pictures.isSkipped()) {
                 pictures.batch.add(.skipped, 1);
