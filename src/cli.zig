@@ -302,7 +302,7 @@ const sections: []const Section = &.{
         .{
             .usage = "--shade LOOK",
             .words = wordsOf(settings.Shade),
-            .help = "a quick look in place of light: ao, normal, uv or cost",
+            .help = "a quick look, not lit: ao, normal, uv or cost",
         },
     } },
     .{ .title = "Several pictures (see docs/batch.md)", .options = &.{
