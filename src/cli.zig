@@ -294,13 +294,15 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--layers LIST",
+            .words = wordsOf(settings.Layer),
             .help = "depth,normal,albedo,uv,node,material,primitive,alpha,\n" ++
                 "position,cost,variance: channels of an EXR file, or\n" ++
                 "files of their own by {layer} in the output's name",
         },
         .{
             .usage = "--shade LOOK",
-            .help = "a quick look in place of light: ao, normal, uv or cost",
+            .words = wordsOf(settings.Shade),
+            .help = "a quick look, not lit: ao, normal, uv or cost",
         },
     } },
     .{ .title = "Several pictures (see docs/batch.md)", .options = &.{
