@@ -10,17 +10,22 @@ const batch = @import("cli/batch.zig");
 const bench = @import("cli/bench.zig");
 const compare = @import("cli/compare.zig");
 const info = @import("cli/info.zig");
+const merge = @import("cli/merge.zig");
 const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
+const completion = @import("cli/completion.zig");
+const man = @import("cli/man.zig");
 const scenario_file = @import("cli/scenario.zig");
 const settings = @import("settings.zig");
 const diagnostic_file = @import("diagnostic.zig");
 const Diagnostic = diagnostic_file.Diagnostic;
+const Page = @import("cli/page.zig").Page;
 const Section = arguments_file.Section;
 const comptimePrint = std.fmt.comptimePrint;
 const integer = arguments_file.integer;
 const namesOf = arguments_file.namesOf;
+const wordsOf = arguments_file.wordsOf;
 const nearest = @import("cli/nearest.zig").nearest;
 const quote = diagnostic_file.quote;
 const variant_file = @import("variant.zig");
@@ -47,6 +52,12 @@ pub const Command = union(enum) {
     compare_help,
     info: Info,
     info_help,
+    merge: Merge,
+    merge_help,
+    completion: Shell,
+    completion_help,
+    man,
+    man_help,
 };
 
 /// What is asked for of several pictures.
@@ -65,6 +76,60 @@ pub const compare_help = compare.help;
 pub const Info = info.Info;
 /// What `raylane info --help` prints.
 pub const info_help = info.help;
+/// What `raylane merge` is to do.
+pub const Merge = merge.Merge;
+/// What `raylane merge --help` prints.
+pub const merge_help = merge.help;
+
+/// What `raylane completion` is for.
+pub const Shell = completion.Shell;
+/// Writes what `raylane completion` prints.
+pub const writeCompletion = completion.write;
+
+/// All commands, that without a word first: what completions and the manual are made of.
+pub const pages: []const Page = &.{
+    .of("", help, sections, null),
+    .of("bench", bench_help, bench.sections, null),
+    .of("compare", compare_help, compare.sections, null),
+    .of("info", info_help, info.sections, null),
+    .of("merge", merge_help, merge.sections, null),
+    .of("serve", serve_help, sections, &.{}),
+    .of("completion", completion_help, &.{}, wordsOf(Shell)),
+    .of("man", man_help, &.{}, &.{}),
+};
+
+/// What `raylane completion --help` prints.
+pub const completion_help: []const u8 = "raylane " ++ version ++
+    \\: prints a script that completes its options in a shell
+    \\
+    \\usage: raylane completion bash|zsh|fish
+    \\
+    \\For this shell alone, or wherever the shell looks for such files:
+    \\
+    \\  source <(raylane completion bash)
+    \\  raylane completion bash > ~/.local/share/bash-completion/completions/raylane
+    \\  raylane completion zsh > a folder of fpath, there called _raylane
+    \\  raylane completion fish > ~/.config/fish/completions/raylane.fish
+    \\
+;
+
+/// What `raylane man --help` prints.
+pub const man_help: []const u8 = "raylane " ++ version ++
+    \\: prints its manual's page, as roff
+    \\
+    \\usage: raylane man
+    \\
+    \\To read it, or to keep it where man looks:
+    \\
+    \\  raylane man | man -l -
+    \\  raylane man > ~/.local/share/man/man1/raylane.1
+    \\
+;
+
+/// Writes what `raylane man` prints.
+pub fn writeMan(writer: *std.Io.Writer) std.Io.Writer.Error!void {
+    return man.write(writer, version, pages);
+}
 
 /// Scenarios on the command line.
 pub const ScenarioCall = struct {
@@ -75,7 +140,7 @@ pub const ScenarioCall = struct {
 };
 
 /// Words that stand before all others, but for `render`, which may stand among flags.
-const Word = enum { bench, compare, info, serve, help };
+const Word = enum { bench, compare, info, merge, serve, completion, man, help };
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -193,11 +258,16 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--format FORMAT",
+            .words = wordsOf(settings.Format),
             .help = "png, jpg, tga, bmp or ppm, linear: hdr, pfm or exr,\n" ++
                 "or a film: y4m",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
-        .{ .usage = "--exr KIND", .help = "half or float: colours of an EXR file (default: half)" },
+        .{
+            .usage = "--exr KIND",
+            .words = wordsOf(settings.ExrKind),
+            .help = "half or float: colours of an EXR file (default: half)",
+        },
         .{
             .usage = "-r, --resolution WxH|N",
             .help = comptimePrint("size in pixels, or of the long side in the camera's\n" ++
@@ -213,17 +283,30 @@ const sections: []const Section = &.{
             .also = &.{"--device-pixel-ratio"},
         },
         .{
+            .usage = "--crop X0,Y0,X1,Y1",
+            .help = "a part alone: pixels, or fractions where a dot is in\n" ++
+                "them; exr files of parts can be merged",
+        },
+        .{
+            .usage = "--tile I/N",
+            .help = "1/N of the picture in tiles all over it, an exr file;\n" ++
+                "'raylane merge' makes the picture of all I",
+        },
+        .{
             .usage = "--exposure EV|auto",
+            .words = &.{"auto"},
             .help = "brighten by EV stops, or by what is seen (default:\n" ++
                 "auto for scenes with lights of their own, else 0)",
         },
         .{
             .usage = "--tonemap CURVE",
+            .words = wordsOf(settings.ToneMapping),
             .help = namesOf(settings.ToneMapping) ++ " (default: neutral)",
             .also = &.{ "--tone-mapping", "--tonemapping" },
         },
         .{
             .usage = "--background WHAT",
+            .words = &.{ "env", "studio", "transparent" },
             .help = "env, studio, transparent, a CSS colour (red, #rrggbb)\n" ++
                 "or radiance R,G,B (default: a grey gradient)",
             .meant = &.{ "--bg", "--background-color" },
@@ -256,12 +339,13 @@ const sections: []const Section = &.{
         .{
             .usage = "--jobs N",
             .help = "scenes side by side, " ++ settings.job_count.text() ++
-                "\n(default: by their number and the pictures' size)",
+                " (default: by their\nnumber and the pictures' size)",
         },
     } },
     .{ .title = "Camera", .options = &.{
         .{
             .usage = "--camera WHICH",
+            .words = &.{"auto"},
             .help = "name or index of a camera, or auto: all in view",
             .also = &.{"--camera-index"},
         },
@@ -312,6 +396,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--animation WHICH",
+            .words = &.{"all"},
             .help = "name or index of an animation, or all (default: none)",
             .also = &.{ "--animation-index", "--animation-name" },
         },
@@ -321,14 +406,17 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--up-axis AXIS",
+            .words = wordsOf(settings.UpAxis),
             .help = "y or z: which axis of the file points up (STL: z)",
         },
         .{
             .usage = "--format-in FORMAT",
+            .words = wordsOf(settings.SceneFormat),
             .help = namesOf(settings.SceneFormat) ++ ", whatever it holds",
         },
         .{
             .usage = "--env FILE",
+            .words = &.{ "studio", "none" },
             .help = "light from all around: an equirectangular image of\n" ++
                 "radiance (exr, hdr, png), studio or none (default:\n" ++
                 "the scene's, or studio, dim around its own lights)",
@@ -351,6 +439,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--floor WHAT",
+            .words = wordsOf(settings.Floor),
             .help = "shadow: a floor that shows it, or none (default)",
         },
         .{
@@ -452,17 +541,20 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--bvh QUALITY",
+            .words = wordsOf(settings.TreeQuality),
             .help = namesOf(settings.TreeQuality) ++ ": time to build the scene's tree\n" ++
                 "against time to trace; the image is always the same",
         },
         .{
             .usage = "--instances HOW",
+            .words = wordsOf(settings.Instances),
             .help = namesOf(settings.Instances) ++ ": whether a mesh is\n" ++
                 "held once for all its instances: less memory, more\n" ++
                 "time; the image is always the same",
         },
         .{
             .usage = "--integrator NAME",
+            .words = wordsOf(settings.Integrator),
             .help = namesOf(settings.Integrator) ++ " (default: whitted)",
         },
         .{
@@ -483,7 +575,7 @@ const sections: []const Section = &.{
                 "ninth of them and its neighbours' by a filter",
         },
         .{ .usage = "--denoise", .help = "filter the noise out" },
-        .{ .usage = "--variant NAME", .help = "how rays are traced; the image is always the same" },
+        .{ .usage = "--variant NAME", .words = variant_file.names, .help = "how rays are traced; the image is always the same" },
         .{
             .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
@@ -493,6 +585,7 @@ const sections: []const Section = &.{
     .{ .title = "Messages", .options = &.{
         .{
             .usage = "--stats FORM",
+            .words = wordsOf(Stats),
             .help = "report as " ++ namesOf(Stats) ++ " (default: text, or none\n" ++
                 "when the image goes to standard output); when it is\n" ++
                 "given, a report that cannot be printed is an error",
@@ -506,6 +599,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--progress HOW",
+            .words = wordsOf(settings.ProgressForm),
             .help = "auto: a line on a terminal; json: lines for programs,\n" ++
                 "see docs/progress.md; or none",
         },
@@ -567,13 +661,16 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
     \\       raylane info SCENE [options]          (see raylane info --help)
+    \\       raylane merge -o FILE PART...         (see raylane merge --help)
     \\       raylane serve [options]               (see raylane serve --help)
+    \\       raylane completion bash|zsh|fish      (a script for that shell)
+    \\       raylane man                           (the manual's page)
     \\       raylane help [COMMAND]
     \\
     \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, a folder of such, - for
-    \\standard input, or builtin:cornell, atrium, nave or handles. The image is
-    \\written to the working directory under the scene's name, as a whole or not at
-    \\all, a report to stdout. Names of several come from a template: -o DIR/ or
+    \\standard input, or builtin:cornell, atrium, nave or handles. The image goes to
+    \\the working directory under the scene's name, as a whole or not at all, a report
+    \\to stdout. Names of several come from a template: -o DIR/, or such as
     \\-o 'DIR/{model}_{frame:4}.png', of {model}, {camera}, {material_variant},
     \\{frame}, {view} and {layer}.
     \\
@@ -625,6 +722,9 @@ pub fn parse(
                 .bench => .bench_help,
                 .compare => .compare_help,
                 .info => .info_help,
+                .merge => .merge_help,
+                .completion => .completion_help,
+                .man => .man_help,
                 .serve => .serve_help,
                 .help => .help,
             } else .help;
@@ -635,9 +735,26 @@ pub fn parse(
         .bench => .{ .bench = try bench.parse(arguments[1..], diagnostic) },
         .compare => .{ .compare = try compare.parse(arguments[1..], diagnostic) },
         .info => .{ .info = try info.parse(arguments[1..], diagnostic) },
+        .merge => .{ .merge = try merge.parse(arguments[1..], diagnostic) },
+        .completion => .{ .completion = try shellOf(arguments[1..], diagnostic) },
+        .man => if (arguments.len == 1) .man else diagnostic.fail(
+            error.UsageInvalid,
+            "'man' takes no arguments (see raylane man --help)",
+            .{},
+        ),
     };
     var parser: Parser = .init(arguments, variant_names, diagnostic);
     return parser.run();
+}
+
+fn shellOf(words: []const [:0]const u8, diagnostic: *Diagnostic) Error!Shell {
+    const name = if (words.len == 1) words[0] else "";
+    return std.meta.stringToEnum(Shell, name) orelse diagnostic.fail(
+        error.UsageInvalid,
+        "'completion' takes a shell, " ++ comptime namesOf(Shell) ++
+            " (see raylane completion --help)",
+        .{},
+    );
 }
 
 /// What `--stats=json` is for, wherever it stands among arguments that may be wrong.
@@ -704,6 +821,9 @@ fn helpWith(words: []const [:0]const u8, diagnostic: *Diagnostic) Error!Command 
         .bench => .bench_help,
         .compare => .compare_help,
         .info => .info_help,
+        .merge => .merge_help,
+        .completion => .completion_help,
+        .man => .man_help,
         .serve => .serve_help,
         .help => .help,
     };
@@ -778,6 +898,7 @@ const Parser = struct {
         try parser.checkViewpoint();
         try parser.settleFormat();
         try parser.checkSampling();
+        try parser.checkPart();
         try parser.settleProgress();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
@@ -811,13 +932,13 @@ const Parser = struct {
             .denoise => options.render.denoise = true,
             .layers => options.render.layers = layersOf(given.value) orelse
                 return reader.bad(given, comptime namesOf(settings.Layer)),
-            .jpeg_quality => {
-                options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
-            },
+            .jpeg_quality => options.write.jpeg_quality =
+                try reader.number(given, settings.jpeg_quality),
             .exr => options.write.exr_kind = try reader.choice(given, settings.ExrKind),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
             .resolution, .width, .height, .pixel_ratio => try parser.setSize(given),
+            .crop, .tile => try parser.setPart(given),
             .threads => options.thread_count = try reader.number(given, settings.thread_count),
             .spp => options.render.sample_count = try reader.number(given, settings.sample_count),
             .noise, .time_budget, .progress_image, .partial => try parser.setSampling(given),
@@ -842,9 +963,8 @@ const Parser = struct {
                 return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
                     settings.exposure_ev_max, settings.exposure_ev_max,
                 })),
-            .tonemap => {
-                options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
-            },
+            .tonemap => options.write.tone_mapping =
+                try reader.choice(given, settings.ToneMapping),
             .stats, .quiet, .verbose, .progress, .progress_fd => try parser.setMessages(given),
             .scenario => try parser.setScenario(given),
             .thesis => parser.setThesis(),
@@ -864,6 +984,21 @@ const Parser = struct {
             .version => parser.other = parser.other orelse .version,
             .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
+        }
+    }
+
+    fn setPart(parser: *Parser, given: Reader.Given) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .crop => options.render.part = .{ .crop = cropOf(given.value) orelse
+                return reader.bad(given, "four pixels, or fractions from 0.0 to 1.0, of a " ++
+                    "rectangle's left, upper, right and lower edge") },
+            .tile => options.render.part = .{ .tile = tileOf(given.value) orelse
+                return reader.bad(given, comptimePrint("I/N, N {s}, I 1 to N", .{
+                    settings.part_count.text(),
+                })) },
+            else => unreachable, // `set` hands over the above.
         }
     }
 
@@ -1199,26 +1334,86 @@ const Parser = struct {
             return parser.reader.fail("a scene from standard input has no name for the image: " ++
                 "say one by -o", .{});
         };
-        const has_no_name = options.toStdout() or std.mem.endsWith(u8, output, "/");
-        if (has_no_name) return;
-        const extension = std.fs.path.extension(output);
-        const implied = if (extension.len == 0) null else formatOf(extension[1..]);
-        if (parser.format) |format| {
-            if (implied == null or implied == format) return;
-            return parser.reader.fail("'--format {t}' contradicts the name {f}", .{
-                format, quote(output),
-            });
+        if (options.toStdout() or std.mem.endsWith(u8, output, "/")) return;
+        options.write.format = try formatFor(&parser.reader, parser.format, output);
+    }
+
+    /// Refuses what is of whole pictures.
+    fn checkPart(parser: *Parser) Error!void {
+        const reader = &parser.reader;
+        const options = &parser.options;
+        const part = options.render.part;
+        if (part == .whole) return;
+        if (options.render.time_budget_s != null) return reader.fail(
+            "'--time-budget' does not go with '--{t}': parts have as many samples as the whole",
+            .{part},
+        );
+        if (options.write.format == .exr) {
+            if (options.progress_image == null) return;
+            return reader.fail("'--progress-image' does not go with parts that are merged", .{});
         }
-        options.write.format = implied orelse return parser.reader.fail(
-            "the name {f} ends in no image format's extension, no --format says which, and a " ++
-                "folder's ends in /",
-            .{quote(output)},
+        if (part == .tile) return reader.fail(
+            "'--tile' makes an exr file, not a {t} file: 'raylane merge' makes that of all parts",
+            .{options.write.format},
+        );
+        if (options.render.denoise) return reader.fail(
+            "'--denoise' needs all of the picture: 'raylane merge' filters exr files of parts",
+            .{},
         );
     }
 };
 
+/// The format of a file called `name`: the one chosen, or by its extension; png on standard output.
+/// An error of the reader where they contradict each other, or there is neither.
+pub fn formatFor(reader: anytype, chosen: ?settings.Format, name: []const u8) Error!settings.Format {
+    if (isStdout(name)) return chosen orelse .png;
+    const extension = std.fs.path.extension(name);
+    const implied = if (extension.len == 0) null else formatOf(extension[1..]);
+    if (chosen) |format| {
+        if (implied == null or implied == format) return format;
+        return reader.fail("'--format {t}' contradicts the name {f}", .{ format, quote(name) });
+    }
+    return implied orelse reader.fail(
+        "the name {f} ends in no image format's extension, no --format says which, and a " ++
+            "folder's ends in /",
+        .{quote(name)},
+    );
+}
+
+/// A rectangle of at least one pixel; with a dot anywhere, all are fractions.
+fn cropOf(text: []const u8) ?settings.Part.Crop {
+    const has_dot = std.mem.findScalar(u8, text, '.') != null;
+    var pixels: [4]u32 = undefined;
+    var shares: [4]f32 = undefined;
+    var numbers = std.mem.splitScalar(u8, text, ',');
+    for (&pixels, &shares) |*pixel, *share| {
+        const number = numbers.next() orelse return null;
+        if (has_dot)
+            share.* = numberWithin(number, crop_shares) orelse return null
+        else
+            pixel.* = integer(number, .{ .min = 0, .max = settings.side.max }) orelse return null;
+    }
+    if (numbers.next() != null) return null;
+    if (has_dot) {
+        const is_some = shares[0] < shares[2] and shares[1] < shares[3];
+        return if (is_some) .{ .shares = shares } else null;
+    }
+    const is_some = pixels[0] < pixels[2] and pixels[1] < pixels[3];
+    return if (is_some) .{ .pixels = pixels } else null;
+}
+
+const crop_shares: struct { min: f32, max: f32 } = .{ .min = 0, .max = 1 };
+
+/// I/N.
+fn tileOf(text: []const u8) ?settings.Part.Tile {
+    const slash = std.mem.findScalar(u8, text, '/') orelse return null;
+    const number = integer(text[0..slash], settings.part_count) orelse return null;
+    const count = integer(text[slash + 1 ..], settings.part_count) orelse return null;
+    return if (number <= count) .{ .number = number, .count = count } else null;
+}
+
 /// A format by its extension, in either case; JPEG has two.
-fn formatOf(extension: []const u8) ?settings.Format {
+pub fn formatOf(extension: []const u8) ?settings.Format {
     if (std.ascii.eqlIgnoreCase(extension, "jpeg")) return .jpg;
     for (std.enums.values(settings.Format)) |format| {
         if (std.ascii.eqlIgnoreCase(extension, @tagName(format))) return format;
@@ -1227,7 +1422,7 @@ fn formatOf(extension: []const u8) ?settings.Format {
 }
 
 /// A number of bytes above 0, or of K, M, G or T, each 1024 times the one before.
-fn bytesOf(text: []const u8) ?u64 {
+pub fn bytesOf(text: []const u8) ?u64 {
     if (text.len == 0) return null;
     const units = "KMGT";
     const unit = std.mem.findScalar(u8, units, std.ascii.toUpper(text[text.len - 1]));
@@ -1901,6 +2096,26 @@ test "noise is told of path tracing alone, as the picture is exposed" {
     }
 }
 
+test "parts are rectangles or shares of tiles" {
+    const Crop = settings.Part.Crop;
+    const pixels = (try optionsForTest(&.{"--crop=0,8,16,24"})).render.part;
+    try std.testing.expectEqual(Crop{ .pixels = .{ 0, 8, 16, 24 } }, pixels.crop);
+    const shares = (try optionsForTest(&.{"--crop=0,0.25,1,1"})).render.part;
+    try std.testing.expectEqual(Crop{ .shares = .{ 0, 0.25, 1, 1 } }, shares.crop);
+    const tile = (try optionsForTest(&.{ "--tile=3/4", "-oa.exr" })).render.part.tile;
+    try std.testing.expectEqual(settings.Part.Tile{ .number = 3, .count = 4 }, tile);
+    for ([_][:0]const u8{
+        "--crop=",        "--crop=1,2,3",    "--crop=1,2,1,3",    "--crop=1,2,3,4,5",
+        "--crop=0,0,1.5", "--crop=-1,0,1,1", "--crop=0,0,1.01,1", "--crop=0.5,0,0.5,1",
+        "--tile=0/1",     "--tile=2/1",      "--tile=1",          "--tile=1/0",
+        "--tile=/",       "--tile=1/70000",  "--crop=nan.,0,1,1",
+    }) |bad| try expectUsage(bad[0..6], &.{ bad, "-oa.exr", "s" });
+    try expectUsage("makes an exr file", &.{ "--tile=1/2", "s" });
+    try expectUsage("'--denoise' needs all", &.{ "--crop=0,0,1,1", "--denoise", "s" });
+    try expectUsage("'--time-budget'", &.{ "--crop=0,0,1,1", "--time-budget=1", "s" });
+    _ = try optionsForTest(&.{ "--crop=0,0,1,1", "--denoise", "-oa.exr" });
+}
+
 test "points and lines are as wide as they may be" {
     try std.testing.expectEqual(1.5, (try optionsForTest(&.{})).view.point_size);
     const wide = try optionsForTest(&.{"--point-size=4.25"});
@@ -1920,16 +2135,66 @@ test "the help fits a screen and says what flags take and may be" {
     }) |text| try std.testing.expect(std.mem.find(u8, help, text) != null);
 }
 
+test "completions and the manual have every option of every command, and its words" {
+    for (std.enums.values(Shell)) |shell| {
+        var script: std.Io.Writer.Allocating = .init(std.testing.allocator);
+        defer script.deinit();
+        try writeCompletion(&script.writer, shell, pages);
+        var manual: std.Io.Writer.Allocating = .init(std.testing.allocator);
+        defer manual.deinit();
+        try writeMan(&manual.writer);
+        for (pages) |*page| {
+            try expectFinds(script.written(), "{s}", page.name());
+            try expectFinds(manual.written(), "raylane {s}", page.word);
+            var options = page.iterate();
+            while (options.next()) |entry| {
+                const long = entry.flag.long;
+                if (shell == .fish)
+                    try expectFinds(script.written(), " -l {s} ", long[2..])
+                else
+                    try expectFinds(script.written(), "{s}", long);
+                for (entry.option.words) |word| try expectFinds(script.written(), "{s}", word);
+                var escaped: std.Io.Writer.Allocating = .init(std.testing.allocator);
+                defer escaped.deinit();
+                for (long) |byte| try escaped.writer.print("{s}", .{
+                    if (byte == '-') "\\-" else &[_]u8{byte},
+                });
+                try expectFinds(manual.written(), "\\fB{s}\\fR", escaped.written());
+            }
+        }
+    }
+}
+
+fn expectFinds(text: []const u8, comptime format: []const u8, part: []const u8) !void {
+    const needle = try std.testing.allocator.print(format, .{part});
+    defer std.testing.allocator.free(needle);
+    errdefer std.debug.print("not found: {s}\n", .{needle});
+    try std.testing.expect(std.mem.find(u8, text, needle) != null);
+}
+
+test "completion takes a shell, the manual nothing" {
+    try std.testing.expectEqual(.zsh, (try parseForTest(&.{ "completion", "zsh" })).completion);
+    try std.testing.expectEqual(.man, try parseForTest(&.{"man"}));
+    try std.testing.expectEqual(.man_help, try parseForTest(&.{ "man", "-h" }));
+    try std.testing.expectEqual(.completion_help, try parseForTest(&.{ "completion", "--help" }));
+    const common = @import("cli/testing.zig");
+    for ([_][]const [:0]const u8{ &.{}, &.{"tcsh"}, &.{ "bash", "zsh" } }) |words|
+        try common.expectUsage("completion", shellOf, "bash, zsh or fish", words);
+    try std.testing.expectError(error.UsageInvalid, parseForTest(&.{ "man", "1" }));
+}
+
 test {
     _ = batch;
     _ = bench;
     _ = compare;
     _ = info;
+    _ = merge;
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");
     _ = scenario_file;
     _ = @import("cli/serve.zig");
+    _ = @import("cli/page.zig");
 }
 
 test "progress: its form, its descriptor, and what contradicts it" {

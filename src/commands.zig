@@ -14,6 +14,8 @@ pub const bench = @import("commands/bench.zig");
 pub const compare = @import("commands/compare.zig");
 /// Describes a scene.
 pub const info = @import("commands/info.zig");
+/// Makes a picture of its parts.
+pub const merge = @import("commands/merge.zig");
 /// Renders scenes.
 pub const render = @import("commands/render.zig");
 /// Renders what JSON describes.

@@ -29,6 +29,9 @@ pub const needed: film_file.Layers = .init(.{
 /// Fewer do not say how noisy they are.
 pub const sample_count_min = 2;
 
+/// What is said then.
+pub const too_few_samples = "it is not denoised: one sample a pixel does not tell its noise";
+
 /// `Canceled`: the image is filtered in part.
 pub const Error = error{OutOfMemory} || parallel.Error;
 

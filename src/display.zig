@@ -28,8 +28,8 @@ const draw_ms = 100;
 const tell_ms = 200;
 const quiet_ms = 500;
 
-/// How a file ended. What went wrong is said elsewhere.
-pub const Outcome = enum { done, failed };
+/// How a file ended. What went wrong is said elsewhere; one that is postponed is begun once more.
+pub const Outcome = enum { done, skipped, postponed, failed };
 
 /// Of all files of a run. Must stay where it is from `start` to `stop`.
 pub const Display = struct {

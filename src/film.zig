@@ -5,7 +5,9 @@
 //! `output` reads.
 
 const std = @import("std");
-const Image = @import("image.zig").Image;
+/// Of a layer.
+pub const Image = @import("image.zig").Image;
+const settings = @import("settings.zig");
 const layout_file = @import("film/layout.zig");
 const assert = std.debug.assert;
 
@@ -45,6 +47,13 @@ pub const Layer = enum {
         return layer != .color and layer != .alpha;
     }
 };
+
+/// The film's, of those that users choose.
+pub fn layerOf(layer: settings.Layer) Layer {
+    return switch (layer) {
+        inline else => |same| @field(Layer, @tagName(same)),
+    };
+}
 
 /// See `Layer`.
 pub const Layers = std.EnumSet(Layer);

@@ -43,6 +43,13 @@ fn run(init: std.process.Init) ExitCode {
         .bench_help => return console.print(io, cli.bench_help),
         .compare_help => return console.print(io, cli.compare_help),
         .info_help => return console.print(io, cli.info_help),
+        .merge_help => return console.print(io, cli.merge_help),
+        .completion => |shell| return console.printBy(init.gpa, io, cli.writeCompletion, .{
+            shell, cli.pages,
+        }),
+        .completion_help => return console.print(io, cli.completion_help),
+        .man => return console.printBy(init.gpa, io, cli.writeMan, .{}),
+        .man_help => return console.print(io, cli.man_help),
         .version => return console.print(io, "raylane " ++ cli.version ++ "\n"),
         .licenses => return console.print(io, raylane.licenses),
         .list_variants => return console.print(io, comptime list: {
@@ -54,6 +61,7 @@ fn run(init: std.process.Init) ExitCode {
         .bench => |*options| return commands.bench.run(init, options, &diagnostic),
         .compare => |*options| return commands.compare.run(init.gpa, io, options, &diagnostic),
         .info => |*options| return commands.info.run(init.gpa, io, options, &diagnostic),
+        .merge => |*options| return commands.merge.run(init.gpa, io, options, &diagnostic),
     }
 }
 

@@ -29,6 +29,8 @@ pub const Picture = encode_file.Picture;
 pub const Further = layers_file.Further;
 /// Writes channels of any kind with texts beside them.
 pub const openexr = @import("output/openexr.zig");
+/// Rows of a picture that has more.
+pub const Extent = encode_file.Extent;
 /// How many pixels look like nothing.
 pub const Tally = encode_file.Tally;
 /// The exposure that suits a picture.
@@ -75,6 +77,8 @@ pub const Settings = struct {
     /// Keep alpha, where the format has it.
     transparent: bool = false,
     background: Background = .none,
+    /// Which of a picture's rows these are; null: all.
+    rows: ?Extent = null,
     /// Within `settings.jpeg_quality`.
     jpeg_quality: u8 = choices.jpeg_quality.default,
     /// Of the colours in an OpenEXR file.
@@ -167,6 +171,7 @@ pub fn write(
             .scale = exposure_file.scaleOf(settings.exposure_ev),
             .tone_mapping = settings.tone_mapping,
             .background = settings.background,
+            .extent = settings.rows orelse .{ .first = 0, .of = image.height },
         },
         .from_bottom = format == .pfm,
     };
@@ -184,16 +189,7 @@ pub fn write(
         .pfm => try target.finish(&.{
             std.mem.print(&buffer, "PF\n{d} {d}\n-1.0\n", size) catch unreachable, pixels,
         }, diagnostic),
-        .y4m => {
-            var header: [y4m.header_bytes_max]u8 = undefined;
-            const is_first = !settings.is_continued;
-            const planes = try y4m.planes(gpa, pixels);
-            defer gpa.free(planes);
-            try target.finish(&.{
-                y4m.header(&header, image.width, image.height, settings.frame_rate, is_first),
-                planes,
-            }, diagnostic);
-        },
+        .y4m => try writeFrame(gpa, size, pixels, &settings, target, diagnostic),
         inline .png, .jpg, .tga, .bmp, .hdr => |coded| {
             const file = try stb_image_write.encode(gpa, @field(
                 stb_image_write.Codec,
@@ -222,6 +218,34 @@ pub fn write(
         },
     }
     return work.tally;
+}
+
+/// Encodes channels as an OpenEXR file and moves it to its place. Closes the target in any case.
+pub fn writeChannels(
+    gpa: Allocator,
+    picture: openexr.Picture,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    defer target.abandon();
+    const file = try openexr.encode(gpa, picture);
+    defer gpa.free(file);
+    try target.finish(&.{file}, diagnostic);
+}
+
+fn writeFrame(
+    gpa: Allocator,
+    size: [2]u32,
+    pixels: []const u8,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const planes = try y4m.planes(gpa, pixels);
+    defer gpa.free(planes);
+    var buffer: [y4m.header_bytes_max]u8 = undefined;
+    const header = y4m.header(&buffer, size, settings.frame_rate, !settings.is_continued);
+    return target.finish(&.{ header, planes }, diagnostic);
 }
 
 const Work = struct {

@@ -24,6 +24,8 @@ const emission = @import("session/emission.zig");
 const course_file = @import("session/course.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
+const fingerprint = @import("session/fingerprint.zig");
+const part_file = @import("part.zig");
 const Film = film_file.Film;
 const Identity = @import("identity.zig").Identity;
 const Progress = @import("progress.zig").Progress;
@@ -130,6 +132,10 @@ pub const Session = struct {
     /// The file that the picture is to replace.
     output: ?Identity = null,
     film: ?Film = null,
+    /// Which pixels the film has.
+    layout: ?film_file.Layout = null,
+    /// What parts say of what they are of.
+    identity: ?PictureIdentity = null,
     traced: trace.Statistics = .{},
     /// What the film was traced with.
     rendered: settings.Render = .{},
@@ -142,7 +148,14 @@ pub const Session = struct {
     /// What it was written with, where that is not linear.
     appearance: ?Report.Appearance = null,
 
-    pub const Error = LoadError || prepare.Error || @import("session/environment.zig").Error;
+    pub const Error = LoadError || prepare.Error || @import("session/environment.zig").Error ||
+        PartError;
+
+    /// `PartUnknown`: the picture has no such part.
+    pub const PartError = error{ OutOfMemory, PartUnknown };
+
+    /// See `identify`.
+    const PictureIdentity = struct { version: []const u8, scene: u64, moment: u64 };
 
     /// Whether the scene is freed with the session, or only looked at: then it must live on until
     /// the last `view`.
@@ -176,6 +189,7 @@ pub const Session = struct {
         session.dropLoaded();
         session.dropScene();
         if (session.film) |*film| film.deinit(session.gpa);
+        if (session.layout) |*layout| layout.deinit(session.gpa);
         session.environment.deinit();
         session.backdrop.deinit();
         session.pool.deinit();
@@ -231,6 +245,19 @@ pub const Session = struct {
         session.dropLoaded();
         session.dropScene();
         session.reference = null;
+    }
+
+    /// Notes what parts of pictures of this view, by a program of this version, are to say of what
+    /// they are of. Before the scene is dropped; asserts that there is a view.
+    pub fn identify(session: *Session, version: []const u8) void {
+        const scene = fingerprint.ofScene(&session.scene.?);
+        const is_file = session.seen.environment.source == .file;
+        const around = if (is_file) fingerprint.of(session.environment.made.?.map) else 0;
+        session.identity = .{
+            .version = version,
+            .scene = fingerprint.of([2]u64{ scene, around }),
+            .moment = fingerprint.of(session.posed.?.moment),
+        };
     }
 
     /// Frees the scene, for which there is no use after the last `view`.
@@ -453,17 +480,28 @@ pub const Session = struct {
         defer if (lights) |*made| made.deinit();
         if (lights) |*made| frame.light_sampler = &made.sampler;
         try session.traceInRounds(&frame, film, choices);
+        try session.cutFilm();
         session.times.trace_ns = session.since(start);
         if (session.traced.non_finite_count > 0) session.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
-        if (choices.denoise) try session.denoiseFilm();
+        if (choices.denoise and choices.part == .whole) try session.denoiseFilm();
+    }
+
+    /// Leaves of the film what was asked for.
+    fn cutFilm(session: *Session) error{OutOfMemory}!void {
+        const layout = &session.layout.?;
+        if (!layout.hasSurroundings()) return;
+        const cut = try session.film.?.cut(session.gpa, layout);
+        session.film.?.deinit(session.gpa);
+        session.film = cut;
+        layout.* = layout.bare();
     }
 
     fn denoiseFilm(session: *Session) denoise.Error!void {
-        if (session.traced.sample_count < denoise.sample_count_min) return session
-            .diagnostic.warn("it is not denoised: one sample a pixel does not tell its noise", .{});
+        if (session.traced.sample_count < denoise.sample_count_min)
+            return session.diagnostic.warn(denoise.too_few_samples, .{});
         const start = Io.Clock.awake.now(session.io);
         try denoise.run(session.gpa, &session.film.?, &session.pool);
         session.times.denoise_ns = session.since(start);
@@ -477,6 +515,7 @@ pub const Session = struct {
     ) trace.Error!void {
         var chosen = session.traceSettings(choices);
         chosen.stop = session.stop;
+        chosen.layout = &session.layout.?;
         if (choices.noise) |noise| chosen.noise = .{
             .error_max = noise.error_max,
             .exposure_scale = output.exposureScale(try session.exposureOf(noise.exposure)),
@@ -539,7 +578,12 @@ pub const Session = struct {
         standing.copyTo(&image.film.?) catch return;
         const appearance = session.appearanceOf(image.choices) catch return;
         const chosen = session.outputSettings(image.choices, appearance);
-        image.write(session.gpa, chosen, session.diagnostic);
+        const layout = &session.layout.?;
+        if (!layout.hasSurroundings())
+            return image.write(session.gpa, &image.film.?, chosen, session.diagnostic);
+        var cut = image.film.?.cut(session.gpa, layout) catch return;
+        defer cut.deinit(session.gpa);
+        image.write(session.gpa, &cut, chosen, session.diagnostic);
     }
 
     /// The list of an integrator that chooses lights at random; null for others.
@@ -557,6 +601,7 @@ pub const Session = struct {
     pub fn countTests(session: *Session, choices: settings.Render) Error!statistics.TestCounts {
         var chosen = session.traceSettings(choices);
         chosen.sample_count = session.traced.sample_count;
+        chosen.layout = &session.layout.?;
         const counted = try trace.traceCounting(
             session.gpa,
             choices.variant,
@@ -568,26 +613,38 @@ pub const Session = struct {
         return counted.tests.?;
     }
 
-    /// Refuses what a file cannot hold of the view; best asked before `render`.
-    pub fn checkWrite(session: *Session, choices: settings.Write) error{InputOutput}!void {
+    /// Refuses a part that the view does not have, and what a file cannot hold of it; best asked
+    /// before `render`.
+    pub fn checkWrite(
+        session: *Session,
+        choices: settings.Write,
+        part: settings.Part,
+    ) (error{InputOutput} || PartError)!void {
         const seen = &session.world.?.view;
+        var layout: film_file.Layout =
+            try .init(session.gpa, seen.width, seen.height, part, .{}, session.diagnostic);
+        defer layout.deinit(session.gpa);
         return output.check(
             choices.format,
             session.seen.background == .transparent,
-            seen.width,
-            seen.height,
+            layout.film_width,
+            layout.film_height,
             session.diagnostic,
         );
     }
 
-    /// Encodes the picture and moves it to its place. Closes the target in any case. Asserts that
-    /// there is a picture.
+    /// Encodes the picture and moves it to its place; a part of one in OpenEXR as `merge` takes it.
+    /// Closes the target in any case. Asserts that there is a picture, that tiles are a file in
+    /// OpenEXR, and that `identify` has been called for it.
     pub fn write(
         session: *Session,
         target: *output.Target,
         choices: settings.Write,
     ) output.Error!void {
         defer target.abandon();
+        const part = session.rendered.part;
+        if (part != .whole and choices.format == .exr) return session.writePart(target, choices);
+        assert(part != .tile);
         session.appearance = try session.appearanceOf(choices);
         const start = Io.Clock.awake.now(session.io);
         const film = &session.film.?;
@@ -601,7 +658,70 @@ pub const Session = struct {
         }, chosen, target, session.diagnostic);
         session.times.output_ns = session.since(start);
         session.times.total_ns = session.since(session.start);
-        session.hint(tally);
+        if (part == .whole) session.hint(tally);
+    }
+
+    fn writePart(
+        session: *Session,
+        target: *output.Target,
+        choices: settings.Write,
+    ) output.Error!void {
+        const film = &session.film.?;
+        const layout = &session.layout.?;
+        const ev = try session.exposureOf(choices.exposure);
+        const start = Io.Clock.awake.now(session.io);
+        const chosen = session.outputSettings(choices, null);
+        var layers: [std.enums.values(film_file.Layer).len]film_file.Layer = undefined;
+        var further: [std.enums.values(settings.Layer).len]settings.Layer = undefined;
+        const identity = &session.identity.?;
+        try part_file.write(session.gpa, film, layout, &.{
+            .version = identity.version,
+            .width = layout.width,
+            .height = layout.height,
+            .part = switch (layout.form) {
+                .window => |own| .{ .crop = .{ .pixels = own } },
+                .share => session.rendered.part,
+            },
+            .scene = part_file.hexOf(identity.scene),
+            .options = part_file.hexOf(session.optionsFingerprint(choices)),
+            .sample_count = session.traced.sample_count,
+            .is_partial = session.traced.is_partial,
+            .layers = listOf(film_file.Layer, film.layers, &layers),
+            .further = listOf(settings.Layer, session.rendered.layers, &further),
+            .denoise = session.rendered.denoise,
+            .exposure_ev = ev,
+            .tone_mapping = chosen.tone_mapping,
+            .transparent = chosen.transparent,
+            .background = chosen.background,
+            .jpeg_quality = chosen.jpeg_quality,
+            .exr_kind = chosen.exr_kind,
+        }, target, session.diagnostic);
+        session.times.output_ns = session.since(start);
+        session.times.total_ns = session.since(session.start);
+    }
+
+    /// Of all that the picture depends on besides what was read.
+    fn optionsFingerprint(session: *const Session, choices: settings.Write) u64 {
+        var seen = session.seen;
+        // A file's contents count, not its name.
+        if (seen.environment.source == .file) seen.environment.source = .{ .file = "" };
+        const rendered = &session.rendered;
+        return fingerprint.of(.{
+            session.identity.?.moment,
+            session.texture_side_max,
+            seen,
+            rendered.integrator,
+            rendered.lights,
+            session.sampleCount(rendered.*),
+            rendered.noise,
+            session.depthOf(rendered.*),
+            rendered.denoise,
+            rendered.layers,
+            choices.exposure,
+            choices.tone_mapping,
+            choices.jpeg_quality,
+            choices.exr_kind,
+        });
     }
 
     /// Null: the format keeps radiance as it is.
@@ -626,10 +746,20 @@ pub const Session = struct {
             .transparent = session.seen.background == .transparent,
             .background = session.behind(),
             .jpeg_quality = @intCast(choices.jpeg_quality),
+            .rows = session.rowsWritten(),
             .exr_kind = choices.exr_kind,
             .frame_rate = choices.frame_rate,
             .is_continued = choices.is_continued,
             .pool = &session.pool,
+        };
+    }
+
+    /// Null: all.
+    fn rowsWritten(session: *const Session) ?output.Extent {
+        const layout = &session.layout.?;
+        return switch (layout.form) {
+            .window => |own| .{ .first = own[1], .of = layout.height },
+            .share => null,
         };
     }
 
@@ -639,7 +769,7 @@ pub const Session = struct {
         var chosen = session.rendered.layers.iterator();
         while (chosen.next()) |layer| : (count += 1) room[count] = .{
             .layer = layer,
-            .image = session.film.?.imageOf(layerOf(layer)).?,
+            .image = session.film.?.imageOf(film_file.layerOf(layer)).?,
         };
         return room[0..count];
     }
@@ -828,17 +958,16 @@ pub const Session = struct {
 
     /// What the picture took; what the user called things is the caller's to fill in.
     pub fn report(session: *const Session, choices: settings.Render) Report {
-        const image = &session.film.?.image;
+        const layout = &session.layout.?;
         const tree = &session.world.?.facts.tree;
         const textures = &session.loaded.?.textures;
         return .{
             .triangle_count = session.facts.triangle_count +
                 session.world.?.facts.stroke_triangle_count,
-            .width = image.width,
-            .height = image.height,
+            .width = if (layout.form == .window) layout.film_width else layout.width,
+            .height = if (layout.form == .window) layout.film_height else layout.height,
             .sample_count = session.traced.sample_count,
-            .sample_mean = float(session.traced.sample_sum) /
-                float(@as(u64, image.width) * image.height),
+            .sample_mean = float(session.traced.sample_sum) / float(session.traced.pixel_count),
             .is_partial = session.traced.is_partial,
             .is_timed = choices.time_budget_s != null,
             .depth = session.depthOf(choices),
@@ -928,18 +1057,31 @@ pub const Session = struct {
     }
 
     /// A film of the view's size.
-    fn sizedFilm(session: *Session, choices: settings.Render) error{OutOfMemory}!*Film {
+    fn sizedFilm(session: *Session, choices: settings.Render) PartError!*Film {
         const view_size = &session.world.?.view;
         var layers = session.layersOf();
         if (choices.denoise) layers.setUnion(denoise.needed);
         var further = choices.layers.iterator();
-        while (further.next()) |layer| layers.insert(layerOf(layer));
+        while (further.next()) |layer| layers.insert(film_file.layerOf(layer));
+        const layout: film_file.Layout = try .init(
+            session.gpa,
+            view_size.width,
+            view_size.height,
+            choices.part,
+            trace.surroundingsOf(&choices),
+            session.diagnostic,
+        );
+        if (session.layout) |*before| before.deinit(session.gpa);
+        session.layout = layout;
+        const width, const height = .{ layout.film_width, layout.film_height };
         if (session.film) |*film| {
-            if (film.become(view_size.width, view_size.height, layers)) return film;
+            if (film.become(width, height, layers)) return film;
             film.deinit(session.gpa);
             session.film = null;
         }
-        session.film = try .init(session.gpa, view_size.width, view_size.height, layers);
+        session.film = try .init(session.gpa, width, height, layers);
+        // Between tiles that the picture's edge cuts there are pixels that nobody writes.
+        if (layout.form == .share) session.film.?.clear();
         return &session.film.?;
     }
 
@@ -948,15 +1090,17 @@ pub const Session = struct {
     }
 };
 
-/// The film's, as users choose them.
-fn layerOf(layer: settings.Layer) film_file.Layer {
-    return switch (layer) {
-        inline else => |same| @field(film_file.Layer, @tagName(same)),
-    };
-}
-
 fn float(count: u64) f64 {
     return @floatFromInt(count);
+}
+
+/// The members of a set, in `room`.
+fn listOf(comptime T: type, set: std.EnumSet(T), room: []T) []const T {
+    var count: usize = 0;
+    var all = set;
+    var members = all.iterator();
+    while (members.next()) |member| : (count += 1) room[count] = member;
+    return room[0..count];
 }
 
 /// Threads where nobody says how many.

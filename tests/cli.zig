@@ -606,6 +606,70 @@ test "-o - puts the image and nothing else on stdout" {
     try sandbox.expectEmpty();
 }
 
+test "of several scenes each is a picture, is there already, or is a line" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const scene = try triangleScene(sandbox.arena_state.allocator());
+    try sandbox.folder.dir.createDirPath(io, "in/more");
+    try sandbox.folder.dir.createDirPath(io, "out");
+    for ([_][2][]const u8{
+        .{ "in/a.glb", scene },   .{ "in/b.gltf", "no" },  .{ "in/c.GLB", scene },
+        .{ "in/d.txt", "notes" }, .{ "out/c.png", "old" },
+    }) |file| try sandbox.write(file[0], file[1]);
+    const ending = try sandbox.expectExit(3, &.{
+        "in", "--skip-existing", "-oout/", "-r4", dark, "--jobs=2", "in/none.ply",
+    });
+    try testing.expectEqualStrings("", ending.stdout);
+    for ([_][]const u8{
+        "raylane: in: warning: not looked into 1 folder in it\n",
+        "raylane: in/b.gltf: ",
+        "raylane: in/none.ply: no such file or directory\n",
+        " a.glb: done, ",
+        "raylane: 1 picture in ",
+        ", 1 kept, 2 failures\n",
+    }) |part| {
+        errdefer std.debug.print("{s}\n", .{ending.stderr});
+        try testing.expect(std.mem.find(u8, ending.stderr, part) != null);
+    }
+    try testing.expectEqualStrings("old", try sandbox.read("out/c.png"));
+    try testing.expectEqualStrings("\x89PNG", (try sandbox.read("out/a.png"))[0..4]);
+}
+
+/// A triangle that moves along x by one in a second.
+const moving_scene =
+    \\{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+    \\"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"bufferViews":[{"buffer":0,
+    \\"byteLength":68}],"accessors":[{"bufferView":0,"count":3,"componentType":5126,"type":"VEC3",
+    \\"min":[0,0,0],"max":[1,1,0]},{"bufferView":0,"byteOffset":36,"count":2,"min":[0],"max":[1],
+    \\"componentType":5126,"type":"SCALAR"},{"bufferView":0,"byteOffset":44,"count":2,
+    \\"componentType":5126,"type":"VEC3"}],"animations":[{"channels":[{"sampler":0,"target":
+    \\{"node":0,"path":"translation"}}],"samplers":[{"input":1,"output":2}]}],"buffers":[{
+    \\"byteLength":68,"uri":"data:application/octet-stream;base64,
+++ "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAA" ++
+    \\AAA="}]}
+;
+
+test "frames are the pictures of their moments, and a film has them in a row" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("m.gltf", moving_scene);
+    const place = [_][]const u8{ "m.gltf", "-q", "-r4x4", dark, "--eye=0,0,4", "--target=0,0,0" };
+    _ = try sandbox.expectExit(0, &place ++ [_][]const u8{
+        "--frames=0,6", "--fps=12", "-omade/{model}_{frame:2}.ppm",
+    });
+    _ = try sandbox.expectExit(0, &place ++ [_][]const u8{ "--animation-time=0.5", "-oone.ppm" });
+    const later = try sandbox.read("made/m_06.ppm");
+    try testing.expectEqualStrings(try sandbox.read("one.ppm"), later);
+    const first = try sandbox.read("made/m_00.ppm");
+    try testing.expect(!std.mem.eql(u8, first, later));
+    const film = try sandbox.expectExit(0, &.{
+        "m.gltf", "--turntable=2", "--format=y4m", "-o-", "-r4x4", dark,
+    });
+    const header = "YUV4MPEG2 W4 H4 F24:1 Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
+    try testing.expectEqual(header.len + 2 * ("FRAME\n".len + 3 * 16), film.stdout.len);
+    try testing.expect(std.mem.startsWith(u8, film.stdout, header ++ "FRAME\n"));
+}
+
 test "every format by its name or by --format, JPEG smaller with less quality" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
@@ -1376,7 +1440,7 @@ fn benchResultsOf(sandbox: *Sandbox, json: []const u8) !BenchResults {
 }
 
 const small_bench = [_][]const u8{
-    "bench", "-r16x16", "-t2", "--rounds=2", "--time-limit=2", "-q", "builtin:cornell",
+    "bench", "-r16x16", "-t2", "--rounds=2", "--time-limit=600", "-q", "builtin:cornell",
 };
 
 /// The argument that measures one variant alone, whichever the program holds.

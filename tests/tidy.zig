@@ -28,6 +28,7 @@ const directions = [_]Row{
         .may_import = &.{
             "builtin", "parse",    "scene",   "prepare", "world",  "trace",
             "film",    "parallel", "variant", "output",  "report", "denoise",
+            "part",
         },
     },
     .{ .part = "kernel", .may_import = &.{ "module:config", "trace", "variant" } },
@@ -36,6 +37,11 @@ const directions = [_]Row{
     .{
         .part = "info",
         .may_import = &.{ "decode", "parse", "prepare", "report", "scene", "world" },
+    },
+    .{ .part = "part", .may_import = &.{ "film", "output" } },
+    .{
+        .part = "merge",
+        .may_import = &.{ "decode", "denoise", "film", "output", "parallel", "parse", "part" },
     },
     .{ .part = "variant", .may_import = &.{"module:config"} },
     .{ .part = "simd", .may_import = &.{"variant"} },

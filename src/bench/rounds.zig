@@ -19,8 +19,10 @@ const assert = std.debug.assert;
 pub const precision = 0.02;
 /// Rounds before an interval may be called narrow: two samples that agree may do so by chance.
 const narrow_round_count_min = 5;
-/// Rounds whatever the time: fewer have no interval.
+/// Rounds beyond the scene's share of the time, if there is any left: fewer have no interval.
 const round_count_min = 2;
+/// What a piece of work may take over the longest before it, for all that is known.
+const margin = 1.25;
 
 /// When to stop.
 pub const Plan = struct {
@@ -29,8 +31,10 @@ pub const Plan = struct {
     thread_count: usize,
     /// Exactly so many; null: until intervals are narrow.
     round_count: ?usize,
-    /// By the subject's clock.
+    /// End of the scene's share of the time, by the subject's clock.
     deadline_ns: u64,
+    /// What nothing is begun for that would end later.
+    end_ns: u64 = std.math.maxInt(u64),
     /// What the machine takes at rest, in watts.
     idle_w: f64 = 0,
 };
@@ -134,7 +138,8 @@ pub fn Rounds(comptime Subject: type) type {
         round_count: usize = 0,
         end: results.End = .rounds,
 
-        /// Runs all rounds of a scene. `ImagesDiffer`: the diagnostic names the variant.
+        /// Runs all rounds of a scene; none where there is no time for one. `ImagesDiffer`: the
+        /// diagnostic names the variant.
         pub fn measure(
             arena: Allocator,
             subject: *Subject,
@@ -151,13 +156,15 @@ pub fn Rounds(comptime Subject: type) type {
                 .diagnostic = diagnostic,
                 .series = series,
             };
-            try rounds.warmUp();
-            var is_done = false;
-            while (!is_done) {
+            var last_round_ns = try rounds.warmUp() orelse {
+                rounds.end = .time;
+                return rounds;
+            };
+            while (!rounds.isDone(last_round_ns)) {
                 const start_ns = subject.now();
                 for (plan.variants, series) |variant, *one| try rounds.repeat(variant, one);
                 rounds.round_count += 1;
-                is_done = rounds.isDone(subject.now() - start_ns);
+                last_round_ns = subject.now() - start_ns;
             }
             return rounds;
         }
@@ -171,9 +178,15 @@ pub fn Rounds(comptime Subject: type) type {
             return list;
         }
 
-        fn warmUp(rounds: *Self) !void {
+        /// What a round takes, about, in nanoseconds; null: there is no time for one.
+        fn warmUp(rounds: *Self) !?u64 {
             const subject = rounds.subject;
+            const energy_ns = if (subject.mark() == null) 0 else 2 * subject.windowNs();
+            var longest_ns: u64 = 0;
+            var round_ns: u64 = 0;
             for (rounds.plan.variants, rounds.series) |variant, *one| {
+                if (!rounds.hasTime(longest_ns)) return null;
+                const start_ns = subject.now();
                 _ = try subject.prepare(variant);
                 const traced = try subject.trace(variant, rounds.plan.thread_count);
                 try rounds.check(variant, rounds.plan.thread_count);
@@ -181,7 +194,18 @@ pub fn Rounds(comptime Subject: type) type {
                 one.tests = try subject.count(variant);
                 try rounds.check(variant, rounds.plan.thread_count);
                 subject.step();
+                const taken_ns = subject.now() - start_ns;
+                longest_ns = @max(longest_ns, taken_ns);
+                round_ns += taken_ns + energy_ns;
             }
+            return round_ns;
+        }
+
+        /// Whether what takes about so long ends in time.
+        fn hasTime(rounds: *const Self, expected_ns: u64) bool {
+            const expected: f64 = @floatFromInt(expected_ns);
+            const with_margin: u64 = @trunc(margin * expected);
+            return rounds.subject.now() +| with_margin <= rounds.plan.end_ns;
         }
 
         fn check(rounds: *Self, variant: usize, thread_count: usize) error{ImagesDiffer}!void {
@@ -255,6 +279,10 @@ pub fn Rounds(comptime Subject: type) type {
         }
 
         fn isDone(rounds: *Self, last_round_ns: u64) bool {
+            if (!rounds.hasTime(last_round_ns)) {
+                rounds.end = .time;
+                return true;
+            }
             if (rounds.round_count < round_count_min) return false;
             if (rounds.plan.round_count) |count| {
                 rounds.end = .rounds;
@@ -278,8 +306,8 @@ pub fn Rounds(comptime Subject: type) type {
         }
 
         /// Traces by each number of threads in turn, until the deadline: `lists` gets, for each
-        /// variant and each number of threads, the render times in milliseconds. The images are
-        /// checked against the one of `measure`.
+        /// variant and each number of threads, the render times in milliseconds, of whole rounds.
+        /// The images are checked against the one of `measure`.
         pub fn scale(
             rounds: *Self,
             scaled_variants: []const usize,
@@ -295,6 +323,10 @@ pub fn Rounds(comptime Subject: type) type {
                 for (scaled_variants, 0..) |variant, variant_index| {
                     _ = try subject.prepare(variant);
                     for (thread_counts, 0..) |thread_count, count_index| {
+                        if (!rounds.hasTime(rounds.expectedNs(variant, thread_count))) {
+                            for (lists) |*list| list.shrinkRetainingCapacity(round);
+                            return;
+                        }
                         const traced = try subject.trace(variant, thread_count);
                         try rounds.check(variant, thread_count);
                         subject.step();
@@ -308,6 +340,18 @@ pub fn Rounds(comptime Subject: type) type {
                 if (end_ns + (end_ns - start_ns) > deadline_ns) return;
                 if (round + 1 >= narrow_round_count_min and areNarrow(lists)) return;
             }
+        }
+
+        /// What a frame may take by fewer threads than it was measured with.
+        fn expectedNs(rounds: *const Self, variant: usize, thread_count: usize) u64 {
+            for (rounds.plan.variants, rounds.series) |other, *one| {
+                if (other != variant) continue;
+                const slower = @as(f64, @floatFromInt(rounds.plan.thread_count)) /
+                    @as(f64, @floatFromInt(thread_count));
+                const time_ms = student.estimate(one.trace_ms.items).mean;
+                return @trunc(time_ms * 1e6 * @max(1, slower));
+            }
+            return 0;
         }
 
         fn areNarrow(lists: []const Column) bool {
@@ -451,11 +495,42 @@ test "narrow intervals end the rounds, wide ones the time" {
         try testing.expect(fake.now_ns <= 2_000_000_000);
         if (case[1] == .precision) try testing.expectEqual(5, rounds.round_count);
     }
-    // Two rounds at least, however late it is.
+    // Two rounds at least, beyond the scene's share of the time.
     var fake: Fake = .{ .trace_ms = &.{ 30, 10, 20 } };
     defer fake.order.deinit(testing.allocator);
     const rounds = try FakeRounds.measure(arena.allocator(), &fake, planFor(null, 0), &diagnostic);
     try testing.expectEqual(2, rounds.round_count);
+}
+
+test "what would end too late is not begun" {
+    var arena: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer arena.deinit();
+    var diagnostic: Diagnostic = .{};
+    // Variants take 36, 16 and 26 ms, and so does the round that does not count.
+    const Case = struct { end_ms: u64, round_count: usize, scaled_count: usize };
+    for ([_]Case{
+        .{ .end_ms = 20, .round_count = 0, .scaled_count = 0 },
+        .{ .end_ms = 150, .round_count = 0, .scaled_count = 0 },
+        .{ .end_ms = 180, .round_count = 1, .scaled_count = 0 },
+        .{ .end_ms = 260, .round_count = 2, .scaled_count = 0 },
+        .{ .end_ms = 500, .round_count = 5, .scaled_count = 0 },
+        .{ .end_ms = 640, .round_count = 5, .scaled_count = 1 },
+    }) |case| {
+        var fake: Fake = .{ .trace_ms = &.{ 30, 10, 20 } };
+        defer fake.order.deinit(testing.allocator);
+        var plan = planFor(null, 1 << 20);
+        plan.end_ns = case.end_ms * 1_000_000;
+        var rounds = try FakeRounds.measure(arena.allocator(), &fake, plan, &diagnostic);
+        try testing.expectEqual(case.round_count, rounds.round_count);
+        try testing.expectEqual(case.round_count < 5, rounds.end == .time);
+        if (case.round_count > 0) {
+            var lists: [2]Column = @splat(.empty);
+            try rounds.scale(&.{0}, &.{ 1, 2 }, plan.end_ns, &lists);
+            for (lists) |list| try testing.expectEqual(case.scaled_count, list.items.len);
+        }
+        // But for the very first frame, which nothing is known of.
+        try testing.expect(fake.now_ns <= @max(36_000_000, plan.end_ns));
+    }
 }
 
 test "another image is an error that names its variant, early or late" {

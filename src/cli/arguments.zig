@@ -13,6 +13,8 @@ const Range = @import("../settings.zig").Range;
 pub const Option = struct {
     /// `-f, --flag VALUE`, perhaps without a letter or a value.
     usage: []const u8,
+    /// Words that its value may be, for shells to offer: all, or those that are not names.
+    words: []const []const u8 = &.{},
     /// What it does: lines of the help's right column.
     help: []const u8,
     /// Names that other programs have for it, with their dashes: understood.
@@ -92,6 +94,11 @@ pub fn helpOf(comptime sections: []const Section) []const u8 {
         }
         return text;
     }
+}
+
+/// The names of an enumeration, for an option's `words`.
+pub fn wordsOf(comptime Enum: type) []const []const u8 {
+    return comptime std.meta.fieldNames(Enum);
 }
 
 /// `png, ppm or pfm`: the names of an enumeration, for messages.

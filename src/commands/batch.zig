@@ -13,7 +13,6 @@ const signals = @import("../signals.zig");
 const Account = raylane.memory_account.Account;
 const Allocator = std.mem.Allocator;
 const Diagnostic = raylane.diagnostic.Diagnostic;
-const Display = raylane.display.Display;
 const ExitCode = @import("exit_code.zig").ExitCode;
 const Io = std.Io;
 const Options = raylane.cli.Options;
@@ -35,7 +34,6 @@ pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnos
         .io = io,
         .options = options,
         .thread_count = options.thread_count orelse raylane.session.processorCount(),
-        .display = .init(io, options.progress, &signals.progress_line),
     };
     defer batch.deinit();
     batch.prepare(arena.allocator(), diagnostic) catch |err| switch (err) {
@@ -63,7 +61,7 @@ pub const Batch = struct {
     thread_count: usize,
     plan: Plan = .{ .files = &.{}, .frames = &.{}, .views = &.{}, .template = null },
     start: Io.Timestamp = .{ .nanoseconds = 0 },
-    display: Display,
+    display: raylane.display.Display = undefined,
     /// Indices of the files, as they are begun.
     order: []const u32 = &.{},
     next: std.atomic.Value(usize) = .init(0),
@@ -145,12 +143,14 @@ pub const Batch = struct {
                 });
             },
             .folder => |folder| if (folder.file_count == 0) {
-                console.say(batch.io, "raylane: {f}: no scenes in this folder, whose {d} " ++
-                    "folders are not looked into\n", .{ name, folder.folder_count });
+                const count = folder.folder_count;
+                console.say(batch.io, "raylane: {f}: no scenes in it, and {d} folder{s} that " ++
+                    "are not looked into\n", .{ name, count, plural(count) });
                 batch.note(.failed);
             } else if (folder.folder_count > 0 and !batch.options.quiet) {
-                console.say(batch.io, "raylane: {f}: warning: {d} folders in it are not looked " ++
-                    "into\n", .{ name, folder.folder_count });
+                const count = folder.folder_count;
+                console.say(batch.io, "raylane: {f}: warning: not looked into {d} folder{s} in " ++
+                    "it\n", .{ name, count, plural(count) });
             },
         }
     }
@@ -200,8 +200,11 @@ pub const Batch = struct {
     /// Takes the files one after the other, by several threads.
     fn runAll(batch: *Batch) void {
         const options = batch.options;
+        batch.display = .init(batch.io, options.progress, &signals.progress_line);
         batch.display.start();
         defer batch.display.stop();
+        defer signals.outcome.clear();
+        batch.foretell();
         signals.stop.is_awaited.store(options.partial, .release);
         defer signals.stop.is_awaited.store(false, .release);
         var threads: [settings.job_count.max]std.Thread = undefined;
@@ -220,7 +223,7 @@ pub const Batch = struct {
             var worker: Worker = .{ .batch = batch };
             worker.init();
             defer worker.session.deinit();
-            worker.runFile(index);
+            worker.runFile(index, batch.order.len);
         }
     }
 
@@ -232,7 +235,7 @@ pub const Batch = struct {
         while (!batch.isStopped()) {
             const place = batch.next.fetchAdd(1, .monotonic);
             if (place >= batch.order.len) break;
-            worker.runFile(batch.order[place]);
+            worker.runFile(batch.order[place], place + 1);
         }
         _ = batch.busy_count.fetchSub(1, .monotonic);
     }
@@ -265,6 +268,14 @@ pub const Batch = struct {
         batch.mutex.lockUncancelable(batch.io);
         defer batch.mutex.unlock(batch.io);
         @field(batch, @tagName(what) ++ "_count") += number;
+        batch.foretell();
+    }
+
+    /// What a signal says that ends the program.
+    fn foretell(batch: *const Batch) void {
+        if (batch.options.quiet) return;
+        const format = "{d} pictures are written, those under way are not";
+        signals.outcome.set(format, .{batch.written_count});
     }
 
     /// Prints the report of a picture, one at a time.
@@ -304,15 +315,22 @@ pub const Batch = struct {
     fn finish(batch: *const Batch) ExitCode {
         const duration = batch.start.untilNow(batch.io, .awake);
         const seconds = @as(f64, @floatFromInt(duration.toMilliseconds())) / 1000;
-        if (!batch.options.quiet) console.say(
-            batch.io,
-            "raylane: {d} pictures in {d:.1} s, {d} there already, {d} failures\n",
-            .{ batch.written_count, seconds, batch.skipped_count, batch.failed_count },
-        );
+        var line: raylane.diagnostic.Message = .{};
+        const written_count = batch.written_count;
+        line.set("{d} picture{s} in {d:.1} s", .{ written_count, plural(written_count), seconds });
+        if (batch.skipped_count > 0) line.append(", {d} kept", .{batch.skipped_count});
+        const failed_count = batch.failed_count;
+        if (failed_count > 0)
+            line.append(", {d} failure{s}", .{ failed_count, plural(failed_count) });
+        if (!batch.options.quiet) console.say(batch.io, "raylane: {s}\n", .{line.text()});
         if (!batch.isStopped()) return batch.exit_code;
         return @fromBackingInt(@intCast(128 + signals.stop.signal.load(.monotonic)));
     }
 };
+
+fn plural(count: usize) []const u8 {
+    return if (count == 1) "" else "s";
+}
 
 /// One of those that take files: a session, whose threads, film and studio serve all of them.
 const Worker = struct {
@@ -327,23 +345,30 @@ const Worker = struct {
         if (batch.options.partial) worker.session.stop = &signals.stop.is_asked;
     }
 
-    fn runFile(worker: *Worker, index: u32) void {
+    /// `number`: of those that have been begun.
+    fn runFile(worker: *Worker, index: u32, number: usize) void {
         const batch = worker.batch;
         const path = batch.plan.files[index].path;
         worker.diagnostic = .{};
-        const progress = batch.display.beginFile(.{
-            .index = index + 1,
-            .count = batch.plan.files.len,
+        const display = &batch.display;
+        const progress = display.beginFile(.{
+            .index = number,
+            .count = batch.order.len,
             .name = path,
         });
         worker.session.pool.progress = progress;
+        defer worker.session.pool.progress = null;
         defer worker.session.drop();
         var pictures: Pictures = .init(batch, &worker.session, index);
         defer pictures.deinit();
         const outcome = pictures.run();
-        batch.display.endFile(progress, if (outcome) |_| .done else |_| .failed);
-        worker.session.pool.progress = null;
-        outcome catch |err| if (err == error.OutOfMemory and batch.postpone(index)) return;
+        outcome catch |err| if (err == error.OutOfMemory and batch.postpone(index))
+            return display.endFile(progress, .postponed);
+        const is_skipped = pictures.begun_count == 0;
+        display.endFile(progress, if (outcome) |_|
+            if (is_skipped) .skipped else .done
+        else |_|
+            .failed);
         pictures.sayWarnings();
         if (!batch.options.quiet) console.sayDropped(batch.io, path, &worker.diagnostic);
         outcome catch |err| {

@@ -30,6 +30,14 @@ pub fn isTerminal(io: Io) bool {
     return true;
 }
 
+/// Prints what a function writes.
+pub fn printBy(gpa: std.mem.Allocator, io: Io, write: anytype, arguments: anytype) ExitCode {
+    var text: Io.Writer.Allocating = .init(gpa);
+    defer text.deinit();
+    @call(.auto, write, .{&text.writer} ++ arguments) catch return outOfMemory(io);
+    return print(io, text.written());
+}
+
 /// Writes all of a text to standard output; the diagnostic says why it cannot.
 pub fn writeToStdout(
     io: Io,

@@ -292,8 +292,12 @@ pub const Pictures = struct {
         try session.view(pictures.viewOf(view));
         pictures.sayWarnings();
         if (pictures.begun_count == 1) facts.say(pictures.batch.io, options, session);
+        if (options.render.part != .whole) session.identify(raylane.cli.version);
         if (pictures.isAlone()) session.dropScene();
-        session.checkWrite(options.write) catch return error.OutputFailed;
+        session.checkWrite(options.write, options.render.part) catch |err| return switch (err) {
+            error.InputOutput => error.OutputFailed,
+            else => |other| other,
+        };
         session.pool.thread_count = pictures.batch.threadCount();
         try session.render(options.render);
         try pictures.sizeFilm();
@@ -427,7 +431,10 @@ pub const Pictures = struct {
         const taken_ns: u64 = @intCast(pictures.start.durationTo(now).toNanoseconds());
         pictures.start = now;
         const seconds = @as(f64, @floatFromInt(taken_ns)) / std.time.ns_per_s;
-        if (!options.quiet) console.say(batch.io, "raylane: {f}: {f}, {d}x{d}, {d:.2} s\n", .{
+        // Where it is the only one, the line of the file says it.
+        const is_said = !options.quiet and options.progress.form == .auto;
+        const is_only = batch.plan.files.len > 1 and pictures.isAlone();
+        if (is_said and !is_only) console.say(batch.io, "raylane: {f}: {f}, {d}x{d}, {d:.2} s\n", .{
             printable(raylane.parse.title(options.scene)),
             printable(measured.output),
             measured.width,

@@ -168,9 +168,13 @@ const Job = struct {
         try session.view(options.view);
         job.sayWarnings();
         facts.say(job.io, options, session);
+        if (options.render.part != .whole) session.identify(cli.version);
         session.dropScene();
         signals.stop.is_awaited.store(options.partial, .release);
-        session.checkWrite(options.write) catch return error.OutputFailed;
+        session.checkWrite(options.write, options.render.part) catch |err| return switch (err) {
+            error.InputOutput => error.OutputFailed,
+            else => |other| other,
+        };
         try session.render(options.render);
         signals.stop.is_awaited.store(false, .release);
         session.write(&target, options.write) catch |err| return switch (err) {

@@ -168,7 +168,11 @@ const Server = struct {
         try session.view(options.view);
         // They would not be said again, and what was missing may be there next time.
         if (diagnostic.warning_count > 0) kept.is_good = false;
-        session.checkWrite(options.write) catch return error.OutputFailed;
+        if (options.render.part != .whole) session.identify(cli.version);
+        session.checkWrite(options.write, options.render.part) catch |err| return switch (err) {
+            error.InputOutput => error.OutputFailed,
+            else => |other| other,
+        };
         try session.render(options.render);
         session.write(&target, options.write) catch |err| return switch (err) {
             error.OutOfMemory, error.Canceled => |other| other,

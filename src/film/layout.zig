@@ -385,7 +385,7 @@ test "a crop is a window, and what is around it ends where the picture does" {
     try testing.expect(Layout.whole(45, 21).isWhole());
 
     const shares: settings.Part.Crop = .{ .shares = .{ 0, 0.25, 0.5, 1 } };
-    try testing.expectEqual([4]u32{ 0, 2, 4, 10 }, shares.pixelsOf(8, 10));
+    try testing.expectEqual([4]u32{ 0, 3, 4, 10 }, shares.pixelsOf(8, 10));
     for ([_]settings.Part{
         .{ .crop = .{ .pixels = .{ 0, 0, 46, 21 } } },
         .{ .crop = .{ .shares = .{ 0.5, 0, 0.5, 1 } } },

@@ -74,6 +74,9 @@ pub const Tally = struct {
     }
 };
 
+/// Rows of a picture, from `first` on, that has `of`.
+pub const Extent = struct { first: u32, of: u32 };
+
 /// The picture as rows of bytes.
 pub const Rows = struct {
     picture: Picture,
@@ -82,6 +85,7 @@ pub const Rows = struct {
     scale: f32 = 1,
     tone_mapping: settings.ToneMapping = .linear,
     background: Background = .none,
+    extent: Extent,
 
     /// Bytes of a row.
     pub fn byteCount(rows: *const Rows) usize {
@@ -99,7 +103,7 @@ pub const Rows = struct {
                 display.pixels[start..][0..image.width]
             else
                 null,
-            .behind = rows.background.at(y, image.height),
+            .behind = rows.background.at(rows.extent.first + y, rows.extent.of),
             .scale = rows.scale,
         };
         switch (rows.tone_mapping) {
@@ -285,7 +289,11 @@ fn encodeForTest(
     return all.encode(0, std.mem.sliceAsBytes(bytes));
 }
 
-const rows_for_test: Rows = .{ .picture = undefined, .form = .rgb };
+const rows_for_test: Rows = .{
+    .picture = undefined,
+    .form = .rgb,
+    .extent = .{ .first = 0, .of = 1 },
+};
 
 test "linear light over black, however many pixels a row has" {
     const some = [_][4]f32{

@@ -1,8 +1,8 @@
 //! YUV4MPEG2, the uncompressed film of mjpegtools that encoders read from a pipe.
 //!
 //! In: sRGB bytes. Out: a header in front of the first frame, and frames of three planes, 4:4:4,
-//! 8 bits. The format does not say which matrix its colours are made by; ITU-R BT.601 in its limited
-//! range (Y 16 to 235, Cb and Cr 16 to 240) is what readers assume that are told nothing else.
+//! 8 bits. The format does not say by which matrix its colours are made; ITU-R BT.601 in its
+//! limited range (Y 16 to 235, Cb and Cr 16 to 240) is what readers assume that are told no other.
 
 const std = @import("std");
 const settings = @import("../settings.zig");
@@ -15,8 +15,7 @@ pub const header_bytes_max = 128;
 /// What stands before a frame; `is_first`: in a film, too.
 pub fn header(
     buffer: *[header_bytes_max]u8,
-    width: u32,
-    height: u32,
+    size: [2]u32,
     rate: settings.FrameRate,
     is_first: bool,
 ) []const u8 {
@@ -25,7 +24,7 @@ pub fn header(
     return std.mem.print(
         buffer,
         "YUV4MPEG2 W{d} H{d} F{d}:{d} Ip A1:1 C444 XCOLORRANGE=LIMITED\nFRAME\n",
-        .{ width, height, rate.numerator, rate.denominator },
+        .{ size[0], size[1], rate.numerator, rate.denominator },
     ) catch unreachable;
 }
 
@@ -72,9 +71,9 @@ test header {
     const rate: settings.FrameRate = .{ .numerator = 30000, .denominator = 1001 };
     try std.testing.expectEqualStrings(
         "YUV4MPEG2 W64 H48 F30000:1001 Ip A1:1 C444 XCOLORRANGE=LIMITED\nFRAME\n",
-        header(&buffer, 64, 48, rate, true),
+        header(&buffer, .{ 64, 48 }, rate, true),
     );
-    try std.testing.expectEqualStrings("FRAME\n", header(&buffer, 64, 48, rate, false));
+    try std.testing.expectEqualStrings("FRAME\n", header(&buffer, .{ 64, 48 }, rate, false));
     const most = std.math.maxInt(u32);
-    _ = header(&buffer, most, most, .{ .numerator = most, .denominator = most }, true);
+    _ = header(&buffer, .{ most, most }, .{ .numerator = most, .denominator = most }, true);
 }

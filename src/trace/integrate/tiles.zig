@@ -26,6 +26,7 @@ const world_file = @import("../../world.zig");
 const statistics = @import("../../statistics.zig");
 const parallel = @import("../../parallel.zig");
 const adaptive = @import("adaptive.zig");
+const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
 const film_file = @import("../../film.zig");
 const sampler = @import("sampler.zig");
 const assert = std.debug.assert;
@@ -131,8 +132,9 @@ pub const Statistics = struct {
     non_finite_count: u64 = 0,
     /// Of the pixels that have the most.
     sample_count: u32 = 0,
-    /// Of all pixels.
+    /// Of all pixels that were traced, and how many these are.
     sample_sum: u64 = 0,
+    pixel_count: u64 = 0,
     /// The work was stopped before its end.
     is_partial: bool = false,
 };
@@ -430,7 +432,10 @@ const Job = struct {
     /// which may have enough sooner, where they are judged.
     fn tellBegin(job: *const Job) void {
         const settings = job.settings;
-        const count: u64 = if (job.blocks) |blocks| blocks.states.len else job.tiles.count;
+        const count: u64 = if (job.blocks) |blocks|
+            blocks.active_count.load(.monotonic)
+        else
+            job.tiles.count;
         Progress.begin(settings.progress, .{
             .stage = .tracing,
             .total = count * settings.sample_count,
@@ -528,6 +533,7 @@ const Job = struct {
             .non_finite_count = finished.non_finite_count,
             .sample_count = finished.sample_count,
             .sample_sum = finished.sample_sum,
+            .pixel_count = job.tiles.layout.tracedCount(),
             .is_partial = !is_whole,
         };
     }
@@ -828,7 +834,8 @@ const NoisyIntegrator = struct {
                 var random: std.Random.SplitMix64 = .init((y * 64 + x) * 4096 + sample);
                 const value: f32 = @floatFromInt(random.next() >> 40);
                 const shown = if (x < quiet_width) 0.25 else value * 0x1p-25;
-                film.add(@intCast(x), @intCast(y), @intCast(sample), @splat(shown));
+                const column, const row = rectangle.placeOf(@intCast(x), @intCast(y));
+                film.add(column, row, @intCast(sample), @splat(shown));
             }
         };
     }
@@ -867,4 +874,54 @@ test "quiet blocks get no more samples than they need, whatever tiles, threads a
             hash = film.hash();
         }
     };
+}
+
+test "parts of a picture are what it has there, with blocks of its own grid" {
+    const gpa = std.testing.allocator;
+    const frame: Frame = undefined;
+    var pool: parallel.Pool = .init(2);
+    defer pool.deinit();
+    var diagnostic: Diagnostic = .{};
+    const width = 45;
+    const height = 37;
+    var whole: Film = try .init(gpa, width, height, .init(.{ .color = true }));
+    defer whole.deinit(gpa);
+    var shown: Settings = .{
+        .pool = &pool,
+        .integrator = .path,
+        .sample_count = 50,
+        .tile_size = 24,
+        .noise = .{ .error_max = 0.015, .exposure_scale = 1 },
+    };
+    const total = try render(&.of(NoisyIntegrator), gpa, &frame, &whole, &shown);
+    var sample_sum: u64 = 0;
+    for ([_]choices.Part{
+        .{ .crop = .{ .pixels = .{ 17, 3, 44, 34 } } },
+        .{ .tile = .{ .number = 1, .count = 2 } },
+        .{ .tile = .{ .number = 2, .count = 2 } },
+    }) |part| {
+        var layout: Layout = try .init(gpa, width, height, part, .{
+            .step = adaptive.block_side,
+            .margin = if (part == .crop) 2 else 0,
+        }, &diagnostic);
+        defer layout.deinit(gpa);
+        shown.layout = &layout;
+        var film: Film =
+            try .init(gpa, layout.film_width, layout.film_height, whole.layers);
+        defer film.deinit(gpa);
+        const found = try render(&.of(NoisyIntegrator), gpa, &frame, &film, &shown);
+        if (part == .tile) sample_sum += found.sample_sum;
+        var cut = try film.cut(gpa, &layout);
+        defer cut.deinit(gpa);
+        const bare = layout.bare();
+        for (0..bare.count()) |number| {
+            const own = bare.windowAt(@intCast(number)).own;
+            for (own.y0..own.y1) |y| for (own.x0..own.x1) |x| {
+                const place = own.placeOf(@intCast(x), @intCast(y));
+                const expected = whole.image.at(@intCast(x), @intCast(y)).*;
+                try std.testing.expectEqual(expected, cut.image.at(place[0], place[1]).*);
+            };
+        }
+    }
+    try std.testing.expectEqual(total.sample_sum, sample_sum);
 }
