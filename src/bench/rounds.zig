@@ -279,20 +279,19 @@ pub fn Rounds(comptime Subject: type) type {
         }
 
         fn isDone(rounds: *Self, last_round_ns: u64) bool {
-            if (!rounds.hasTime(last_round_ns)) {
-                rounds.end = .time;
-                return true;
+            const has_interval = rounds.round_count >= round_count_min;
+            if (has_interval) {
+                if (rounds.plan.round_count) |count| {
+                    rounds.end = .rounds;
+                    if (rounds.round_count >= count) return true;
+                } else if (rounds.isNarrow()) {
+                    rounds.end = .precision;
+                    return true;
+                }
+                if (rounds.round_count == student.round_count_max) return true;
             }
-            if (rounds.round_count < round_count_min) return false;
-            if (rounds.plan.round_count) |count| {
-                rounds.end = .rounds;
-                if (rounds.round_count >= count) return true;
-            } else if (rounds.isNarrow()) {
-                rounds.end = .precision;
-                return true;
-            }
-            if (rounds.round_count == student.round_count_max) return true;
-            if (rounds.subject.now() + last_round_ns <= rounds.plan.deadline_ns) return false;
+            const is_late = rounds.subject.now() + last_round_ns > rounds.plan.deadline_ns;
+            if (rounds.hasTime(last_round_ns) and !(has_interval and is_late)) return false;
             rounds.end = .time;
             return true;
         }
@@ -514,7 +513,7 @@ test "what would end too late is not begun" {
         .{ .end_ms = 180, .round_count = 1, .scaled_count = 0 },
         .{ .end_ms = 260, .round_count = 2, .scaled_count = 0 },
         .{ .end_ms = 500, .round_count = 5, .scaled_count = 0 },
-        .{ .end_ms = 640, .round_count = 5, .scaled_count = 1 },
+        .{ .end_ms = 640, .round_count = 5, .scaled_count = 2 },
     }) |case| {
         var fake: Fake = .{ .trace_ms = &.{ 30, 10, 20 } };
         defer fake.order.deinit(testing.allocator);
