@@ -8,6 +8,7 @@
 
 const std = @import("std");
 const energy = @import("energy.zig");
+const Alarm = @import("bench/alarm.zig").Alarm;
 const bounces = @import("bench/bounces.zig");
 const choices = @import("settings.zig");
 const machine = @import("bench/machine.zig");
@@ -274,6 +275,9 @@ pub const Bench = struct {
             progress,
         );
         defer stages.deinit();
+        var alarm: Alarm = .{ .io = bench.io, .session = &stages.session, .end_ns = end_ns };
+        alarm.start();
+        defer alarm.stop();
         var rounds = try Rounds.measure(bench.arena, &stages, .{
             .variants = bench.order,
             .thread_count = settings.thread_count,
@@ -432,6 +436,7 @@ pub fn writeJson(results: *const Results, writer: *Io.Writer) Io.Writer.Error!vo
 }
 
 test {
+    _ = @import("bench/alarm.zig");
     _ = bounces;
     _ = machine;
     _ = rounds_file;

@@ -55,12 +55,18 @@ pub fn measure(
     while (round < (plan.round_count orelse round_count_default)) : (round += 1) {
         const start_ns = subject.now();
         for (plan.variants, 0..) |variant, index| {
-            _ = try subject.prepare(variant);
+            _ = subject.prepare(variant) catch |err| return switch (err) {
+                error.Canceled => listOf(arena, subject, &plan, cells, round),
+                else => |other| other,
+            };
             for (cells[index * depth_count ..][0..depth_count], 0..) |*cell, depth| {
                 if (subject.now() +| plan.frame_ns +| subject.windowNs() > plan.end_ns)
                     return listOf(arena, subject, &plan, cells, round);
                 subject.setDepth(@intCast(depth));
-                try cell.repeat(arena, subject, variant, &plan);
+                cell.repeat(arena, subject, variant, &plan) catch |err| return switch (err) {
+                    error.Canceled => listOf(arena, subject, &plan, cells, round),
+                    else => |other| other,
+                };
                 subject.step();
                 if (cell.hash == cells[depth].hash) continue;
                 return diagnostic.fail(
@@ -160,13 +166,13 @@ const Fake = struct {
     last: usize = 0,
     differs: bool = false,
 
-    pub fn prepare(_: *Fake, _: usize) error{}!void {}
+    pub fn prepare(_: *Fake, _: usize) error{ OutOfMemory, Canceled }!void {}
 
     pub fn setDepth(fake: *Fake, depth: u32) void {
         fake.depth = depth;
     }
 
-    pub fn trace(fake: *Fake, variant: usize, _: usize) error{}!rounds.Traced {
+    pub fn trace(fake: *Fake, variant: usize, _: usize) error{Canceled}!rounds.Traced {
         fake.last = variant;
         const trace_ns = (10 + 4 * fake.depth * (1 + variant)) * std.time.ns_per_ms;
         fake.now_ns += trace_ns;

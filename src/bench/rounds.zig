@@ -60,6 +60,15 @@ const Series = struct {
     trace_s: Column = .empty,
     tests: statistics.TestCounts = .{},
 
+    /// Forgets what is of a round that was not finished.
+    fn shrink(series: *Series, round_count: usize) void {
+        inline for (comptime std.meta.fieldNames(Series)) |name| {
+            const column = &@field(series, name);
+            if (@TypeOf(column.*) != Column) continue;
+            column.shrinkRetainingCapacity(@min(round_count, column.items.len));
+        }
+    }
+
     fn result(series: *const Series, name: []const u8) results.Variant {
         return .{
             .name = name,
@@ -162,7 +171,12 @@ pub fn Rounds(comptime Subject: type) type {
             };
             while (!rounds.isDone(last_round_ns)) {
                 const start_ns = subject.now();
-                for (plan.variants, series) |variant, *one| try rounds.repeat(variant, one);
+                rounds.repeatAll() catch |err| {
+                    if (err != error.Canceled) return err;
+                    for (series) |*one| one.shrink(rounds.round_count);
+                    rounds.end = .time;
+                    return rounds;
+                };
                 rounds.round_count += 1;
                 last_round_ns = subject.now() - start_ns;
             }
@@ -187,18 +201,24 @@ pub fn Rounds(comptime Subject: type) type {
             for (rounds.plan.variants, rounds.series) |variant, *one| {
                 if (!rounds.hasTime(longest_ns)) return null;
                 const start_ns = subject.now();
-                _ = try subject.prepare(variant);
-                const traced = try subject.trace(variant, rounds.plan.thread_count);
-                try rounds.check(variant, rounds.plan.thread_count);
-                rounds.rays = traced.rays;
-                one.tests = try subject.count(variant);
-                try rounds.check(variant, rounds.plan.thread_count);
+                rounds.warmUpOne(variant, one) catch |err|
+                    return if (err == error.Canceled) null else err;
                 subject.step();
                 const taken_ns = subject.now() - start_ns;
                 longest_ns = @max(longest_ns, taken_ns);
                 round_ns += taken_ns + energy_ns;
             }
             return round_ns;
+        }
+
+        fn warmUpOne(rounds: *Self, variant: usize, one: *Series) !void {
+            const subject = rounds.subject;
+            _ = try subject.prepare(variant);
+            const traced = try subject.trace(variant, rounds.plan.thread_count);
+            try rounds.check(variant, rounds.plan.thread_count);
+            rounds.rays = traced.rays;
+            one.tests = try subject.count(variant);
+            try rounds.check(variant, rounds.plan.thread_count);
         }
 
         /// Whether what takes about so long ends in time.
@@ -224,6 +244,11 @@ pub fn Rounds(comptime Subject: type) type {
                     expected,
                 },
             );
+        }
+
+        fn repeatAll(rounds: *Self) !void {
+            for (rounds.plan.variants, rounds.series) |variant, *one|
+                try rounds.repeat(variant, one);
         }
 
         /// One sample of one variant: a frame, or as many as the energy's window takes.
@@ -319,25 +344,39 @@ pub fn Rounds(comptime Subject: type) type {
             var round: usize = 0;
             while (round < student.round_count_max) : (round += 1) {
                 const start_ns = subject.now();
-                for (scaled_variants, 0..) |variant, variant_index| {
-                    _ = try subject.prepare(variant);
-                    for (thread_counts, 0..) |thread_count, count_index| {
-                        if (!rounds.hasTime(rounds.expectedNs(variant, thread_count))) {
-                            for (lists) |*list| list.shrinkRetainingCapacity(round);
-                            return;
-                        }
-                        const traced = try subject.trace(variant, thread_count);
-                        try rounds.check(variant, thread_count);
-                        subject.step();
-                        const list = &lists[variant_index * thread_counts.len + count_index];
-                        try list.append(rounds.arena, milliseconds(traced.trace_ns, 1));
-                    }
-                }
+                rounds.scaleOnce(scaled_variants, thread_counts, lists) catch |err| {
+                    if (err != error.Canceled) return err;
+                    for (lists) |*list|
+                        list.shrinkRetainingCapacity(@min(round, list.items.len));
+                    return;
+                };
                 if (round + 1 < round_count_min) continue;
                 if (rounds.plan.round_count) |count| if (round + 1 >= count) return;
                 const end_ns = subject.now();
                 if (end_ns + (end_ns - start_ns) > deadline_ns) return;
                 if (round + 1 >= narrow_round_count_min and areNarrow(lists)) return;
+            }
+        }
+
+        /// `Canceled`: there is no time for all of it.
+        fn scaleOnce(
+            rounds: *Self,
+            scaled_variants: []const usize,
+            thread_counts: []const usize,
+            lists: []Column,
+        ) !void {
+            const subject = rounds.subject;
+            for (scaled_variants, 0..) |variant, variant_index| {
+                _ = try subject.prepare(variant);
+                for (thread_counts, 0..) |thread_count, count_index| {
+                    if (!rounds.hasTime(rounds.expectedNs(variant, thread_count)))
+                        return error.Canceled;
+                    const traced = try subject.trace(variant, thread_count);
+                    try rounds.check(variant, thread_count);
+                    subject.step();
+                    const list = &lists[variant_index * thread_counts.len + count_index];
+                    try list.append(rounds.arena, milliseconds(traced.trace_ns, 1));
+                }
             }
         }
 
@@ -387,6 +426,8 @@ const Fake = struct {
     energy_j: f64 = 0,
     window_ms: u64 = 0,
     meter_is_there: bool = false,
+    /// When it is cancelled.
+    end_ns: u64 = std.math.maxInt(u64),
 
     fn spend(fake: *Fake, time_ms: f64, power_w: f64) u64 {
         const time_ns: u64 = @trunc(time_ms * 1e6);
@@ -395,20 +436,23 @@ const Fake = struct {
         return time_ns;
     }
 
-    pub fn prepare(fake: *Fake, variant: usize) error{OutOfMemory}!Prepared {
+    pub fn prepare(fake: *Fake, variant: usize) error{ OutOfMemory, Canceled }!Prepared {
         fake.last_variant = variant;
         _ = fake.spend(6, fake.idle_w + 3);
+        if (fake.now_ns > fake.end_ns) return error.Canceled;
         return .{ .parse_ns = 1_000_000, .prepare_ns = 2_000_000, .bvh_build_ns = 3_000_000 };
     }
 
-    pub fn trace(fake: *Fake, variant: usize, thread_count: usize) error{OutOfMemory}!Traced {
+    pub fn trace(fake: *Fake, variant: usize, thread_count: usize) error{ OutOfMemory, Canceled }!Traced {
         try fake.order.append(testing.allocator, @intCast(variant));
         fake.frame_count += 1;
         const noise = fake.noise * (2 * fake.random.random().float(f64) - 1);
         const time_ms = fake.trace_ms[variant] * (1 + noise) /
             @as(f64, @floatFromInt(thread_count));
+        const trace_ns = fake.spend(time_ms, fake.idle_w + fake.trace_w);
+        if (fake.now_ns > fake.end_ns) return error.Canceled;
         return .{
-            .trace_ns = fake.spend(time_ms, fake.idle_w + fake.trace_w),
+            .trace_ns = trace_ns,
             .rays = .{ .primary = 7 },
         };
     }
@@ -529,6 +573,26 @@ test "what would end too late is not begun" {
         }
         // But for the very first frame, which nothing is known of.
         try testing.expect(fake.now_ns <= @max(36_000_000, plan.end_ns));
+    }
+}
+
+test "a round that is cancelled does not count" {
+    var arena: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer arena.deinit();
+    var diagnostic: Diagnostic = .{};
+    for ([_]u64{ 20, 60, 140, 200, 300 }, [_]usize{ 0, 0, 0, 1, 2 }) |end_ms, round_count| {
+        var fake: Fake = .{ .trace_ms = &.{ 30, 10, 20 }, .end_ns = end_ms * 1_000_000 };
+        defer fake.order.deinit(testing.allocator);
+        const plan = planFor(9, 1 << 20);
+        var rounds = try FakeRounds.measure(arena.allocator(), &fake, plan, &diagnostic);
+        try testing.expectEqual(round_count, rounds.round_count);
+        try testing.expectEqual(.time, rounds.end);
+        for (try rounds.variants()) |*variant|
+            try testing.expectEqual(round_count, variant.trace_ms.len);
+        if (round_count == 0) continue;
+        var lists: [1]Column = @splat(.empty);
+        try rounds.scale(&.{0}, &.{1}, 1 << 60, &lists);
+        try testing.expectEqual(0, lists[0].items.len);
     }
 }
 
