@@ -55,6 +55,7 @@ pub fn addAll(tests: Tests, step: *std.Build.Step, targets: []const Target) void
     const arena = tests.owner.allocator;
     logs.appendSlice(arena, &.{
         tests.format(), tests.tidy(), tests.machinery(), tests.report(), tests.fetcher(),
+        tests.farm(targets[0]),
     }) catch @panic("OOM");
     for (targets) |target| {
         const tested = tests.ofLibrary(target.package, null);
@@ -91,9 +92,10 @@ pub fn addTidy(tests: Tests, step: *std.Build.Step) void {
     tests.close(step, &.{tests.tidy()}, .logs_only);
 }
 
-/// Makes `step` test the tools in Python: the report of the benchmark, and vendor/fetch.
-pub fn addReport(tests: Tests, step: *std.Build.Step) void {
-    tests.close(step, &.{ tests.report(), tests.fetcher() }, .logs_only);
+/// Makes `step` test the tools in Python: the report of the benchmark, vendor/fetch, and farm/ with
+/// the program of `target`.
+pub fn addReport(tests: Tests, step: *std.Build.Step, target: Target) void {
+    tests.close(step, &.{ tests.report(), tests.fetcher(), tests.farm(target) }, .logs_only);
 }
 
 /// Makes `step` compile the test programs of `target` without a file as the result.
@@ -128,6 +130,18 @@ fn fetcher(tests: Tests) LazyPath {
     const run, const log = tests.start("fetch", "sources");
     run.addArgs(&.{ "--one", "--needs=python3", "--", "python3", "-m", "unittest", "discover" });
     run.addArgs(&.{ "-s", "vendor" });
+    return log;
+}
+
+/// Several machines: what needs Dask is tested where its environment can be made.
+fn farm(tests: Tests, target: Target) LazyPath {
+    const run, const log = tests.start("farm", "sources");
+    run.addArg("--needs=python3");
+    if (target.emulator.len == 0) run.addArtifactArg2(target.package.program(), .{
+        .prefix = "--env=RAYLANE_PROGRAM=",
+        .make_absolute = true,
+    });
+    run.addArgs(&.{ "--", "python3", "farm/tests/run.py", ".zig-cache/farm" });
     return log;
 }
 

@@ -99,32 +99,9 @@ pub const pages: []const Page = &.{
 };
 
 /// What `raylane completion --help` prints.
-pub const completion_help: []const u8 = "raylane " ++ version ++
-    \\: prints a script that completes its options in a shell
-    \\
-    \\usage: raylane completion bash|zsh|fish
-    \\
-    \\For this shell alone, or wherever the shell looks for such files:
-    \\
-    \\  source <(raylane completion bash)
-    \\  raylane completion bash > ~/.local/share/bash-completion/completions/raylane
-    \\  raylane completion zsh > a folder of fpath, there called _raylane
-    \\  raylane completion fish > ~/.config/fish/completions/raylane.fish
-    \\
-;
-
+pub const completion_help = completion.help;
 /// What `raylane man --help` prints.
-pub const man_help: []const u8 = "raylane " ++ version ++
-    \\: prints its manual's page, as roff
-    \\
-    \\usage: raylane man
-    \\
-    \\To read it, or to keep it where man looks:
-    \\
-    \\  raylane man | man -l -
-    \\  raylane man > ~/.local/share/man/man1/raylane.1
-    \\
-;
+pub const man_help = man.help;
 
 /// Writes what `raylane man` prints.
 pub fn writeMan(writer: *std.Io.Writer) std.Io.Writer.Error!void {
@@ -324,8 +301,8 @@ const sections: []const Section = &.{
         .{ .usage = "--fps F", .help = "24 (default), 23.976 or 30000/1001, say" },
         .{
             .usage = "--reference-frame F",
-            .help = "whose exposure, framing and studio all frames have\n" ++
-                "(default: the first of --frames)",
+            .help = "whose exposure, framing and studio all frames have,\n" ++
+                "a range's first (default: the first of --frames)",
         },
         .{
             .usage = "--turntable N",
@@ -339,7 +316,7 @@ const sections: []const Section = &.{
         .{
             .usage = "--jobs N",
             .help = "scenes side by side, " ++ settings.job_count.text() ++
-                " (default: by their\nnumber and the pictures' size)",
+                "\n(default: by their number and the pictures' size)",
         },
     } },
     .{ .title = "Camera", .options = &.{
@@ -575,7 +552,11 @@ const sections: []const Section = &.{
                 "ninth of them and its neighbours' by a filter",
         },
         .{ .usage = "--denoise", .help = "filter the noise out" },
-        .{ .usage = "--variant NAME", .words = variant_file.names, .help = "how rays are traced; the image is always the same" },
+        .{
+            .usage = "--variant NAME",
+            .words = variant_file.names,
+            .help = "how rays are traced; the image is always the same",
+        },
         .{
             .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
@@ -822,9 +803,9 @@ fn helpWith(words: []const [:0]const u8, diagnostic: *Diagnostic) Error!Command 
         .compare => .compare_help,
         .info => .info_help,
         .merge => .merge_help,
+        .serve => .serve_help,
         .completion => .completion_help,
         .man => .man_help,
-        .serve => .serve_help,
         .help => .help,
     };
 }
@@ -937,8 +918,8 @@ const Parser = struct {
             .exr => options.write.exr_kind = try reader.choice(given, settings.ExrKind),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
-            .resolution, .width, .height, .pixel_ratio => try parser.setSize(given),
             .crop, .tile => try parser.setPart(given),
+            .resolution, .width, .height, .pixel_ratio => try parser.setSize(given),
             .threads => options.thread_count = try reader.number(given, settings.thread_count),
             .spp => options.render.sample_count = try reader.number(given, settings.sample_count),
             .noise, .time_budget, .progress_image, .partial => try parser.setSampling(given),
@@ -965,7 +946,8 @@ const Parser = struct {
                 })),
             .tonemap => options.write.tone_mapping =
                 try reader.choice(given, settings.ToneMapping),
-            .stats, .quiet, .verbose, .progress, .progress_fd => try parser.setMessages(given),
+            .stats, .count_tests, .quiet, .verbose => try parser.setMessages(given),
+            .progress, .progress_fd => try parser.setMessages(given),
             .scenario => try parser.setScenario(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
@@ -974,7 +956,6 @@ const Parser = struct {
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
             .virtual_lights, .sky_lights, .all_lights => try parser.setLights(given),
-            .count_tests => options.count_tests = true,
             .point_size => options.view.point_size =
                 numberWithin(given.value, settings.point_size) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
@@ -987,25 +968,24 @@ const Parser = struct {
         }
     }
 
-    fn setPart(parser: *Parser, given: Reader.Given) Error!void {
-        const options = &parser.options;
-        const reader = &parser.reader;
-        switch (given.id) {
-            .crop => options.render.part = .{ .crop = cropOf(given.value) orelse
-                return reader.bad(given, "four pixels, or fractions from 0.0 to 1.0, of a " ++
-                    "rectangle's left, upper, right and lower edge") },
-            .tile => options.render.part = .{ .tile = tileOf(given.value) orelse
-                return reader.bad(given, comptimePrint("I/N, N {s}, I 1 to N", .{
-                    settings.part_count.text(),
-                })) },
-            else => unreachable, // `set` hands over the above.
-        }
-    }
-
     fn setScenario(parser: *Parser, given: Reader.Given) Error!void {
         if (parser.scenario != null)
             return parser.reader.fail("'--scenario' is there twice", .{});
         parser.scenario = try parser.reader.text(given, "a file name or JSON");
+    }
+
+    fn setPart(parser: *Parser, given: Reader.Given) Error!void {
+        const part = &parser.options.render.part;
+        switch (given.id) {
+            .crop => part.* = .{ .crop = cropOf(given.value) orelse
+                return parser.reader.bad(given, "four pixels, or fractions from 0.0 to 1.0, of " ++
+                    "a rectangle's left, upper, right and lower edge") },
+            .tile => part.* = .{ .tile = tileOf(given.value) orelse
+                return parser.reader.bad(given, comptimePrint("I/N, N {s}, I 1 to N", .{
+                    settings.part_count.text(),
+                })) },
+            else => unreachable,
+        }
     }
 
     fn setSize(parser: *Parser, given: Reader.Given) Error!void {
@@ -1066,8 +1046,7 @@ const Parser = struct {
             .fps => parser.options.write.frame_rate = batch.frameRateOf(given.value) orelse
                 return reader.bad(given, "a number above 0, up to 1000, or a fraction"),
             .reference_frame => chosen.reference_frame =
-                std.fmt.parseInt(i32, given.value, 10) catch
-                    return reader.bad(given, "the number of a frame"),
+                batch_plan.frames.first(try parser.rangeOf(given)),
             .turntable => chosen.view_count = try reader.number(given, settings.view_count),
             .skip_existing => chosen.skip_existing = true,
             .jobs => chosen.job_count = try reader.number(given, settings.job_count),
@@ -1174,6 +1153,7 @@ const Parser = struct {
         const reader = &parser.reader;
         switch (given.id) {
             .stats => options.stats = try reader.choice(given, Stats),
+            .count_tests => options.count_tests = true,
             .quiet => options.quiet = true,
             .verbose => options.verbose = true,
             .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
@@ -1349,6 +1329,7 @@ const Parser = struct {
             .{part},
         );
         if (options.write.format == .exr) {
+            options.render.is_merged = true;
             if (options.progress_image == null) return;
             return reader.fail("'--progress-image' does not go with parts that are merged", .{});
         }
@@ -1356,16 +1337,16 @@ const Parser = struct {
             "'--tile' makes an exr file, not a {t} file: 'raylane merge' makes that of all parts",
             .{options.write.format},
         );
-        if (options.render.denoise) return reader.fail(
-            "'--denoise' needs all of the picture: 'raylane merge' filters exr files of parts",
-            .{},
-        );
     }
 };
 
 /// The format of a file called `name`: the one chosen, or by its extension; png on standard output.
 /// An error of the reader where they contradict each other, or there is neither.
-pub fn formatFor(reader: anytype, chosen: ?settings.Format, name: []const u8) Error!settings.Format {
+pub fn formatFor(
+    reader: anytype,
+    chosen: ?settings.Format,
+    name: []const u8,
+) Error!settings.Format {
     if (isStdout(name)) return chosen orelse .png;
     const extension = std.fs.path.extension(name);
     const implied = if (extension.len == 0) null else formatOf(extension[1..]);
@@ -1638,6 +1619,8 @@ test "frames, views and names of pictures" {
     try std.testing.expectEqual(0, options.animation.which.index);
     try std.testing.expectEqual(.jpg, options.write.format);
     try std.testing.expect(options.isBatch());
+    const part = try optionsForTest(&.{ "--frames=8", "--reference-frame=5-9,4-2:-1" });
+    try std.testing.expectEqual(2, part.batch.reference_frame.?);
     const turned = try optionsForTest(&.{ "--turntable=8", "--views=0-3", "-oa/", "--jobs=2" });
     try std.testing.expectEqual(30, turned.view.viewpoint.orbit.?.theta_degrees);
     try std.testing.expectEqual(8, turned.batch.view_count.?);
@@ -1649,6 +1632,7 @@ test "frames, views and names of pictures" {
         .{ "has more than 1000000", &.{"--frames=0-1000000"} },
         .{ "both choose the time", &.{ "--frames=1", "--animation-time=2" } },
         .{ "needs '--frames'", &.{"--reference-frame=2"} },
+        .{ "'x' is not a range", &.{ "--frames=1", "--reference-frame=x" } },
         .{ "those of '--turntable'", &.{"--views=2"} },
         .{ "both place the camera", &.{ "--turntable=2", "--eye=1,2,3" } },
         .{ "'--camera' contradicts", &.{ "--turntable=2", "--camera=0" } },
@@ -2111,9 +2095,10 @@ test "parts are rectangles or shares of tiles" {
         "--tile=/",       "--tile=1/70000",  "--crop=nan.,0,1,1",
     }) |bad| try expectUsage(bad[0..6], &.{ bad, "-oa.exr", "s" });
     try expectUsage("makes an exr file", &.{ "--tile=1/2", "s" });
-    try expectUsage("'--denoise' needs all", &.{ "--crop=0,0,1,1", "--denoise", "s" });
     try expectUsage("'--time-budget'", &.{ "--crop=0,0,1,1", "--time-budget=1", "s" });
-    _ = try optionsForTest(&.{ "--crop=0,0,1,1", "--denoise", "-oa.exr" });
+    const merged = try optionsForTest(&.{ "--crop=0,0,1,1", "-oa.exr" });
+    const alone = try optionsForTest(&.{"--crop=0,0,1,1"});
+    try std.testing.expect(merged.render.is_merged and !alone.render.is_merged);
 }
 
 test "points and lines are as wide as they may be" {
@@ -2192,9 +2177,9 @@ test {
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");
+    _ = @import("cli/page.zig");
     _ = scenario_file;
     _ = @import("cli/serve.zig");
-    _ = @import("cli/page.zig");
 }
 
 test "progress: its form, its descriptor, and what contradicts it" {

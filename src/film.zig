@@ -74,7 +74,8 @@ fn firstHalfCount(count: u32) u32 {
     return power / 2 + @min(count - power, power / 2);
 }
 
-/// Pixels x0 <= x < x1, y0 <= y < y1 of a picture; of a bundle's every `step`th in either direction.
+/// Pixels x0 <= x < x1, y0 <= y < y1 of a picture; of a bundle's every `step`th in either
+/// direction.
 pub const Rectangle = struct {
     x0: u32,
     y0: u32,

@@ -96,6 +96,7 @@ pub const Merged = struct {
             .background = record.background,
             .jpeg_quality = record.jpeg_quality,
             .exr_kind = record.exr_kind,
+            .frame_rate = record.frame_rate,
             .further = further,
             .pool = pool,
         }, target, diagnostic);

@@ -50,6 +50,7 @@ pub const Record = struct {
     background: output.Background,
     jpeg_quality: u8,
     exr_kind: settings.ExrKind,
+    frame_rate: settings.FrameRate,
 
     /// The layers as a film has them.
     pub fn layerSet(record: *const Record) film_file.Layers {
@@ -59,9 +60,12 @@ pub const Record = struct {
     /// In what it is first unlike a part of the same picture, for messages that go on with its
     /// name; null: in nothing.
     pub fn differenceFrom(record: *const Record, other: *const Record) ?[]const u8 {
-        if (record.width != other.width or record.height != other.height) return "it is of another size than";
-        if (!std.mem.eql(u8, &record.scene, &other.scene)) return "it is of another scene than";
-        if (!std.mem.eql(u8, &record.options, &other.options)) return "it was rendered with other options than";
+        if (record.width != other.width or record.height != other.height)
+            return "it is of another size than";
+        if (!std.mem.eql(u8, &record.scene, &other.scene))
+            return "it is of another scene than";
+        if (!std.mem.eql(u8, &record.options, &other.options))
+            return "it was rendered with other options than";
         // What follows from these, unless somebody has changed it.
         const is_same = record.layerSet().eql(other.layerSet()) and
             std.mem.eql(settings.Layer, record.further, other.further) and
@@ -69,7 +73,8 @@ pub const Record = struct {
             record.tone_mapping == other.tone_mapping and
             record.transparent == other.transparent and
             std.meta.eql(record.background, other.background) and
-            record.jpeg_quality == other.jpeg_quality and record.exr_kind == other.exr_kind;
+            record.jpeg_quality == other.jpeg_quality and record.exr_kind == other.exr_kind and
+            std.meta.eql(record.frame_rate, other.frame_rate);
         return if (is_same) null else "it was changed, other than";
     }
 };
@@ -186,7 +191,8 @@ fn isWithinLimits(record: *const Record) bool {
         record.further.len <= std.enums.values(settings.Layer).len and
         settings.sample_count.holds(record.sample_count) and
         @abs(record.exposure_ev) <= settings.exposure_ev_max and
-        settings.jpeg_quality.holds(record.jpeg_quality);
+        settings.jpeg_quality.holds(record.jpeg_quality) and
+        record.frame_rate.numerator > 0 and record.frame_rate.denominator > 0;
 }
 
 const testing = std.testing;
@@ -210,6 +216,7 @@ const record_for_test: Record = .{
     .background = .{ .srgb = .{ 1, 2, 255 } },
     .jpeg_quality = 90,
     .exr_kind = .float,
+    .frame_rate = .{ .numerator = 30_000, .denominator = 1001 },
 };
 
 test "a record comes back as it was, and no other gets through" {
@@ -235,6 +242,7 @@ test "a record comes back as it was, and no other gets through" {
         .{ "[\"depth\"]", "[\"normal\"]", "damaged" },
         .{ "\"sample_count\":4", "\"sample_count\":-1", "damaged" },
         .{ "\"version\":\"1.2\"", "\"version\":\"1.2\",\"more\":1", "damaged" },
+        .{ "\"denominator\":1001", "\"denominator\":0", "damaged" },
         .{ "{\"version\"", "[\"version\"", "damaged" },
     }) |change| {
         errdefer std.debug.print("{s}\n", .{change[1]});

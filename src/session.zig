@@ -136,6 +136,8 @@ pub const Session = struct {
     layout: ?film_file.Layout = null,
     /// What parts say of what they are of.
     identity: ?PictureIdentity = null,
+    /// Of the scene, once it is known.
+    scene_fingerprint: ?u64 = null,
     traced: trace.Statistics = .{},
     /// What the film was traced with.
     rendered: settings.Render = .{},
@@ -225,6 +227,7 @@ pub const Session = struct {
         session.dropScene();
         session.start = Io.Clock.awake.now(session.io);
         session.environment.dropScene();
+        session.scene_fingerprint = null;
         session.scene = scene;
         session.ownership = ownership;
         session.facts = .{
@@ -250,7 +253,9 @@ pub const Session = struct {
     /// Notes what parts of pictures of this view, by a program of this version, are to say of what
     /// they are of. Before the scene is dropped; asserts that there is a view.
     pub fn identify(session: *Session, version: []const u8) void {
-        const scene = fingerprint.ofScene(&session.scene.?);
+        const known = session.scene_fingerprint;
+        const scene = known orelse fingerprint.ofScene(&session.scene.?);
+        session.scene_fingerprint = scene;
         const is_file = session.seen.environment.source == .file;
         const around = if (is_file) fingerprint.of(session.environment.made.?.map) else 0;
         session.identity = .{
@@ -430,7 +435,9 @@ pub const Session = struct {
         try session.weighEmitters();
         try session.dimStudio();
         const world = &session.world.?;
-        const is_exposed = !output.isLinear(written.format) or choices.noise != null;
+        // The file of a part says how all of the picture is exposed.
+        const is_exposed = !output.isLinear(written.format) or choices.noise != null or
+            choices.is_merged;
         return .{
             .view = session.framing(),
             .emission = session.weight,
@@ -480,13 +487,13 @@ pub const Session = struct {
         defer if (lights) |*made| made.deinit();
         if (lights) |*made| frame.light_sampler = &made.sampler;
         try session.traceInRounds(&frame, film, choices);
-        try session.cutFilm();
         session.times.trace_ns = session.since(start);
         if (session.traced.non_finite_count > 0) session.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
-        if (choices.denoise and choices.part == .whole) try session.denoiseFilm();
+        if (choices.denoise and !choices.is_merged) try session.denoiseFilm();
+        try session.cutFilm();
     }
 
     /// Leaves of the film what was asked for.
@@ -633,18 +640,16 @@ pub const Session = struct {
         );
     }
 
-    /// Encodes the picture and moves it to its place; a part of one in OpenEXR as `merge` takes it.
-    /// Closes the target in any case. Asserts that there is a picture, that tiles are a file in
-    /// OpenEXR, and that `identify` has been called for it.
+    /// Encodes the picture and moves it to its place; a part that is to be merged in OpenEXR, as
+    /// `merge` takes it. Closes the target in any case. Asserts that there is a picture, and that
+    /// `identify` has been called for a part.
     pub fn write(
         session: *Session,
         target: *output.Target,
         choices: settings.Write,
     ) output.Error!void {
         defer target.abandon();
-        const part = session.rendered.part;
-        if (part != .whole and choices.format == .exr) return session.writePart(target, choices);
-        assert(part != .tile);
+        if (session.rendered.is_merged) return session.writePart(target, choices);
         session.appearance = try session.appearanceOf(choices);
         const start = Io.Clock.awake.now(session.io);
         const film = &session.film.?;
@@ -658,7 +663,7 @@ pub const Session = struct {
         }, chosen, target, session.diagnostic);
         session.times.output_ns = session.since(start);
         session.times.total_ns = session.since(session.start);
-        if (part == .whole) session.hint(tally);
+        if (session.rendered.part == .whole) session.hint(tally);
     }
 
     fn writePart(
@@ -695,6 +700,7 @@ pub const Session = struct {
             .background = chosen.background,
             .jpeg_quality = chosen.jpeg_quality,
             .exr_kind = chosen.exr_kind,
+            .frame_rate = chosen.frame_rate,
         }, target, session.diagnostic);
         session.times.output_ns = session.since(start);
         session.times.total_ns = session.since(session.start);
@@ -708,6 +714,7 @@ pub const Session = struct {
         const rendered = &session.rendered;
         return fingerprint.of(.{
             session.identity.?.moment,
+            if (session.reference) |reference| fingerprint.of(reference.*) else 0,
             session.texture_side_max,
             seen,
             rendered.integrator,
@@ -1068,7 +1075,7 @@ pub const Session = struct {
             view_size.width,
             view_size.height,
             choices.part,
-            trace.surroundingsOf(&choices),
+            surroundingsOf(&choices),
             session.diagnostic,
         );
         if (session.layout) |*before| before.deinit(session.gpa);
@@ -1092,6 +1099,14 @@ pub const Session = struct {
 
 fn float(count: u64) f64 {
     return @floatFromInt(count);
+}
+
+/// What has to be traced around the pixels that are asked for.
+fn surroundingsOf(choices: *const settings.Render) film_file.Surroundings {
+    assert(choices.is_merged or choices.part != .tile);
+    var around = trace.surroundingsOf(choices);
+    if (choices.denoise and !choices.is_merged) around.margin += denoise.reach;
+    return around;
 }
 
 /// The members of a set, in `room`.

@@ -479,6 +479,9 @@ pub const Part = union(enum) {
 /// How rays are traced.
 pub const Render = struct {
     part: Part = .whole,
+    /// It is to be merged with the others: what needs all of the picture is left to that. Of tiles
+    /// always.
+    is_merged: bool = false,
     integrator: Integrator = .whitted,
     lights: Lights = .{},
     /// Index into `variant.compiled`.

@@ -94,8 +94,8 @@ pub fn surroundingsOf(render: *const choices.Render) Surroundings {
 }
 
 /// Traces the picture with variant `variant_index` of `variant.compiled`. Asserts that the film has
-/// the layout's size, without one the view's, the tree the variant's width, and that the variant holds the integrator. The
-/// film may hold an earlier picture.
+/// the layout's size, without one the view's, the tree the variant's width, and that the variant
+/// holds the integrator. The film may hold an earlier picture.
 pub fn trace(
     gpa: Allocator,
     variant_index: usize,

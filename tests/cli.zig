@@ -417,7 +417,7 @@ test "help is for everybody, fits a screen and keeps its promises" {
     defer sandbox.deinit();
     const help = try sandbox.expectExit(0, &.{"--help"});
     try testing.expectEqualStrings("", help.stderr);
-    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 120);
+    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 150);
     const again = try sandbox.expectExit(0, &.{ "absent.glb", "--no-such-flag", "-h" });
     try testing.expectEqualStrings(help.stdout, again.stdout);
     // The built-in scenes that the help names are those that there are.
@@ -623,8 +623,8 @@ test "of several scenes each is a picture, is there already, or is a line" {
     for ([_][]const u8{
         "raylane: in: warning: not looked into 1 folder in it\n",
         "raylane: in/b.gltf: ",
-        "raylane: in/none.ply: no such file or directory\n",
-        " a.glb: done, ",
+        "raylane: in/none.ply: does not exist\n",
+        "raylane: in/a.glb: out/a.png, 4x3, ",
         "raylane: 1 picture in ",
         ", 1 kept, 2 failures\n",
     }) |part| {
@@ -1222,6 +1222,11 @@ test "a signal has the picture so far written where that is asked for" {
     } else return error.NotStarted;
     try expectEndedBy(&child, &.{}, .INT);
     const gpa = testing.allocator;
+    const log = try sandbox.folder.dir.readFileAlloc(io, "log", gpa, .unlimited);
+    defer gpa.free(log);
+    const needle = "raylane: interrupted: a.png written with ";
+    try testing.expect(std.mem.find(u8, log, needle) != null);
+    try testing.expectStringEndsWith(log, " of 4096 samples\n");
     const picture = try sandbox.folder.dir.readFileAlloc(io, "a.png", gpa, .unlimited);
     defer gpa.free(picture);
     try testing.expectEqualStrings("IEND", picture[picture.len - 8 ..][0..4]);
@@ -1235,7 +1240,100 @@ test "the limit of CPU time ends a render like a signal" {
         "builtin:cornell", "-r512x512", "--spp=4096",
     });
     try testing.expectEqual(152, ending.exit_code);
+    const said = "raylane: out of CPU time: cornell.png not written\n";
+    try testing.expectEqualStrings(said, ending.stderr);
     try sandbox.expectEmpty();
+}
+
+test "progress for programs is one JSON object a line, and nothing of it is anywhere else" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const ending = try sandbox.runShell("exec \"$@\" 3>log", &.{
+        "builtin:cornell", "-r16x16", "--spp=1", "-oa.png", "-t2", "--stats=none",
+        "--progress-fd=3",
+    });
+    try testing.expectEqual(0, ending.exit_code);
+    try testing.expectEqualStrings("", ending.stderr);
+    try testing.expectEqualStrings("", ending.stdout);
+    const gpa = testing.allocator;
+    const log = try sandbox.folder.dir.readFileAlloc(io, "log", gpa, .unlimited);
+    defer gpa.free(log);
+    const Told = struct { stage: []const u8, file: []const u8, index: u32, elapsed_s: f64 };
+    var lines = std.mem.tokenizeScalar(u8, log, '\n');
+    // Others stand between them where the machine is slow.
+    for ([_][]const u8{
+        "reading", "textures", "tree", "view", "tracing", "writing", "done",
+    }) |stage| {
+        while (lines.next()) |line| {
+            const told = try std.json.parseFromSlice(Told, gpa, line, .{
+                .ignore_unknown_fields = true,
+            });
+            defer told.deinit();
+            try testing.expectEqualStrings("builtin:cornell", told.value.file);
+            try testing.expectEqual(1, told.value.index);
+            if (std.mem.eql(u8, told.value.stage, stage)) break;
+        } else {
+            std.debug.print("{s} is not told of\n", .{stage});
+            return error.NotTold;
+        }
+    }
+    try testing.expectEqual(null, lines.next());
+}
+
+/// Completes words in bash, as it calls the function of a script. 77: there is no bash.
+const complete_script =
+    \\command -v bash >/dev/null || exit 77
+    \\"$@" completion bash >script || exit 1
+    \\exec bash -c '. ./script
+    \\t() { COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _raylane; echo "${COMPREPLY[@]}"; }
+    \\t raylane --tonem
+    \\t raylane a.glb --tonemap = ag
+    \\t raylane --up-axis ""
+    \\t raylane my
+    \\t raylane compa
+    \\t raylane compare --thre
+    \\t raylane completion ""
+    \\t raylane --spp ""
+    \\'
+;
+
+test "bash completes options, their words, files and commands" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("my model.glb", "");
+    const ending = try sandbox.runShell(complete_script, &.{});
+    if (ending.exit_code == 77) return error.SkipZigTest;
+    errdefer std.debug.print("{s}", .{ending.stderr});
+    try testing.expectEqual(0, ending.exit_code);
+    try testing.expectEqualStrings(
+        "--tonemap\nagx\ny z\nmy model.glb\ncompare\n--threshold\nbash zsh fish\n\n",
+        ending.stdout,
+    );
+    try testing.expectEqualStrings("", ending.stderr);
+}
+
+test "scripts for shells and the manual are what their programs read" {
+    var any = false;
+    for ([_]struct { []const u8, []const u8 }{
+        .{ "zsh", "\"$@\" completion zsh >script && zsh -n script" },
+        .{ "fish", "\"$@\" completion fish >script && fish -n script" },
+        .{ "groff", "\"$@\" man >raylane.1 && groff -man -ww -Tutf8 raylane.1 >/dev/null" },
+    }) |case| {
+        var sandbox: Sandbox = .init();
+        defer sandbox.deinit();
+        const reader, const script = case;
+        const arena = sandbox.arena_state.allocator();
+        const known = try arena.print("command -v {s} >/dev/null || exit 77; {s}", .{
+            reader, script,
+        });
+        const ending = try sandbox.runShell(known, &.{});
+        if (ending.exit_code == 77) continue;
+        any = true;
+        errdefer std.debug.print("{s}: {s}", .{ reader, ending.stderr });
+        try testing.expectEqual(0, ending.exit_code);
+        try testing.expectEqualStrings("", ending.stderr);
+    }
+    if (!any) return error.SkipZigTest;
 }
 
 test "signals that are ignored at the start stay so" {

@@ -15,6 +15,7 @@ const Allocator = std.mem.Allocator;
 const Batch = batch_file.Batch;
 const Io = std.Io;
 const Options = raylane.cli.Options;
+const Progress = raylane.progress.Progress;
 const Report = raylane.report.Report;
 const Session = raylane.session.Session;
 const Target = raylane.output.Target;
@@ -203,6 +204,9 @@ pub const Pictures = struct {
         for (plan.frames) |frame| for (plan.views, 0..) |view, index| {
             if (pictures.batch.isStopped()) return;
             defer pictures.number += 1;
+            const count = plan.pictureCount();
+            const progress = pictures.session.pool.progress;
+            Progress.beginPicture(progress, pictures.number % count + 1, count);
             try pictures.setName(frame, view);
             if (pictures.isSkipped()) {
                 pictures.batch.add(.skipped, 1);
@@ -431,10 +435,9 @@ pub const Pictures = struct {
         const taken_ns: u64 = @intCast(pictures.start.durationTo(now).toNanoseconds());
         pictures.start = now;
         const seconds = @as(f64, @floatFromInt(taken_ns)) / std.time.ns_per_s;
-        // Where it is the only one, the line of the file says it.
-        const is_said = !options.quiet and options.progress.form == .auto;
-        const is_only = batch.plan.files.len > 1 and pictures.isAlone();
-        if (is_said and !is_only) console.say(batch.io, "raylane: {f}: {f}, {d}x{d}, {d:.2} s\n", .{
+        // Not among lines for programs.
+        const is_told = options.progress.form == .json and options.progress.file == null;
+        if (!options.quiet and !is_told) console.say(batch.io, "raylane: {f}: {f}, {d}x{d}, {d:.2} s\n", .{
             printable(raylane.parse.title(options.scene)),
             printable(measured.output),
             measured.width,

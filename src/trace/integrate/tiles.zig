@@ -13,7 +13,8 @@
 //!
 //!     width, height, counts_tests               pixels of a bundle; whether tests are counted
 //!     init(gpa, frame, settings), deinit(gpa)   *I, one a thread
-//!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it
+//!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it, whose
+//!                                               places on the film `Rectangle.placeOf` says
 //!     counts()                                  of all its passes, `Counts`
 //!     tile_step                                 tiles' sides are multiples of it; none: of 1
 //!     Shared                                    what all threads' share; none, void: nothing
