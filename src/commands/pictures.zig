@@ -273,6 +273,7 @@ pub const Pictures = struct {
             .sharing = .of(options.instances),
             .animation = options.animation,
             .view = options.view,
+            .layers = options.render.layers,
         });
         pictures.posed = .{ .frame = frame, .camera = options.view.camera };
     }
@@ -309,6 +310,7 @@ pub const Pictures = struct {
             error.OutOfMemory, error.Canceled => |other| other,
             error.InputOutput => error.OutputFailed,
         };
+        try pictures.writeLayers();
         var report = session.report(options.render);
         report.version = raylane.cli.version;
         report.scene = options.scene;
@@ -316,6 +318,28 @@ pub const Pictures = struct {
         if (options.count_tests) report.tests = try session.countTests(options.render);
         pictures.batch.add(.written, 1);
         try pictures.say(&report);
+    }
+
+    /// Layers in files of their own, where the names say so.
+    fn writeLayers(pictures: *Pictures) Error!void {
+        const values = &pictures.values;
+        const write = &pictures.options.write;
+        if (!write.layers_apart) return;
+        const color = values.layer;
+        var layers = pictures.options.render.layers.iterator();
+        while (layers.next()) |layer| {
+            values.layer = @tagName(layer);
+            try pictures.setName(values.frame, values.view);
+            if (pictures.isSkipped()) continue;
+            try pictures.claim();
+            var target = try pictures.openFile();
+            pictures.session.writeLayer(layer, &target, write.*) catch |err| return switch (err) {
+                error.OutOfMemory, error.Canceled => |other| other,
+                error.InputOutput => error.OutputFailed,
+            };
+        }
+        values.layer = color;
+        try pictures.setName(values.frame, values.view);
     }
 
     /// Whether nothing else is to be made of the file.
@@ -366,7 +390,7 @@ pub const Pictures = struct {
         };
     }
 
-    /// The place of the picture that is named, which nobody else may have.
+    /// The place of the picture that is named.
     fn open(pictures: *Pictures) Error!Target {
         const is_film = pictures.options.write.format == .y4m;
         pictures.options.write.is_continued = is_film and pictures.begun_count > 0;
@@ -378,15 +402,7 @@ pub const Pictures = struct {
             try pictures.finishFilm();
         }
         pictures.options.write.is_continued = false;
-        const is_own = try pictures.batch.claim(path, .{
-            .file = pictures.file_index,
-            .number = pictures.number,
-        });
-        if (!is_own) return pictures.session.diagnostic.fail(
-            error.OutputFailed,
-            "it is the name of another picture, too",
-            .{},
-        );
+        try pictures.claim();
         const target = pictures.ahead orelse try pictures.openFile();
         pictures.ahead = null;
         if (!is_film) return target;
@@ -395,6 +411,19 @@ pub const Pictures = struct {
             .name = try pictures.arena.allocator().dupe(u8, path),
         };
         return pictures.film.?.target.part();
+    }
+
+    /// Makes the name this picture's, which nobody else may have.
+    fn claim(pictures: *Pictures) Error!void {
+        const is_own = try pictures.batch.claim(pictures.name.written(), .{
+            .file = pictures.file_index,
+            .number = pictures.number,
+        });
+        if (!is_own) return pictures.session.diagnostic.fail(
+            error.OutputFailed,
+            "it is the name of another picture, too",
+            .{},
+        );
     }
 
     fn openFile(pictures: *Pictures) error{OutputFailed}!Target {
@@ -437,13 +466,12 @@ pub const Pictures = struct {
         const seconds = @as(f64, @floatFromInt(taken_ns)) / std.time.ns_per_s;
         // Not among lines for programs.
         const is_told = options.progress.form == .json and options.progress.file == null;
-        if (!options.quiet and !is_told) console.say(batch.io, "raylane: {f}: {f}, {d}x{d}, {d:.2} s\n", .{
-            printable(raylane.parse.title(options.scene)),
-            printable(measured.output),
-            measured.width,
-            measured.height,
-            seconds,
-        });
+        if (!options.quiet and !is_told) console.sayOf(
+            batch.io,
+            options.scene,
+            "{f}, {d}x{d}, {d:.2} s",
+            .{ printable(measured.output), measured.width, measured.height, seconds },
+        );
         var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
         var report = measured.*;
         report.warnings = pictures.session.diagnostic.warningTexts(&warnings);
