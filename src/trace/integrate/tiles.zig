@@ -38,7 +38,6 @@ const Frame = world_file.Frame;
 const Look = @import("survey.zig").Look;
 const progress_file = @import("../../progress.zig");
 const Progress = progress_file.Progress;
-const Work = progress_file.Work;
 const Rectangle = film_file.Rectangle;
 
 /// How a frame is traced, and who does the work.
@@ -908,7 +907,7 @@ const TestProgress = struct {
         told.progress = .{ .context = told, .begun = begun };
     }
 
-    fn begun(context: *anyopaque, work: *const Work) void {
+    fn begun(context: *anyopaque, work: *const progress_file.Work) void {
         const told: *TestProgress = @ptrCast(@alignCast(context));
         told.progress.restart(work);
     }
