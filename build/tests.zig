@@ -54,7 +54,7 @@ pub fn addAll(tests: Tests, step: *std.Build.Step, targets: []const Target) void
     var logs: std.ArrayList(LazyPath) = .empty;
     const arena = tests.owner.allocator;
     logs.appendSlice(arena, &.{
-        tests.format(), tests.tidy(), tests.machinery(), tests.report(), tests.fetcher(),
+        tests.format(),         tests.tidy(), tests.machinery(), tests.report(), tests.fetcher(),
         tests.farm(targets[0]),
     }) catch @panic("OOM");
     for (targets) |target| {

@@ -300,7 +300,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--shade LOOK",
-            .help = "a quick look in place of light: ao, normal, uv or cost",
+            .help = "a quick look, not light: ao, normal, uv or cost",
         },
     } },
     .{ .title = "Several pictures (see docs/batch.md)", .options = &.{
