@@ -31,8 +31,11 @@ pub const Report = struct {
     /// Where the image went, as on the command line.
     output: []const u8 = "",
     triangle_count: u64,
+    /// Of a crop, if it is one.
     width: u32,
     height: u32,
+    /// A crop in pixels.
+    part: settings.Part = .whole,
     /// Samples a pixel, of those that have the most.
     sample_count: u32,
     /// Of all pixels.
@@ -82,6 +85,12 @@ pub const Report = struct {
     /// or none does.
     fn again(report: *const Report) ?u32 {
         return if (report.is_timed and !report.is_partial) report.sample_count else null;
+    }
+
+    /// Which part of a picture it is, in `room` for four numbers; null: all of it.
+    fn partText(report: *const Report, room: []u8) ?[]const u8 {
+        if (report.part == .whole) return null;
+        return std.mem.print(room, "{f}", .{report.part}) catch unreachable;
     }
 
     fn rayCount(report: *const Report) u64 {
@@ -137,10 +146,14 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
     try writer.print("scene        {f}, {d} triangles\n", .{
         printable(report.scene), report.triangle_count,
     });
-    try writer.print("image        {f}, {d} x {d}, {d} {s} a pixel", .{
+    var part: [64]u8 = undefined;
+    const shown = report.partText(&part);
+    try writer.print("image        {f}, {d} x {d}{s}{s}, {d} {s} a pixel", .{
         printable(report.output),
         report.width,
         report.height,
+        if (shown == null) "" else ", ",
+        shown orelse "",
         report.sample_count,
         if (report.sample_count == 1) "sample" else "samples",
     });
@@ -213,6 +226,7 @@ fn writeRate(writer: *Writer, count: u64, time_ns: u64) Writer.Error!void {
 pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
     const times = &report.times;
     const cost = report.bvh.sah_cost;
+    var part: [64]u8 = undefined;
     var hash: [16]u8 = undefined;
     var hash_writer: Writer = .fixed(&hash);
     try hash_writer.print("{x:0>16}", .{report.image_hash});
@@ -227,6 +241,7 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
         .triangles = report.triangle_count,
         .width = report.width,
         .height = report.height,
+        .part = report.partText(&part),
         .samples = report.sample_count,
         .samples_mean = report.sample_mean,
         .partial = report.is_partial,
@@ -451,6 +466,7 @@ test "the JSON has every key and nothing else" {
         triangles: u64,
         width: u32,
         height: u32,
+        part: ?[]const u8,
         samples: u32,
         samples_mean: f64,
         partial: bool,
@@ -492,6 +508,7 @@ test "the JSON has every key and nothing else" {
             report.tests = null;
             report.appearance = null;
             report.manifest = null;
+            report.part = .{ .tile = .{ .number = 1, .count = 2 } };
             report.bvh.sah_cost = std.math.inf(f64);
             report.warnings = &.{};
         }
@@ -510,6 +527,8 @@ test "the JSON has every key and nothing else" {
         try std.testing.expectEqualStrings("0000000000000abc", value.image_hash);
         try std.testing.expectEqual(@as(?f32, if (is_bare) null else -9.31), value.exposure_ev);
         try std.testing.expectEqual(is_bare, value.tonemap == null);
+        try std.testing.expectEqual(is_bare, value.part != null);
+        if (value.part) |part| try std.testing.expectEqualStrings("tile 1/2", part);
         if (!is_bare) try std.testing.expectEqualStrings("a", value.manifest.?.node.@"1");
         if (value.tonemap) |name| try std.testing.expectEqualStrings("neutral", name);
         try std.testing.expectEqual(1.5, value.time_ms.parse);

@@ -773,10 +773,7 @@ pub const Session = struct {
             .version = identity.version,
             .width = layout.width,
             .height = layout.height,
-            .part = switch (layout.form) {
-                .window => |own| .{ .crop = .{ .pixels = own } },
-                .share => session.rendered.part,
-            },
+            .part = session.partOf(),
             .scene = part_file.hexOf(identity.scene),
             .options = part_file.hexOf(session.optionsFingerprint(choices)),
             .sample_count = session.traced.sample_count,
@@ -796,6 +793,14 @@ pub const Session = struct {
         }, target, session.diagnostic);
         session.times.output_ns = session.since(start);
         session.times.total_ns = session.since(session.start);
+    }
+
+    /// What the film has, of crops the pixels.
+    fn partOf(session: *const Session) settings.Part {
+        return switch (session.rendered.part) {
+            .crop => .{ .crop = .{ .pixels = session.layout.?.form.window } },
+            .whole, .tile => session.rendered.part,
+        };
     }
 
     /// Of all that the picture depends on besides what was read.
@@ -1090,6 +1095,7 @@ pub const Session = struct {
                 session.world.?.facts.stroke_triangle_count,
             .width = if (layout.form == .window) layout.film_width else layout.width,
             .height = if (layout.form == .window) layout.film_height else layout.height,
+            .part = session.partOf(),
             .sample_count = session.traced.sample_count,
             .sample_mean = float(session.traced.sample_sum) / float(session.traced.pixel_count),
             .is_partial = session.traced.is_partial,

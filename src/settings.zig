@@ -510,6 +510,19 @@ pub const Part = union(enum) {
 
     /// One of `count` shares of tiles that are spread all over the picture, from 1 on.
     pub const Tile = struct { number: u32, count: u32 };
+
+    /// `crop 0,0,4,3` or `tile 1/2`.
+    pub fn format(part: Part, writer: *std.Io.Writer) std.Io.Writer.Error!void {
+        switch (part) {
+            .whole => try writer.writeAll("whole"),
+            .crop => |crop| switch (crop) {
+                inline else => |edges| try writer.print("crop {d},{d},{d},{d}", .{
+                    edges[0], edges[1], edges[2], edges[3],
+                }),
+            },
+            .tile => |tile| try writer.print("tile {d}/{d}", .{ tile.number, tile.count }),
+        }
+    }
 };
 
 /// How rays are traced.
