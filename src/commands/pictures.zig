@@ -306,11 +306,12 @@ pub const Pictures = struct {
         session.pool.thread_count = pictures.batch.threadCount();
         try session.render(options.render);
         try pictures.sizeFilm();
+        // First, so that where there is the picture there are its layers.
+        try pictures.writeLayers();
         session.write(&target, options.write) catch |err| return switch (err) {
             error.OutOfMemory, error.Canceled => |other| other,
             error.InputOutput => error.OutputFailed,
         };
-        try pictures.writeLayers();
         var report = session.report(options.render);
         report.version = raylane.cli.version;
         report.scene = options.scene;
