@@ -236,8 +236,8 @@ const sections: []const Section = &.{
         .{
             .usage = "--format FORMAT",
             .words = wordsOf(settings.Format),
-            .help = "png, jpg, webp, tga, bmp or ppm, linear: hdr, pfm or exr,\n" ++
-                "or a film: y4m",
+            .help = "png, jpg, webp, tga, bmp or ppm, linear: hdr, pfm or\n" ++
+                "exr, or a film: y4m",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
         .{
@@ -1384,6 +1384,10 @@ const Parser = struct {
         if (part == .whole) return;
         if (options.render.time_budget_s != null) return reader.fail(
             "'--time-budget' does not go with '--{t}': parts have as many samples as the whole",
+            .{part},
+        );
+        if (options.render.layers.contains(.cost)) return reader.fail(
+            "'--layers cost' does not go with '--{t}': it is of pixels that are traced together",
             .{part},
         );
         if (options.write.format == .exr) {

@@ -671,6 +671,31 @@ test "frames are the pictures of their moments, and a film has them in a row" {
     try testing.expect(std.mem.startsWith(u8, film.stdout, header ++ "FRAME\n"));
 }
 
+test "parts merge into the picture's file, wherever the scene lies; without one it stays" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.folder.dir.createDirPath(io, "there");
+    try sandbox.write("s.pbrt", pbrt_scene);
+    try sandbox.write("there/t.pbrt", pbrt_scene);
+    _ = try sandbox.expectExit(0, &.{ "s.pbrt", "-owhole.ppm" });
+    _ = try sandbox.expectExit(0, &.{ "s.pbrt", "--tile=1/2", "-o1.exr" });
+    _ = try sandbox.expectExit(0, &.{
+        "there/t.pbrt", "--tile", "2/2", "-o2.exr", "-t1", "--tile-size=8",
+    });
+    try sandbox.write("merged.ppm", "old");
+    const missing = try sandbox.expectExit(3, &.{ "merge", "1.exr", "-omerged.ppm" });
+    const reason = "raylane: merged.ppm: part 2 of 2 is missing\n";
+    try testing.expectEqualStrings(reason, missing.stderr);
+    try testing.expectEqualStrings("old", try sandbox.read("merged.ppm"));
+    const merged = try sandbox.expectExit(0, &.{ "merge", "2.exr", "1.exr", "-omerged.ppm" });
+    try testing.expectEqualStrings("", merged.stderr);
+    const whole = try sandbox.read("whole.ppm");
+    try testing.expectEqualStrings(whole, try sandbox.read("merged.ppm"));
+    const outside = try sandbox.expectExit(2, &.{ "s.pbrt", "--crop=30,0,31,1" });
+    try testing.expectStringEndsWith(outside.stderr, "in a picture of 30x20\n");
+    try sandbox.expectFiles(&.{ "1.exr", "2.exr", "merged.ppm", "s.pbrt", "there", "whole.ppm" });
+}
+
 test "every format by its name or by --format, JPEG smaller with less quality" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
