@@ -294,13 +294,15 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--layers LIST",
+            .words = wordsOf(settings.Layer),
             .help = "depth,normal,albedo,uv,node,material,primitive,alpha,\n" ++
                 "position,cost,variance: channels of an EXR file, or\n" ++
                 "files of their own by {layer} in the output's name",
         },
         .{
             .usage = "--shade LOOK",
-            .help = "a quick look in place of light: ao, normal, uv or cost",
+            .words = wordsOf(settings.Shade),
+            .help = "a quick look, not lit: ao, normal, uv or cost",
         },
     } },
     .{ .title = "Several pictures (see docs/batch.md)", .options = &.{
@@ -2206,6 +2208,9 @@ test "completions and the manual have every option of every command, and its wor
         var manual: std.Io.Writer.Allocating = .init(std.testing.allocator);
         defer manual.deinit();
         try writeMan(&manual.writer);
+        for (std.meta.fieldNames(Word)) |word| for (pages) |*page| {
+            if (std.mem.eql(u8, page.word, word)) break;
+        } else try std.testing.expectEqualStrings("help", word);
         for (pages) |*page| {
             try expectFinds(script.written(), "{s}", page.name());
             try expectFinds(manual.written(), "raylane {s}", page.word);

@@ -1564,7 +1564,7 @@ fn benchResultsOf(sandbox: *Sandbox, json: []const u8) !BenchResults {
 }
 
 const small_bench = [_][]const u8{
-    "bench", "-r16x16", "-t2", "--rounds=2", "--time-limit=2", "-q", "builtin:cornell",
+    "bench", "-r16x16", "-t2", "--rounds=2", "--time-limit=600", "-q", "builtin:cornell",
 };
 
 /// The argument that measures one variant alone, whichever the program holds.
