@@ -306,11 +306,12 @@ pub const Pictures = struct {
         session.pool.thread_count = pictures.batch.threadCount();
         try session.render(options.render);
         try pictures.sizeFilm();
+        // First, so that where there is the picture there are its layers.
+        try pictures.writeLayers();
         session.write(&target, options.write) catch |err| return switch (err) {
             error.OutOfMemory, error.Canceled => |other| other,
             error.InputOutput => error.OutputFailed,
         };
-        try pictures.writeLayers();
         var report = session.report(options.render);
         report.version = raylane.cli.version;
         report.scene = options.scene;
@@ -429,11 +430,22 @@ pub const Pictures = struct {
     fn openFile(pictures: *Pictures) error{OutputFailed}!Target {
         const io = pictures.batch.io;
         const path = pictures.name.written();
-        // Where this fails, so does what follows, and says why.
-        if (std.fs.path.dirname(path)) |folder| Io.Dir.cwd().createDirPath(io, folder) catch {};
+        makeFolders(io, path);
         const diagnostic = pictures.session.diagnostic;
         return Target.openFile(io, &signals.temporary_files, path, diagnostic) catch
             error.OutputFailed;
+    }
+
+    /// Makes the folders above a file, as far as that goes: where one is missing, opening the file
+    /// says so.
+    fn makeFolders(io: Io, path: []const u8) void {
+        const cwd: Io.Dir = .cwd();
+        const whole = std.fs.path.dirname(path) orelse return;
+        if (cwd.access(io, whole, .{})) return else |_| {}
+        for (path[0 .. whole.len + 1], 0..) |byte, end| {
+            if (byte != '/' or end == 0) continue;
+            cwd.createDir(io, path[0..end], .default_dir) catch {}; // It may be there.
+        }
     }
 
     /// All frames of a film have one size.
