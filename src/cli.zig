@@ -1388,6 +1388,10 @@ const Parser = struct {
             "'--time-budget' does not go with '--{t}': parts have as many samples as the whole",
             .{part},
         );
+        if (options.render.layers.contains(.cost)) return reader.fail(
+            "'--layers cost' does not go with '--{t}': it is of pixels that are traced together",
+            .{part},
+        );
         if (options.write.format == .exr) {
             options.render.is_merged = true;
             if (options.progress_image == null) return;
@@ -2204,6 +2208,9 @@ test "completions and the manual have every option of every command, and its wor
         var manual: std.Io.Writer.Allocating = .init(std.testing.allocator);
         defer manual.deinit();
         try writeMan(&manual.writer);
+        for (std.meta.fieldNames(Word)) |word| for (pages) |*page| {
+            if (std.mem.eql(u8, page.word, word)) break;
+        } else try std.testing.expectEqualStrings("help", word);
         for (pages) |*page| {
             try expectFinds(script.written(), "{s}", page.name());
             try expectFinds(manual.written(), "raylane {s}", page.word);

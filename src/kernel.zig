@@ -39,6 +39,6 @@ fn show(comptime Integrator: type, comptime what: []const u8) void {
 /// The program's: what prints a trace of the stack is large and has state.
 pub const panic = std.debug.FullPanic(struct {
     fn panic(message: []const u8, address: ?usize) noreturn {
-        trace.link.rl_kernel_panic(message.ptr, message.len, address orelse @returnAddress());
+        trace.link.kernelPanic(message.ptr, message.len, address orelse @returnAddress());
     }
 }.panic);

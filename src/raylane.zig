@@ -33,6 +33,7 @@ pub const parallel = @import("parallel.zig");
 pub const parse = @import("parse.zig");
 pub const part = @import("part.zig");
 pub const prepare = @import("prepare.zig");
+pub const processor = @import("processor.zig");
 pub const progress = @import("progress.zig");
 pub const report = @import("report.zig");
 pub const scene = @import("scene.zig");
@@ -45,7 +46,7 @@ pub const variant = @import("variant.zig");
 pub const world = @import("world.zig");
 
 comptime {
-    @export(&trace.link.panicOfKernel, .{ .name = "rl_kernel_panic" });
+    @export(&trace.link.panicOfKernel, .{ .name = trace.link.panic_symbol });
 }
 
 test {

@@ -14,12 +14,12 @@ const json_text = @import("json_text.zig");
 const settings = @import("settings.zig");
 const statistics = @import("statistics.zig");
 
+/// What a job of `raylane serve` is known by; null: there are no jobs.
+pub const Id = ?std.json.Value;
 /// See `json_text.zig`.
 pub const Text = json_text.Text;
 /// See `json_text.zig`.
 pub const Texts = json_text.Texts;
-/// What a job of `raylane serve` is known by; null: there are no jobs.
-pub const Id = ?std.json.Value;
 
 /// One frame.
 pub const Report = struct {

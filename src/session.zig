@@ -528,8 +528,6 @@ pub const Session = struct {
         defer if (lights) |*made| made.deinit();
         if (lights) |*made| frame.light_sampler = &made.sampler;
         try session.traceInRounds(&frame, film, choices);
-        if (film.layers.contains(.origin)) try session.survey(&frame, film);
-        if (shade == .cost) try session.paintCost();
         session.times.trace_ns = session.since(start);
         if (session.traced.non_finite_count > 0) session.diagnostic.warn(
             "{d} pixels came out as not a number and were made black",
@@ -537,6 +535,8 @@ pub const Session = struct {
         );
         if (choices.denoise and !choices.is_merged) try session.denoiseFilm();
         try session.cutFilm();
+        try session.survey(&frame);
+        if (shade == .cost) try session.paintCost();
     }
 
     /// Leaves of the film what was asked for.
@@ -549,8 +549,11 @@ pub const Session = struct {
         layout.* = layout.bare();
     }
 
-    /// Makes layers of what the picture's first samples see.
-    fn survey(session: *Session, frame: *const Frame, film: *Film) trace.Error!void {
+    /// Makes layers of what the picture's first samples see, if the film has any.
+    fn survey(session: *Session, frame: *const Frame) trace.Error!void {
+        const film = &session.film.?;
+        if (!film.layers.contains(.origin)) return;
+        const start = Io.Clock.awake.now(session.io);
         const choices = &session.rendered;
         var chosen = session.traceSettings(choices.*);
         chosen.sample_count = @max(session.traced.sample_count, 1);
@@ -567,6 +570,7 @@ pub const Session = struct {
             .shift = session.pose_cache.?.shift,
             .origins = origins,
         }, &session.pool);
+        session.times.trace_ns += session.since(start);
     }
 
     /// Makes the picture a map of what it took.

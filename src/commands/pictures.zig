@@ -466,13 +466,12 @@ pub const Pictures = struct {
         const seconds = @as(f64, @floatFromInt(taken_ns)) / std.time.ns_per_s;
         // Not among lines for programs.
         const is_told = options.progress.form == .json and options.progress.file == null;
-        if (!options.quiet and !is_told) console.say(batch.io, "raylane: {f}: {f}, {d}x{d}, {d:.2} s\n", .{
-            printable(raylane.parse.title(options.scene)),
-            printable(measured.output),
-            measured.width,
-            measured.height,
-            seconds,
-        });
+        if (!options.quiet and !is_told) console.sayOf(
+            batch.io,
+            options.scene,
+            "{f}, {d}x{d}, {d:.2} s",
+            .{ printable(measured.output), measured.width, measured.height, seconds },
+        );
         var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
         var report = measured.*;
         report.warnings = pictures.session.diagnostic.warningTexts(&warnings);

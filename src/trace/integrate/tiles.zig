@@ -36,7 +36,9 @@ const Film = film_file.Film;
 const Layout = film_file.Layout;
 const Frame = world_file.Frame;
 const Look = @import("survey.zig").Look;
-const Progress = @import("../../progress.zig").Progress;
+const progress_file = @import("../../progress.zig");
+const Progress = progress_file.Progress;
+const Work = progress_file.Work;
 const Rectangle = film_file.Rectangle;
 
 /// How a frame is traced, and who does the work.
@@ -377,24 +379,24 @@ pub fn fillHits(
     while (count < chosen.pool.threadsFor(tiles.count)) : (count += 1) {
         by_thread[count] = survey.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
     }
-    const Work = struct {
+    const Hits = struct {
         survey: *const Integrator,
         tiles: *const Tiles,
         film: *Film,
         by_thread: []const *anyopaque,
 
-        fn tile(work: *const @This(), number: usize, thread_index: usize) void {
-            const rectangle = work.tiles.rectangleOf(@intCast(number));
-            work.survey.pass(work.by_thread[thread_index], &rectangle, 0, 1, work.film);
+        fn tile(hits: *const @This(), number: usize, thread_index: usize) void {
+            const rectangle = hits.tiles.rectangleOf(@intCast(number));
+            hits.survey.pass(hits.by_thread[thread_index], &rectangle, 0, 1, hits.film);
         }
     };
-    const work: Work = .{
+    const hits: Hits = .{
         .survey = survey,
         .tiles = &tiles,
         .film = film,
         .by_thread = by_thread[0..count],
     };
-    try chosen.pool.forEach(tiles.count, &work, Work.tile);
+    try chosen.pool.forEach(tiles.count, &hits, Hits.tile);
 }
 
 /// One frame by one integrator.
@@ -898,6 +900,26 @@ const NoisyIntegrator = struct {
     }
 };
 
+/// Holds that all pieces that are told when the work begins are done at its end.
+const TestProgress = struct {
+    progress: Progress,
+
+    fn init(told: *TestProgress) void {
+        told.progress = .{ .context = told, .begun = begun };
+    }
+
+    fn begun(context: *anyopaque, work: *const Work) void {
+        const told: *TestProgress = @ptrCast(@alignCast(context));
+        told.progress.restart(work);
+    }
+
+    fn expectDone(told: *const TestProgress) !void {
+        const total = told.progress.total.load(.monotonic);
+        try std.testing.expect(total > 0);
+        try std.testing.expectEqual(total, told.progress.done.load(.monotonic));
+    }
+};
+
 test "quiet blocks get no more samples than they need, whatever tiles, threads and rounds" {
     const gpa = std.testing.allocator;
     const frame: Frame = undefined;
@@ -908,8 +930,11 @@ test "quiet blocks get no more samples than they need, whatever tiles, threads a
             defer pool.deinit();
             var film: Film = try .init(gpa, 40, 20, .init(.{ .color = true }));
             defer film.deinit(gpa);
+            var told: TestProgress = undefined;
+            told.init();
             const total = try render(&.of(NoisyIntegrator), gpa, &frame, &film, &.{
                 .pool = &pool,
+                .progress = &told.progress,
                 .integrator = .path,
                 .sample_count = 100,
                 .tile_size = tile_size,
@@ -919,6 +944,7 @@ test "quiet blocks get no more samples than they need, whatever tiles, threads a
                     .next = NoisyIntegrator.one,
                 },
             });
+            try told.expectDone();
             // In three columns of blocks: some stay until the end.
             try std.testing.expectEqual(100, total.sample_count);
             try std.testing.expectEqual(16 * 20 * 16 + 24 * 20 * 100, total.sample_sum);
@@ -939,8 +965,11 @@ test "parts of a picture are what it has there, with blocks of its own grid" {
     const height = 37;
     var whole: Film = try .init(gpa, width, height, .init(.{ .color = true }));
     defer whole.deinit(gpa);
+    var told: TestProgress = undefined;
+    told.init();
     var shown: Settings = .{
         .pool = &pool,
+        .progress = &told.progress,
         .integrator = .path,
         .sample_count = 50,
         .tile_size = 24,
@@ -963,6 +992,7 @@ test "parts of a picture are what it has there, with blocks of its own grid" {
             try .init(gpa, layout.film_width, layout.film_height, whole.layers);
         defer film.deinit(gpa);
         const found = try render(&.of(NoisyIntegrator), gpa, &frame, &film, &shown);
+        try told.expectDone();
         if (part == .tile) sample_sum += found.sample_sum;
         var cut = try film.cut(gpa, &layout);
         defer cut.deinit(gpa);
