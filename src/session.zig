@@ -1126,6 +1126,8 @@ pub const Session = struct {
     /// Samples a pixel that `render` takes at most. Asserts that there is a view.
     pub fn sampleCount(session: *const Session, choices: settings.Render) u32 {
         if (choices.sample_count) |count| return count;
+        // One tells as much of what rays cost.
+        if (session.seen.shade == .cost) return 1;
         if (choices.noise != null) return settings.noise_sample_count;
         if (choices.time_budget_s != null) return settings.sample_count.max;
         const seen = &session.world.?.view;

@@ -384,9 +384,9 @@ pub fn fillHits(
         film: *Film,
         by_thread: []const *anyopaque,
 
-        fn tile(work: *const @This(), number: usize, thread_index: usize) void {
-            const rectangle = work.tiles.rectangleOf(@intCast(number));
-            work.survey.pass(work.by_thread[thread_index], &rectangle, 0, 1, work.film);
+        fn tile(hits: *const @This(), number: usize, thread_index: usize) void {
+            const rectangle = hits.tiles.rectangleOf(@intCast(number));
+            hits.survey.pass(hits.by_thread[thread_index], &rectangle, 0, 1, hits.film);
         }
     };
     const work: Hits = .{
