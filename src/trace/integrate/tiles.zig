@@ -379,7 +379,7 @@ pub fn fillHits(
     while (count < chosen.pool.threadsFor(tiles.count)) : (count += 1) {
         by_thread[count] = survey.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
     }
-    const Work = struct {
+    const Pieces = struct {
         survey: *const Integrator,
         tiles: *const Tiles,
         film: *Film,
@@ -390,13 +390,13 @@ pub fn fillHits(
             work.survey.pass(work.by_thread[thread_index], &rectangle, 0, 1, work.film);
         }
     };
-    const work: Work = .{
+    const work: Pieces = .{
         .survey = survey,
         .tiles = &tiles,
         .film = film,
         .by_thread = by_thread[0..count],
     };
-    try chosen.pool.forEach(tiles.count, &work, Work.tile);
+    try chosen.pool.forEach(tiles.count, &work, Pieces.tile);
 }
 
 /// One frame by one integrator.
