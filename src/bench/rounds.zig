@@ -309,7 +309,7 @@ pub fn Rounds(comptime Subject: type) type {
                 if (rounds.plan.round_count) |count| {
                     rounds.end = .rounds;
                     if (rounds.round_count >= count) return true;
-                } else if (rounds.isNarrow()) {
+                } else if (isNarrow(rounds.series)) {
                     rounds.end = .precision;
                     return true;
                 }
@@ -318,14 +318,6 @@ pub fn Rounds(comptime Subject: type) type {
             const is_late = rounds.subject.now() + last_round_ns > rounds.plan.deadline_ns;
             if (rounds.hasTime(last_round_ns) and !(has_interval and is_late)) return false;
             rounds.end = .time;
-            return true;
-        }
-
-        fn isNarrow(rounds: *const Self) bool {
-            if (rounds.round_count < narrow_round_count_min) return false;
-            for (rounds.series) |*one| {
-                if (student.estimate(one.trace_ms.items).relative() > precision) return false;
-            }
             return true;
         }
 
@@ -369,7 +361,12 @@ pub fn Rounds(comptime Subject: type) type {
             for (scaled_variants, 0..) |variant, variant_index| {
                 _ = try subject.prepare(variant);
                 for (thread_counts, 0..) |thread_count, count_index| {
-                    if (!rounds.hasTime(rounds.expectedNs(variant, thread_count)))
+                    if (!rounds.hasTime(expectedNs(
+                        &rounds.plan,
+                        rounds.series,
+                        variant,
+                        thread_count,
+                    )))
                         return error.Canceled;
                     const traced = try subject.trace(variant, thread_count);
                     try rounds.check(variant, thread_count);
@@ -379,26 +376,41 @@ pub fn Rounds(comptime Subject: type) type {
                 }
             }
         }
-
-        /// What a frame may take by fewer threads than it was measured with.
-        fn expectedNs(rounds: *const Self, variant: usize, thread_count: usize) u64 {
-            for (rounds.plan.variants, rounds.series) |other, *one| {
-                if (other != variant) continue;
-                const slower = @as(f64, @floatFromInt(rounds.plan.thread_count)) /
-                    @as(f64, @floatFromInt(thread_count));
-                const time_ms = student.estimate(one.trace_ms.items).mean;
-                return @trunc(time_ms * 1e6 * @max(1, slower));
-            }
-            return 0;
-        }
-
-        fn areNarrow(lists: []const Column) bool {
-            for (lists) |list| {
-                if (student.estimate(list.items).relative() > precision) return false;
-            }
-            return true;
-        }
     };
+}
+
+/// What a frame may take by fewer threads than it was measured with.
+fn expectedNs(
+    plan: *const Plan,
+    series: []const Series,
+    variant: usize,
+    thread_count: usize,
+) u64 {
+    for (plan.variants, series) |other, *one| {
+        if (other != variant) continue;
+        const slower = @as(f64, @floatFromInt(plan.thread_count)) /
+            @as(f64, @floatFromInt(thread_count));
+        const time_ms = student.estimate(one.trace_ms.items).mean;
+        return @trunc(time_ms * 1e6 * @max(1, slower));
+    }
+    return 0;
+}
+
+fn areNarrow(lists: []const Column) bool {
+    for (lists) |list| {
+        if (student.estimate(list.items).relative() > precision) return false;
+    }
+    return true;
+}
+
+/// Whether all render times have narrow intervals, by enough samples.
+fn isNarrow(series: []const Series) bool {
+    for (series) |*one| {
+        const samples = one.trace_ms.items;
+        if (samples.len < narrow_round_count_min) return false;
+        if (student.estimate(samples).relative() > precision) return false;
+    }
+    return true;
 }
 
 fn milliseconds(time_ns: u64, count: usize) f64 {
@@ -443,7 +455,11 @@ const Fake = struct {
         return .{ .parse_ns = 1_000_000, .prepare_ns = 2_000_000, .bvh_build_ns = 3_000_000 };
     }
 
-    pub fn trace(fake: *Fake, variant: usize, thread_count: usize) error{ OutOfMemory, Canceled }!Traced {
+    pub fn trace(
+        fake: *Fake,
+        variant: usize,
+        thread_count: usize,
+    ) error{ OutOfMemory, Canceled }!Traced {
         try fake.order.append(testing.allocator, @intCast(variant));
         fake.frame_count += 1;
         const noise = fake.noise * (2 * fake.random.random().float(f64) - 1);

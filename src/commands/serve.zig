@@ -166,6 +166,7 @@ const Server = struct {
             .sharing = .of(options.instances),
             .animation = options.animation,
             .view = options.view,
+            .layers = options.render.layers,
         });
         try session.view(options.view);
         // They would not be said again, and what was missing may be there next time.
