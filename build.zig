@@ -86,7 +86,7 @@ pub fn build(b: *std.Build) void {
     tests.addHere(steps.test_unit, steps.test_integration, targets[0]);
     tests.addFormat(steps.test_fmt);
     tests.addTidy(steps.test_tidy);
-    tests.addReport(steps.test_report);
+    tests.addReport(steps.test_report, targets[0]);
     tests.addCheck(steps.check, targets[0]);
     steps.check.dependOn(&package.program().step);
 

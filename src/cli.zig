@@ -16,6 +16,7 @@ const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
 const completion = @import("cli/completion.zig");
 const man = @import("cli/man.zig");
+const scenario_file = @import("cli/scenario.zig");
 const settings = @import("settings.zig");
 const diagnostic_file = @import("diagnostic.zig");
 const Diagnostic = diagnostic_file.Diagnostic;
@@ -36,10 +37,15 @@ pub const version: []const u8 = config.version;
 /// What the user wants.
 pub const Command = union(enum) {
     help,
+    /// Nothing was asked for.
+    beginning,
     version,
     licenses,
     list_variants,
     render: Options,
+    scenario: ScenarioCall,
+    serve: []const [:0]const u8,
+    serve_help,
     bench: Bench,
     bench_help,
     compare: Compare,
@@ -87,45 +93,31 @@ pub const pages: []const Page = &.{
     .of("compare", compare_help, compare.sections, null),
     .of("info", info_help, info.sections, null),
     .of("merge", merge_help, merge.sections, null),
+    .of("serve", serve_help, sections, &.{}),
     .of("completion", completion_help, &.{}, wordsOf(Shell)),
     .of("man", man_help, &.{}, &.{}),
 };
 
 /// What `raylane completion --help` prints.
-pub const completion_help: []const u8 = "raylane " ++ version ++
-    \\: prints a script that completes its options in a shell
-    \\
-    \\usage: raylane completion bash|zsh|fish
-    \\
-    \\For this shell alone, or wherever the shell looks for such files:
-    \\
-    \\  source <(raylane completion bash)
-    \\  raylane completion bash > ~/.local/share/bash-completion/completions/raylane
-    \\  raylane completion zsh > a folder of fpath, there called _raylane
-    \\  raylane completion fish > ~/.config/fish/completions/raylane.fish
-    \\
-;
-
+pub const completion_help = completion.help;
 /// What `raylane man --help` prints.
-pub const man_help: []const u8 = "raylane " ++ version ++
-    \\: prints its manual's page, as roff
-    \\
-    \\usage: raylane man
-    \\
-    \\To read it, or to keep it where man looks:
-    \\
-    \\  raylane man | man -l -
-    \\  raylane man > ~/.local/share/man/man1/raylane.1
-    \\
-;
+pub const man_help = man.help;
 
 /// Writes what `raylane man` prints.
 pub fn writeMan(writer: *std.Io.Writer) std.Io.Writer.Error!void {
     return man.write(writer, version, pages);
 }
 
+/// Scenarios on the command line.
+pub const ScenarioCall = struct {
+    /// JSON, or the name of a file of it.
+    scenario: []const u8,
+    /// All arguments of `render`, `--scenario` among them.
+    arguments: []const [:0]const u8,
+};
+
 /// Words that stand before all others, but for `render`, which may stand among flags.
-const Word = enum { bench, compare, info, merge, completion, man };
+const Word = enum { bench, compare, info, merge, serve, completion, man, help };
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -239,14 +231,19 @@ const sections: []const Section = &.{
         .{
             .usage = "-o, --output FILE",
             .help = "name ending in a format, or a template of names; - is\nstandard output",
+            .also = &.{ "--outfile", "--output-file" },
         },
         .{
             .usage = "--format FORMAT",
             .words = wordsOf(settings.Format),
-            .help = "png, jpg, tga, bmp or ppm, linear: hdr, pfm or exr,\n" ++
-                "or a film: y4m",
+            .help = "png, jpg, webp, tga, bmp or ppm, linear: hdr, pfm or\n" ++
+                "exr, or a film: y4m",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
+        .{
+            .usage = "--webp-quality N",
+            .help = settings.webp_quality.text() ++ ", with loss (default: without)",
+        },
         .{
             .usage = "--exr KIND",
             .words = wordsOf(settings.ExrKind),
@@ -256,6 +253,15 @@ const sections: []const Section = &.{
             .usage = "-r, --resolution WxH|N",
             .help = comptimePrint("size in pixels, or of the long side in the camera's\n" ++
                 "aspect (default: the scene's own, or {d})", .{settings.long_side.default}),
+            .also = &.{"--size"},
+            .meant = &.{ "--geometry", "--res" },
+        },
+        .{ .usage = "--width N", .help = "with --height N: -r in two numbers" },
+        .{ .usage = "--height N", .help = "with --width N" },
+        .{
+            .usage = "--pixel-ratio N",
+            .help = "multiply both sides of that size, " ++ settings.pixel_ratio.textWithDefault(),
+            .also = &.{"--device-pixel-ratio"},
         },
         .{
             .usage = "--crop X0,Y0,X1,Y1",
@@ -277,16 +283,24 @@ const sections: []const Section = &.{
             .usage = "--tonemap CURVE",
             .words = wordsOf(settings.ToneMapping),
             .help = namesOf(settings.ToneMapping) ++ " (default: neutral)",
+            .also = &.{ "--tone-mapping", "--tonemapping" },
         },
         .{
             .usage = "--background WHAT",
             .words = &.{ "env", "studio", "transparent" },
             .help = "env, studio, transparent, a CSS colour (red, #rrggbb)\n" ++
                 "or radiance R,G,B (default: a grey gradient)",
+            .meant = &.{ "--bg", "--background-color" },
         },
         .{
             .usage = "--layers LIST",
-            .help = "of an EXR file: albedo,normal,depth,variance",
+            .help = "depth,normal,albedo,uv,node,material,primitive,alpha,\n" ++
+                "position,cost,variance: channels of an EXR file, or\n" ++
+                "files of their own by {layer} in the output's name",
+        },
+        .{
+            .usage = "--shade LOOK",
+            .help = "a quick look in place of light: ao, normal, uv or cost",
         },
     } },
     .{ .title = "Several pictures (see docs/batch.md)", .options = &.{
@@ -297,8 +311,8 @@ const sections: []const Section = &.{
         .{ .usage = "--fps F", .help = "24 (default), 23.976 or 30000/1001, say" },
         .{
             .usage = "--reference-frame F",
-            .help = "whose exposure, framing and studio all frames have\n" ++
-                "(default: the first of --frames)",
+            .help = "whose exposure, framing and studio all frames have,\n" ++
+                "a range's first (default: the first of --frames)",
         },
         .{
             .usage = "--turntable N",
@@ -312,7 +326,7 @@ const sections: []const Section = &.{
         .{
             .usage = "--jobs N",
             .help = "scenes side by side, " ++ settings.job_count.text() ++
-                " (default: by their\nnumber and the pictures' size)",
+                "\n(default: by their number and the pictures' size)",
         },
     } },
     .{ .title = "Camera", .options = &.{
@@ -320,23 +334,41 @@ const sections: []const Section = &.{
             .usage = "--camera WHICH",
             .words = &.{"auto"},
             .help = "name or index of a camera, or auto: all in view",
+            .also = &.{"--camera-index"},
         },
         .{
             .usage = "--eye X,Y,Z",
             .help = "where the camera stands, in place of the file's",
+            .also = &.{"--camera-position"},
         },
         .{
             .usage = "--target X,Y,Z",
             .help = "what it looks at (default: the middle of the scene)",
+            .also = &.{"--camera-focal-point"},
+            .meant = &.{ "--look-at", "--camera-target" },
         },
-        .{ .usage = "--up X,Y,Z", .help = "what is upwards in the picture (default: 0,1,0)" },
+        .{
+            .usage = "--up X,Y,Z",
+            .help = "what is upwards in the picture (default: 0,1,0)",
+            .also = &.{"--camera-view-up"},
+        },
         .{
             .usage = "--orbit THETA,PHI,R",
             .help = "stand about the target, degrees from +z and from\n" ++
                 "above, R metres or percent (default: 100%, all seen)",
+            .meant = &.{"--camera-orbit"},
         },
-        .{ .usage = "--fov DEG", .help = "vertical angle of view, in place of the camera's" },
-        .{ .usage = "--ortho", .help = "no perspective" },
+        .{
+            .usage = "--fov DEG",
+            .help = "vertical angle of view, in place of the camera's",
+            .also = &.{"--camera-view-angle"},
+            .meant = &.{"--field-of-view"},
+        },
+        .{
+            .usage = "--ortho",
+            .help = "no perspective",
+            .also = &.{ "--orthographic", "--camera-orthographic" },
+        },
         .{
             .usage = "--frame-all",
             .help = "frame all that the animation shows at any time",
@@ -347,11 +379,13 @@ const sections: []const Section = &.{
         .{
             .usage = "--material-variant N",
             .help = "name or index of one of its variants of materials",
+            .also = &.{"--variant-name"},
         },
         .{
             .usage = "--animation WHICH",
             .words = &.{"all"},
             .help = "name or index of an animation, or all (default: none)",
+            .also = &.{ "--animation-index", "--animation-name" },
         },
         .{
             .usage = "--animation-time S",
@@ -373,6 +407,8 @@ const sections: []const Section = &.{
             .help = "light from all around: an equirectangular image of\n" ++
                 "radiance (exr, hdr, png), studio or none (default:\n" ++
                 "the scene's, or studio, dim around its own lights)",
+            .also = &.{ "--hdri", "--hdri-file", "--environment" },
+            .meant = &.{ "--ibl", "--environment-image" },
         },
         .{ .usage = "--env-intensity X", .help = "multiplies its radiance (default: 1)" },
         .{
@@ -439,6 +475,7 @@ const sections: []const Section = &.{
                 settings.sample_count_small,  settings.side_small,
                 settings.sample_count_path,
             }),
+            .also = &.{ "--samples", "--samples-per-pixel" },
         },
         .{
             .usage = "--noise E",
@@ -466,6 +503,7 @@ const sections: []const Section = &.{
                 "(default: {d}; path, all bounces of light: {d})", .{
                 settings.depth.text(), settings.depth.default, settings.depth_path,
             }),
+            .also = &.{ "--max-depth", "--maxdepth", "--bounces", "--max-bounces" },
         },
         .{
             .usage = "--thesis",
@@ -478,6 +516,7 @@ const sections: []const Section = &.{
         .{
             .usage = "-t, --threads N",
             .help = settings.thread_count.text() ++ " (default: as many as CPUs)",
+            .also = &.{ "--nthreads", "--num-threads" },
         },
         .{
             .usage = "--tile-size N",
@@ -523,7 +562,11 @@ const sections: []const Section = &.{
                 "ninth of them and its neighbours' by a filter",
         },
         .{ .usage = "--denoise", .help = "filter the noise out" },
-        .{ .usage = "--variant NAME", .words = variant_file.names, .help = "how rays are traced; the image is always the same" },
+        .{
+            .usage = "--variant NAME",
+            .words = variant_file.names,
+            .help = "how rays are traced; the image is always the same",
+        },
         .{
             .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
@@ -537,6 +580,13 @@ const sections: []const Section = &.{
             .help = "report as " ++ namesOf(Stats) ++ " (default: text, or none\n" ++
                 "when the image goes to standard output); when it is\n" ++
                 "given, a report that cannot be printed is an error",
+            .meant = &.{"--json"},
+        },
+        .{
+            .usage = "--scenario FILE|JSON",
+            .help = "options as JSON (docs/json.md), or scenarios of\n" ++
+                "Khronos's render fidelity comparison; what else the\n" ++
+                "command line says counts more",
         },
         .{
             .usage = "--progress HOW",
@@ -552,12 +602,47 @@ const sections: []const Section = &.{
         .{ .usage = "-q, --quiet", .help = "no warnings, no progress, no report but by --stats" },
         .{ .usage = "-v, --verbose", .help = "say what was chosen by default" },
         .{ .usage = "-h, --help", .help = "print this" },
-        .{ .usage = "--version", .help = "print the version" },
-        .{ .usage = "--licenses", .help = "print the licence, and those of the libraries used" },
+        .{ .usage = "-V, --version", .help = "print the version" },
+        .{
+            .usage = "--licenses",
+            .help = "print the licence, and those of the libraries used",
+            .also = &.{ "--license", "--licence" },
+        },
     } },
 };
 
 const Reader = arguments_file.Arguments(sections);
+
+/// One of `--scenario`'s, or a job.
+pub const Scenario = scenario_file.Scenario;
+/// Where the text of scenarios is from.
+pub const ScenarioSource = scenario_file.Source;
+/// Longest text of scenarios.
+pub const scenario_bytes_max = scenario_file.bytes_max;
+/// The `id` of a job that is wrong otherwise.
+pub const idOf = scenario_file.idOf;
+/// Why scenarios cannot be read.
+pub const ScenarioError = scenario_file.Error;
+
+/// Reads scenarios; all memory is from `arena`. See `parseParts` for what becomes of them.
+pub fn readScenarios(
+    arena: std.mem.Allocator,
+    io: std.Io,
+    source: ScenarioSource,
+    diagnostic: *Diagnostic,
+) ScenarioError![]const Scenario {
+    return scenario_file.read(arena, io, Reader.flags, source, diagnostic);
+}
+
+/// Reads a job.
+pub fn readJob(
+    arena: std.mem.Allocator,
+    io: std.Io,
+    text: []const u8,
+    diagnostic: *Diagnostic,
+) ScenarioError!Scenario {
+    return scenario_file.readOne(arena, io, Reader.flags, text, diagnostic);
+}
 
 /// What `--help` prints.
 pub const help: []const u8 = "raylane " ++ version ++
@@ -568,8 +653,10 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
     \\       raylane info SCENE [options]          (see raylane info --help)
     \\       raylane merge -o FILE PART...         (see raylane merge --help)
+    \\       raylane serve [options]               (see raylane serve --help)
     \\       raylane completion bash|zsh|fish      (a script for that shell)
     \\       raylane man                           (the manual's page)
+    \\       raylane help [COMMAND]
     \\
     \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, a folder of such, - for
     \\standard input, or builtin:cornell, atrium, nave or handles. The image goes to
@@ -580,10 +667,31 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\
 ++ arguments_file.helpOf(sections) ++
     \\
+    \\Examples
+    \\  raylane model.glb
+    \\      model.png: all of it in view, in the light of a studio
+    \\  raylane model.glb -o a.png -r 800x600 --orbit 30,70 --env sky.hdr
+    \\      from the right and a little above, in the light of an image
+    \\  raylane room.pbrt -o room.exr --integrator path --spp 256 --denoise
+    \\      with all the light that bounces, as radiance
+    \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
-    \\supported, 128 + N ended by signal N (with --partial, the picture may be there).
+    \\supported, 4 images differ (bench, compare), 128 + N ended by signal N (with
+    \\--partial, the picture may be there).
     \\
 ;
+
+/// What `raylane` alone prints.
+pub const beginning: []const u8 =
+    \\usage: raylane SCENE [options]
+    \\
+    \\  raylane model.glb                        writes model.png
+    \\  raylane builtin:cornell -o box.png       a scene that needs no file
+    \\  raylane --help                           all options, and examples
+    \\
+;
+/// What `raylane serve --help` prints.
+pub const serve_help: []const u8 = @import("cli/serve.zig").help;
 
 pub const Error = error{UsageInvalid};
 
@@ -595,6 +703,7 @@ pub fn parse(
     diagnostic: *Diagnostic,
 ) Error!Command {
     assert(variant_names.len >= 1);
+    if (arguments.len == 0) return .beginning;
     const first = if (arguments.len > 0) std.meta.stringToEnum(Word, arguments[0]) else null;
     // Help wins over everything, for it is what somebody asks for who got the rest wrong.
     for (arguments) |argument| {
@@ -607,9 +716,13 @@ pub fn parse(
                 .merge => .merge_help,
                 .completion => .completion_help,
                 .man => .man_help,
+                .serve => .serve_help,
+                .help => .help,
             } else .help;
     }
     if (first) |word| return switch (word) {
+        .help => helpWith(arguments[1..], diagnostic),
+        .serve => .{ .serve = try checkedDefaults(arguments[1..], variant_names, diagnostic) },
         .bench => .{ .bench = try bench.parse(arguments[1..], diagnostic) },
         .compare => .{ .compare = try compare.parse(arguments[1..], diagnostic) },
         .info => .{ .info = try info.parse(arguments[1..], diagnostic) },
@@ -621,10 +734,7 @@ pub fn parse(
             .{},
         ),
     };
-    var parser: Parser = .{
-        .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
-        .variant_names = variant_names,
-    };
+    var parser: Parser = .init(arguments, variant_names, diagnostic);
     return parser.run();
 }
 
@@ -638,6 +748,78 @@ fn shellOf(words: []const [:0]const u8, diagnostic: *Diagnostic) Error!Shell {
     );
 }
 
+/// What `--stats=json` is for, wherever it stands among arguments that may be wrong.
+pub fn wantsJson(arguments: []const [:0]const u8) bool {
+    for (arguments, 0..) |argument, index| {
+        if (std.mem.eql(u8, argument, "--stats=json")) return true;
+        if (!std.mem.eql(u8, argument, "--stats") or index + 1 == arguments.len) continue;
+        if (std.mem.eql(u8, arguments[index + 1], "json")) return true;
+    }
+    return false;
+}
+
+/// Reads arguments of `render` in two parts, of which the second counts where both say the same:
+/// a scenario and the command line, or the defaults of `serve` and a job.
+pub fn parseParts(
+    parts: [2][]const [:0]const u8,
+    variant_names: []const []const u8,
+    diagnostic: *Diagnostic,
+) Error!Options {
+    var parser: Parser = .init(parts[0], variant_names, diagnostic);
+    try parser.read();
+    const before = parser;
+    parser.scene = null;
+    parser.input_count = 0;
+    parser.command = .{};
+    parser.reader = .{ .arguments = parts[1], .diagnostic = diagnostic, .help = "--help" };
+    try parser.read();
+    if (parser.scene != null) {
+        parser.named_in = parts[1];
+    } else {
+        parser.scene = before.scene;
+        parser.input_count = before.input_count;
+    }
+    return parser.finish();
+}
+
+/// Refuses defaults of `serve` that no job could do with.
+fn checkedDefaults(
+    arguments: []const [:0]const u8,
+    variant_names: []const []const u8,
+    diagnostic: *Diagnostic,
+) Error![]const [:0]const u8 {
+    var parser: Parser = .init(arguments, variant_names, diagnostic);
+    parser.reader.help = "raylane serve --help";
+    try parser.read();
+    if (parser.scene) |scene| return parser.reader.fail("{f}: scenes come by standard input", .{
+        quote(scene),
+    });
+    if (parser.other != null or parser.scenario != null)
+        return parser.reader.fail("one of the options is no default of pictures", .{});
+    return arguments;
+}
+
+/// `help`, `help WORD`.
+fn helpWith(words: []const [:0]const u8, diagnostic: *Diagnostic) Error!Command {
+    if (words.len == 0 or std.mem.eql(u8, words[0], "render")) return .help;
+    return switch (std.meta.stringToEnum(Word, words[0]) orelse {
+        const candidates = comptime std.meta.fieldNames(Word);
+        const name = nearest(words[0], candidates) orelse "--help";
+        return diagnostic.fail(error.UsageInvalid, "no command {f}, did you mean '{s}'?", .{
+            quote(words[0]), name,
+        });
+    }) {
+        .bench => .bench_help,
+        .compare => .compare_help,
+        .info => .info_help,
+        .merge => .merge_help,
+        .serve => .serve_help,
+        .completion => .completion_help,
+        .man => .man_help,
+        .help => .help,
+    };
+}
+
 const Parser = struct {
     reader: Reader,
     variant_names: []const []const u8,
@@ -647,24 +829,60 @@ const Parser = struct {
     command: RenderWord = .{},
     /// A time is asked for.
     has_time: bool = false,
+    has_variant: bool = false,
     /// The explicit `--format`.
     format: ?settings.Format = null,
     /// The explicit `--progress`.
     progress: ?settings.ProgressForm = null,
     /// Set by the flags that print something and end.
     other: ?Command = null,
+    /// Arguments that name the inputs.
+    named_in: []const [:0]const u8,
+    /// The explicit `--scenario`.
+    scenario: ?[]const u8 = null,
+    /// The explicit `--width` and `--height`.
+    sides: [2]?u32 = .{ null, null },
+    pixel_ratio: u32 = settings.pixel_ratio.default,
+
+    fn init(
+        arguments: []const [:0]const u8,
+        variant_names: []const []const u8,
+        diagnostic: *Diagnostic,
+    ) Parser {
+        return .{
+            .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
+            .variant_names = variant_names,
+            .named_in = arguments,
+        };
+    }
 
     fn run(parser: *Parser) Error!Command {
+        try parser.read();
+        if (parser.other) |command| return command;
+        if (parser.scenario) |scenario| return .{ .scenario = .{
+            .scenario = scenario,
+            .arguments = parser.reader.arguments,
+        } };
+        return .{ .render = try parser.finish() };
+    }
+
+    /// Reads all arguments.
+    fn read(parser: *Parser) Error!void {
         const reader = &parser.reader;
         while (try reader.next()) |argument| switch (argument) {
             .flag => |flag| try parser.set(flag),
             .word => |word| if (!parser.command.isCommand(reader, word))
                 try parser.positional(word),
         };
-        if (parser.other) |command| return command;
+    }
+
+    /// Checks them together.
+    fn finish(parser: *Parser) Error!Options {
+        const reader = &parser.reader;
         parser.options.scene = parser.scene orelse return reader.fail("no scene given", .{});
+        try parser.settleSize();
         const animation = &parser.options.animation;
-        parser.options.arguments = reader.arguments;
+        parser.options.arguments = parser.named_in;
         parser.options.batch.input_count = parser.input_count;
         const is_timed = parser.has_time or parser.options.batch.frames != null;
         if (is_timed and animation.which == .default) animation.which = .{ .index = 0 };
@@ -672,11 +890,12 @@ const Parser = struct {
         try parser.checkViewpoint();
         try parser.settleFormat();
         try parser.checkSampling();
+        try parser.checkShade();
         try parser.checkPart();
         try parser.settleProgress();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
-        return .{ .render = parser.options };
+        return parser.options;
     }
 
     fn positional(parser: *Parser, argument: []const u8) Error!void {
@@ -704,26 +923,13 @@ const Parser = struct {
             .format => parser.format = formatOf(given.value) orelse
                 return reader.bad(given, comptime namesOf(settings.Format)),
             .denoise => options.render.denoise = true,
-            .layers => options.render.layers = layersOf(given.value) orelse
-                return reader.bad(given, comptime namesOf(settings.Layer)),
-            .jpeg_quality => options.write.jpeg_quality =
-                try reader.number(given, settings.jpeg_quality),
-            .exr => options.write.exr_kind = try reader.choice(given, settings.ExrKind),
+            .shade => options.view.shade = try reader.choice(given, settings.Shade),
+            .layers, .jpeg_quality, .webp_quality, .exr => try parser.setWriting(given),
+            .exposure, .tonemap => try parser.setWriting(given),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
-            .resolution => {
-                options.view.long_side = integer(given.value, settings.long_side);
-                options.view.resolution = resolutionOf(given.value);
-                if (options.view.long_side == null and options.view.resolution == null)
-                    return reader.bad(given, expected_size);
-            },
-            .crop => options.render.part = .{ .crop = cropOf(given.value) orelse
-                return reader.bad(given, "four pixels, or fractions from 0.0 to 1.0, of a " ++
-                    "rectangle's left, upper, right and lower edge") },
-            .tile => options.render.part = .{ .tile = tileOf(given.value) orelse
-                return reader.bad(given, comptimePrint("I/N, N {s}, I 1 to N", .{
-                    settings.part_count.text(),
-                })) },
+            .crop, .tile => try parser.setPart(given),
+            .resolution, .width, .height, .pixel_ratio => try parser.setSize(given),
             .threads => options.thread_count = try reader.number(given, settings.thread_count),
             .spp => options.render.sample_count = try reader.number(given, settings.sample_count),
             .noise, .time_budget, .progress_image, .partial => try parser.setSampling(given),
@@ -744,21 +950,19 @@ const Parser = struct {
             .floor => options.view.floor = try reader.choice(given, settings.Floor),
             .ambient => options.view.ambient = radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
-            .exposure => options.write.exposure = exposureOf(given.value) orelse
-                return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
-                    settings.exposure_ev_max, settings.exposure_ev_max,
-                })),
-            .tonemap => options.write.tone_mapping =
-                try reader.choice(given, settings.ToneMapping),
-            .stats, .quiet, .verbose, .progress, .progress_fd => try parser.setMessages(given),
+            .stats, .count_tests, .quiet, .verbose => try parser.setMessages(given),
+            .progress, .progress_fd => try parser.setMessages(given),
+            .scenario => try parser.setScenario(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
-            .variant => options.render.variant = try parser.variantOf(given.value),
+            .variant => {
+                options.render.variant = try parser.variantOf(given.value);
+                parser.has_variant = true;
+            },
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
             .virtual_lights, .sky_lights, .all_lights => try parser.setLights(given),
-            .count_tests => options.count_tests = true,
             .point_size => options.view.point_size =
                 numberWithin(given.value, settings.point_size) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
@@ -771,6 +975,75 @@ const Parser = struct {
         }
     }
 
+    fn setScenario(parser: *Parser, given: Reader.Given) Error!void {
+        if (parser.scenario != null)
+            return parser.reader.fail("'--scenario' is there twice", .{});
+        parser.scenario = try parser.reader.text(given, "a file name or JSON");
+    }
+
+    fn setPart(parser: *Parser, given: Reader.Given) Error!void {
+        const part = &parser.options.render.part;
+        switch (given.id) {
+            .crop => part.* = .{ .crop = cropOf(given.value) orelse
+                return parser.reader.bad(given, "four pixels, or fractions from 0.0 to 1.0, of " ++
+                    "a rectangle's left, upper, right and lower edge") },
+            .tile => part.* = .{ .tile = tileOf(given.value) orelse
+                return parser.reader.bad(given, comptimePrint("I/N, N {s}, I 1 to N", .{
+                    settings.part_count.text(),
+                })) },
+            else => unreachable,
+        }
+    }
+
+    fn setSize(parser: *Parser, given: Reader.Given) Error!void {
+        const view = &parser.options.view;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .resolution => {
+                parser.sides = .{ null, null };
+                view.long_side = integer(given.value, settings.long_side);
+                view.resolution = resolutionOf(given.value);
+                if (view.long_side == null and view.resolution == null)
+                    return reader.bad(given, expected_size);
+            },
+            .width => parser.sides[0] = try reader.number(given, settings.side),
+            .height => parser.sides[1] = try reader.number(given, settings.side),
+            .pixel_ratio => parser.pixel_ratio = try reader.number(given, settings.pixel_ratio),
+            else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    /// Makes one size of what may be said in several options.
+    fn settleSize(parser: *Parser) Error!void {
+        const view = &parser.options.view;
+        const reader = &parser.reader;
+        if (parser.sides[0] != null or parser.sides[1] != null) {
+            view.long_side = null;
+            view.resolution = .{
+                parser.sides[0] orelse return reader.fail("'--height' without '--width'; " ++
+                    "-r N is the long side alone", .{}),
+                parser.sides[1] orelse return reader.fail("'--width' without '--height'; " ++
+                    "-r N is the long side alone", .{}),
+            };
+        }
+        const ratio = parser.pixel_ratio;
+        if (view.resolution) |*sides| {
+            for (sides) |*length| length.* *= ratio;
+            const is_large = for (sides) |length| {
+                if (!settings.side.holds(length)) break true;
+            } else @as(u64, sides[0]) * sides[1] > settings.pixel_count_max;
+            if (is_large) return reader.fail("a picture of {d}x{d} is not " ++
+                expected_resolution, .{ sides[0], sides[1] });
+        } else if (view.long_side) |*length| {
+            length.* *= ratio;
+            if (!settings.long_side.holds(length.*))
+                return reader.fail("a long side of {d} is not {s}", .{
+                    length.*, comptime settings.long_side.text(),
+                });
+        } else if (ratio != 1) return reader.fail("'--pixel-ratio' multiplies a size: say it " ++
+            "by '--resolution'", .{});
+    }
+
     fn setBatch(parser: *Parser, given: Reader.Given) Error!void {
         const chosen = &parser.options.batch;
         const reader = &parser.reader;
@@ -780,8 +1053,7 @@ const Parser = struct {
             .fps => parser.options.write.frame_rate = batch.frameRateOf(given.value) orelse
                 return reader.bad(given, "a number above 0, up to 1000, or a fraction"),
             .reference_frame => chosen.reference_frame =
-                std.fmt.parseInt(i32, given.value, 10) catch
-                    return reader.bad(given, "the number of a frame"),
+                batch_plan.frames.first(try parser.rangeOf(given)),
             .turntable => chosen.view_count = try reader.number(given, settings.view_count),
             .skip_existing => chosen.skip_existing = true,
             .jobs => chosen.job_count = try reader.number(given, settings.job_count),
@@ -821,6 +1093,26 @@ const Parser = struct {
             return reader.fail("{s}", .{message.text()});
         if (batch_plan.template.holds(output, .camera) and viewpoint.replacesCamera()) return reader
             .fail("'{{camera}}' stands for the file's, in whose place the options put one", .{});
+    }
+
+    fn setWriting(parser: *Parser, given: Reader.Given) Error!void {
+        const write = &parser.options.write;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .layers => parser.options.render.layers = layersOf(given.value) orelse
+                return reader.bad(given, comptime namesOf(settings.Layer)),
+            .jpeg_quality => write.jpeg_quality =
+                try reader.number(given, settings.jpeg_quality),
+            .webp_quality => write.webp_quality =
+                try reader.number(given, settings.webp_quality),
+            .exr => write.exr_kind = try reader.choice(given, settings.ExrKind),
+            .exposure => write.exposure = exposureOf(given.value) orelse
+                return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
+                    settings.exposure_ev_max, settings.exposure_ev_max,
+                })),
+            .tonemap => write.tone_mapping = try reader.choice(given, settings.ToneMapping),
+            else => unreachable, // `set` hands over the above.
+        }
     }
 
     fn setLights(parser: *Parser, given: Reader.Given) Error!void {
@@ -888,6 +1180,7 @@ const Parser = struct {
         const reader = &parser.reader;
         switch (given.id) {
             .stats => options.stats = try reader.choice(given, Stats),
+            .count_tests => options.count_tests = true,
             .quiet => options.quiet = true,
             .verbose => options.verbose = true,
             .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
@@ -1034,10 +1327,41 @@ const Parser = struct {
     fn settleFormat(parser: *Parser) Error!void {
         try parser.findFormat();
         const options = &parser.options;
-        if (options.render.layers.count() == 0 or options.write.format == .exr) return;
-        return parser.reader.fail("'--layers' has a place in an exr file, not in a {t} file", .{
-            options.write.format,
-        });
+        const format = options.write.format;
+        if (options.output) |output| options.write.layers_apart =
+            batch_plan.template.isTemplate(output) and
+            batch_plan.template.holds(output, .layer);
+        if (options.render.layers.count() == 0 or format == .exr) return;
+        if (options.write.layers_apart and format != .y4m) return;
+        return parser.reader.fail("'--layers' has a place in an exr file, not in a {t} file, or " ++
+            "in files of their own, by {{layer}} in the output's name", .{format});
+    }
+
+    /// What some integrators alone can tell, or is told in place of them. Where rays are traced one
+    /// by one, each pixel has tests of its own: nothing else is as good for these.
+    fn checkShade(parser: *Parser) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        const is_whitted = options.render.integrator == .whitted;
+        if (options.render.layers.contains(.cost) and !is_whitted)
+            return reader.fail("'--layers cost' counts tests of '--integrator whitted'", .{});
+        const has_cost = options.render.layers.contains(.cost) or options.view.shade == .cost;
+        if (has_cost and !parser.has_variant) for (parser.variant_names, 0..) |name, index| {
+            if (std.mem.find(u8, name, "-single-") == null) continue;
+            options.render.variant = index;
+            break;
+        };
+        const part = options.render.part;
+        if (options.write.layers_apart and part == .tile) return reader.fail(
+            "'--tile' puts layers into one file: no {{layer}} in the output's name",
+            .{},
+        );
+        if (options.view.shade == null) return;
+        if (options.view.shade == .cost and part != .whole) return reader
+            .fail("'--shade cost' has colours by the whole picture: no '--crop' or '--tile'", .{});
+        if (!is_whitted) return reader.fail("'--shade' contradicts '--integrator'", .{});
+        if (options.render.denoise) return reader.fail("'--shade' contradicts '--denoise'", .{});
+        if (options.count_tests) return reader.fail("'--shade' contradicts '--count-tests'", .{});
     }
 
     fn findFormat(parser: *Parser) Error!void {
@@ -1062,7 +1386,12 @@ const Parser = struct {
             "'--time-budget' does not go with '--{t}': parts have as many samples as the whole",
             .{part},
         );
+        if (options.render.layers.contains(.cost)) return reader.fail(
+            "'--layers cost' does not go with '--{t}': it is of pixels that are traced together",
+            .{part},
+        );
         if (options.write.format == .exr) {
+            options.render.is_merged = true;
             if (options.progress_image == null) return;
             return reader.fail("'--progress-image' does not go with parts that are merged", .{});
         }
@@ -1070,16 +1399,16 @@ const Parser = struct {
             "'--tile' makes an exr file, not a {t} file: 'raylane merge' makes that of all parts",
             .{options.write.format},
         );
-        if (options.render.denoise) return reader.fail(
-            "'--denoise' needs all of the picture: 'raylane merge' filters exr files of parts",
-            .{},
-        );
     }
 };
 
 /// The format of a file called `name`: the one chosen, or by its extension; png on standard output.
 /// An error of the reader where they contradict each other, or there is neither.
-pub fn formatFor(reader: anytype, chosen: ?settings.Format, name: []const u8) Error!settings.Format {
+pub fn formatFor(
+    reader: anytype,
+    chosen: ?settings.Format,
+    name: []const u8,
+) Error!settings.Format {
     if (isStdout(name)) return chosen orelse .png;
     const extension = std.fs.path.extension(name);
     const implied = if (extension.len == 0) null else formatOf(extension[1..]);
@@ -1320,7 +1649,7 @@ test "a scene alone is rendered by the defaults" {
     const named = try parseForTest(&.{ "render", "render" });
     try std.testing.expectEqualStrings("render", named.render.scene);
     try expectUsage("no scene", &.{"render"});
-    try expectUsage("no scene", &.{});
+    try std.testing.expectEqual(.beginning, try parseForTest(&.{}));
     try expectUsage("no scene", &.{ "-q", "--" });
     try expectUsage("empty", &.{""});
 }
@@ -1352,6 +1681,8 @@ test "frames, views and names of pictures" {
     try std.testing.expectEqual(0, options.animation.which.index);
     try std.testing.expectEqual(.jpg, options.write.format);
     try std.testing.expect(options.isBatch());
+    const part = try optionsForTest(&.{ "--frames=8", "--reference-frame=5-9,4-2:-1" });
+    try std.testing.expectEqual(2, part.batch.reference_frame.?);
     const turned = try optionsForTest(&.{ "--turntable=8", "--views=0-3", "-oa/", "--jobs=2" });
     try std.testing.expectEqual(30, turned.view.viewpoint.orbit.?.theta_degrees);
     try std.testing.expectEqual(8, turned.batch.view_count.?);
@@ -1363,6 +1694,7 @@ test "frames, views and names of pictures" {
         .{ "has more than 1000000", &.{"--frames=0-1000000"} },
         .{ "both choose the time", &.{ "--frames=1", "--animation-time=2" } },
         .{ "needs '--frames'", &.{"--reference-frame=2"} },
+        .{ "'x' is not a range", &.{ "--frames=1", "--reference-frame=x" } },
         .{ "those of '--turntable'", &.{"--views=2"} },
         .{ "both place the camera", &.{ "--turntable=2", "--eye=1,2,3" } },
         .{ "'--camera' contradicts", &.{ "--turntable=2", "--camera=0" } },
@@ -1418,6 +1750,96 @@ test "a long option takes its value joined or apart, a short one also attached" 
     }
     try expectUsage("'-t' needs a value", &.{ "s", "-t" });
     try expectUsage("'--threads': '' is not 1 to 256", &.{ "s", "--threads=" });
+}
+
+test "names of other programs are understood or answered with ours" {
+    const options = try optionsForTest(&.{
+        "--samples=3", "--hdri=none", "--nthreads", "2", "--camera-position=1,2,3", "--max-depth=4",
+    });
+    try std.testing.expectEqual(3, options.render.sample_count);
+    try std.testing.expectEqual(.none, options.view.environment.source);
+    try std.testing.expectEqual(2, options.thread_count.?);
+    try std.testing.expectEqual([3]f32{ 1, 2, 3 }, options.view.viewpoint.eye.?);
+    try std.testing.expectEqual(4, options.render.depth);
+    try expectUsage("option '--camera-orbit' is '--orbit' here", &.{"--camera-orbit=1deg 2deg 3m"});
+    try expectUsage("'--background-color' is '--background'", &.{"--background-color=0,0,0"});
+    try std.testing.expectEqual(.version, try parseForTest(&.{"-V"}));
+    // No name may be that of two options.
+    for (Reader.flags, 0..) |*flag, index| for ([_][]const []const u8{
+        flag.also, flag.meant, &.{flag.long},
+    }) |names| for (names) |name| {
+        for (Reader.flags[index + 1 ..]) |*other|
+            try std.testing.expect(!other.isNamed(name[2..]) and !other.isMeant(name[2..]));
+    };
+}
+
+test "help for a command by a word" {
+    try std.testing.expectEqual(.help, try parseForTest(&.{"help"}));
+    try std.testing.expectEqual(.help, try parseForTest(&.{ "help", "render" }));
+    try std.testing.expectEqual(.bench_help, try parseForTest(&.{ "help", "bench" }));
+    try std.testing.expectEqual(.serve_help, try parseForTest(&.{ "help", "serve" }));
+    try std.testing.expectEqual(.serve_help, try parseForTest(&.{ "serve", "-h" }));
+    var diagnostic: Diagnostic = .{};
+    const result = parse(&.{ "help", "benhc" }, test_names, &diagnostic);
+    try std.testing.expectError(error.UsageInvalid, result);
+    const expected = "no command 'benhc', did you mean 'bench'?";
+    try std.testing.expectEqualStrings(expected, diagnostic.message.text());
+}
+
+test "a size in two options, and pixels of pixels" {
+    const view = (try optionsForTest(&.{ "-r512", "--width=8", "--height=4" })).view;
+    try std.testing.expectEqual([2]u32{ 8, 4 }, view.resolution.?);
+    try std.testing.expectEqual(null, view.long_side);
+    const later = (try optionsForTest(&.{ "--width=8", "--height=4", "-r3x2" })).view;
+    try std.testing.expectEqual([2]u32{ 3, 2 }, later.resolution.?);
+    const doubled = (try optionsForTest(&.{ "--pixel-ratio=2", "-r8x4" })).view;
+    try std.testing.expectEqual([2]u32{ 16, 8 }, doubled.resolution.?);
+    const long = (try optionsForTest(&.{ "-r100", "--pixel-ratio=3" })).view;
+    try std.testing.expectEqual(300, long.long_side.?);
+    try expectUsage("'--width' without '--height'", &.{ "s", "--width=8" });
+    try expectUsage("'--height' without '--width'", &.{ "s", "--height=8" });
+    try expectUsage("multiplies a size", &.{ "s", "--pixel-ratio=2" });
+    try expectUsage("is not 1 to 8", &.{ "s", "--pixel-ratio=9" });
+    try expectUsage("32768x32768 is not WxH", &.{ "s", "--pixel-ratio=2", "-r16384x16384" });
+    try expectUsage("131072x2 is not WxH", &.{ "s", "--pixel-ratio=2", "-r65536x1" });
+    try expectUsage("side of 32768 is not 1 to", &.{ "s", "--pixel-ratio=2", "-r16384" });
+    try expectUsage("65536x65536 is not WxH", &.{ "s", "--width=65536", "--height=65536" });
+}
+
+test "scenarios are kept for whoever reads them, and what comes after counts" {
+    const call = (try parseForTest(&.{ "--scenario={}", "-q", "a.glb" })).scenario;
+    try std.testing.expectEqualStrings("{}", call.scenario);
+    try std.testing.expectEqual(3, call.arguments.len);
+    try expectUsage("twice", &.{ "--scenario=a", "--scenario=b" });
+    try expectUsage("'--scenario'", &.{"--scenario="});
+    var diagnostic: Diagnostic = .{};
+    const scenario: []const [:0]const u8 = &.{ "--spp=2", "--depth=3", "--", "-a", "b" };
+    const own = try parseParts(.{ scenario, &.{ "--spp=4", "-q" } }, test_names, &diagnostic);
+    try std.testing.expectEqual(4, own.render.sample_count);
+    try std.testing.expectEqual(3, own.render.depth);
+    try std.testing.expectEqualStrings("-a", own.scene);
+    try std.testing.expectEqual(2, own.batch.input_count);
+    var inputs = own.inputs(&diagnostic);
+    for ([_][]const u8{ "-a", "b" }) |name|
+        try std.testing.expectEqualStrings(name, inputs.next().?);
+    const other = try parseParts(.{ scenario, &.{"c"} }, test_names, &diagnostic);
+    try std.testing.expectEqualStrings("c", other.scene);
+    try std.testing.expectEqual(1, other.batch.input_count);
+    inputs = other.inputs(&diagnostic);
+    try std.testing.expectEqualStrings("c", inputs.next().?);
+    try std.testing.expectEqual(2, (try parseForTest(&.{ "serve", "-q", "-t2" })).serve.len);
+    const bad = parse(&.{ "serve", "--spp=0" }, test_names, &diagnostic);
+    try std.testing.expectError(error.UsageInvalid, bad);
+    const named = parse(&.{ "serve", "a.glb" }, test_names, &diagnostic);
+    try std.testing.expectError(error.UsageInvalid, named);
+    const text = diagnostic.message.text();
+    try std.testing.expectStringEndsWith(text, "(see raylane serve --help)");
+}
+
+test wantsJson {
+    try std.testing.expect(wantsJson(&.{ "a", "--stats=json" }));
+    try std.testing.expect(wantsJson(&.{ "--stats", "json", "--spp=0" }));
+    try std.testing.expect(!wantsJson(&.{ "--stats=text", "json", "--stats" }));
 }
 
 test "unknown options are named, misspelt ones are recognised" {
@@ -1484,9 +1906,13 @@ test "numbers keep to their ranges" {
         .{ .flag = "--integrator", .good = &.{ "whitted", "lights", "path" }, .bad = &.{"bdpt"} },
         .{
             .flag = "--format",
-            .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },
+            .good = &.{
+                "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr", "webp",
+            },
             .bad = &.{ "tiff", "" },
         },
+        .{ .flag = "--shade", .good = &.{ "ao", "normal", "uv", "cost" }, .bad = &.{ "", "AO" } },
+        .{ .flag = "--webp-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "" } },
         .{ .flag = "--exr", .good = &.{ "half", "float" }, .bad = &.{ "Half", "double", "" } },
         .{ .flag = "--jpeg-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "", "x" } },
         .{
@@ -1676,9 +2102,21 @@ test "the format follows the name, unless said otherwise" {
     try expectUsage("contradicts", &.{ "--format=pfm", "-oa.png", "s" });
     try expectUsage("not in a png file", &.{ "--layers=depth", "s" });
     for ([_][:0]const u8{ "--layers=", "--layers=depht", "--layers=depth,", "--layers=a b" }) |bad|
-        try expectUsage("albedo, normal, depth", &.{ bad, "-oa.exr", "s" });
+        try expectUsage("depth, normal, albedo", &.{ bad, "-oa.exr", "s" });
     const layered = try optionsForTest(&.{ "--layers=depth,albedo,depth", "-oa.exr" });
     try std.testing.expectEqual(2, layered.render.layers.count());
+    const each = try optionsForTest(&.{
+        "--layers=depth,normal,albedo,uv,node,material,primitive,alpha,position,cost,variance",
+        "-oa-{layer}.png",
+    });
+    try std.testing.expectEqual(11, each.render.layers.count());
+    try expectUsage("counts", &.{ "--layers=cost", "--integrator=path", "-oa.exr", "s" });
+    const alone = try optionsForTest(&.{"--shade=cost"});
+    try std.testing.expectEqualStrings("scalar-single-4", test_names[alone.render.variant]);
+    const chosen = try optionsForTest(&.{ "--variant=vector-beam-8", "--layers=cost", "-oa.exr" });
+    try std.testing.expectEqual(0, chosen.render.variant);
+    for ([_][:0]const u8{ "--denoise", "--count-tests", "--integrator=lights" }) |other|
+        try expectUsage("'--shade' contradicts", &.{ "--shade=ao", other, "s" });
     try expectUsage("'a.tiff' ends in no image format", &.{ "-oa.tiff", "s" });
 }
 
@@ -1735,9 +2173,10 @@ test "parts are rectangles or shares of tiles" {
         "--tile=/",       "--tile=1/70000",  "--crop=nan.,0,1,1",
     }) |bad| try expectUsage(bad[0..6], &.{ bad, "-oa.exr", "s" });
     try expectUsage("makes an exr file", &.{ "--tile=1/2", "s" });
-    try expectUsage("'--denoise' needs all", &.{ "--crop=0,0,1,1", "--denoise", "s" });
     try expectUsage("'--time-budget'", &.{ "--crop=0,0,1,1", "--time-budget=1", "s" });
-    _ = try optionsForTest(&.{ "--crop=0,0,1,1", "--denoise", "-oa.exr" });
+    const merged = try optionsForTest(&.{ "--crop=0,0,1,1", "-oa.exr" });
+    const alone = try optionsForTest(&.{"--crop=0,0,1,1"});
+    try std.testing.expect(merged.render.is_merged and !alone.render.is_merged);
 }
 
 test "points and lines are as wide as they may be" {
@@ -1750,7 +2189,7 @@ test "points and lines are as wide as they may be" {
 }
 
 test "the help fits a screen and says what flags take and may be" {
-    try std.testing.expect(try @import("cli/testing.zig").expectFits(help) <= 150);
+    try std.testing.expect(try @import("cli/testing.zig").expectFits(help) <= 190);
     for ([_][]const u8{
         "\n  -o, --output FILE        name ending in",
         "\n                           4 to 1024 (default: 32)\n",
@@ -1817,6 +2256,8 @@ test {
     _ = colors;
     _ = @import("cli/nearest.zig");
     _ = @import("cli/page.zig");
+    _ = scenario_file;
+    _ = @import("cli/serve.zig");
 }
 
 test "progress: its form, its descriptor, and what contradicts it" {

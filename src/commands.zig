@@ -18,3 +18,7 @@ pub const info = @import("commands/info.zig");
 pub const merge = @import("commands/merge.zig");
 /// Renders scenes.
 pub const render = @import("commands/render.zig");
+/// Renders what JSON describes.
+pub const scenario = @import("commands/scenario.zig");
+/// Renders what jobs on standard input ask for.
+pub const serve = @import("commands/serve.zig");

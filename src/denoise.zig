@@ -26,6 +26,9 @@ pub const needed: film_file.Layers = .init(.{
     .halves = true,
 });
 
+/// A pixel depends on others no further away, along each side.
+pub const reach = filter.margin + planes_file.ratio_radius;
+
 /// Fewer do not say how noisy they are.
 pub const sample_count_min = 2;
 

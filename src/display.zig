@@ -65,6 +65,11 @@ pub const Display = struct {
         /// What was done when it was last looked at, and when there was first so much.
         seen_done: usize = 0,
         seen_s: f64 = 0,
+        /// The same of the picture that is made, and of the first one.
+        seen_picture: usize = 0,
+        seen_picture_s: f64 = 0,
+        first_picture: usize = 0,
+        first_picture_s: f64 = 0,
 
         fn begun(context: *anyopaque, work: *const Work) void {
             const slot: *Slot = @ptrCast(@alignCast(context));
@@ -85,11 +90,27 @@ pub const Display = struct {
                 slot.seen_done = done;
                 slot.seen_s = now_s;
             }
+            slot.seePicture(now_s);
             return .of(slot.place.?, &(slot.work orelse .{ .stage = .reading }), &slot.progress, .{
                 .file_s = now_s - slot.begin_s,
                 .work_s = slot.seen_s - slot.work_begin_s,
                 .idle_s = now_s - slot.seen_s,
+                .picture_count = slot.seen_picture - slot.first_picture,
+                .pictures_s = slot.seen_picture_s - slot.first_picture_s,
+                .picture_idle_s = now_s - slot.seen_picture_s,
             });
+        }
+
+        fn seePicture(slot: *Slot, now_s: f64) void {
+            const picture = slot.progress.picture.load(.monotonic);
+            if (picture == slot.seen_picture) return;
+            // By the next camera they begin anew.
+            if (picture < slot.seen_picture or slot.first_picture == 0) {
+                slot.first_picture = picture;
+                slot.first_picture_s = now_s;
+            }
+            slot.seen_picture = picture;
+            slot.seen_picture_s = now_s;
         }
     };
 

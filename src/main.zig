@@ -25,10 +25,21 @@ fn run(init: std.process.Init) ExitCode {
     const names = raylane.variant.names;
     const command = cli.parse(own_arguments, names, &diagnostic) catch {
         console.say(io, "raylane: {s}\n", .{diagnostic.message.text()});
+        if (cli.wantsJson(own_arguments)) console.printFailure(init.gpa, io, &.{
+            .version = cli.version,
+            .problem = .of(&diagnostic, "", @backingInt(ExitCode.usage)),
+        }, false);
         return .usage;
     };
     switch (command) {
         .help => return console.print(io, cli.help),
+        .beginning => {
+            console.say(io, "{s}", .{cli.beginning});
+            return .usage;
+        },
+        .scenario => |*call| return commands.scenario.run(init, call, &diagnostic),
+        .serve => |defaults| return commands.serve.run(init.gpa, io, defaults),
+        .serve_help => return console.print(io, cli.serve_help),
         .bench_help => return console.print(io, cli.bench_help),
         .compare_help => return console.print(io, cli.compare_help),
         .info_help => return console.print(io, cli.info_help),

@@ -14,13 +14,14 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Film = film_file.Film;
 const Layer = film_file.Layer;
 const Layout = film_file.Layout;
+const Manifest = @import("manifest.zig").Manifest;
 const quote = @import("diagnostic.zig").quote;
 const assert = std.debug.assert;
 
 /// Name of the attribute.
 pub const attribute_name = "raylane:part";
 /// Bytes of its text at most.
-const text_bytes_max = 1 << 20;
+const text_bytes_max = output.openexr.text_bytes_max;
 
 /// What the attribute says. Slices are the caller's.
 pub const Record = struct {
@@ -48,8 +49,12 @@ pub const Record = struct {
     tone_mapping: settings.ToneMapping,
     transparent: bool,
     background: output.Background,
+    /// Names of what the part shows.
+    manifest: ?Names,
     jpeg_quality: u8,
+    webp_quality: ?u8,
     exr_kind: settings.ExrKind,
+    frame_rate: settings.FrameRate,
 
     /// The layers as a film has them.
     pub fn layerSet(record: *const Record) film_file.Layers {
@@ -59,9 +64,12 @@ pub const Record = struct {
     /// In what it is first unlike a part of the same picture, for messages that go on with its
     /// name; null: in nothing.
     pub fn differenceFrom(record: *const Record, other: *const Record) ?[]const u8 {
-        if (record.width != other.width or record.height != other.height) return "it is of another size than";
-        if (!std.mem.eql(u8, &record.scene, &other.scene)) return "it is of another scene than";
-        if (!std.mem.eql(u8, &record.options, &other.options)) return "it was rendered with other options than";
+        if (record.width != other.width or record.height != other.height)
+            return "it is of another size than";
+        if (!std.mem.eql(u8, &record.scene, &other.scene))
+            return "it is of another scene than";
+        if (!std.mem.eql(u8, &record.options, &other.options))
+            return "it was rendered with other options than";
         // What follows from these, unless somebody has changed it.
         const is_same = record.layerSet().eql(other.layerSet()) and
             std.mem.eql(settings.Layer, record.further, other.further) and
@@ -69,8 +77,35 @@ pub const Record = struct {
             record.tone_mapping == other.tone_mapping and
             record.transparent == other.transparent and
             std.meta.eql(record.background, other.background) and
-            record.jpeg_quality == other.jpeg_quality and record.exr_kind == other.exr_kind;
+            (record.manifest == null) == (other.manifest == null) and
+            record.jpeg_quality == other.jpeg_quality and
+            std.meta.eql(record.webp_quality, other.webp_quality) and
+            record.exr_kind == other.exr_kind and
+            std.meta.eql(record.frame_rate, other.frame_rate);
         return if (is_same) null else "it was changed, other than";
+    }
+};
+
+/// A manifest as records have it.
+pub const Names = struct {
+    node: []const Entry,
+    mesh: []const Entry,
+    material: []const Entry,
+
+    const Entry = @import("manifest.zig").Entry;
+
+    /// Of the one that a picture has.
+    pub fn of(manifest: *const Manifest) Names {
+        return .{
+            .node = manifest.node,
+            .mesh = manifest.mesh,
+            .material = manifest.material,
+        };
+    }
+
+    /// The manifest again.
+    pub fn manifestOf(names: *const Names) Manifest {
+        return .{ .node = names.node, .mesh = names.mesh, .material = names.material };
     }
 };
 
@@ -186,7 +221,9 @@ fn isWithinLimits(record: *const Record) bool {
         record.further.len <= std.enums.values(settings.Layer).len and
         settings.sample_count.holds(record.sample_count) and
         @abs(record.exposure_ev) <= settings.exposure_ev_max and
-        settings.jpeg_quality.holds(record.jpeg_quality);
+        settings.jpeg_quality.holds(record.jpeg_quality) and
+        (record.webp_quality == null or settings.webp_quality.holds(record.webp_quality.?)) and
+        record.frame_rate.numerator > 0 and record.frame_rate.denominator > 0;
 }
 
 const testing = std.testing;
@@ -208,8 +245,11 @@ const record_for_test: Record = .{
     .tone_mapping = .agx,
     .transparent = true,
     .background = .{ .srgb = .{ 1, 2, 255 } },
+    .manifest = .{ .node = &.{.{ .number = 3, .name = "a\xff" }}, .mesh = &.{}, .material = &.{} },
     .jpeg_quality = 90,
+    .webp_quality = null,
     .exr_kind = .float,
+    .frame_rate = .{ .numerator = 30_000, .denominator = 1001 },
 };
 
 test "a record comes back as it was, and no other gets through" {
@@ -235,6 +275,7 @@ test "a record comes back as it was, and no other gets through" {
         .{ "[\"depth\"]", "[\"normal\"]", "damaged" },
         .{ "\"sample_count\":4", "\"sample_count\":-1", "damaged" },
         .{ "\"version\":\"1.2\"", "\"version\":\"1.2\",\"more\":1", "damaged" },
+        .{ "\"denominator\":1001", "\"denominator\":0", "damaged" },
         .{ "{\"version\"", "[\"version\"", "damaged" },
     }) |change| {
         errdefer std.debug.print("{s}\n", .{change[1]});

@@ -47,13 +47,16 @@ pub const Work = struct {
 /// An atomic counter that wraps where addresses do.
 const Counter = std.atomic.Value(usize);
 
-/// Of one picture at a time. Who has it owns what it tells, too.
+/// Of one file, whose pictures are made one after the other.
 pub const Progress = struct {
     /// Pieces.
     done: Counter align(std.atomic.cache_line) = .init(0),
     total: Counter = .init(0),
     /// Traced since the work began.
     rays: Counter = .init(0),
+    /// Which picture is made, from 1 on, and of how many; 0: it is not known yet.
+    picture: Counter = .init(0),
+    picture_count: Counter = .init(0),
     context: *anyopaque,
     /// Told of what begins, by the thread that begins it.
     begun: *const fn (context: *anyopaque, work: *const Work) void,
@@ -81,6 +84,13 @@ pub const Progress = struct {
     pub fn addRays(optional: ?*Progress, count: u64) void {
         const progress = optional orelse return;
         _ = progress.rays.fetchAdd(@truncate(count), .monotonic);
+    }
+
+    /// Begins a picture, from 1 on, of so many.
+    pub fn beginPicture(optional: ?*Progress, number: usize, count: usize) void {
+        const progress = optional orelse return;
+        progress.picture_count.store(count, .monotonic);
+        progress.picture.store(number, .monotonic);
     }
 
     /// Sets the counters to those of work that begins.
@@ -121,6 +131,10 @@ test "stages tell what they begin, and nobody who does not listen" {
     try std.testing.expectEqual(2, listener.progress.done.load(.monotonic));
     try std.testing.expectEqual(9, listener.progress.total.load(.monotonic));
     try std.testing.expectEqual(0, listener.progress.rays.load(.monotonic));
+    Progress.beginPicture(progress, 2, 3);
+    try std.testing.expectEqual(2, listener.progress.picture.load(.monotonic));
+    try std.testing.expectEqual(3, listener.progress.picture_count.load(.monotonic));
+    Progress.beginPicture(null, 2, 3);
     Progress.begin(null, .{ .stage = .tree });
     Progress.add(null, 1);
     Progress.addRays(null, 1);

@@ -23,6 +23,8 @@ pub const image = @import("image.zig");
 /// The project's licence and those of what a program is made of.
 pub const licenses = @import("licenses").text;
 pub const info = @import("info.zig");
+pub const json_text = @import("json_text.zig");
+pub const manifest = @import("manifest.zig");
 pub const math = @import("math.zig");
 pub const memory_account = @import("memory_account.zig");
 pub const output = @import("output.zig");

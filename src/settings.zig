@@ -30,6 +30,10 @@ pub const Range = struct {
     }
 };
 
+/// Longest line of a job, in bytes.
+pub const job_bytes_max = 1 << 20;
+/// Pixels on the side of one that a size is given in.
+pub const pixel_ratio: Range = .{ .min = 1, .max = 8, .default = 1 };
 /// Threads; by default as many as there are processors.
 pub const thread_count: Range = .{ .min = 1, .max = 256 };
 /// Samples a pixel; in small pictures each pixel has more to show.
@@ -65,6 +69,8 @@ pub const pixel_count_max = 1 << 28;
 pub const long_side: Range = .{ .min = 1, .max = 1 << 14, .default = side.default };
 /// Parts of a picture that are tiles.
 pub const part_count: Range = .{ .min = 1, .max = 1 << 16 };
+/// Quality of a WebP that loses information.
+pub const webp_quality: Range = .{ .min = 1, .max = 100 };
 /// Frames of a film, and pictures that are numbered.
 pub const frame_count_max = 1_000_000;
 /// Files that are rendered side by side.
@@ -77,6 +83,8 @@ pub const jpeg_quality: Range = .{ .min = 1, .max = 100, .default = 90 };
 pub const exposure_ev_max = 64;
 /// Directional lights a sample that stand for an environment, to find how much of it arrives.
 pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4 };
+/// And where they are all the light there is.
+pub const occlusion_shadow_count = 16;
 /// And where a floor catches their shadows, unless the user says.
 pub const floor_shadow_count = 16;
 /// See `Lights`.
@@ -107,6 +115,8 @@ pub const Format = enum {
     ppm,
     /// Its relative for floats, linear: the picture itself, bit for bit, without alpha.
     pfm,
+    /// Lossless, unless a quality is asked for.
+    webp,
     /// OpenEXR: linear, halves or floats, with alpha where the background is transparent.
     exr,
     /// YUV4MPEG2: frames of a film, one after the other.
@@ -116,16 +126,41 @@ pub const Format = enum {
 /// What colours are in an OpenEXR file.
 pub const ExrKind = enum { half, float };
 
-/// What is known of pixels besides their colours, for other programs: channels of an OpenEXR file.
+/// What is known of pixels besides their colours, for other programs: channels of an OpenEXR file,
+/// or files of their own.
 pub const Layer = enum {
-    /// Share of white light that what is seen sends to the camera.
-    albedo,
-    /// Its unit normal in the world's axes.
-    normal,
     /// Distance from the camera's plane in metres.
     depth,
+    /// Unit normal in the world's axes.
+    normal,
+    /// Share of white light that what is seen sends to the camera.
+    albedo,
+    /// Texture coordinates of the first set.
+    uv,
+    /// Numbers that the file gives to the node, to the material, and to the primitive of the mesh.
+    node,
+    material,
+    primitive,
+    /// Share of the pixel that surfaces cover.
+    alpha,
+    /// Place in the world's axes in metres.
+    position,
+    /// Tests of rays with boxes and triangles.
+    cost,
     /// Variance of the mean of the pixel's samples, before it is denoised.
     variance,
+};
+
+/// Quick looks, in place of what light makes of a scene.
+pub const Shade = enum {
+    /// Ambient occlusion: light from everywhere on white clay.
+    ao,
+    /// Unit normals in the world's axes as colours.
+    normal,
+    /// Texture coordinates as colours.
+    uv,
+    /// Tests of rays with boxes and triangles as a heat map.
+    cost,
 };
 
 /// Care taken over the tree of the scene: time to build it against time to trace rays through it.
@@ -281,6 +316,8 @@ pub const Environment = struct {
         default,
         none,
         studio,
+        /// As much from everywhere, for quick looks.
+        white,
         /// An image by its name.
         file: []const u8,
     };
@@ -395,10 +432,13 @@ pub const View = struct {
     display_referred: bool = true,
     /// Within `point_size`.
     point_size: f32 = point_size.default,
+    /// Null: what light makes of it. Asserts that the integrator is Whitted's.
+    shade: ?Shade = null,
 
     /// Directional lights a sample that stand for the environment.
     pub fn shadowCount(view: *const View) u32 {
         if (view.environment.shadow_count) |count| return count;
+        if (view.shade == .ao) return occlusion_shadow_count;
         return if (view.floor == .shadow) floor_shadow_count else environment_shadow_count.default;
     }
 };
@@ -475,6 +515,9 @@ pub const Part = union(enum) {
 /// How rays are traced.
 pub const Render = struct {
     part: Part = .whole,
+    /// It is to be merged with the others: what needs all of the picture is left to that. Of tiles
+    /// always.
+    is_merged: bool = false,
     integrator: Integrator = .whitted,
     lights: Lights = .{},
     /// Index into `variant.compiled`.
@@ -519,7 +562,11 @@ pub const Write = struct {
     tone_mapping: ToneMapping = .neutral,
     /// Within `jpeg_quality`.
     jpeg_quality: u32 = jpeg_quality.default,
+    /// Within `webp_quality`; null: without loss.
+    webp_quality: ?u32 = null,
     exr_kind: ExrKind = .half,
+    /// Layers are in files of their own.
+    layers_apart: bool = false,
 };
 
 test FrameRate {

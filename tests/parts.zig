@@ -69,6 +69,7 @@ const Bench = struct {
     ) !void {
         var chosen = choices;
         chosen.part = part;
+        chosen.is_merged = part != .whole and write.format == .exr;
         try bench.session.render(chosen);
         var target = try bench.open(name);
         try bench.session.write(&target, write);
@@ -148,15 +149,12 @@ test "parts by all integrators have the whole's pixels, and merge into its files
             .depth = 1,
             .lights = .{ .virtual_count = 9, .sky_count = 9 },
         },
-        .{ .integrator = .path, .sample_count = 2, .depth = 2, .denoise = true },
+        .{ .integrator = .path, .sample_count = 2, .depth = 1, .denoise = true },
     }, 0..) |choices, index| {
         const format: settings.Format = if (index == 0) .exr else .png;
         const write: settings.Write = .{ .format = format };
         const part_file: settings.Write = .{ .format = .exr };
         try bench.render(choices, .whole, "whole", write);
-        var noisy = choices;
-        noisy.denoise = false;
-        try bench.session.render(noisy);
         const whole = bench.session.film.?;
         bench.session.film = null;
         defer {
@@ -166,6 +164,11 @@ test "parts by all integrators have the whole's pixels, and merge into its files
         for (crops, [_][]const u8{ "1", "2", "3" }) |part, name| {
             try bench.render(choices, part, name, part_file);
             const own = part.crop.pixels;
+            if (choices.denoise) {
+                var alone = choices;
+                alone.part = part;
+                try bench.session.render(alone);
+            }
             for (own[1]..own[3]) |y| for (own[0]..own[2]) |x| {
                 const found = bench.session.film.?.image.at(
                     @intCast(x - own[0]),

@@ -1,4 +1,4 @@
-"""Sends the code that runs on workers: the folder `remote`, as a zip of source for Dask's UploadFile.
+"""Sends the code that runs on workers: the folder `remote`, zipped, for Dask's UploadFile.
 
 The package in it is named by its contents, so that workers that serve several versions of this
 package, at the same time or one after the other, have each of them.

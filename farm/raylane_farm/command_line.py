@@ -63,7 +63,7 @@ def read(arguments: Sequence[str]) -> CommandLine:
     found = _parser().parse_args(own)
     if found.frames is None and found.turntable is None and found.tiles is None:
         raise FarmError(
-            "what to spread? --frames 1-240, --turntable 120, or --tiles 16 of one big picture", USAGE
+            "what to spread? --frames 1-240, --turntable 120, or --tiles 16 of a big picture", USAGE
         )
     frames = None if found.frames is None else ranges.parse(found.frames)
     pattern = template.of(found.output, frames is not None, found.turntable is not None)
@@ -92,8 +92,8 @@ def read(arguments: Sequence[str]) -> CommandLine:
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="python -m raylane_farm",
-        usage="python -m raylane_farm SCENE (--frames RANGE | --turntable N | --tiles N) [options]\n"
-        "                              [-- raylane options]",
+        usage="python -m raylane_farm SCENE (--frames RANGE | --turntable N | --tiles N)\n"
+        "                              [options] [-- raylane options]",
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -1,15 +1,17 @@
 """Leads a job: hands tasks to Dask, a few for each worker ahead, and takes their results.
 
 Dask moves the tasks of a lost worker to another one. What is left to do here: tasks that may only
-go to workers that are all lost, programs that fail on one machine (out of memory, disk full) and may
-not on another, and the end, by success, by the first error or by a signal.
+go to workers that are all lost, programs that fail on one machine (out of memory, disk full) and
+may not on another, and the end, by success, by the first error or by a signal.
 """
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import time
-from typing import Any, Callable, Dict, Set, Tuple
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Dict, Set, Tuple
 
 from distributed import Client, Future
 from distributed.scheduler import KilledWorker
@@ -27,10 +29,13 @@ AHEAD = 2
 TICK_S = 1.0
 # How long the result of a task that is done may take to arrive.
 RESULT_TIMEOUT_S = 120
+FETCHER_COUNT = 8
 # How often a task may fail for what may be its machine's fault.
 TRIES = 3
 # Exit codes that say so: files or memory, or ended by a signal.
 MACHINE_CODES = (1, *range(129, 256))
+# How the program marks what is odd but harmless; what else it says is its progress.
+WARNING = " warning: "
 
 
 class Farm:
@@ -55,7 +60,9 @@ class Farm:
         self._scene = scene
         self._progress = progress
         self._is_quiet = is_quiet
-        self._events: "queue.SimpleQueue[Future]" = queue.SimpleQueue()
+        self._events: "queue.SimpleQueue[Tuple[Future, Any]]" = queue.SimpleQueue()
+        # That a result's worker is lost takes long to find out, which others need not wait for.
+        self._fetchers = ThreadPoolExecutor(FETCHER_COUNT, thread_name_prefix="fetch")
         # By key: the task, and who may do it.
         self._pending: Dict[str, Tuple[Task, Future, Set[str]]] = {}
         self._failures: Dict[Tuple[Any, ...], int] = {}
@@ -72,7 +79,7 @@ class Farm:
         while not self._work.is_done():
             self._submit()
             try:
-                self._finish(self._events.get(timeout=TICK_S))
+                self._finish(*self._events.get(timeout=TICK_S))
             except queue.Empty:
                 pass
             now = time.monotonic()
@@ -107,21 +114,31 @@ class Farm:
                 pure=False,
             )
             self._pending[key] = (task, future, set(addresses))
-            future.add_done_callback(self._events.put)
+            future.add_done_callback(self._fetch_later)
 
-    def _finish(self, future: Future) -> None:
+    def _fetch_later(self, future: Future) -> None:
+        with contextlib.suppress(RuntimeError):  # The job has ended.
+            self._fetchers.submit(self._fetch, future)
+
+    def _fetch(self, future: Future) -> None:
+        result: Any
+        try:
+            result = future.result(timeout=RESULT_TIMEOUT_S)
+        except Exception as error:  # pylint: disable=broad-except
+            result = error
+        self._events.put((future, result))
+
+    def _finish(self, future: Future, result: Any) -> None:
         entry = self._pending.get(future.key)
         if entry is None or entry[1] is not future:
             return
         del self._pending[future.key]
         task = entry[0]
-        try:
-            result = future.result(timeout=RESULT_TIMEOUT_S)
-        except KilledWorker as error:
-            raise FarmError(f"{self._scene.name}: every worker that tried was lost: {error}") from None
-        except Exception as error:  # pylint: disable=broad-except
+        if isinstance(result, KilledWorker):
+            raise FarmError(f"{self._scene.name}: every worker that tried was lost: {result}")
+        if isinstance(result, BaseException):
             # A worker's disk is full, or its result was lost on the way.
-            self._fail(task, f"{type(error).__name__}: {error}", 1)
+            self._fail(task, f"{type(result).__name__}: {result}", 1)
             return
         if result.code != 0:
             self._fail(task, self._reason(result), result.code)
@@ -146,9 +163,9 @@ class Farm:
         return text
 
     def _repeat(self, stderr: str) -> None:
-        """Prints what the program says, each line once."""
+        """Prints the program's warnings, each once."""
         for line in self._own_names(stderr).splitlines():
-            if line not in self._said:
+            if WARNING in line and line not in self._said:
                 self._said.add(line)
                 self._progress.say(line)
 
@@ -167,6 +184,7 @@ class Farm:
 
     def stop(self) -> None:
         """Cancels what is out, and ends what runs."""
+        self._fetchers.shutdown(wait=False)
         futures = [future for _, future, _ in self._pending.values()]
         self._pending.clear()
         if futures:

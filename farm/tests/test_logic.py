@@ -1,4 +1,4 @@
-"""What needs neither Dask nor the program: ranges, names, batches, options, files of a scene, cache."""
+"""What needs neither Dask nor the program: ranges, names, batches, options, scenes, the cache."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import json
 import os
 import stat
 import tempfile
+import threading
+import time
 import unittest
 from unittest import mock
 
@@ -25,7 +27,9 @@ RANGES = (
     "1 - 5", "1 - -1", "-1 - 1", "1-5:2", "10-15:2,1-5", "1-10:4", "100,-1--2:-1,3-5,\t7 ",
     "10-1:-2", "2147483647,-2147483648",
 )
-NO_RANGES = ("", "a", "1-", "-", "1,,2", "1-5:0", "1:2", "1 2", "+1", "1-2-3", "1.5", "5,5", "9-2:-3,4")
+NO_RANGES = (
+    "", "a", "1-", "-", "1,,2", "1-5:0", "1:2", "1 2", "+1", "1-2-3", "1.5", "5,5", "9-2:-3,4",
+)
 
 
 def read(path):
@@ -74,7 +78,8 @@ class TemplateTest(unittest.TestCase):
     """Names of pictures."""
 
     def test_the_folder_in_front_is_the_clients(self):
-        self.assertEqual(("out", "{model}/{frame:4}.png"), template.split("out/{model}/{frame:4}.png"))
+        text = "{model}/{frame:4}.png"
+        self.assertEqual(("out", text), template.split(f"out/{text}"))
         self.assertEqual((".", "x{frame}.png"), template.split("x{frame}.png"))
         self.assertEqual(("/", "{frame}.png"), template.split("/{frame}.png"))
         self.assertEqual(("/a", "b.png"), template.split("/a/b.png"))
@@ -122,8 +127,8 @@ class OptionsTest(unittest.TestCase):
     """What is handed on."""
 
     def test_files_and_options_of_reading_are_found(self):
-        words = ["--scene=1", "-qt4", "--env", "sky.hdr", "--allow-outside", "-r", "64", "--eye", "-1,2,3"]
-        found = options.read(words)
+        words = ["--scene=1", "-qt4", "--env", "sky.hdr", "--allow-outside", "-r", "64"]
+        found = options.read([*words, "--eye", "-1,2,3"])
         self.assertEqual(["--scene", "1", "--allow-outside"], found.load)
         self.assertEqual([(3, "", "sky.hdr")], found.files)
         self.assertTrue(found.is_quiet)
@@ -141,7 +146,8 @@ class OptionsTest(unittest.TestCase):
         self.assertEqual([1, 2, 3], line.frames)
         self.assertEqual("{model}_{frame:4}.png", line.pattern)
         self.assertEqual(["-r", "64", "--"], line.options)
-        self.assertEqual(500 << 20, command_line.read(["a", "--tiles=4", "--cache-size=500M"]).cache_bytes)
+        line = command_line.read(["a", "--tiles=4", "--cache-size=500M"])
+        self.assertEqual(500 << 20, line.cache_bytes)
         for words in (
             [], ["a"], ["a", "--frames=1", "--tiles=0"], ["a", "--frames=1-2", "-o", "b.png"],
             ["a", "--frames=1", "--workers=2", "--scheduler=tcp://b:1"], ["a", "--tile=4"],
@@ -380,9 +386,11 @@ class OutputTest(FolderTest):
         progress.step(1, 2)
         progress.step(3, 1)
         first, last = [json.loads(line) for line in stream.getvalue().splitlines()]
-        self.assertEqual((1, 4, "frames", 2), tuple(first[k] for k in ("done", "total", "unit", "workers")))
+        keys = ("done", "total", "unit", "workers")
+        self.assertEqual([1, 4, "frames", 2], [first[key] for key in keys])
         self.assertEqual(0, last["seconds_left"])
-        self.assertEqual(["12.3 s", "2 min", "2 h 00 min"], [duration(s) for s in (12.3, 130, 7200)])
+        texts = [duration(seconds) for seconds in (12.3, 130, 7200)]
+        self.assertEqual(["12.3 s", "2 min", "2 h 00 min"], texts)
 
 
 class ProgramTest(FolderTest):
@@ -400,8 +408,15 @@ class ProgramTest(FolderTest):
         self.assertEqual((0, b"out", "raylane: x: 0\n"), (run.code, run.stdout, run.stderr))
         run = runner.run(["1"])
         self.assertEqual((137, "raylane: x: 1"), (run.code, program.reason(run)))
+        said = "raylane: a: is broken\nraylane: 0 pictures in 2.5 s, 1 failure\n"
+        self.assertEqual("raylane: a: is broken", program.reason(program.Run(3, b"", said)))
         self.assertEqual("ended by signal 9", program.reason(program.Run(137, b"", "")))
-        runner.stop()
+        # What a script starts holds the pipes as long as it runs.
+        runner = self.program("sleep 60; true")
+        threading.Timer(0.2, runner.stop).start()
+        start = time.monotonic()
+        self.assertEqual(143, runner.run([]).code)
+        self.assertLess(time.monotonic() - start, 30)
         self.assertEqual(143, runner.run(["0"]).code)
 
     def test_which_it_is(self):
@@ -411,8 +426,9 @@ class ProgramTest(FolderTest):
         self.assertIsNone(program.difference(own, own))
         other = program.Identity("raylane 7", "0")
         self.assertIn("another picture", program.difference(own, other))
-        with mock.patch.dict(os.environ, RAYLANE="/no/such"), self.assertRaises(program.ProgramMissing):
-            program.identity()
+        with mock.patch.dict(os.environ, RAYLANE="/no/such"):
+            with self.assertRaises(program.ProgramMissing):
+                program.identity()
 
 
 if __name__ == "__main__":

@@ -57,7 +57,8 @@ pub const Flag = struct {
         return std.mem.eql(u8, flag.long[2..], name) or holds(flag.also, name);
     }
 
-    fn isMeant(flag: *const Flag, name: []const u8) bool {
+    /// Whether it is the answer to that name.
+    pub fn isMeant(flag: *const Flag, name: []const u8) bool {
         return holds(flag.meant, name);
     }
 

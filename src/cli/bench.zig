@@ -72,7 +72,11 @@ pub const sections: []const Section = &.{
             }),
         },
         .{ .usage = "-t, --threads N", .help = "threads (default: as many as CPUs)" },
-        .{ .usage = "--bvh QUALITY", .words = arguments_file.wordsOf(settings.TreeQuality), .help = arguments_file.namesOf(settings.TreeQuality) },
+        .{
+            .usage = "--bvh QUALITY",
+            .words = arguments_file.wordsOf(settings.TreeQuality),
+            .help = arguments_file.namesOf(settings.TreeQuality),
+        },
         .{
             .usage = "--integrator NAME",
             .words = arguments_file.wordsOf(settings.Integrator),

@@ -41,7 +41,11 @@ pub const sections: []const Section = &.{
             .usage = "--exposure EV",
             .help = "brighten images of radiance by EV stops (default: 0)",
         },
-        .{ .usage = "--stats FORM", .words = arguments_file.wordsOf(cli.Stats), .help = "text (default), json or none" },
+        .{
+            .usage = "--stats FORM",
+            .words = arguments_file.wordsOf(cli.Stats),
+            .help = "text (default), json or none",
+        },
         .{ .usage = "-h, --help", .help = "print this" },
     } },
 };

@@ -4,6 +4,7 @@
 //! files may follow them, and what each is for, where the shell shows that.
 
 const std = @import("std");
+const cli = @import("../cli.zig");
 const page_file = @import("page.zig");
 const Entry = page_file.Entry;
 const Page = page_file.Page;
@@ -11,6 +12,21 @@ const Writer = std.Io.Writer;
 
 /// A shell that is known.
 pub const Shell = enum { bash, zsh, fish };
+
+/// What `raylane completion --help` prints.
+pub const help: []const u8 = "raylane " ++ cli.version ++
+    \\: prints a script that completes its options in a shell
+    \\
+    \\usage: raylane completion bash|zsh|fish
+    \\
+    \\For this shell alone, or wherever the shell looks for such files:
+    \\
+    \\  source <(raylane completion bash)
+    \\  raylane completion bash > ~/.local/share/bash-completion/completions/raylane
+    \\  raylane completion zsh > a folder of fpath, there called _raylane
+    \\  raylane completion fish > ~/.config/fish/completions/raylane.fish
+    \\
+;
 
 /// Writes the script.
 pub fn write(writer: *Writer, shell: Shell, pages: []const Page) Writer.Error!void {

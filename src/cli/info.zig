@@ -25,7 +25,11 @@ pub const sections: []const Section = &.{
             .usage = "--material-variant N",
             .help = "name or index of one of its variants of materials",
         },
-        .{ .usage = "--up-axis AXIS", .words = arguments_file.wordsOf(settings.UpAxis), .help = "y or z: which axis of the file points up" },
+        .{
+            .usage = "--up-axis AXIS",
+            .words = arguments_file.wordsOf(settings.UpAxis),
+            .help = "y or z: which axis of the file points up",
+        },
         .{
             .usage = "--format-in FORMAT",
             .words = arguments_file.wordsOf(settings.SceneFormat),

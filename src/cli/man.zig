@@ -3,11 +3,25 @@
 //! In: the commands. Out: roff with the macros of man(7), for man, groff and mandoc alike.
 
 const std = @import("std");
+const cli = @import("../cli.zig");
 const page_file = @import("page.zig");
 const writeEscaped = @import("completion.zig").writeEscaped;
 const Entry = page_file.Entry;
 const Page = page_file.Page;
 const Writer = std.Io.Writer;
+
+/// What `raylane man --help` prints.
+pub const help: []const u8 = "raylane " ++ cli.version ++
+    \\: prints its manual's page, as roff
+    \\
+    \\usage: raylane man
+    \\
+    \\To read it, or to keep it where man looks:
+    \\
+    \\  raylane man | man -l -
+    \\  raylane man > ~/.local/share/man/man1/raylane.1
+    \\
+;
 
 /// Writes the page of all commands, that without a word first.
 pub fn write(writer: *Writer, version: []const u8, pages: []const Page) Writer.Error!void {

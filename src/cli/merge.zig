@@ -20,7 +20,10 @@ pub const Merge = struct {
     memory_max: ?u64 = null,
 
     /// Names of the parts, as given; the caller frees the list.
-    pub fn parts(merge: *const Merge, gpa: std.mem.Allocator) error{OutOfMemory}![]const []const u8 {
+    pub fn parts(
+        merge: *const Merge,
+        gpa: std.mem.Allocator,
+    ) error{OutOfMemory}![]const []const u8 {
         const list = try gpa.alloc([]const u8, merge.part_count);
         var diagnostic: Diagnostic = .{};
         var reader = readerOf(merge.arguments, &diagnostic);

@@ -3,6 +3,7 @@
 const std = @import("std");
 const exit_code = @import("exit_code.zig");
 const raylane = @import("raylane");
+const Allocator = std.mem.Allocator;
 const signals = @import("../signals.zig");
 const Account = raylane.memory_account.Account;
 const Diagnostic = raylane.diagnostic.Diagnostic;
@@ -45,6 +46,20 @@ pub fn writeToStdout(
 ) raylane.output.TargetError!void {
     var target: Target = .openStdout(io);
     return target.finish(&.{text}, diagnostic);
+}
+
+/// Prints the JSON of what went wrong, to standard error where a picture has the output. In words
+/// it has been said already.
+pub fn printFailure(
+    gpa: Allocator,
+    io: Io,
+    failure: *const raylane.report.Failure,
+    to_stderr: bool,
+) void {
+    var text: Io.Writer.Allocating = .init(gpa);
+    defer text.deinit();
+    raylane.report.writeFailure(failure, &text.writer) catch return;
+    if (to_stderr) say(io, "{s}", .{text.written()}) else _ = print(io, text.written());
 }
 
 /// Says something of a scene.

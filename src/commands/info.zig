@@ -27,7 +27,19 @@ pub fn run(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagno
     outcome catch |err| {
         if (err == error.WriteFailed) return console.outOfMemory(io);
         const place = console.placeOf(diagnostic, scene);
-        return console.fail(&account, io, place, @errorCast(err), diagnostic);
+        const code = console.fail(&account, io, place, @errorCast(err), diagnostic);
+        if (!options.json) return code;
+        text.clearRetainingCapacity();
+        var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
+        raylane.info.writeFailure(
+            cli.version,
+            scene,
+            &.of(diagnostic, scene, @backingInt(code)),
+            diagnostic.warningTexts(&warnings),
+            &text.writer,
+        ) catch return console.outOfMemory(io);
+        _ = console.print(io, text.written());
+        return code;
     };
     return console.print(io, text.written());
 }

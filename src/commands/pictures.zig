@@ -15,6 +15,7 @@ const Allocator = std.mem.Allocator;
 const Batch = batch_file.Batch;
 const Io = std.Io;
 const Options = raylane.cli.Options;
+const Progress = raylane.progress.Progress;
 const Report = raylane.report.Report;
 const Session = raylane.session.Session;
 const Target = raylane.output.Target;
@@ -203,6 +204,9 @@ pub const Pictures = struct {
         for (plan.frames) |frame| for (plan.views, 0..) |view, index| {
             if (pictures.batch.isStopped()) return;
             defer pictures.number += 1;
+            const count = plan.pictureCount();
+            const progress = pictures.session.pool.progress;
+            Progress.beginPicture(progress, pictures.number % count + 1, count);
             try pictures.setName(frame, view);
             if (pictures.isSkipped()) {
                 pictures.batch.add(.skipped, 1);
@@ -269,6 +273,7 @@ pub const Pictures = struct {
             .sharing = .of(options.instances),
             .animation = options.animation,
             .view = options.view,
+            .layers = options.render.layers,
         });
         pictures.posed = .{ .frame = frame, .camera = options.view.camera };
     }
@@ -305,6 +310,7 @@ pub const Pictures = struct {
             error.OutOfMemory, error.Canceled => |other| other,
             error.InputOutput => error.OutputFailed,
         };
+        try pictures.writeLayers();
         var report = session.report(options.render);
         report.version = raylane.cli.version;
         report.scene = options.scene;
@@ -312,6 +318,28 @@ pub const Pictures = struct {
         if (options.count_tests) report.tests = try session.countTests(options.render);
         pictures.batch.add(.written, 1);
         try pictures.say(&report);
+    }
+
+    /// Layers in files of their own, where the names say so.
+    fn writeLayers(pictures: *Pictures) Error!void {
+        const values = &pictures.values;
+        const write = &pictures.options.write;
+        if (!write.layers_apart) return;
+        const color = values.layer;
+        var layers = pictures.options.render.layers.iterator();
+        while (layers.next()) |layer| {
+            values.layer = @tagName(layer);
+            try pictures.setName(values.frame, values.view);
+            if (pictures.isSkipped()) continue;
+            try pictures.claim();
+            var target = try pictures.openFile();
+            pictures.session.writeLayer(layer, &target, write.*) catch |err| return switch (err) {
+                error.OutOfMemory, error.Canceled => |other| other,
+                error.InputOutput => error.OutputFailed,
+            };
+        }
+        values.layer = color;
+        try pictures.setName(values.frame, values.view);
     }
 
     /// Whether nothing else is to be made of the file.
@@ -362,7 +390,7 @@ pub const Pictures = struct {
         };
     }
 
-    /// The place of the picture that is named, which nobody else may have.
+    /// The place of the picture that is named.
     fn open(pictures: *Pictures) Error!Target {
         const is_film = pictures.options.write.format == .y4m;
         pictures.options.write.is_continued = is_film and pictures.begun_count > 0;
@@ -374,15 +402,7 @@ pub const Pictures = struct {
             try pictures.finishFilm();
         }
         pictures.options.write.is_continued = false;
-        const is_own = try pictures.batch.claim(path, .{
-            .file = pictures.file_index,
-            .number = pictures.number,
-        });
-        if (!is_own) return pictures.session.diagnostic.fail(
-            error.OutputFailed,
-            "it is the name of another picture, too",
-            .{},
-        );
+        try pictures.claim();
         const target = pictures.ahead orelse try pictures.openFile();
         pictures.ahead = null;
         if (!is_film) return target;
@@ -391,6 +411,19 @@ pub const Pictures = struct {
             .name = try pictures.arena.allocator().dupe(u8, path),
         };
         return pictures.film.?.target.part();
+    }
+
+    /// Makes the name this picture's, which nobody else may have.
+    fn claim(pictures: *Pictures) Error!void {
+        const is_own = try pictures.batch.claim(pictures.name.written(), .{
+            .file = pictures.file_index,
+            .number = pictures.number,
+        });
+        if (!is_own) return pictures.session.diagnostic.fail(
+            error.OutputFailed,
+            "it is the name of another picture, too",
+            .{},
+        );
     }
 
     fn openFile(pictures: *Pictures) error{OutputFailed}!Target {
@@ -431,16 +464,14 @@ pub const Pictures = struct {
         const taken_ns: u64 = @intCast(pictures.start.durationTo(now).toNanoseconds());
         pictures.start = now;
         const seconds = @as(f64, @floatFromInt(taken_ns)) / std.time.ns_per_s;
-        // Where it is the only one, the line of the file says it.
-        const is_said = !options.quiet and options.progress.form == .auto;
-        const is_only = batch.plan.files.len > 1 and pictures.isAlone();
-        if (is_said and !is_only) console.say(batch.io, "raylane: {f}: {f}, {d}x{d}, {d:.2} s\n", .{
-            printable(raylane.parse.title(options.scene)),
-            printable(measured.output),
-            measured.width,
-            measured.height,
-            seconds,
-        });
+        // Not among lines for programs.
+        const is_told = options.progress.form == .json and options.progress.file == null;
+        if (!options.quiet and !is_told) console.sayOf(
+            batch.io,
+            options.scene,
+            "{f}, {d}x{d}, {d:.2} s",
+            .{ printable(measured.output), measured.width, measured.height, seconds },
+        );
         var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
         var report = measured.*;
         report.warnings = pictures.session.diagnostic.warningTexts(&warnings);

@@ -22,19 +22,53 @@ const printable = raylane.diagnostic.printable;
 
 /// Renders, then says what it cost or why it failed.
 pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnostic) ExitCode {
-    const chosen = &options.render;
-    const names = raylane.variant.names;
-    if (chosen.integrator != .whitted and raylane.variant.litIndexOf(chosen.variant) == null) {
-        console.say(io, "raylane: variant '{s}' has no integrator '{t}', but '{s}' has\n", .{
-            names[chosen.variant], chosen.integrator, names[0],
-        });
-        return .usage;
-    }
+    checkVariant(&options.render, diagnostic) catch {
+        console.say(io, "raylane: {s}\n", .{diagnostic.message.text()});
+        return failed(gpa, io, options, null, "", .usage, diagnostic);
+    };
     if (options.toStdout() and console.isTerminal(io)) return .usage;
     if (options.isBatch() or isFolder(io, options.scene))
         return batch.run(gpa, io, options, diagnostic);
     var account: Account = .init(gpa, options.memory_max);
     return renderAndReport(&account, io, options, diagnostic);
+}
+
+/// Refuses an integrator that the variant was built without.
+pub fn checkVariant(
+    chosen: *const raylane.settings.Render,
+    diagnostic: *Diagnostic,
+) error{UsageInvalid}!void {
+    if (chosen.integrator == .whitted) return;
+    if (raylane.variant.litIndexOf(chosen.variant) != null) return;
+    const names = raylane.variant.names;
+    return diagnostic.fail(
+        error.UsageInvalid,
+        "variant '{s}' has no integrator '{t}', but '{s}' has",
+        .{ names[chosen.variant], chosen.integrator, names[0] },
+    );
+}
+
+/// Prints what there is instead of the report that was asked for.
+fn failed(
+    gpa: Allocator,
+    io: Io,
+    options: *const Options,
+    output: ?[]const u8,
+    file: []const u8,
+    code: ExitCode,
+    diagnostic: *const Diagnostic,
+) ExitCode {
+    if (options.stats != .json) return code;
+    var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
+    const failure: raylane.report.Failure = .{
+        .version = cli.version,
+        .scene = options.scene,
+        .output = output orelse options.output,
+        .problem = .of(diagnostic, file, @backingInt(code)),
+        .warnings = diagnostic.warningTexts(&warnings),
+    };
+    console.printFailure(gpa, io, &failure, options.toStdout());
+    return code;
 }
 
 fn isFolder(io: Io, path: []const u8) bool {
@@ -82,7 +116,8 @@ fn renderAndReport(
             job.failed_output orelse job.outputTitle()
         else
             console.placeOf(diagnostic, options.scene);
-        return console.fail(account, io, file, err, diagnostic);
+        const code = console.fail(account, io, file, err, diagnostic);
+        return failed(gpa, io, options, job.outputTitle(), file, code, diagnostic);
     };
     const exit_code = job.printReport(&report);
     if (exit_code != .ok or !report.is_partial) return exit_code;
@@ -129,6 +164,7 @@ const Job = struct {
             .sharing = .of(options.instances),
             .animation = options.animation,
             .view = options.view,
+            .layers = options.render.layers,
         });
         try session.view(options.view);
         job.sayWarnings();

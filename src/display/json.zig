@@ -18,6 +18,9 @@ pub fn write(writer: *Writer, stage: []const u8, standing: *const Standing) Writ
         .elapsed_s = rounded(standing.elapsed_s, 1e3),
         .left_s = rounded(standing.left_s, 10),
         .rays_per_s = rounded(standing.rays_per_s, 1),
+        .picture = standing.picture,
+        .pictures = standing.pictures,
+        .pictures_left_s = rounded(standing.pictures_left_s, 10),
         .file = Text{ .bytes = standing.place.name },
         .index = standing.place.index,
         .count = standing.place.count,
@@ -54,6 +57,9 @@ test write {
         elapsed_s: f64,
         left_s: ?f64,
         rays_per_s: ?f64,
+        picture: ?u64,
+        pictures: ?u64,
+        pictures_left_s: ?f64,
         file: []const u8,
         index: u32,
         count: u32,
@@ -69,6 +75,7 @@ test write {
     try std.testing.expectEqual(64.3, found.left_s.?);
     try std.testing.expectEqual(35_240_001, found.rays_per_s.?);
     try std.testing.expectEqual(12, found.done.?);
+    try std.testing.expectEqual(null, found.picture);
 
     standing.fraction = null;
     standing.left_s = null;

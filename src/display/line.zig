@@ -59,10 +59,12 @@ pub const text_bytes_max = 1024;
 fn writeText(writer: *Writer, standing: *const Standing, under_way: usize) Writer.Error!void {
     try writePlace(writer, standing.place);
     if (under_way > 1) try writer.print(" and {d} more", .{under_way - 1});
+    const pictures = standing.pictures orelse 1;
+    if (pictures > 1) try writer.print(", picture {d}/{d}", .{ standing.picture.?, pictures });
     try writer.print(": {t}", .{standing.stage});
     if (standing.fraction) |fraction| try writer.print(" {d:.0}%", .{@floor(100 * fraction)});
     try writeUnits(writer, standing);
-    if (standing.left_s) |left_s| {
+    if (if (pictures > 1) standing.pictures_left_s else standing.left_s) |left_s| {
         try writer.writeAll(", ");
         try writeDuration(writer, left_s);
         try writer.writeAll(" left");
@@ -151,6 +153,14 @@ test "a standing in words" {
     );
     try testing.expectEqualStrings("", write(&buffer, &tracing_for_test, 1, 1));
     var standing = tracing_for_test;
+    standing.picture = 7;
+    standing.pictures = 240;
+    standing.pictures_left_s = 50;
+    try testing.expectEqualStrings(
+        "3/60 Fox.glb, picture 7/240: tracing 19%, 12 of 64 samples, 50 s left, 35.2 Mrays/s",
+        write(&buffer, &standing, 1, 100),
+    );
+    standing.pictures = 1;
     standing.place = .{ .index = 1, .count = 1, .name = "-" };
     standing.total = null;
     standing.left_s = null;

@@ -25,6 +25,10 @@ pub const Times = struct {
     work_s: f64,
     /// Since then.
     idle_s: f64 = 0,
+    /// How many of the file's pictures were made, and in what time; since then.
+    picture_count: usize = 0,
+    pictures_s: f64 = 0,
+    picture_idle_s: f64 = 0,
 };
 
 /// At one moment.
@@ -43,6 +47,11 @@ pub const Standing = struct {
     left_s: ?f64,
     /// Since the stage began; null: it traces none.
     rays_per_s: ?f64,
+    /// Of the file's, from 1 on, and how many it has; null: not known.
+    picture: ?u64 = null,
+    pictures: ?u64 = null,
+    /// Until all of them are made; null: not known.
+    pictures_left_s: ?f64 = null,
 
     pub fn of(
         place: Place,
@@ -83,7 +92,20 @@ pub const Standing = struct {
             standing.fraction = @max(standing.fraction orelse 0, 1 - left_s / budget_s);
             standing.left_s = @min(standing.left_s orelse left_s, left_s);
         }
+        standing.tellPictures(progress, times);
         return standing;
+    }
+
+    fn tellPictures(standing: *Standing, progress: *const Progress, times: Times) void {
+        const picture = progress.picture.load(.monotonic);
+        const count = progress.picture_count.load(.monotonic);
+        if (picture == 0 or picture > count) return;
+        standing.picture = picture;
+        standing.pictures = count;
+        if (times.picture_count == 0) return;
+        const picture_s = times.pictures_s / float(times.picture_count);
+        const left_s = picture_s * float(count - picture + 1);
+        standing.pictures_left_s = @max(@min(1, left_s), left_s - times.picture_idle_s);
     }
 };
 
@@ -154,4 +176,22 @@ test "a time for the work ends it, or its pieces do" {
     const by_pieces = ofForTest(&work, .{ 80, 100, 0 }, times);
     try testing.expectApproxEqAbs(0.8, by_pieces.fraction.?, 1e-9);
     try testing.expectApproxEqAbs(1, by_pieces.left_s.?, 1e-9);
+}
+
+test "of ten pictures, two were made in 6 s" {
+    const progress: Progress = .{
+        .picture = .init(3),
+        .picture_count = .init(10),
+        .context = undefined,
+        .begun = undefined,
+    };
+    const place: Place = .{ .index = 1, .count = 1, .name = "a.glb" };
+    var times: Times = .{ .file_s = 9, .work_s = 0, .pictures_s = 6, .picture_idle_s = 1 };
+    const early: Standing = .of(place, &.{ .stage = .view }, &progress, times);
+    try testing.expectEqual(3, early.picture.?);
+    try testing.expectEqual(10, early.pictures.?);
+    try testing.expectEqual(null, early.pictures_left_s);
+    times.picture_count = 2;
+    const later: Standing = .of(place, &.{ .stage = .view }, &progress, times);
+    try testing.expectEqual(23, later.pictures_left_s.?);
 }

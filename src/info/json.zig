@@ -9,6 +9,7 @@ const Info = info_file.Info;
 const Stringify = std.json.Stringify;
 const Text = report.Text;
 const Writer = std.Io.Writer;
+const writeFields = report.writeFields;
 
 /// Writes all that is known, and a line end.
 pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
@@ -19,6 +20,7 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     try json.beginObject();
     try writeFields(&json, .{
         .version = Text{ .bytes = info.version },
+        .@"error" = null,
         .file = Text{ .bytes = info.name },
         .bytes = file.byte_count,
     });
@@ -65,12 +67,24 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     try writer.writeByte('\n');
 }
 
-/// The fields of a structure as keys of the object that is open.
-fn writeFields(json: *Stringify, fields: anytype) Writer.Error!void {
-    inline for (comptime std.meta.fieldNames(@TypeOf(fields))) |name| {
-        try json.objectField(name);
-        try json.write(@field(fields, name));
-    }
+/// Writes why a file cannot be described, and a line end.
+pub fn writeFailure(
+    version: []const u8,
+    file: []const u8,
+    problem: *const report.Problem,
+    warnings: []const []const u8,
+    writer: *Writer,
+) Writer.Error!void {
+    var json: Stringify = .{ .writer = writer };
+    try json.beginObject();
+    try writeFields(&json, .{
+        .version = Text{ .bytes = version },
+        .@"error" = problem,
+        .file = Text{ .bytes = file },
+        .warnings = report.Texts{ .list = warnings },
+    });
+    try json.endObject();
+    try writer.writeByte('\n');
 }
 
 fn optional(text: []const u8) ?Text {

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import dataclasses
 import functools
 import hashlib
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -19,6 +21,8 @@ PROBE = ("builtin:atrium", "-r", "48x32", "--spp", "1", "--depth", "4", "-q", "-
 PROBE_OUTPUT = ("--format", "ppm", "-o", "-")
 # Bytes of what a program may say that are kept.
 STDERR_BYTES_MAX = 1 << 16
+# What it says at the end of several pictures.
+SUMMARY = re.compile(r"raylane: [0-9]+ pictures? in ")
 
 
 class ProgramMissing(Exception):
@@ -84,7 +88,7 @@ class Runner:
             with self._lock:
                 del self._running[process.pid]
             if process.poll() is None:
-                process.kill()
+                _end(process, signal.SIGKILL)
                 process.wait()
         code = process.returncode if process.returncode >= 0 else 128 - process.returncode
         return Run(code, stdout, stderr[-STDERR_BYTES_MAX:].decode("utf-8", "replace"))
@@ -94,7 +98,13 @@ class Runner:
         with self._lock:
             self._is_stopped = True
             for process in self._running.values():
-                process.terminate()
+                _end(process, signal.SIGTERM)
+
+
+def _end(process: "subprocess.Popen[bytes]", number: int) -> None:
+    """With what it has started: the program may be a script that starts it."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, number)
 
 
 def _end_with_parent():
@@ -140,8 +150,10 @@ def difference(own: Identity, wanted: Identity) -> Optional[str]:
 
 
 def reason(run: Run) -> str:
-    """The last line of what a program said that failed."""
-    lines: List[str] = [line for line in run.stderr.splitlines() if line.strip()]
+    """Why a program failed: the last line that it said, but for a summary."""
+    lines: List[str] = [
+        line for line in run.stderr.splitlines() if line.strip() and not SUMMARY.match(line)
+    ]
     if lines:
         return lines[-1]
     if run.code > 128:

@@ -204,7 +204,8 @@ pub const Blocks = struct {
 
 test "blocks of a picture, those of tiles, and those side by side that are active" {
     const gpa = std.testing.allocator;
-    var blocks: Blocks = try .init(gpa, &.whole(70, 40), .{ .error_max = 0.1, .exposure_scale = 1 });
+    const noise: Noise = .{ .error_max = 0.1, .exposure_scale = 1 };
+    var blocks: Blocks = try .init(gpa, &.whole(70, 40), noise);
     defer blocks.deinit(gpa);
     try std.testing.expectEqual(5 * 3, blocks.states.len);
     var all = blocks.of(.{ .x0 = 32, .y0 = 16, .x1 = 70, .y1 = 40 });

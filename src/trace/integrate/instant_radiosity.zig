@@ -406,13 +406,13 @@ fn SharedOf(comptime Kernel: type) type {
 
         fn place(shared: *Self, band: u32) void {
             const part = bandOf(shared.settings.layout.?, band);
-            shared.layers.placeAll(shared.frame.view, part.traced);
+            shared.layers.placeAll(shared.frame.view, part.pixels);
         }
 
         fn filter(shared: *Self, band: u32, film: *Film) u64 {
             const part = bandOf(shared.settings.layout.?, band);
             const view = shared.frame.view;
-            return shared.layers.finish(film, view, &part.window, part.own);
+            return shared.layers.finish(film, view, &part.window, part.pixels);
         }
     };
 }
@@ -425,16 +425,16 @@ fn bandCount(layout: *const Layout) u32 {
     };
 }
 
-/// A piece: its window, and the pixels of it that are traced and those that are asked for.
-const Band = struct { window: Rectangle, traced: Rectangle, own: Rectangle };
+/// A piece, and the window that it is of.
+const Band = struct { window: Rectangle, pixels: Rectangle };
 
 fn bandOf(layout: *const Layout, number: u32) Band {
-    const window = layout.windowAt(if (layout.form == .share) number else 0);
-    var band: Band = .{ .window = window.traced, .traced = window.traced, .own = window.own };
-    if (layout.form == .share) return band;
-    band.traced.y0 += number * band_rows;
-    band.traced.y1 = @min(band.traced.y0 + band_rows, band.traced.y1);
-    band.own.y0 = @max(band.own.y0, band.traced.y0);
-    band.own.y1 = @max(band.own.y0, @min(band.own.y1, band.traced.y1));
+    const is_window = layout.form == .window;
+    const window = layout.windowAt(if (is_window) 0 else number).traced;
+    var band: Band = .{ .window = window, .pixels = window };
+    if (is_window) {
+        band.pixels.y0 += number * band_rows;
+        band.pixels.y1 = @min(band.pixels.y0 + band_rows, band.pixels.y1);
+    }
     return band;
 }

@@ -152,8 +152,8 @@ pub const Layers = struct {
     }
 
     /// Where a pixel of a rectangle is in the layers.
-    pub inline fn indexOf(layers: *const Layers, rectangle: *const Rectangle, x: u32, y: u32) usize {
-        const column, const row = rectangle.placeOf(x, y);
+    pub inline fn indexOf(layers: *const Layers, part: *const Rectangle, x: u32, y: u32) usize {
+        const column, const row = part.placeOf(x, y);
         return @as(usize, row) * layers.width + column;
     }
 

@@ -13,7 +13,8 @@
 //!
 //!     width, height, counts_tests               pixels of a bundle; whether tests are counted
 //!     init(gpa, frame, settings), deinit(gpa)   *I, one a thread
-//!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it
+//!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it, whose
+//!                                               places on the film `Rectangle.placeOf` says
 //!     counts()                                  of all its passes, `Counts`
 //!     tile_step                                 tiles' sides are multiples of it; none: of 1
 //!     Shared                                    what all threads' share; none, void: nothing
@@ -34,6 +35,7 @@ const Allocator = std.mem.Allocator;
 const Film = film_file.Film;
 const Layout = film_file.Layout;
 const Frame = world_file.Frame;
+const Look = @import("survey.zig").Look;
 const Progress = @import("../../progress.zig").Progress;
 const Rectangle = film_file.Rectangle;
 
@@ -62,6 +64,8 @@ pub const Settings = struct {
     noise: ?adaptive.Noise = null,
     /// Null: all samples in one round.
     course: ?Course = null,
+    /// Of a survey.
+    look: Look = .hits,
     /// Which pixels; null: all of the picture, as `render` fills in.
     layout: ?*const Layout = null,
     /// The integrator's `Shared`: `render` fills it in.
@@ -288,12 +292,7 @@ pub fn render(
     if (with_tiles.layout == null) with_tiles.layout = &whole;
     const settings = &with_tiles;
     const layout = settings.layout.?;
-    var shown = settings.*;
-    shown.offsets = offsets;
-    if (settings.integrator.isOpen()) {
-        sampler.placeInSequence(offsets);
-        shown.sample_count = open_sample_count;
-    } else sampler.place(offsets);
+    var shown = withSamples(settings, offsets);
     if (integrator.shared) |shared|
         shown.shared = shared.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
     defer if (integrator.shared) |shared| shared.deinit(shown.shared.?, &gpa);
@@ -342,6 +341,60 @@ pub fn render(
     }
     if (integrator.counts_tests) total.tests = tests;
     return total;
+}
+
+/// Settings as integrators find them, with places for all samples.
+fn withSamples(chosen: *const Settings, offsets: []sampler.Offset) Settings {
+    var shown = chosen.*;
+    shown.offsets = offsets;
+    if (chosen.integrator.isOpen()) {
+        sampler.placeInSequence(offsets);
+        shown.sample_count = open_sample_count;
+    } else sampler.place(offsets);
+    return shown;
+}
+
+/// Has a survey leave hits on the film's layer of origins, of the first sample of those that the
+/// picture has by these settings; all else of the film stays.
+pub fn fillHits(
+    survey: *const Integrator,
+    gpa: Allocator,
+    frame: *const Frame,
+    film: *Film,
+    chosen: *const Settings,
+) Error!void {
+    assert(survey.shared == null and chosen.look == .hits);
+    const offsets = try gpa.alloc(sampler.Offset, chosen.sample_count);
+    defer gpa.free(offsets);
+    const shown = withSamples(chosen, offsets);
+    const whole: Layout = .whole(film.image.width, film.image.height);
+    const tiles: Tiles = .init(chosen.layout orelse &whole, &shown);
+    const nothing: f32 = @bitCast(film_file.no_triangle);
+    @memset(film.imageOf(.origin).?.pixels, .{ nothing, 0, 0, 0 });
+    var by_thread: [parallel.thread_count_max]*anyopaque = undefined;
+    var count: usize = 0;
+    defer for (by_thread[0..count]) |one| survey.deinit(one, &gpa);
+    while (count < chosen.pool.threadsFor(tiles.count)) : (count += 1) {
+        by_thread[count] = survey.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
+    }
+    const Work = struct {
+        survey: *const Integrator,
+        tiles: *const Tiles,
+        film: *Film,
+        by_thread: []const *anyopaque,
+
+        fn tile(work: *const @This(), number: usize, thread_index: usize) void {
+            const rectangle = work.tiles.rectangleOf(@intCast(number));
+            work.survey.pass(work.by_thread[thread_index], &rectangle, 0, 1, work.film);
+        }
+    };
+    const work: Work = .{
+        .survey = survey,
+        .tiles = &tiles,
+        .film = film,
+        .by_thread = by_thread[0..count],
+    };
+    try chosen.pool.forEach(tiles.count, &work, Work.tile);
 }
 
 /// One frame by one integrator.
