@@ -160,6 +160,7 @@ fn moduleOfC(package: Package) *Module {
         .optimize = package.optimize,
         .link_libc = true,
         .strip = if (package.is_stripped) true else null,
+        .unwind_tables = if (package.is_stripped) .none else null,
         .omit_frame_pointer = if (package.optimize == .fast) true else null,
     });
 }
@@ -172,6 +173,7 @@ fn moduleOf(package: Package, root: []const u8) *Module {
         .optimize = package.optimize,
         .link_libc = true,
         .strip = if (package.is_stripped) true else null,
+        .unwind_tables = if (package.is_stripped) .none else null,
         // A failed test tells where its error came from, in safe mode too.
         .error_tracing = if (package.optimize == .safe) true else null,
         .omit_frame_pointer = if (package.optimize == .fast) true else null,
@@ -349,6 +351,7 @@ pub fn addProgram(package: Package, name: []const u8, root: []const u8) *Compile
         .target = package.target,
         .optimize = package.optimize,
         .strip = package.is_stripped or package.optimize == .fast,
+        .unwind_tables = if (package.is_stripped) .none else null,
         .omit_frame_pointer = if (package.optimize == .fast) true else null,
         .imports = &.{.{ .name = "raylane", .module = package.raylane }},
     }) });

@@ -13,7 +13,12 @@ const Model = std.Target.Cpu.Model;
 const Compile = std.Build.Step.Compile;
 
 /// A level of processors, by its name in src/processor.zig.
-const Level = struct { name: []const u8, cpu: *const Model };
+const Level = struct {
+    name: []const u8,
+    cpu: *const Model,
+    /// Small for those that hardly anybody has any more.
+    optimize: std.lang.Optimize = .fast,
+};
 
 /// One that programs are released for.
 const Architecture = struct {
@@ -26,7 +31,7 @@ const Architecture = struct {
 
 const architectures = [_]Architecture{
     .{ .arch = .x86_64, .lowest = &std.Target.x86.cpu.x86_64, .levels = &.{
-        .{ .name = "x86-64", .cpu = &std.Target.x86.cpu.x86_64 },
+        .{ .name = "x86-64", .cpu = &std.Target.x86.cpu.x86_64, .optimize = .small },
         .{ .name = "x86-64-v2", .cpu = &std.Target.x86.cpu.x86_64_v2 },
         .{ .name = "x86-64-v3", .cpu = &std.Target.x86.cpu.x86_64_v3 },
         .{ .name = "x86-64-v4", .cpu = &std.Target.x86.cpu.x86_64_v4 },
@@ -106,7 +111,7 @@ fn programOf(
         var own = options;
         own.part = .{ .level = level.name };
         const target = targetOf(b, architecture.arch, level.cpu);
-        package.* = .init(b, target, .fast, headers, own);
+        package.* = .init(b, target, level.optimize, headers, own);
     }
     var own = options;
     own.part = .shared;

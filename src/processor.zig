@@ -28,7 +28,7 @@ pub const Level = enum {
 pub fn highestLevel() ?Level {
     return switch (builtin.cpu.arch) {
         .x86_64 => levelOfX86(.read()),
-        .arm => levelOfArm(std.c.getauxval(std.elf.AT_HWCAP)),
+        .arm => levelOfArm(std.c.getauxval(std.elf.AT.HWCAP)),
         else => null,
     };
 }

@@ -1,17 +1,16 @@
 //! A program that runs on every processor of an architecture, and as fast as one that is built for
 //! it: chooses, at start, among programs that are each compiled for a level.
 //!
-//! In: what the system hands to a program. Out: what `level.zig` makes of it; or, where nothing
-//! here runs on this processor, one line. RAYLANE_CPU=LEVEL chooses a lower level, to compare and
+//! In: arguments, environment. Out: what `level.zig` makes of them; or, where nothing here runs on
+//! this processor, one line. RAYLANE_CPU=LEVEL chooses a lower level, to compare and
 //! to test. The libraries in C, the scalar reference and this file are there once, for the lowest.
 
 const std = @import("std");
 const config = @import("config");
 const raylane = @import("raylane");
 const link = raylane.trace.link;
+const Program = link.Program;
 const Level = raylane.processor.Level;
-const Program = fn (init: *const std.process.Init) callconv(.c) u8;
-
 /// One that this program holds.
 const Entry = struct { level: Level, program: *const Program };
 
@@ -25,29 +24,36 @@ const entries: [config.levels.len]Entry = list: {
     break :list list;
 };
 
-pub fn main(init: std.process.Init) u8 {
+pub fn main(init: std.process.Init.Minimal) u8 {
+    const program = chosen(init.environ.getPosix("RAYLANE_CPU")) catch |err| return switch (err) {
+        error.NoLevel => 1,
+        error.WrongLevel => 2,
+    };
+    const arguments = init.args.vector;
+    const variables = init.environ.block.slice;
+    return program(arguments.len, arguments.ptr, variables.len, variables.ptr);
+}
+
+/// The one for the highest level, or for the level of this name; says why there is none.
+fn chosen(wanted: ?[]const u8) error{ NoLevel, WrongLevel }!*const Program {
     const highest = raylane.processor.highestLevel() orelse {
-        say(init.io, "this processor lacks NEON, and Raylane needs it", .{});
-        return 1;
+        say("this processor lacks NEON, and Raylane needs it", .{});
+        return error.NoLevel;
     };
-    if (init.environ_map.get("RAYLANE_CPU")) |name| {
+    if (wanted) |name| {
         const entry = entryOf(name) orelse {
-            say(init.io, "RAYLANE_CPU is none of {s}", .{comptime names()});
-            return 2;
+            say("RAYLANE_CPU is none of {s}", .{comptime names()});
+            return error.WrongLevel;
         };
-        if (!entry.level.isWithin(highest)) {
-            say(init.io, "RAYLANE_CPU is {t}, but this processor is {t}", .{
-                entry.level, highest,
-            });
-            return 2;
-        }
-        return entry.program(&init);
+        if (entry.level.isWithin(highest)) return entry.program;
+        say("RAYLANE_CPU is {t}, but this processor is {t}", .{ entry.level, highest });
+        return error.WrongLevel;
     }
-    var chosen = &entries[0];
+    var best = &entries[0];
     for (&entries) |*entry| if (entry.level.isWithin(highest)) {
-        chosen = entry;
+        best = entry;
     };
-    return chosen.program(&init);
+    return best.program;
 }
 
 fn entryOf(name: []const u8) ?*const Entry {
@@ -63,10 +69,10 @@ fn names() []const u8 {
     }
 }
 
-fn say(io: std.Io, comptime format: []const u8, arguments: anytype) void {
+fn say(comptime format: []const u8, arguments: anytype) void {
     var buffer: [256]u8 = undefined;
-    var stderr: std.Io.File.Writer = .initStreaming(.stderr(), io, &buffer);
+    const line = std.fmt.bufPrint(&buffer, "raylane: " ++ format ++ "\n", arguments) catch
+        unreachable; // Names of levels are short.
     // Nobody is left to tell when stderr is gone.
-    stderr.interface.print("raylane: " ++ format ++ "\n", arguments) catch return;
-    stderr.interface.flush() catch {};
+    _ = std.c.write(2, line.ptr, line.len);
 }

@@ -27,8 +27,16 @@ fn isShared(comptime variant: Variant) bool {
     return variant.traversal == .single;
 }
 
-/// Name of the symbol of the program for a level. What it is handed is std's alone, whose layout
-/// does not depend on levels, and takes the compiler minutes to hash.
+/// A program for a level: numbers and lists of arguments and of variables, as C has them, to an
+/// exit code.
+pub const Program = fn (
+    argument_count: usize,
+    arguments: [*]const [*:0]const u8,
+    variable_count: usize,
+    variables: [*:null]const ?[*:0]const u8,
+) callconv(.c) u8;
+
+/// Name of its symbol.
 pub fn programOf(comptime level: []const u8) [:0]const u8 {
     return "rl_program" ++ suffixOf(level);
 }
