@@ -117,5 +117,10 @@ def _kept(state: Dict[str, Any]) -> str:
     return f": {progress.done} of {progress.total} {progress.unit} are done"
 
 
-if __name__ == "__main__":
+def console() -> None:
+    """The command `raylane-farm`."""
     sys.exit(main(sys.argv[1:]))
+
+
+if __name__ == "__main__":
+    console()
