@@ -236,10 +236,14 @@ const sections: []const Section = &.{
         .{
             .usage = "--format FORMAT",
             .words = wordsOf(settings.Format),
-            .help = "png, jpg, tga, bmp or ppm, linear: hdr, pfm or exr,\n" ++
-                "or a film: y4m",
+            .help = "png, jpg, webp, tga, bmp or ppm, linear: hdr, pfm or\n" ++
+                "exr, or a film: y4m",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
+        .{
+            .usage = "--webp-quality N",
+            .help = settings.webp_quality.text() ++ ", with loss (default: without)",
+        },
         .{
             .usage = "--exr KIND",
             .words = wordsOf(settings.ExrKind),
@@ -290,7 +294,15 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--layers LIST",
-            .help = "of an EXR file: albedo,normal,depth,variance",
+            .words = wordsOf(settings.Layer),
+            .help = "depth,normal,albedo,uv,node,material,primitive,alpha,\n" ++
+                "position,cost,variance: channels of an EXR file, or\n" ++
+                "files of their own by {layer} in the output's name",
+        },
+        .{
+            .usage = "--shade LOOK",
+            .words = wordsOf(settings.Shade),
+            .help = "a quick look, not lit: ao, normal, uv or cost",
         },
     } },
     .{ .title = "Several pictures (see docs/batch.md)", .options = &.{
@@ -819,6 +831,7 @@ const Parser = struct {
     command: RenderWord = .{},
     /// A time is asked for.
     has_time: bool = false,
+    has_variant: bool = false,
     /// The explicit `--format`.
     format: ?settings.Format = null,
     /// The explicit `--progress`.
@@ -879,6 +892,7 @@ const Parser = struct {
         try parser.checkViewpoint();
         try parser.settleFormat();
         try parser.checkSampling();
+        try parser.checkShade();
         try parser.checkPart();
         try parser.settleProgress();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
@@ -911,11 +925,9 @@ const Parser = struct {
             .format => parser.format = formatOf(given.value) orelse
                 return reader.bad(given, comptime namesOf(settings.Format)),
             .denoise => options.render.denoise = true,
-            .layers => options.render.layers = layersOf(given.value) orelse
-                return reader.bad(given, comptime namesOf(settings.Layer)),
-            .jpeg_quality => options.write.jpeg_quality =
-                try reader.number(given, settings.jpeg_quality),
-            .exr => options.write.exr_kind = try reader.choice(given, settings.ExrKind),
+            .shade => options.view.shade = try reader.choice(given, settings.Shade),
+            .layers, .jpeg_quality, .webp_quality, .exr => try parser.setWriting(given),
+            .exposure, .tonemap => try parser.setWriting(given),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
             .crop, .tile => try parser.setPart(given),
@@ -940,19 +952,16 @@ const Parser = struct {
             .floor => options.view.floor = try reader.choice(given, settings.Floor),
             .ambient => options.view.ambient = radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
-            .exposure => options.write.exposure = exposureOf(given.value) orelse
-                return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
-                    settings.exposure_ev_max, settings.exposure_ev_max,
-                })),
-            .tonemap => options.write.tone_mapping =
-                try reader.choice(given, settings.ToneMapping),
             .stats, .count_tests, .quiet, .verbose => try parser.setMessages(given),
             .progress, .progress_fd => try parser.setMessages(given),
             .scenario => try parser.setScenario(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
-            .variant => options.render.variant = try parser.variantOf(given.value),
+            .variant => {
+                options.render.variant = try parser.variantOf(given.value);
+                parser.has_variant = true;
+            },
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
             .virtual_lights, .sky_lights, .all_lights => try parser.setLights(given),
@@ -1086,6 +1095,26 @@ const Parser = struct {
             return reader.fail("{s}", .{message.text()});
         if (batch_plan.template.holds(output, .camera) and viewpoint.replacesCamera()) return reader
             .fail("'{{camera}}' stands for the file's, in whose place the options put one", .{});
+    }
+
+    fn setWriting(parser: *Parser, given: Reader.Given) Error!void {
+        const write = &parser.options.write;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .layers => parser.options.render.layers = layersOf(given.value) orelse
+                return reader.bad(given, comptime namesOf(settings.Layer)),
+            .jpeg_quality => write.jpeg_quality =
+                try reader.number(given, settings.jpeg_quality),
+            .webp_quality => write.webp_quality =
+                try reader.number(given, settings.webp_quality),
+            .exr => write.exr_kind = try reader.choice(given, settings.ExrKind),
+            .exposure => write.exposure = exposureOf(given.value) orelse
+                return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
+                    settings.exposure_ev_max, settings.exposure_ev_max,
+                })),
+            .tonemap => write.tone_mapping = try reader.choice(given, settings.ToneMapping),
+            else => unreachable, // `set` hands over the above.
+        }
     }
 
     fn setLights(parser: *Parser, given: Reader.Given) Error!void {
@@ -1300,10 +1329,41 @@ const Parser = struct {
     fn settleFormat(parser: *Parser) Error!void {
         try parser.findFormat();
         const options = &parser.options;
-        if (options.render.layers.count() == 0 or options.write.format == .exr) return;
-        return parser.reader.fail("'--layers' has a place in an exr file, not in a {t} file", .{
-            options.write.format,
-        });
+        const format = options.write.format;
+        if (options.output) |output| options.write.layers_apart =
+            batch_plan.template.isTemplate(output) and
+            batch_plan.template.holds(output, .layer);
+        if (options.render.layers.count() == 0 or format == .exr) return;
+        if (options.write.layers_apart and format != .y4m) return;
+        return parser.reader.fail("'--layers' has a place in an exr file, not in a {t} file, or " ++
+            "in files of their own, by {{layer}} in the output's name", .{format});
+    }
+
+    /// What some integrators alone can tell, or is told in place of them. Where rays are traced one
+    /// by one, each pixel has tests of its own: nothing else is as good for these.
+    fn checkShade(parser: *Parser) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        const is_whitted = options.render.integrator == .whitted;
+        if (options.render.layers.contains(.cost) and !is_whitted)
+            return reader.fail("'--layers cost' counts tests of '--integrator whitted'", .{});
+        const has_cost = options.render.layers.contains(.cost) or options.view.shade == .cost;
+        if (has_cost and !parser.has_variant) for (parser.variant_names, 0..) |name, index| {
+            if (std.mem.find(u8, name, "-single-") == null) continue;
+            options.render.variant = index;
+            break;
+        };
+        const part = options.render.part;
+        if (options.write.layers_apart and part == .tile) return reader.fail(
+            "'--tile' puts layers into one file: no {{layer}} in the output's name",
+            .{},
+        );
+        if (options.view.shade == null) return;
+        if (options.view.shade == .cost and part != .whole) return reader
+            .fail("'--shade cost' has colours by the whole picture: no '--crop' or '--tile'", .{});
+        if (!is_whitted) return reader.fail("'--shade' contradicts '--integrator'", .{});
+        if (options.render.denoise) return reader.fail("'--shade' contradicts '--denoise'", .{});
+        if (options.count_tests) return reader.fail("'--shade' contradicts '--count-tests'", .{});
     }
 
     fn findFormat(parser: *Parser) Error!void {
@@ -1326,6 +1386,10 @@ const Parser = struct {
         if (part == .whole) return;
         if (options.render.time_budget_s != null) return reader.fail(
             "'--time-budget' does not go with '--{t}': parts have as many samples as the whole",
+            .{part},
+        );
+        if (options.render.layers.contains(.cost)) return reader.fail(
+            "'--layers cost' does not go with '--{t}': it is of pixels that are traced together",
             .{part},
         );
         if (options.write.format == .exr) {
@@ -1844,9 +1908,13 @@ test "numbers keep to their ranges" {
         .{ .flag = "--integrator", .good = &.{ "whitted", "lights", "path" }, .bad = &.{"bdpt"} },
         .{
             .flag = "--format",
-            .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },
+            .good = &.{
+                "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr", "webp",
+            },
             .bad = &.{ "tiff", "" },
         },
+        .{ .flag = "--shade", .good = &.{ "ao", "normal", "uv", "cost" }, .bad = &.{ "", "AO" } },
+        .{ .flag = "--webp-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "" } },
         .{ .flag = "--exr", .good = &.{ "half", "float" }, .bad = &.{ "Half", "double", "" } },
         .{ .flag = "--jpeg-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "", "x" } },
         .{
@@ -2036,9 +2104,21 @@ test "the format follows the name, unless said otherwise" {
     try expectUsage("contradicts", &.{ "--format=pfm", "-oa.png", "s" });
     try expectUsage("not in a png file", &.{ "--layers=depth", "s" });
     for ([_][:0]const u8{ "--layers=", "--layers=depht", "--layers=depth,", "--layers=a b" }) |bad|
-        try expectUsage("albedo, normal, depth", &.{ bad, "-oa.exr", "s" });
+        try expectUsage("depth, normal, albedo", &.{ bad, "-oa.exr", "s" });
     const layered = try optionsForTest(&.{ "--layers=depth,albedo,depth", "-oa.exr" });
     try std.testing.expectEqual(2, layered.render.layers.count());
+    const each = try optionsForTest(&.{
+        "--layers=depth,normal,albedo,uv,node,material,primitive,alpha,position,cost,variance",
+        "-oa-{layer}.png",
+    });
+    try std.testing.expectEqual(11, each.render.layers.count());
+    try expectUsage("counts", &.{ "--layers=cost", "--integrator=path", "-oa.exr", "s" });
+    const alone = try optionsForTest(&.{"--shade=cost"});
+    try std.testing.expectEqualStrings("scalar-single-4", test_names[alone.render.variant]);
+    const chosen = try optionsForTest(&.{ "--variant=vector-beam-8", "--layers=cost", "-oa.exr" });
+    try std.testing.expectEqual(0, chosen.render.variant);
+    for ([_][:0]const u8{ "--denoise", "--count-tests", "--integrator=lights" }) |other|
+        try expectUsage("'--shade' contradicts", &.{ "--shade=ao", other, "s" });
     try expectUsage("'a.tiff' ends in no image format", &.{ "-oa.tiff", "s" });
 }
 
@@ -2128,6 +2208,9 @@ test "completions and the manual have every option of every command, and its wor
         var manual: std.Io.Writer.Allocating = .init(std.testing.allocator);
         defer manual.deinit();
         try writeMan(&manual.writer);
+        for (std.meta.fieldNames(Word)) |word| for (pages) |*page| {
+            if (std.mem.eql(u8, page.word, word)) break;
+        } else try std.testing.expectEqualStrings("help", word);
         for (pages) |*page| {
             try expectFinds(script.written(), "{s}", page.name());
             try expectFinds(manual.written(), "raylane {s}", page.word);

@@ -5,7 +5,7 @@
 //! `output` reads.
 
 const std = @import("std");
-/// Of a layer.
+/// What layers are made of.
 pub const Image = @import("image.zig").Image;
 const settings = @import("settings.zig");
 const layout_file = @import("film/layout.zig");
@@ -41,6 +41,23 @@ pub const Layer = enum {
     /// Half of what the mean of the samples `isInFirstHalf` has more than that of the others; 0
     /// where there is but one sample.
     halves,
+    /// What the first sample shows. A survey (`integrate/survey.zig`) leaves bits of a triangle's
+    /// number, `no_triangle` where there is none, weights of its corners 1 and 2, and 0; these
+    /// become bits of the file's numbers of node, material and primitive, all ones where there is
+    /// none, and 0. As the next two it is no mean, and left alone by `finish`.
+    origin,
+    /// Where that is, in the world's axes, and fourth 1; 0 where there is nothing.
+    position,
+    /// Its texture coordinates, of the first set.
+    texcoord,
+    /// Tests of rays with boxes and with triangles that all samples took, by kernels that count
+    /// them; of pixels that are traced together, the mean.
+    cost,
+
+    /// Whether it is of the first sample alone.
+    fn isSurveyed(layer: Layer) bool {
+        return layer == .origin or layer == .position or layer == .texcoord;
+    }
 
     /// Whether it has an image of its own.
     pub fn isApart(layer: Layer) bool {
@@ -48,10 +65,19 @@ pub const Layer = enum {
     }
 };
 
-/// The film's, of those that users choose.
+/// See `Layer.origin`.
+pub const no_triangle: u32 = std.math.maxInt(u32);
+
+/// The film's that has one that users choose, or some of its channels do.
 pub fn layerOf(layer: settings.Layer) Layer {
     return switch (layer) {
-        inline else => |same| @field(Layer, @tagName(same)),
+        .depth, .alpha => .depth,
+        .uv => .texcoord,
+        .node, .material, .primitive => .origin,
+        inline .normal, .albedo, .position, .cost, .variance => |same| @field(
+            Layer,
+            @tagName(same),
+        ),
     };
 }
 
@@ -226,7 +252,7 @@ pub const Film = struct {
         number: u32,
         sample: [4]f32,
     ) void {
-        assert(layer != .variance and layer != .halves);
+        assert(layer != .variance and layer != .halves and !layer.isSurveyed());
         addTo(film.apart.getPtr(layer).*.?.at(x, y), number, sample);
     }
 
@@ -302,9 +328,12 @@ pub const Film = struct {
         const count: V4 = @splat(@floatFromInt(sample_count));
         for (&film.apart.values, std.enums.values(Layer)) |*apart, layer| {
             const image = if (apart.*) |*image| image else continue;
+            if (layer.isSurveyed()) continue;
             const sums: V4 = image.pixels[at];
             const means: [4]f32 = switch (layer) {
                 .color, .alpha => unreachable, // They are not apart.
+                .origin, .position, .texcoord => unreachable, // See above.
+                .cost => sums,
                 .display, .albedo, .normal => sums / count,
                 .depth => depthOf(sums, count[0]),
                 .variance => sums / (count * @as(V4, @splat(@max(count[0] - 1, 1)))),
@@ -447,8 +476,9 @@ test "layers of what is seen: means, depth of what is hit, variance of the mean,
         film.addApart(.albedo, 0, 0, n, .{ share, 0.5, 1, 0 });
         film.addApart(.normal, 0, 0, n, .{ 0, share, 0, 0 });
         film.addApart(.depth, 0, 0, n, .{ 7 * share, 0, 0, share });
+        film.addApart(.cost, 0, 0, n, .{ 3, 2, 0, 0 });
         film.addApart(.display, 0, 0, n, @splat(0));
-        for ([_]Layer{ .albedo, .normal, .depth }) |layer| {
+        for ([_]Layer{ .albedo, .normal, .depth, .cost }) |layer| {
             film.addApart(layer, 1, 0, n, @splat(nan));
         }
         film.addApart(.display, 1, 0, n, @splat(0));
@@ -461,6 +491,7 @@ test "layers of what is seen: means, depth of what is hit, variance of the mean,
         .depth = .{ 7, 0, 0, 0.5 },
         // Squares of 3, 1, 1, 3 make 20, by 3 and by 4.
         .variance = .{ 20.0 / 12.0, 0, 0, 0 },
+        .cost = .{ 12, 8, 0, 0 },
         // 0 and 2 against 1 and 3.
         .halves = .{ -1, 0, 0, 0 },
     });

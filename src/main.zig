@@ -50,7 +50,8 @@ fn run(init: std.process.Init) ExitCode {
         .completion_help => return console.print(io, cli.completion_help),
         .man => return console.printBy(init.gpa, io, cli.writeMan, .{}),
         .man_help => return console.print(io, cli.man_help),
-        .version => return console.print(io, "raylane " ++ cli.version ++ "\n"),
+        .version => return console.print(io, "raylane " ++ cli.version ++
+            (if (raylane.variant.level.len == 0) "" else " for " ++ raylane.variant.level) ++ "\n"),
         .licenses => return console.print(io, raylane.licenses),
         .list_variants => return console.print(io, comptime list: {
             var list: []const u8 = "";

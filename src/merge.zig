@@ -21,6 +21,7 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Film = film_file.Film;
 const Identity = @import("identity.zig").Identity;
 const Layout = film_file.Layout;
+const Manifest = @import("manifest.zig").Manifest;
 const Record = part_file.Record;
 const openexr = decode.openexr;
 const quote = @import("diagnostic.zig").quote;
@@ -44,6 +45,8 @@ pub const Merged = struct {
     film: Film,
     /// Of the first part: what all have in common.
     record: Record,
+    /// Of all of them.
+    manifest: ?Manifest,
 
     /// Frees everything.
     pub fn deinit(merged: *Merged) void {
@@ -95,6 +98,8 @@ pub const Merged = struct {
             .transparent = record.transparent,
             .background = record.background,
             .jpeg_quality = record.jpeg_quality,
+            .webp_quality = record.webp_quality,
+            .manifest = if (merged.manifest) |*manifest| manifest else null,
             .exr_kind = record.exr_kind,
             .frame_rate = record.frame_rate,
             .further = further,
@@ -125,8 +130,13 @@ pub fn run(
     for (0..paths.len) |index| try merger.readRecord(index);
     try merger.checkCover();
     var record = merger.records[0];
-    for (merger.records) |*other|
+    var manifest: ?Manifest = null;
+    for (merger.records) |*other| {
         record.sample_count = @max(record.sample_count, other.sample_count);
+        const names = if (other.manifest) |*names| names.manifestOf() else continue;
+        const before: Manifest = manifest orelse .{};
+        manifest = try before.joinedWith(merger.arena, &names);
+    }
     var film: Film = try .init(gpa, record.width, record.height, record.layerSet());
     errdefer film.deinit(gpa);
     for (0..paths.len) |index| try merger.place(index, &film);
@@ -136,7 +146,13 @@ pub fn run(
         else
             diagnostic.warn(denoise.too_few_samples, .{});
     }
-    return .{ .gpa = gpa, .arena = arena, .film = film, .record = record };
+    return .{
+        .gpa = gpa,
+        .arena = arena,
+        .film = film,
+        .record = record,
+        .manifest = manifest,
+    };
 }
 
 const Merger = struct {

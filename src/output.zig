@@ -10,8 +10,11 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Image = @import("image.zig").Image;
 const huge_pages = @import("huge_pages.zig");
 const parallel = @import("parallel.zig");
+const layer_picture = @import("output/layer_picture.zig");
 const layers_file = @import("output/layers.zig");
+const Manifest = @import("manifest.zig").Manifest;
 const stb_image_write = @import("output/stb_image_write.zig");
+const webp = @import("output/webp.zig");
 const target_file = @import("output/target.zig");
 const y4m = @import("output/y4m.zig");
 const encode_file = @import("output/encode.zig");
@@ -29,6 +32,8 @@ pub const Picture = encode_file.Picture;
 pub const Further = layers_file.Further;
 /// Writes channels of any kind with texts beside them.
 pub const openexr = @import("output/openexr.zig");
+/// Makes colours of a layer.
+pub const paintLayer = layer_picture.paint;
 /// Rows of a picture that has more.
 pub const Extent = encode_file.Extent;
 /// How many pixels look like nothing.
@@ -47,6 +52,7 @@ fn sideMax(format: choices.Format) u32 {
     return switch (format) {
         .jpg, .tga => 65_535,
         .exr => openexr.width_max,
+        .webp => webp.side_max,
         else => std.math.maxInt(u31),
     };
 }
@@ -57,7 +63,7 @@ fn formOf(
     exr_kind: choices.ExrKind,
 ) encode_file.Form {
     return switch (format) {
-        .png, .tga => if (transparent) .rgba else .rgb,
+        .png, .tga, .webp => if (transparent) .rgba else .rgb,
         .jpg, .bmp, .ppm, .y4m => .rgb,
         .hdr => .radiance,
         .pfm => .linear,
@@ -81,6 +87,8 @@ pub const Settings = struct {
     rows: ?Extent = null,
     /// Within `settings.jpeg_quality`.
     jpeg_quality: u8 = choices.jpeg_quality.default,
+    /// Within `settings.webp_quality`; null: without loss.
+    webp_quality: ?u8 = null,
     /// Of the colours in an OpenEXR file.
     exr_kind: choices.ExrKind = .half,
     /// Of a film.
@@ -89,6 +97,8 @@ pub const Settings = struct {
     is_continued: bool = false,
     /// Layers of the picture's size, each once at most; only a file in OpenEXR holds them.
     further: []const Further = &.{},
+    /// What such a file is to have; null: no layer has numbers.
+    manifest: ?*const Manifest = null,
     pool: *parallel.Pool,
 };
 
@@ -126,7 +136,10 @@ pub fn check(
         .{ format, sideMax(format) },
     );
     const channel_count: u64 = channelCount(formOf(format, transparent, .half));
-    const by_library = format != .ppm and format != .pfm and format != .y4m;
+    const by_library = switch (format) {
+        .ppm, .pfm, .y4m, .webp => false,
+        .png, .jpg, .tga, .bmp, .hdr, .exr => true,
+    };
     const value_count = (width * channel_count + 1) * height;
     if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
         error.InputOutput,
@@ -204,20 +217,34 @@ pub fn write(
             defer gpa.free(file);
             try target.finish(&.{file}, diagnostic);
         },
+        .webp => try writeWebp(gpa, size, pixels, &settings, target, diagnostic),
         .exr => {
             var channels: layers_file.Channels = .{};
             channels.addPicture(pixels, channelCount(form), settings.exr_kind);
             for (settings.further) |*further| channels.addLayer(further);
-            const file = try openexr.encode(gpa, .{
-                .width = image.width,
-                .height = image.height,
-                .channels = channels.all(),
-            });
-            defer gpa.free(file);
-            try target.finish(&.{file}, diagnostic);
+            try writeExr(gpa, image, channels.all(), &settings, target, diagnostic);
         },
     }
     return work.tally;
+}
+
+fn writeWebp(
+    gpa: Allocator,
+    size: [2]u32,
+    pixels: []const u8,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const file = try webp.encode(gpa, .{
+        .width = size[0],
+        .height = size[1],
+        .channel_count = channelCount(formOf(.webp, settings.transparent, .half)),
+        .pixels = pixels,
+        .quality = settings.webp_quality,
+    });
+    defer gpa.free(file);
+    return target.finish(&.{file}, diagnostic);
 }
 
 /// Encodes channels as an OpenEXR file and moves it to its place. Closes the target in any case.
@@ -246,6 +273,62 @@ fn writeFrame(
     var buffer: [y4m.header_bytes_max]u8 = undefined;
     const header = y4m.header(&buffer, size, settings.frame_rate, !settings.is_continued);
     return target.finish(&.{ header, planes }, diagnostic);
+}
+
+/// A file of these channels, of an image's size.
+fn writeExr(
+    gpa: Allocator,
+    image: *const Image,
+    channels: []const openexr.Channel,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const text = if (settings.manifest) |manifest| try manifest.text(gpa) else null;
+    defer if (text) |some| gpa.free(some);
+    return writeChannels(gpa, .{
+        .width = image.width,
+        .height = image.height,
+        .channels = channels,
+        .attributes = if (text) |some|
+            &.{.{ .name = layers_file.manifest_name, .text = some }}
+        else
+            &.{},
+    }, target, diagnostic);
+}
+
+/// Encodes a layer alone and moves it to its place: its channels in OpenEXR, its numbers as they
+/// are in the other linear formats, else colours (`paintLayer`). Closes the target in any case.
+pub fn writeLayer(
+    gpa: Allocator,
+    further: *const Further,
+    settings: Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    defer target.abandon();
+    const from = further.image;
+    try check(settings.format, false, from.width, from.height, diagnostic);
+    if (settings.format == .exr) {
+        var channels: layers_file.Channels = .{};
+        channels.addLayer(further);
+        return writeExr(gpa, from, channels.all(), &settings, target, diagnostic);
+    }
+    var chosen = settings;
+    chosen.transparent = false;
+    chosen.background = .none;
+    var image: Image = try .init(gpa, from.width, from.height);
+    defer image.deinit(gpa);
+    if (isLinear(settings.format)) {
+        layer_picture.copy(further, &image);
+        _ = try write(gpa, .{ .image = &image }, chosen, target, diagnostic);
+        return;
+    }
+    var display: Image = try .init(gpa, from.width, from.height);
+    defer display.deinit(gpa);
+    @memset(image.pixels, .{ 0, 0, 0, 1 });
+    try layer_picture.paint(gpa, further, &display);
+    _ = try write(gpa, .{ .image = &image, .display = &display }, chosen, target, diagnostic);
 }
 
 const Work = struct {
@@ -282,6 +365,9 @@ test {
     _ = openexr;
     _ = y4m;
     _ = stb_image_write;
+    _ = webp;
+    _ = layers_file;
+    _ = layer_picture;
     _ = target_file;
     _ = @import("output/temporary.zig");
     _ = @import("output/background.zig");

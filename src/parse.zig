@@ -14,6 +14,7 @@ const gltf = @import("parse/gltf.zig");
 const obj = @import("parse/obj.zig");
 const pbrt = @import("parse/pbrt.zig");
 const ply_scene = @import("parse/ply_scene.zig");
+const progress_file = @import("progress.zig");
 const settings_file = @import("settings.zig");
 const stl = @import("parse/stl.zig");
 const Settings = settings_file.Load;
@@ -222,4 +223,27 @@ test "what does not exist is of no format" {
         const missing = parse(gpa, io, path, .{}, &diagnostic);
         try std.testing.expectError(error.InputOutput, missing);
     }
+}
+
+test "the text of a PBRT scene tells how far it is read" {
+    const Reading = struct {
+        stage: ?progress_file.Stage = null,
+
+        fn begun(context: *anyopaque, work: *const progress_file.Work) void {
+            const reading: *@This() = @ptrCast(@alignCast(context));
+            reading.stage = work.stage;
+        }
+    };
+    var reading: Reading = .{};
+    var progress: progress_file.Progress = .{ .context = &reading, .begun = Reading.begun };
+    var diagnostic: Diagnostic = .{};
+    const text = "WorldBegin Shape \"sphere\" WorldEnd";
+    const gpa = std.testing.allocator;
+    const io = std.testing.io;
+    var scene = try parsePbrt(gpa, io, text, .cwd(), .{ .progress = &progress }, &diagnostic);
+    defer scene.deinit();
+    try std.testing.expectEqual(.parsing, reading.stage.?);
+    try std.testing.expectEqual(text.len + 1, progress.total.load(.monotonic));
+    const done = progress.done.load(.monotonic);
+    try std.testing.expect(done > "WorldBegin Shape".len and done <= text.len);
 }

@@ -14,13 +14,14 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Film = film_file.Film;
 const Layer = film_file.Layer;
 const Layout = film_file.Layout;
+const Manifest = @import("manifest.zig").Manifest;
 const quote = @import("diagnostic.zig").quote;
 const assert = std.debug.assert;
 
 /// Name of the attribute.
 pub const attribute_name = "raylane:part";
 /// Bytes of its text at most.
-const text_bytes_max = 1 << 20;
+const text_bytes_max = output.openexr.text_bytes_max;
 
 /// What the attribute says. Slices are the caller's.
 pub const Record = struct {
@@ -48,7 +49,10 @@ pub const Record = struct {
     tone_mapping: settings.ToneMapping,
     transparent: bool,
     background: output.Background,
+    /// Names of what the part shows.
+    manifest: ?Names,
     jpeg_quality: u8,
+    webp_quality: ?u8,
     exr_kind: settings.ExrKind,
     frame_rate: settings.FrameRate,
 
@@ -73,9 +77,35 @@ pub const Record = struct {
             record.tone_mapping == other.tone_mapping and
             record.transparent == other.transparent and
             std.meta.eql(record.background, other.background) and
-            record.jpeg_quality == other.jpeg_quality and record.exr_kind == other.exr_kind and
+            (record.manifest == null) == (other.manifest == null) and
+            record.jpeg_quality == other.jpeg_quality and
+            std.meta.eql(record.webp_quality, other.webp_quality) and
+            record.exr_kind == other.exr_kind and
             std.meta.eql(record.frame_rate, other.frame_rate);
         return if (is_same) null else "it was changed, other than";
+    }
+};
+
+/// A manifest as records have it.
+pub const Names = struct {
+    node: []const Entry,
+    mesh: []const Entry,
+    material: []const Entry,
+
+    const Entry = @import("manifest.zig").Entry;
+
+    /// Of the one that a picture has.
+    pub fn of(manifest: *const Manifest) Names {
+        return .{
+            .node = manifest.node,
+            .mesh = manifest.mesh,
+            .material = manifest.material,
+        };
+    }
+
+    /// The manifest again.
+    pub fn manifestOf(names: *const Names) Manifest {
+        return .{ .node = names.node, .mesh = names.mesh, .material = names.material };
     }
 };
 
@@ -192,6 +222,7 @@ fn isWithinLimits(record: *const Record) bool {
         settings.sample_count.holds(record.sample_count) and
         @abs(record.exposure_ev) <= settings.exposure_ev_max and
         settings.jpeg_quality.holds(record.jpeg_quality) and
+        (record.webp_quality == null or settings.webp_quality.holds(record.webp_quality.?)) and
         record.frame_rate.numerator > 0 and record.frame_rate.denominator > 0;
 }
 
@@ -214,7 +245,9 @@ const record_for_test: Record = .{
     .tone_mapping = .agx,
     .transparent = true,
     .background = .{ .srgb = .{ 1, 2, 255 } },
+    .manifest = .{ .node = &.{.{ .number = 3, .name = "a\xff" }}, .mesh = &.{}, .material = &.{} },
     .jpeg_quality = 90,
+    .webp_quality = null,
     .exr_kind = .float,
     .frame_rate = .{ .numerator = 30_000, .denominator = 1001 },
 };

@@ -80,9 +80,24 @@ pub const PoseSettings = struct {
     sharing: SharingRule = .{},
     /// Diameter of points and width of lines, in pixels of the automatic view.
     point_size: f32 = choices.point_size.default,
+    /// The first set of texture coordinates is there, whatever textures want.
+    keeps_texcoords: bool = false,
     /// What decides how large these are.
     view: WantedView = .{},
 };
+
+/// What of the file each triangle is.
+pub const Origins = @import("prepare/origins.zig");
+
+/// Of the triangles of a world that was made with this cache. `from` is the scene that it shows.
+pub fn originsOf(
+    gpa: Allocator,
+    from: *const Scene,
+    loaded: *const Loaded,
+    cache: *const PoseCache,
+) error{OutOfMemory}!Origins {
+    return .init(gpa, from, &loaded.parts, cache.plan.detail);
+}
 
 /// See `PoseSettings`.
 pub const SharingRule = sharing_file.Rule;
@@ -213,8 +228,12 @@ fn visibleInstances(
 }
 
 /// What of the vertices the materials ask for.
-fn attributesOf(textures: *const texture.TextureSet) flatten.Attributes {
+fn attributesOf(
+    textures: *const texture.TextureSet,
+    settings: *const PoseSettings,
+) flatten.Attributes {
     var attributes: flatten.Attributes = .{};
+    attributes.texcoord_sets[0] = settings.keeps_texcoords;
     for (textures.lookups) |lookup| attributes.texcoord_sets[lookup.texcoord_set] = true;
     for (textures.materials) |use| if (use.tangents != null) {
         attributes.tangents = true;
@@ -263,6 +282,7 @@ pub const PoseCache = struct {
     lanes: u8,
     tree_quality: TreeQuality,
     point_size: f32,
+    keeps_texcoords: bool,
 
     /// Frees it.
     pub fn deinit(cache: *PoseCache) void {
@@ -276,7 +296,8 @@ pub const PoseCache = struct {
     pub fn fits(cache: *const PoseCache, settings: *const PoseSettings) bool {
         return cache.sharing.instances.len == 0 and cache.lanes == settings.lanes and
             cache.tree_quality == settings.tree_quality and
-            cache.point_size == settings.point_size;
+            cache.point_size == settings.point_size and
+            cache.keeps_texcoords == settings.keeps_texcoords;
     }
 };
 
@@ -300,7 +321,7 @@ pub fn pose(
     errdefer posed.world.deinit();
     const parts = &loaded.parts;
     const point_size = settings.point_size;
-    const attributes = attributesOf(&loaded.textures);
+    const attributes = attributesOf(&loaded.textures, &settings);
     const snapshot: Snapshot = try .of(posed.world.pose_arena.allocator(), from, loaded);
     const sharing = try shareMeshes(&posed.world, gpa, &snapshot, loaded, settings);
     var plan: flatten.Plan = try .init(gpa, sharing.flat, parts.meshes, point_size, diagnostic);
@@ -314,6 +335,7 @@ pub fn pose(
         .lanes = settings.lanes,
         .tree_quality = settings.tree_quality,
         .point_size = point_size,
+        .keeps_texcoords = settings.keeps_texcoords,
     };
     const planned_ns = nanoseconds(start.durationTo(Clock.awake.now(io)));
     try placeAll(
@@ -380,7 +402,7 @@ noinline fn shareMeshes(
         gpa,
         posed.arena.allocator(),
         &snapshot.drawn.parts,
-        attributesOf(&loaded.textures),
+        attributesOf(&loaded.textures, &settings),
         &snapshot.place,
         &.{
             .rule = settings.sharing,
@@ -457,7 +479,7 @@ fn placeAll(
         &cache.sharing,
         parts,
         &soup,
-        attributesOf(&loaded.textures),
+        attributesOf(&loaded.textures, &settings),
     );
     const materials = try material.place(arena, parts, &snapshot.drawn.textures, &geometry);
     const tree_start = Clock.awake.now(io);
@@ -1666,6 +1688,7 @@ test {
     _ = tangents;
     _ = texture;
     _ = extent_file;
+    _ = Origins;
     _ = @import("prepare/relief.zig");
     _ = @import("prepare/layers.zig");
     _ = @import("prepare/texture_use.zig");

@@ -23,6 +23,8 @@ pub const image = @import("image.zig");
 /// The project's licence and those of what a program is made of.
 pub const licenses = @import("licenses").text;
 pub const info = @import("info.zig");
+pub const json_text = @import("json_text.zig");
+pub const manifest = @import("manifest.zig");
 pub const math = @import("math.zig");
 pub const memory_account = @import("memory_account.zig");
 pub const output = @import("output.zig");
@@ -31,6 +33,7 @@ pub const parallel = @import("parallel.zig");
 pub const parse = @import("parse.zig");
 pub const part = @import("part.zig");
 pub const prepare = @import("prepare.zig");
+pub const processor = @import("processor.zig");
 pub const progress = @import("progress.zig");
 pub const report = @import("report.zig");
 pub const scene = @import("scene.zig");
@@ -43,7 +46,7 @@ pub const variant = @import("variant.zig");
 pub const world = @import("world.zig");
 
 comptime {
-    @export(&trace.link.panicOfKernel, .{ .name = "rl_kernel_panic" });
+    @export(&trace.link.panicOfKernel, .{ .name = trace.link.panic_symbol });
 }
 
 test {

@@ -9,11 +9,17 @@ const Stringify = std.json.Stringify;
 const Writer = std.Io.Writer;
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const printable = @import("diagnostic.zig").printable;
+const Manifest = @import("manifest.zig").Manifest;
+const json_text = @import("json_text.zig");
 const settings = @import("settings.zig");
 const statistics = @import("statistics.zig");
 
 /// What a job of `raylane serve` is known by; null: there are no jobs.
 pub const Id = ?std.json.Value;
+/// See `json_text.zig`.
+pub const Text = json_text.Text;
+/// See `json_text.zig`.
+pub const Texts = json_text.Texts;
 
 /// One frame.
 pub const Report = struct {
@@ -25,8 +31,11 @@ pub const Report = struct {
     /// Where the image went, as on the command line.
     output: []const u8 = "",
     triangle_count: u64,
+    /// Of a crop, if it is one.
     width: u32,
     height: u32,
+    /// A crop in pixels.
+    part: settings.Part = .whole,
     /// Samples a pixel, of those that have the most.
     sample_count: u32,
     /// Of all pixels.
@@ -49,6 +58,8 @@ pub const Report = struct {
     image_hash: u64,
     /// Null: the picture keeps radiance as it is.
     appearance: ?Appearance = null,
+    /// Names of what layers have numbers of; null: there are no such layers.
+    manifest: ?Manifest = null,
     warnings: []const []const u8 = &.{},
 
     /// What images became.
@@ -74,6 +85,12 @@ pub const Report = struct {
     /// or none does.
     fn again(report: *const Report) ?u32 {
         return if (report.is_timed and !report.is_partial) report.sample_count else null;
+    }
+
+    /// Which part of a picture it is, in `room` for four numbers; null: all of it.
+    fn partText(report: *const Report, room: []u8) ?[]const u8 {
+        if (report.part == .whole) return null;
+        return std.mem.print(room, "{f}", .{report.part}) catch unreachable;
     }
 
     fn rayCount(report: *const Report) u64 {
@@ -129,10 +146,14 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
     try writer.print("scene        {f}, {d} triangles\n", .{
         printable(report.scene), report.triangle_count,
     });
-    try writer.print("image        {f}, {d} x {d}, {d} {s} a pixel", .{
+    var part: [64]u8 = undefined;
+    const shown = report.partText(&part);
+    try writer.print("image        {f}, {d} x {d}{s}{s}, {d} {s} a pixel", .{
         printable(report.output),
         report.width,
         report.height,
+        if (shown == null) "" else ", ",
+        shown orelse "",
         report.sample_count,
         if (report.sample_count == 1) "sample" else "samples",
     });
@@ -205,6 +226,7 @@ fn writeRate(writer: *Writer, count: u64, time_ns: u64) Writer.Error!void {
 pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
     const times = &report.times;
     const cost = report.bvh.sah_cost;
+    var part: [64]u8 = undefined;
     var hash: [16]u8 = undefined;
     var hash_writer: Writer = .fixed(&hash);
     try hash_writer.print("{x:0>16}", .{report.image_hash});
@@ -219,6 +241,7 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
         .triangles = report.triangle_count,
         .width = report.width,
         .height = report.height,
+        .part = report.partText(&part),
         .samples = report.sample_count,
         .samples_mean = report.sample_mean,
         .partial = report.is_partial,
@@ -250,6 +273,7 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
         },
         .memory_peak_bytes = report.memory_peak_bytes,
         .image_hash = Text{ .bytes = &hash },
+        .manifest = report.manifest,
         .warnings = Texts{ .list = report.warnings },
     });
     try json.endObject();
@@ -342,41 +366,6 @@ pub fn writeFailure(failure: *const Failure, writer: *Writer) Writer.Error!void 
     try json.endObject();
     try writer.writeByte('\n');
 }
-
-/// A JSON string of any bytes. Those that are not UTF-8, which a file name may hold, become
-/// U+FFFD.
-pub const Text = struct {
-    bytes: []const u8,
-
-    /// Called by `Stringify`.
-    pub fn jsonStringify(text: Text, json: *Stringify) Writer.Error!void {
-        try json.beginWriteRaw();
-        try json.writer.writeByte('"');
-        var rest = text.bytes;
-        while (rest.len > 0) {
-            const length = std.unicode.utf8ByteSequenceLength(rest[0]) catch 1;
-            const sequence = rest[0..@min(length, rest.len)];
-            const is_valid = std.unicode.utf8ValidateSlice(sequence);
-            const shown = if (is_valid) sequence else "\u{fffd}";
-            try Stringify.encodeJsonStringChars(shown, .{}, json.writer);
-            rest = rest[if (is_valid) sequence.len else 1..];
-        }
-        try json.writer.writeByte('"');
-        json.endWriteRaw();
-    }
-};
-
-/// An array of them.
-pub const Texts = struct {
-    list: []const []const u8,
-
-    /// Called by `Stringify`.
-    pub fn jsonStringify(texts: Texts, json: *Stringify) Writer.Error!void {
-        try json.beginArray();
-        for (texts.list) |bytes| try json.write(Text{ .bytes = bytes });
-        try json.endArray();
-    }
-};
 
 fn milliseconds(time_ns: u64) f64 {
     return float(time_ns) / 1e6;
@@ -477,6 +466,7 @@ test "the JSON has every key and nothing else" {
         triangles: u64,
         width: u32,
         height: u32,
+        part: ?[]const u8,
         samples: u32,
         samples_mean: f64,
         partial: bool,
@@ -502,14 +492,23 @@ test "the JSON has every key and nothing else" {
         bvh: struct { nodes: u64, depth: u32, sah_cost: ?f64, bytes: u64 },
         memory_peak_bytes: u64,
         image_hash: []const u8,
+        manifest: ?struct {
+            none: u32,
+            node: struct { @"1": []const u8 },
+            mesh: struct {},
+            material: struct {},
+        },
         warnings: []const []const u8,
     };
     const gpa = std.testing.allocator;
     for ([_]bool{ false, true }) |is_bare| {
         var report = report_for_test;
+        report.manifest = .{ .node = &.{.{ .number = 1, .name = "a" }} };
         if (is_bare) {
             report.tests = null;
             report.appearance = null;
+            report.manifest = null;
+            report.part = .{ .tile = .{ .number = 1, .count = 2 } };
             report.bvh.sah_cost = std.math.inf(f64);
             report.warnings = &.{};
         }
@@ -528,6 +527,9 @@ test "the JSON has every key and nothing else" {
         try std.testing.expectEqualStrings("0000000000000abc", value.image_hash);
         try std.testing.expectEqual(@as(?f32, if (is_bare) null else -9.31), value.exposure_ev);
         try std.testing.expectEqual(is_bare, value.tonemap == null);
+        try std.testing.expectEqual(is_bare, value.part != null);
+        if (value.part) |part| try std.testing.expectEqualStrings("tile 1/2", part);
+        if (!is_bare) try std.testing.expectEqualStrings("a", value.manifest.?.node.@"1");
         if (value.tonemap) |name| try std.testing.expectEqualStrings("neutral", name);
         try std.testing.expectEqual(1.5, value.time_ms.parse);
         try std.testing.expectEqual(0.000001, value.time_ms.prepare);

@@ -19,7 +19,10 @@ const srgb = math.srgb;
 const statistics = @import("statistics.zig");
 const trace = @import("trace.zig");
 const variant = @import("variant.zig");
+const Clay = @import("session/clay.zig");
 const Environment = @import("session/environment.zig").Environment;
+const Manifest = @import("manifest.zig").Manifest;
+const hit_layers = @import("session/hit_layers.zig");
 const emission = @import("session/emission.zig");
 const course_file = @import("session/course.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
@@ -80,8 +83,20 @@ pub const Pose = struct {
     sharing: prepare.SharingRule = .{},
     animation: settings.Animation = .{},
     /// What `view` will be asked for: points and lines are as large as its pixels want them, and
-    /// stay so until the next pose.
+    /// stay so until the next pose. What `shade` wants is there for the next views.
     view: settings.View = .{},
+    /// What these want is there for the next pictures.
+    layers: std.EnumSet(settings.Layer) = .empty,
+
+    fn keepsTexcoords(pose: *const Pose) bool {
+        return pose.layers.contains(.uv) or pose.view.shade == .uv;
+    }
+
+    fn keepsOrigins(pose: *const Pose) bool {
+        const layers = &pose.layers;
+        return layers.contains(.node) or layers.contains(.material) or
+            layers.contains(.primitive);
+    }
 };
 
 /// What the pictures of a film have of one of them: a film neither jumps nor flickers.
@@ -126,12 +141,16 @@ pub const Session = struct {
     world: ?World = null,
     /// What the next pose has a use for; there with the world.
     pose_cache: ?prepare.PoseCache = null,
+    /// Of the world's triangles, where layers want them.
+    origins: ?prepare.Origins = null,
     environment: Environment = .{},
     /// The studio, where it is seen but something else lights the scene.
     backdrop: Environment = .{},
     /// The file that the picture is to replace.
     output: ?Identity = null,
     film: ?Film = null,
+    /// Names of what a layer of it has numbers of; the memory is that of `origins`.
+    manifest: ?Manifest = null,
     /// Which pixels the film has.
     layout: ?film_file.Layout = null,
     /// What parts say of what they are of.
@@ -293,6 +312,9 @@ pub const Session = struct {
         session.world = null;
         if (session.pose_cache) |*cache| cache.deinit();
         session.pose_cache = null;
+        if (session.origins) |*origins| origins.deinit();
+        session.origins = null;
+        session.manifest = null;
     }
 
     fn dropLoaded(session: *Session) void {
@@ -322,6 +344,7 @@ pub const Session = struct {
             .tree_quality = chosen.tree_quality,
             .sharing = chosen.sharing,
             .point_size = chosen.view.point_size,
+            .keeps_texcoords = chosen.keepsTexcoords(),
             .view = .{
                 .camera = chosen.view.camera,
                 .viewpoint = chosen.view.viewpoint,
@@ -329,7 +352,8 @@ pub const Session = struct {
                 .long_side = chosen.view.long_side,
             },
         };
-        if (session.pose_cache) |*cache| if (cache.fits(&pose_settings)) {
+        const has_origins = session.origins != null or !chosen.keepsOrigins();
+        if (session.pose_cache) |*cache| if (has_origins and cache.fits(&pose_settings)) {
             return prepare.poseAgain(
                 &session.world.?,
                 cache,
@@ -353,6 +377,8 @@ pub const Session = struct {
         );
         session.world = posed.world;
         session.pose_cache = posed.cache;
+        if (chosen.keepsOrigins()) session.origins =
+            try prepare.originsOf(session.gpa, shown, loaded, &session.pose_cache.?);
     }
 
     /// The scene at a moment, until the next one.
@@ -370,8 +396,15 @@ pub const Session = struct {
 
     /// Chooses what is seen, from where and by what light; the tree stays. Asserts that there is a
     /// pose.
-    pub fn view(session: *Session, choices: settings.View) Error!void {
+    pub fn view(session: *Session, chosen: settings.View) Error!void {
         if (session.pool.cancelled.load(.monotonic)) return error.Canceled;
+        var choices = chosen;
+        if (choices.shade == .ao) {
+            choices.environment.source = .white;
+            choices.environment.intensity = Clay.radiance;
+            choices.ambient = null;
+            choices.emitters = false;
+        }
         session.seen = choices;
         session.seen.background = session.backgroundOf(&choices);
         const background = session.seen.background;
@@ -480,9 +513,17 @@ pub const Session = struct {
         session.appearance = null;
         session.metered = null;
         session.times.denoise_ns = 0;
-        try session.weighEmitters();
-        try session.dimStudio();
+        session.manifest = null;
+        const shade = session.seen.shade;
+        if (shade == null) {
+            try session.weighEmitters();
+            try session.dimStudio();
+        }
         var frame = session.world.?.frame();
+        var clay: ?Clay =
+            if (shade == .ao) try .init(session.gpa, &session.world.?) else null;
+        defer if (clay) |*made| made.deinit();
+        if (clay) |*made| made.dress(&frame);
         var lights = try session.makeLightSampler(choices.integrator, &frame);
         defer if (lights) |*made| made.deinit();
         if (lights) |*made| frame.light_sampler = &made.sampler;
@@ -494,6 +535,8 @@ pub const Session = struct {
         );
         if (choices.denoise and !choices.is_merged) try session.denoiseFilm();
         try session.cutFilm();
+        try session.survey(&frame);
+        if (shade == .cost) try session.paintCost();
     }
 
     /// Leaves of the film what was asked for.
@@ -504,6 +547,38 @@ pub const Session = struct {
         session.film.?.deinit(session.gpa);
         session.film = cut;
         layout.* = layout.bare();
+    }
+
+    /// Makes layers of what the picture's first samples see, if the film has any.
+    fn survey(session: *Session, frame: *const Frame) trace.Error!void {
+        const film = &session.film.?;
+        if (!film.layers.contains(.origin)) return;
+        const start = Io.Clock.awake.now(session.io);
+        const choices = &session.rendered;
+        var chosen = session.traceSettings(choices.*);
+        chosen.sample_count = @max(session.traced.sample_count, 1);
+        chosen.layout = &session.layout.?;
+        try trace.fillHits(session.gpa, choices.variant, frame, film, chosen);
+        const origins = if (session.origins) |*origins| origins else null;
+        if (origins) |made| {
+            const arena = made.arena.allocator();
+            session.manifest =
+                try hit_layers.manifestOf(arena, film.imageOf(.origin).?, made);
+        }
+        try hit_layers.fill(film, .{
+            .geometry = frame.geometry,
+            .shift = session.pose_cache.?.shift,
+            .origins = origins,
+        }, &session.pool);
+        session.times.trace_ns += session.since(start);
+    }
+
+    /// Makes the picture a map of what it took.
+    fn paintCost(session: *Session) error{OutOfMemory}!void {
+        const film = &session.film.?;
+        const display = film.imageOf(.display).?;
+        try output.paintLayer(session.gpa, &session.furtherOf(.cost), display);
+        @memset(film.image.pixels, .{ 0, 0, 0, 1 });
     }
 
     fn denoiseFilm(session: *Session) denoise.Error!void {
@@ -556,8 +631,20 @@ pub const Session = struct {
         film: *Film,
         chosen: trace.Settings,
     ) trace.Error!void {
-        const variant_index = session.rendered.variant;
-        session.traced = try trace.trace(session.gpa, variant_index, frame, film, chosen);
+        const gpa = session.gpa;
+        const index = session.rendered.variant;
+        var settled = chosen;
+        if (session.seen.shade) |shade| switch (shade) {
+            .normal => settled.look = .normals,
+            .uv => settled.look = .texcoords,
+            .ao, .cost => {},
+        };
+        session.traced = if (settled.look != .hits)
+            try trace.look(gpa, index, frame, film, settled)
+        else if (film.layers.contains(.cost))
+            try trace.traceCounting(gpa, index, frame, film, settled)
+        else
+            try trace.trace(gpa, index, frame, film, settled);
     }
 
     /// Traces a picture of one sample, to find how many fit into the time, and chooses so many;
@@ -655,7 +742,10 @@ pub const Session = struct {
         const film = &session.film.?;
         var further: [std.enums.values(settings.Layer).len]output.Further = undefined;
         var chosen = session.outputSettings(choices, session.appearance);
-        chosen.further = session.furtherLayers(&further);
+        if (!choices.layers_apart) {
+            chosen.further = session.furtherLayers(&further);
+            chosen.manifest = if (session.manifest) |*manifest| manifest else null;
+        }
         Progress.begin(session.pool.progress, .{ .stage = .writing });
         const tally = try output.write(session.gpa, .{
             .image = &film.image,
@@ -683,10 +773,7 @@ pub const Session = struct {
             .version = identity.version,
             .width = layout.width,
             .height = layout.height,
-            .part = switch (layout.form) {
-                .window => |own| .{ .crop = .{ .pixels = own } },
-                .share => session.rendered.part,
-            },
+            .part = session.partOf(),
             .scene = part_file.hexOf(identity.scene),
             .options = part_file.hexOf(session.optionsFingerprint(choices)),
             .sample_count = session.traced.sample_count,
@@ -698,12 +785,22 @@ pub const Session = struct {
             .tone_mapping = chosen.tone_mapping,
             .transparent = chosen.transparent,
             .background = chosen.background,
+            .manifest = if (session.manifest) |*manifest| .of(manifest) else null,
             .jpeg_quality = chosen.jpeg_quality,
+            .webp_quality = chosen.webp_quality,
             .exr_kind = chosen.exr_kind,
             .frame_rate = chosen.frame_rate,
         }, target, session.diagnostic);
         session.times.output_ns = session.since(start);
         session.times.total_ns = session.since(session.start);
+    }
+
+    /// What the film has, of crops the pixels.
+    fn partOf(session: *const Session) settings.Part {
+        return switch (session.rendered.part) {
+            .crop => .{ .crop = .{ .pixels = session.layout.?.form.window } },
+            .whole, .tile => session.rendered.part,
+        };
     }
 
     /// Of all that the picture depends on besides what was read.
@@ -727,13 +824,33 @@ pub const Session = struct {
             choices.exposure,
             choices.tone_mapping,
             choices.jpeg_quality,
+            choices.webp_quality,
             choices.exr_kind,
         });
+    }
+
+    /// Encodes a layer alone, as numbers or as colours, whichever the format holds, and moves it to
+    /// its place. Closes the target in any case. Asserts that the picture was made with the layer.
+    pub fn writeLayer(
+        session: *Session,
+        layer: settings.Layer,
+        target: *output.Target,
+        choices: settings.Write,
+    ) output.Error!void {
+        defer target.abandon();
+        const start = Io.Clock.awake.now(session.io);
+        var chosen = session.outputSettings(choices, null);
+        chosen.manifest = if (session.manifest) |*manifest| manifest else null;
+        const further = session.furtherOf(layer);
+        try output.writeLayer(session.gpa, &further, chosen, target, session.diagnostic);
+        session.times.output_ns += session.since(start);
     }
 
     /// Null: the format keeps radiance as it is.
     fn appearanceOf(session: *Session, choices: settings.Write) trace.Error!?Report.Appearance {
         if (output.isLinear(choices.format)) return null;
+        if (session.seen.shade != null)
+            return .{ .exposure_ev = 0, .is_automatic = false, .tone_mapping = .linear };
         return .{
             .exposure_ev = try session.exposureOf(choices.exposure),
             .is_automatic = session.isMetered(choices.exposure),
@@ -749,10 +866,11 @@ pub const Session = struct {
         return .{
             .format = choices.format,
             .exposure_ev = if (appearance) |chosen| chosen.exposure_ev else 0,
-            .tone_mapping = choices.tone_mapping,
+            .tone_mapping = if (session.seen.shade == null) choices.tone_mapping else .linear,
             .transparent = session.seen.background == .transparent,
             .background = session.behind(),
             .jpeg_quality = @intCast(choices.jpeg_quality),
+            .webp_quality = if (choices.webp_quality) |quality| @intCast(quality) else null,
             .rows = session.rowsWritten(),
             .exr_kind = choices.exr_kind,
             .frame_rate = choices.frame_rate,
@@ -774,11 +892,13 @@ pub const Session = struct {
     fn furtherLayers(session: *const Session, room: []output.Further) []const output.Further {
         var count: usize = 0;
         var chosen = session.rendered.layers.iterator();
-        while (chosen.next()) |layer| : (count += 1) room[count] = .{
-            .layer = layer,
-            .image = session.film.?.imageOf(film_file.layerOf(layer)).?,
-        };
+        while (chosen.next()) |layer| : (count += 1) room[count] = session.furtherOf(layer);
         return room[0..count];
+    }
+
+    fn furtherOf(session: *const Session, layer: settings.Layer) output.Further {
+        const image = session.film.?.imageOf(film_file.layerOf(layer)).?;
+        return .{ .layer = layer, .image = image };
     }
 
     fn isMetered(session: *const Session, exposure: settings.Exposure) bool {
@@ -792,6 +912,7 @@ pub const Session = struct {
 
     /// In stops: as chosen, or metered. That time counts as tracing.
     fn exposureOf(session: *Session, exposure: settings.Exposure) trace.Error!f32 {
+        if (session.seen.shade != null) return 0;
         if (session.reference) |reference| return reference.exposure_ev;
         if (!session.isMetered(exposure)) return if (exposure == .ev) exposure.ev else 0;
         const start = Io.Clock.awake.now(session.io);
@@ -916,6 +1037,7 @@ pub const Session = struct {
 
     /// Says so where the picture shows next to nothing, and what may help.
     fn hint(session: *Session, tally: output.Tally) void {
+        if (session.seen.shade != null) return;
         const total = session.film.?.image.pixels.len;
         if (isNearlyAll(tally.clear, total)) return session.hintOf(
             "background",
@@ -973,6 +1095,7 @@ pub const Session = struct {
                 session.world.?.facts.stroke_triangle_count,
             .width = if (layout.form == .window) layout.film_width else layout.width,
             .height = if (layout.form == .window) layout.film_height else layout.height,
+            .part = session.partOf(),
             .sample_count = session.traced.sample_count,
             .sample_mean = float(session.traced.sample_sum) / float(session.traced.pixel_count),
             .is_partial = session.traced.is_partial,
@@ -996,12 +1119,15 @@ pub const Session = struct {
             .memory_peak_bytes = memoryPeakBytes(),
             .image_hash = session.film.?.hash(),
             .appearance = session.appearance,
+            .manifest = session.manifest,
         };
     }
 
     /// Samples a pixel that `render` takes at most. Asserts that there is a view.
     pub fn sampleCount(session: *const Session, choices: settings.Render) u32 {
         if (choices.sample_count) |count| return count;
+        // One tells as much of what rays cost.
+        if (session.seen.shade == .cost) return 1;
         if (choices.noise != null) return settings.noise_sample_count;
         if (choices.time_budget_s != null) return settings.sample_count.max;
         const seen = &session.world.?.view;
@@ -1041,6 +1167,8 @@ pub const Session = struct {
     fn layersOf(session: *const Session) film_file.Layers {
         const seen = &session.seen;
         const facts = &session.facts;
+        if (seen.shade) |shade| if (shade != .ao)
+            return .init(.{ .color = true, .alpha = true, .display = true });
         return .init(.{
             .color = true,
             .alpha = switch (seen.background) {
@@ -1070,6 +1198,9 @@ pub const Session = struct {
         if (choices.denoise) layers.setUnion(denoise.needed);
         var further = choices.layers.iterator();
         while (further.next()) |layer| layers.insert(film_file.layerOf(layer));
+        // Where hits are before they become numbers.
+        if (layers.contains(.position) or layers.contains(.texcoord)) layers.insert(.origin);
+        if (session.seen.shade == .cost) layers.insert(.cost);
         const layout: film_file.Layout = try .init(
             session.gpa,
             view_size.width,
@@ -1196,6 +1327,41 @@ test "a scene that is loaded once gives each view the picture it has alone" {
     try testing.expectEqual(2, made.depth);
     try testing.expectEqual(24 * 16 * settings.sample_count_small, made.rays.primary);
     try testing.expectEqual(hashes[2], made.image_hash);
+}
+
+test "layers leave the picture as it is, and places are as far away as depths say" {
+    var diagnostic: Diagnostic = .{};
+    var session: Session = .init(testing.allocator, testing.io, 2, &diagnostic);
+    defer session.deinit();
+    try session.load("builtin:cornell", .{});
+    const layers: std.EnumSet(settings.Layer) = .full;
+    try session.pose(.{ .lanes = variant.compiled[0].lanes, .layers = layers });
+    const seen: settings.View = .{
+        .resolution = .{ 8, 8 },
+        .camera = .auto,
+        .environment = .{ .source = .none },
+        .background = .transparent,
+    };
+    try session.view(seen);
+    try session.render(.{ .sample_count = 2 });
+    const hash = session.film.?.hash();
+    try session.render(.{ .sample_count = 2, .layers = layers });
+    try testing.expectEqual(hash, session.film.?.hash());
+    try testing.expect(session.report(.{}).manifest != null);
+    const camera = &session.world.?.view.camera;
+    const forward = math.vec3.normalize(camera.forward).?;
+    const alpha = session.furtherOf(.alpha);
+    var hit_count: usize = 0;
+    for (session.film.?.imageOf(.position).?.pixels, 0..) |place, at| {
+        if (place[3] == 0) continue;
+        // Depths of other samples of the pixel are much the same.
+        const shifted = math.vec3.sub(place[0..3].*, camera.origin);
+        const depth = math.vec3.dot(shifted, forward);
+        if (alpha.valuesAt(at)[0] < 1) continue;
+        try testing.expectApproxEqRel(session.furtherOf(.depth).valuesAt(at)[0], depth, 0.5);
+        hit_count += 1;
+    }
+    try testing.expect(hit_count > 8);
 }
 
 test "every stage ends when it is cancelled, and no file is left" {

@@ -69,6 +69,8 @@ pub const pixel_count_max = 1 << 28;
 pub const long_side: Range = .{ .min = 1, .max = 1 << 14, .default = side.default };
 /// Parts of a picture that are tiles.
 pub const part_count: Range = .{ .min = 1, .max = 1 << 16 };
+/// Quality of a WebP that loses information.
+pub const webp_quality: Range = .{ .min = 1, .max = 100 };
 /// Frames of a film, and pictures that are numbered.
 pub const frame_count_max = 1_000_000;
 /// Files that are rendered side by side.
@@ -81,6 +83,8 @@ pub const jpeg_quality: Range = .{ .min = 1, .max = 100, .default = 90 };
 pub const exposure_ev_max = 64;
 /// Directional lights a sample that stand for an environment, to find how much of it arrives.
 pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4 };
+/// And where they are all the light there is.
+pub const occlusion_shadow_count = 16;
 /// And where a floor catches their shadows, unless the user says.
 pub const floor_shadow_count = 16;
 /// See `Lights`.
@@ -111,6 +115,8 @@ pub const Format = enum {
     ppm,
     /// Its relative for floats, linear: the picture itself, bit for bit, without alpha.
     pfm,
+    /// Lossless, unless a quality is asked for.
+    webp,
     /// OpenEXR: linear, halves or floats, with alpha where the background is transparent.
     exr,
     /// YUV4MPEG2: frames of a film, one after the other.
@@ -120,16 +126,41 @@ pub const Format = enum {
 /// What colours are in an OpenEXR file.
 pub const ExrKind = enum { half, float };
 
-/// What is known of pixels besides their colours, for other programs: channels of an OpenEXR file.
+/// What is known of pixels besides their colours, for other programs: channels of an OpenEXR file,
+/// or files of their own.
 pub const Layer = enum {
-    /// Share of white light that what is seen sends to the camera.
-    albedo,
-    /// Its unit normal in the world's axes.
-    normal,
     /// Distance from the camera's plane in metres.
     depth,
+    /// Unit normal in the world's axes.
+    normal,
+    /// Share of white light that what is seen sends to the camera.
+    albedo,
+    /// Texture coordinates of the first set.
+    uv,
+    /// Numbers that the file gives to the node, to the material, and to the primitive of the mesh.
+    node,
+    material,
+    primitive,
+    /// Share of the pixel that surfaces cover.
+    alpha,
+    /// Place in the world's axes in metres.
+    position,
+    /// Tests of rays with boxes and triangles.
+    cost,
     /// Variance of the mean of the pixel's samples, before it is denoised.
     variance,
+};
+
+/// Quick looks, in place of what light makes of a scene.
+pub const Shade = enum {
+    /// Ambient occlusion: light from everywhere on white clay.
+    ao,
+    /// Unit normals in the world's axes as colours.
+    normal,
+    /// Texture coordinates as colours.
+    uv,
+    /// Tests of rays with boxes and triangles as a heat map.
+    cost,
 };
 
 /// Care taken over the tree of the scene: time to build it against time to trace rays through it.
@@ -285,6 +316,8 @@ pub const Environment = struct {
         default,
         none,
         studio,
+        /// As much from everywhere, for quick looks.
+        white,
         /// An image by its name.
         file: []const u8,
     };
@@ -399,10 +432,13 @@ pub const View = struct {
     display_referred: bool = true,
     /// Within `point_size`.
     point_size: f32 = point_size.default,
+    /// Null: what light makes of it. Asserts that the integrator is Whitted's.
+    shade: ?Shade = null,
 
     /// Directional lights a sample that stand for the environment.
     pub fn shadowCount(view: *const View) u32 {
         if (view.environment.shadow_count) |count| return count;
+        if (view.shade == .ao) return occlusion_shadow_count;
         return if (view.floor == .shadow) floor_shadow_count else environment_shadow_count.default;
     }
 };
@@ -474,6 +510,19 @@ pub const Part = union(enum) {
 
     /// One of `count` shares of tiles that are spread all over the picture, from 1 on.
     pub const Tile = struct { number: u32, count: u32 };
+
+    /// `crop 0,0,4,3` or `tile 1/2`.
+    pub fn format(part: Part, writer: *std.Io.Writer) std.Io.Writer.Error!void {
+        switch (part) {
+            .whole => try writer.writeAll("whole"),
+            .crop => |crop| switch (crop) {
+                inline else => |edges| try writer.print("crop {d},{d},{d},{d}", .{
+                    edges[0], edges[1], edges[2], edges[3],
+                }),
+            },
+            .tile => |tile| try writer.print("tile {d}/{d}", .{ tile.number, tile.count }),
+        }
+    }
 };
 
 /// How rays are traced.
@@ -526,7 +575,11 @@ pub const Write = struct {
     tone_mapping: ToneMapping = .neutral,
     /// Within `jpeg_quality`.
     jpeg_quality: u32 = jpeg_quality.default,
+    /// Within `webp_quality`; null: without loss.
+    webp_quality: ?u32 = null,
     exr_kind: ExrKind = .half,
+    /// Layers are in files of their own.
+    layers_apart: bool = false,
 };
 
 test FrameRate {

@@ -26,6 +26,10 @@ pub const Whitted = @import("trace/integrate/whitted.zig").Whitted;
 pub const Lights = @import("trace/integrate/instant_radiosity.zig").InstantRadiosity;
 /// Path tracing, by one kernel.
 pub const PathTracer = @import("trace/integrate/path_tracer.zig").PathTracer;
+/// What primary rays see, by one kernel that counts tests.
+pub const Survey = @import("trace/integrate/survey.zig").Survey;
+/// What a survey makes.
+pub const Look = @import("trace/integrate/survey.zig").Look;
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
 pub const kernel = @import("trace/traverse/kernel.zig");
 /// Rays in lanes.
@@ -118,6 +122,42 @@ pub fn traceCounting(
     return run(true, gpa, variant_index, frame, film, &settings);
 }
 
+/// Leaves hits on the film's layer of origins, see `tiles.fillHits`.
+pub fn fillHits(
+    gpa: Allocator,
+    variant_index: usize,
+    frame: *const Frame,
+    film: *Film,
+    settings: Settings,
+) Error!void {
+    return tiles.fillHits(surveyOf(variant_index), gpa, frame, film, &settings);
+}
+
+/// Makes a picture of what `settings.look` names, of colours of the display: not one of hits, and
+/// the film has a layer for those colours.
+pub fn look(
+    gpa: Allocator,
+    variant_index: usize,
+    frame: *const Frame,
+    film: *Film,
+    settings: Settings,
+) Error!Statistics {
+    assert(settings.look != .hits and film.layers.contains(.display));
+    return tiles.render(surveyOf(variant_index), gpa, frame, film, &settings);
+}
+
+fn surveyOf(variant_index: usize) *const Integrator {
+    return (comptime integratorsOf("survey", counting_variants))[variant_index];
+}
+
+/// By variant, those that count its tests.
+const counting_variants: []const Variant = list: {
+    var list: [variant_file.compiled.len]Variant = variant_file.compiled[0..].*;
+    for (&list) |*variant| variant.* = variant_file.countingOf(variant.*);
+    const all = list;
+    break :list &all;
+};
+
 fn run(
     comptime counting: bool,
     gpa: Allocator,
@@ -132,13 +172,10 @@ fn run(
     else
         assert(film.image.width == view.width and film.image.height == view.height);
     assert(settings.sample_count >= 1 and choices.depth.holds(settings.depth_max));
-    const whitted = comptime integratorsOf(if (counting) "counting" else "whitted", list: {
-        var list: [variant_file.compiled.len]Variant = variant_file.compiled[0..].*;
-        if (counting) for (&list) |*variant| {
-            variant.* = variant_file.countingOf(variant.*);
-        };
-        break :list &list;
-    });
+    const whitted = comptime if (counting)
+        integratorsOf("counting", counting_variants)
+    else
+        integratorsOf("whitted", variant_file.compiled);
     const integrator = switch (settings.integrator) {
         .whitted => whitted[variant_index],
         inline .lights, .path => |which| integrator: {

@@ -312,8 +312,9 @@ test "an unknown flag is a usage error" {
 test "mistakes on the command line are usage errors in one line" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
+    const alone = try sandbox.expectExit(2, &.{});
+    try testing.expect(std.mem.startsWith(u8, alone.stderr, "usage: raylane SCENE"));
     for ([_][]const []const u8{
-        &.{},
         &.{"render"},
         &.{ "builtin:cornell", "builtin:cornell" },
         &.{ "builtin:cornell", "-o", "a.tif" },
@@ -417,7 +418,7 @@ test "help is for everybody, fits a screen and keeps its promises" {
     defer sandbox.deinit();
     const help = try sandbox.expectExit(0, &.{"--help"});
     try testing.expectEqualStrings("", help.stderr);
-    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 150);
+    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 190);
     const again = try sandbox.expectExit(0, &.{ "absent.glb", "--no-such-flag", "-h" });
     try testing.expectEqualStrings(help.stdout, again.stdout);
     // The built-in scenes that the help names are those that there are.
@@ -668,6 +669,31 @@ test "frames are the pictures of their moments, and a film has them in a row" {
     const header = "YUV4MPEG2 W4 H4 F24:1 Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
     try testing.expectEqual(header.len + 2 * ("FRAME\n".len + 3 * 16), film.stdout.len);
     try testing.expect(std.mem.startsWith(u8, film.stdout, header ++ "FRAME\n"));
+}
+
+test "parts merge into the picture's file, wherever the scene lies; without one it stays" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.folder.dir.createDirPath(io, "there");
+    try sandbox.write("s.pbrt", pbrt_scene);
+    try sandbox.write("there/t.pbrt", pbrt_scene);
+    _ = try sandbox.expectExit(0, &.{ "s.pbrt", "-owhole.ppm" });
+    _ = try sandbox.expectExit(0, &.{ "s.pbrt", "--tile=1/2", "-o1.exr" });
+    _ = try sandbox.expectExit(0, &.{
+        "there/t.pbrt", "--tile", "2/2", "-o2.exr", "-t1", "--tile-size=8",
+    });
+    try sandbox.write("merged.ppm", "old");
+    const missing = try sandbox.expectExit(3, &.{ "merge", "1.exr", "-omerged.ppm" });
+    const reason = "raylane: merged.ppm: part 2 of 2 is missing\n";
+    try testing.expectEqualStrings(reason, missing.stderr);
+    try testing.expectEqualStrings("old", try sandbox.read("merged.ppm"));
+    const merged = try sandbox.expectExit(0, &.{ "merge", "2.exr", "1.exr", "-omerged.ppm" });
+    try testing.expectEqualStrings("", merged.stderr);
+    const whole = try sandbox.read("whole.ppm");
+    try testing.expectEqualStrings(whole, try sandbox.read("merged.ppm"));
+    const outside = try sandbox.expectExit(2, &.{ "s.pbrt", "--crop=30,0,31,1" });
+    try testing.expectStringEndsWith(outside.stderr, "in a picture of 30x20\n");
+    try sandbox.expectFiles(&.{ "1.exr", "2.exr", "merged.ppm", "s.pbrt", "there", "whole.ppm" });
 }
 
 test "every format by its name or by --format, JPEG smaller with less quality" {
@@ -1538,7 +1564,7 @@ fn benchResultsOf(sandbox: *Sandbox, json: []const u8) !BenchResults {
 }
 
 const small_bench = [_][]const u8{
-    "bench", "-r16x16", "-t2", "--rounds=2", "--time-limit=2", "-q", "builtin:cornell",
+    "bench", "-r16x16", "-t2", "--rounds=2", "--time-limit=600", "-q", "builtin:cornell",
 };
 
 /// The argument that measures one variant alone, whichever the program holds.

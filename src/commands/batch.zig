@@ -129,30 +129,34 @@ pub const Batch = struct {
         const name = printable(input);
         switch (found) {
             .file => {},
-            .unreadable => |reason| {
-                console.say(batch.io, "raylane: {f}: {s}\n", .{ name, reason });
-                batch.note(.failed);
-                batch.printFailure(&.{
-                    .version = cli.version,
-                    .scene = input,
-                    .problem = .{
-                        .message = reason,
-                        .file = input,
-                        .exit_code = @backingInt(ExitCode.failed),
-                    },
-                });
-            },
+            .unreadable => |reason| batch.refuse(input, reason),
             .folder => |folder| if (folder.file_count == 0) {
+                var reason: raylane.diagnostic.Message = .{};
                 const count = folder.folder_count;
-                console.say(batch.io, "raylane: {f}: no scenes in it, and {d} folder{s} that " ++
-                    "are not looked into\n", .{ name, count, plural(count) });
-                batch.note(.failed);
+                reason.set("no scenes in it, and {d} folder{s} that are not looked into", .{
+                    count, plural(count),
+                });
+                batch.refuse(input, reason.text());
             } else if (folder.folder_count > 0 and !batch.options.quiet) {
                 const count = folder.folder_count;
                 console.say(batch.io, "raylane: {f}: warning: not looked into {d} folder{s} in " ++
                     "it\n", .{ name, count, plural(count) });
             },
         }
+    }
+
+    fn refuse(batch: *Batch, input: []const u8, reason: []const u8) void {
+        console.say(batch.io, "raylane: {f}: {s}\n", .{ printable(input), reason });
+        batch.note(.failed);
+        batch.printFailure(&.{
+            .version = cli.version,
+            .scene = input,
+            .problem = .{
+                .message = reason,
+                .file = input,
+                .exit_code = @backingInt(ExitCode.failed),
+            },
+        });
     }
 
     /// Pictures that follow each other in a stream are told apart by some formats only.
@@ -168,7 +172,7 @@ pub const Batch = struct {
                 "a y4m film on standard output is one of a single scene, not of {d}",
                 .{file_count},
             ),
-            .tga, .bmp, .hdr, .pfm, .exr => return diagnostic.fail(
+            .tga, .bmp, .hdr, .pfm, .webp, .exr => return diagnostic.fail(
                 error.UsageInvalid,
                 "several {t} pictures in one stream cannot be told apart; " ++
                     "ppm, png, jpg and y4m can",
@@ -274,8 +278,9 @@ pub const Batch = struct {
     /// What a signal says that ends the program.
     fn foretell(batch: *const Batch) void {
         if (batch.options.quiet) return;
-        const format = "{d} pictures are written, those under way are not";
-        signals.outcome.set(format, .{batch.written_count});
+        const count = batch.written_count;
+        const format = "{d} picture{s} written, those under way are not";
+        signals.outcome.set(format, .{ count, plural(count) });
     }
 
     /// Prints the report of a picture, one at a time.

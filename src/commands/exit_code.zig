@@ -21,7 +21,7 @@ pub const ExitCode = enum(u8) {
     /// Of what ended a command.
     pub fn of(err: Error) ExitCode {
         return switch (err) {
-            error.OutOfMemory, error.InputOutput, error.OutputFailed => .failed,
+            error.OutOfMemory, error.InputOutput, error.OutputFailed, error.TimeOver => .failed,
             error.CameraUnknown, error.SceneUnknown => .usage,
             error.MaterialVariantUnknown, error.AnimationUnknown, error.PartUnknown => .usage,
             error.InvalidInput, error.SceneTooLarge => .invalid,

@@ -273,6 +273,7 @@ pub const Pictures = struct {
             .sharing = .of(options.instances),
             .animation = options.animation,
             .view = options.view,
+            .layers = options.render.layers,
         });
         pictures.posed = .{ .frame = frame, .camera = options.view.camera };
     }
@@ -305,6 +306,8 @@ pub const Pictures = struct {
         session.pool.thread_count = pictures.batch.threadCount();
         try session.render(options.render);
         try pictures.sizeFilm();
+        // First, so that where there is the picture there are its layers.
+        try pictures.writeLayers();
         session.write(&target, options.write) catch |err| return switch (err) {
             error.OutOfMemory, error.Canceled => |other| other,
             error.InputOutput => error.OutputFailed,
@@ -316,6 +319,28 @@ pub const Pictures = struct {
         if (options.count_tests) report.tests = try session.countTests(options.render);
         pictures.batch.add(.written, 1);
         try pictures.say(&report);
+    }
+
+    /// Layers in files of their own, where the names say so.
+    fn writeLayers(pictures: *Pictures) Error!void {
+        const values = &pictures.values;
+        const write = &pictures.options.write;
+        if (!write.layers_apart) return;
+        const color = values.layer;
+        var layers = pictures.options.render.layers.iterator();
+        while (layers.next()) |layer| {
+            values.layer = @tagName(layer);
+            try pictures.setName(values.frame, values.view);
+            if (pictures.isSkipped()) continue;
+            try pictures.claim();
+            var target = try pictures.openFile();
+            pictures.session.writeLayer(layer, &target, write.*) catch |err| return switch (err) {
+                error.OutOfMemory, error.Canceled => |other| other,
+                error.InputOutput => error.OutputFailed,
+            };
+        }
+        values.layer = color;
+        try pictures.setName(values.frame, values.view);
     }
 
     /// Whether nothing else is to be made of the file.
@@ -366,7 +391,7 @@ pub const Pictures = struct {
         };
     }
 
-    /// The place of the picture that is named, which nobody else may have.
+    /// The place of the picture that is named.
     fn open(pictures: *Pictures) Error!Target {
         const is_film = pictures.options.write.format == .y4m;
         pictures.options.write.is_continued = is_film and pictures.begun_count > 0;
@@ -378,15 +403,7 @@ pub const Pictures = struct {
             try pictures.finishFilm();
         }
         pictures.options.write.is_continued = false;
-        const is_own = try pictures.batch.claim(path, .{
-            .file = pictures.file_index,
-            .number = pictures.number,
-        });
-        if (!is_own) return pictures.session.diagnostic.fail(
-            error.OutputFailed,
-            "it is the name of another picture, too",
-            .{},
-        );
+        try pictures.claim();
         const target = pictures.ahead orelse try pictures.openFile();
         pictures.ahead = null;
         if (!is_film) return target;
@@ -397,14 +414,38 @@ pub const Pictures = struct {
         return pictures.film.?.target.part();
     }
 
+    /// Makes the name this picture's, which nobody else may have.
+    fn claim(pictures: *Pictures) Error!void {
+        const is_own = try pictures.batch.claim(pictures.name.written(), .{
+            .file = pictures.file_index,
+            .number = pictures.number,
+        });
+        if (!is_own) return pictures.session.diagnostic.fail(
+            error.OutputFailed,
+            "it is the name of another picture, too",
+            .{},
+        );
+    }
+
     fn openFile(pictures: *Pictures) error{OutputFailed}!Target {
         const io = pictures.batch.io;
         const path = pictures.name.written();
-        // Where this fails, so does what follows, and says why.
-        if (std.fs.path.dirname(path)) |folder| Io.Dir.cwd().createDirPath(io, folder) catch {};
+        makeFolders(io, path);
         const diagnostic = pictures.session.diagnostic;
         return Target.openFile(io, &signals.temporary_files, path, diagnostic) catch
             error.OutputFailed;
+    }
+
+    /// Makes the folders above a file, as far as that goes: where one is missing, opening the file
+    /// says so.
+    fn makeFolders(io: Io, path: []const u8) void {
+        const cwd: Io.Dir = .cwd();
+        const whole = std.fs.path.dirname(path) orelse return;
+        if (cwd.access(io, whole, .{})) return else |_| {}
+        for (path[0 .. whole.len + 1], 0..) |byte, end| {
+            if (byte != '/' or end == 0) continue;
+            cwd.createDir(io, path[0..end], .default_dir) catch {}; // It may be there.
+        }
     }
 
     /// All frames of a film have one size.
@@ -437,13 +478,12 @@ pub const Pictures = struct {
         const seconds = @as(f64, @floatFromInt(taken_ns)) / std.time.ns_per_s;
         // Not among lines for programs.
         const is_told = options.progress.form == .json and options.progress.file == null;
-        if (!options.quiet and !is_told) console.say(batch.io, "raylane: {f}: {f}, {d}x{d}, {d:.2} s\n", .{
-            printable(raylane.parse.title(options.scene)),
-            printable(measured.output),
-            measured.width,
-            measured.height,
-            seconds,
-        });
+        if (!options.quiet and !is_told) console.sayOf(
+            batch.io,
+            options.scene,
+            "{f}, {d}x{d}, {d:.2} s",
+            .{ printable(measured.output), measured.width, measured.height, seconds },
+        );
         var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
         var report = measured.*;
         report.warnings = pictures.session.diagnostic.warningTexts(&warnings);

@@ -164,6 +164,7 @@ const Job = struct {
             .sharing = .of(options.instances),
             .animation = options.animation,
             .view = options.view,
+            .layers = options.render.layers,
         });
         try session.view(options.view);
         job.sayWarnings();

@@ -140,6 +140,8 @@ const Server = struct {
             return fail(diagnostic, error.UsageInvalid, "standard input has the jobs", .{});
         if (options.progress_image != null)
             return fail(diagnostic, error.UsageInvalid, "a job has no progress image", .{});
+        if (options.progress.form == .json)
+            return fail(diagnostic, error.UsageInvalid, "a job tells no progress", .{});
         if (options.isBatch() or options.write.format == .y4m)
             return fail(diagnostic, error.UsageInvalid, "a job is one picture of a name", .{});
         return @import("render.zig").checkVariant(&options.render, diagnostic);
@@ -164,6 +166,7 @@ const Server = struct {
             .sharing = .of(options.instances),
             .animation = options.animation,
             .view = options.view,
+            .layers = options.render.layers,
         });
         try session.view(options.view);
         // They would not be said again, and what was missing may be there next time.

@@ -1,6 +1,7 @@
 //! Layers of a picture as channels of an OpenEXR file: their names, kinds and places.
 //!
-//! In: rows of RGB or RGBA floats, and images of further layers. Out: a list of channels.
+//! In: rows of RGB or RGBA floats, and images of further layers. Out: a list of channels. Their
+//! names are those that compositing programs look for, where there are such: docs/layers.md.
 
 const std = @import("std");
 const Image = @import("../image.zig").Image;
@@ -10,7 +11,28 @@ const assert = std.debug.assert;
 const Channel = openexr.Channel;
 
 /// What a file may hold besides the picture.
-pub const Further = struct { layer: settings.Layer, image: *const Image };
+pub const Further = struct {
+    layer: settings.Layer,
+    /// Pixels of which the layer has some channels.
+    image: *const Image,
+
+    /// A layer's values at a pixel; those of numbers are bits.
+    pub fn valuesAt(further: *const Further, at: usize) []const f32 {
+        const place = namesOf(further.layer);
+        return further.image.pixels[at][place.first..][0..place.names.len];
+    }
+};
+
+/// Whether the values of a layer are numbers of things, `none` where there is nothing.
+pub fn isNumber(layer: settings.Layer) bool {
+    return namesOf(layer).kind == .uint;
+}
+
+/// What stands for no thing.
+pub const none = @import("../manifest.zig").none;
+
+/// The text in a file that has the names of the things with numbers.
+pub const manifest_name = "raylane/manifest";
 
 /// The channels of a layer.
 const Names = struct {
@@ -22,9 +44,16 @@ const Names = struct {
 
 fn namesOf(layer: settings.Layer) Names {
     return switch (layer) {
-        .albedo => .{ .names = &.{ "albedo.R", "albedo.G", "albedo.B" }, .kind = .half },
-        .normal => .{ .names = &.{ "N.X", "N.Y", "N.Z" }, .kind = .half },
         .depth => .{ .names = &.{"Z"} },
+        .normal => .{ .names = &.{ "N.X", "N.Y", "N.Z" }, .kind = .half },
+        .albedo => .{ .names = &.{ "albedo.R", "albedo.G", "albedo.B" }, .kind = .half },
+        .uv => .{ .names = &.{ "UV.U", "UV.V" } },
+        .node => .{ .names = &.{"node"}, .kind = .uint },
+        .material => .{ .names = &.{"material"}, .kind = .uint, .first = 1 },
+        .primitive => .{ .names = &.{"primitive"}, .kind = .uint, .first = 2 },
+        .alpha => .{ .names = &.{"alpha"}, .first = 3 },
+        .position => .{ .names = &.{ "P.X", "P.Y", "P.Z" } },
+        .cost => .{ .names = &.{ "cost.boxes", "cost.triangles" } },
         .variance => .{ .names = &.{ "variance.R", "variance.G", "variance.B" } },
     };
 }

@@ -1,9 +1,9 @@
 /* OpenEXRCore's writer, and the one call of it that we make.
  *
- * In: channels of floats and whole numbers, texts. Out: a file, in pieces with their places to a sink.
- * The library allocates by the hooks; its allocator has no place for a context, so the call in
- * progress is thread-local. When memory runs out it is left by longjmp; what it holds then is freed
- * with the heap behind the hooks.
+ * In: channels of floats and whole numbers, texts. Out: a file, in pieces with their places to a
+ * sink. The library allocates by the hooks; its allocator has no place for a context, so the call
+ * in progress is thread-local. When memory runs out it is left by longjmp; what it holds then is
+ * freed with the heap behind the hooks.
  */
 #include <setjmp.h>
 #include <stdbool.h>

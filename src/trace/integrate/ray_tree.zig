@@ -138,6 +138,7 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
 
         /// A sample of each pixel of a bundle.
         fn trace(tree: *Self, rectangle: Rectangle, sample: u32, film: *Film) void {
+            const before = if (Kernel.counts_tests) tree.visibility.tests else {};
             tree.sample.start(sample, film.layers);
             tree.bounces.start(rectangle, sample);
             tree.lighting.start(rectangle);
@@ -149,6 +150,9 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
             }
             tree.sample.expose(film, rectangle);
             tree.lighting.expose(rectangle, sample);
+            const place: camera.Place = .{ .rectangle = rectangle, .sample = sample };
+            if (Kernel.counts_tests and film.layers.contains(.cost))
+                camera.exposeCost(Kernel, film, place, before, tree.visibility.tests);
         }
 
         fn pushPrimary(tree: *Self, rectangle: Rectangle) void {

@@ -35,7 +35,9 @@ const Allocator = std.mem.Allocator;
 const Film = film_file.Film;
 const Layout = film_file.Layout;
 const Frame = world_file.Frame;
-const Progress = @import("../../progress.zig").Progress;
+const Look = @import("survey.zig").Look;
+const progress_file = @import("../../progress.zig");
+const Progress = progress_file.Progress;
 const Rectangle = film_file.Rectangle;
 
 /// How a frame is traced, and who does the work.
@@ -63,6 +65,8 @@ pub const Settings = struct {
     noise: ?adaptive.Noise = null,
     /// Null: all samples in one round.
     course: ?Course = null,
+    /// Of a survey.
+    look: Look = .hits,
     /// Which pixels; null: all of the picture, as `render` fills in.
     layout: ?*const Layout = null,
     /// The integrator's `Shared`: `render` fills it in.
@@ -289,12 +293,7 @@ pub fn render(
     if (with_tiles.layout == null) with_tiles.layout = &whole;
     const settings = &with_tiles;
     const layout = settings.layout.?;
-    var shown = settings.*;
-    shown.offsets = offsets;
-    if (settings.integrator.isOpen()) {
-        sampler.placeInSequence(offsets);
-        shown.sample_count = open_sample_count;
-    } else sampler.place(offsets);
+    var shown = withSamples(settings, offsets);
     if (integrator.shared) |shared|
         shown.shared = shared.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
     defer if (integrator.shared) |shared| shared.deinit(shown.shared.?, &gpa);
@@ -343,6 +342,60 @@ pub fn render(
     }
     if (integrator.counts_tests) total.tests = tests;
     return total;
+}
+
+/// Settings as integrators find them, with places for all samples.
+fn withSamples(chosen: *const Settings, offsets: []sampler.Offset) Settings {
+    var shown = chosen.*;
+    shown.offsets = offsets;
+    if (chosen.integrator.isOpen()) {
+        sampler.placeInSequence(offsets);
+        shown.sample_count = open_sample_count;
+    } else sampler.place(offsets);
+    return shown;
+}
+
+/// Has a survey leave hits on the film's layer of origins, of the first sample of those that the
+/// picture has by these settings; all else of the film stays.
+pub fn fillHits(
+    survey: *const Integrator,
+    gpa: Allocator,
+    frame: *const Frame,
+    film: *Film,
+    chosen: *const Settings,
+) Error!void {
+    assert(survey.shared == null and chosen.look == .hits);
+    const offsets = try gpa.alloc(sampler.Offset, chosen.sample_count);
+    defer gpa.free(offsets);
+    const shown = withSamples(chosen, offsets);
+    const whole: Layout = .whole(film.image.width, film.image.height);
+    const tiles: Tiles = .init(chosen.layout orelse &whole, &shown);
+    const nothing: f32 = @bitCast(film_file.no_triangle);
+    @memset(film.imageOf(.origin).?.pixels, .{ nothing, 0, 0, 0 });
+    var by_thread: [parallel.thread_count_max]*anyopaque = undefined;
+    var count: usize = 0;
+    defer for (by_thread[0..count]) |one| survey.deinit(one, &gpa);
+    while (count < chosen.pool.threadsFor(tiles.count)) : (count += 1) {
+        by_thread[count] = survey.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
+    }
+    const Hits = struct {
+        survey: *const Integrator,
+        tiles: *const Tiles,
+        film: *Film,
+        by_thread: []const *anyopaque,
+
+        fn tile(hits: *const @This(), number: usize, thread_index: usize) void {
+            const rectangle = hits.tiles.rectangleOf(@intCast(number));
+            hits.survey.pass(hits.by_thread[thread_index], &rectangle, 0, 1, hits.film);
+        }
+    };
+    const work: Hits = .{
+        .survey = survey,
+        .tiles = &tiles,
+        .film = film,
+        .by_thread = by_thread[0..count],
+    };
+    try chosen.pool.forEach(tiles.count, &work, Hits.tile);
 }
 
 /// One frame by one integrator.
@@ -846,6 +899,26 @@ const NoisyIntegrator = struct {
     }
 };
 
+/// Holds that all pieces that are told when the work begins are done at its end.
+const TestProgress = struct {
+    progress: Progress,
+
+    fn init(told: *TestProgress) void {
+        told.progress = .{ .context = told, .begun = begun };
+    }
+
+    fn begun(context: *anyopaque, work: *const progress_file.Work) void {
+        const told: *TestProgress = @ptrCast(@alignCast(context));
+        told.progress.restart(work);
+    }
+
+    fn expectDone(told: *const TestProgress) !void {
+        const total = told.progress.total.load(.monotonic);
+        try std.testing.expect(total > 0);
+        try std.testing.expectEqual(total, told.progress.done.load(.monotonic));
+    }
+};
+
 test "quiet blocks get no more samples than they need, whatever tiles, threads and rounds" {
     const gpa = std.testing.allocator;
     const frame: Frame = undefined;
@@ -856,8 +929,11 @@ test "quiet blocks get no more samples than they need, whatever tiles, threads a
             defer pool.deinit();
             var film: Film = try .init(gpa, 40, 20, .init(.{ .color = true }));
             defer film.deinit(gpa);
+            var told: TestProgress = undefined;
+            told.init();
             const total = try render(&.of(NoisyIntegrator), gpa, &frame, &film, &.{
                 .pool = &pool,
+                .progress = &told.progress,
                 .integrator = .path,
                 .sample_count = 100,
                 .tile_size = tile_size,
@@ -867,6 +943,7 @@ test "quiet blocks get no more samples than they need, whatever tiles, threads a
                     .next = NoisyIntegrator.one,
                 },
             });
+            try told.expectDone();
             // In three columns of blocks: some stay until the end.
             try std.testing.expectEqual(100, total.sample_count);
             try std.testing.expectEqual(16 * 20 * 16 + 24 * 20 * 100, total.sample_sum);
@@ -887,8 +964,11 @@ test "parts of a picture are what it has there, with blocks of its own grid" {
     const height = 37;
     var whole: Film = try .init(gpa, width, height, .init(.{ .color = true }));
     defer whole.deinit(gpa);
+    var told: TestProgress = undefined;
+    told.init();
     var shown: Settings = .{
         .pool = &pool,
+        .progress = &told.progress,
         .integrator = .path,
         .sample_count = 50,
         .tile_size = 24,
@@ -911,6 +991,7 @@ test "parts of a picture are what it has there, with blocks of its own grid" {
             try .init(gpa, layout.film_width, layout.film_height, whole.layers);
         defer film.deinit(gpa);
         const found = try render(&.of(NoisyIntegrator), gpa, &frame, &film, &shown);
+        try told.expectDone();
         if (part == .tile) sample_sum += found.sample_sum;
         var cut = try film.cut(gpa, &layout);
         defer cut.deinit(gpa);
