@@ -9,7 +9,7 @@ import sys
 import tempfile
 from typing import Any, Dict, Sequence
 
-from . import command_line, options, scene, work
+from . import command_line, scene, work
 from .errors import FarmError
 from .progress import Progress, duration, plural
 from .remote import program
@@ -39,13 +39,12 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _run(line: command_line.CommandLine, state: Dict[str, Any]) -> None:
-    handed = options.read(line.options)
     try:
         identity = program.identity()
     except program.ProgramMissing as error:
         raise FarmError(f"{error}: raylane is needed here, too") from None
     runner = program.Runner()
-    found = scene.find(line.scene, handed, runner)
+    found = scene.find(line.scene, line.options, line.pattern, runner)
     pictures = work.Pictures(line.frames, line.turntable, line.pattern, line.skip_existing)
     with tempfile.TemporaryDirectory(prefix="raylane-farm-") as folder:
         job_work: work.Work
@@ -56,7 +55,7 @@ def _run(line: command_line.CommandLine, state: Dict[str, Any]) -> None:
         progress = Progress(line.progress, job_work.unit, job_work.total)
         state["progress"] = progress
         if job_work.total > 0:
-            is_quiet = line.quiet or handed.is_quiet
+            is_quiet = line.quiet or line.options.is_quiet
             _run_on_cluster(line, found, identity, job_work, progress, is_quiet, folder)
 
 
@@ -89,7 +88,13 @@ def _run_on_cluster(
         members = crew.Crew(client, station, job, found.sources, progress.say)
         leader = farm.Farm(client, station, name, members, job_work, found, progress, is_quiet)
         stack.callback(leader.stop)
-        leader.run(line.patience_s)
+        try:
+            leader.run(line.patience_s)
+        except FarmError:
+            raise
+        except Exception as error:  # pylint: disable=broad-except
+            # Of Dask's many: the scheduler has gone, say.
+            raise FarmError(f"the cluster is lost: {type(error).__name__}: {error}") from error
         if not line.quiet:
             progress.say(
                 f"{progress.done} {progress.unit} in {duration(progress.seconds())}: "
@@ -117,5 +122,10 @@ def _kept(state: Dict[str, Any]) -> str:
     return f": {progress.done} of {progress.total} {progress.unit} are done"
 
 
-if __name__ == "__main__":
+def console() -> None:
+    """The command `raylane-farm`."""
     sys.exit(main(sys.argv[1:]))
+
+
+if __name__ == "__main__":
+    console()

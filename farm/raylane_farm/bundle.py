@@ -60,5 +60,7 @@ def on_workers(client: Client, folder: str, name: str) -> Iterator[ModuleType]:
         yield importlib.import_module(package + ".station")
     finally:
         sys.path.remove(path)
-        client.unregister_worker_plugin(plugin)
-        client.unregister_scheduler_plugin(plugin)
+        # Where the cluster is lost there is nothing to tidy up.
+        with contextlib.suppress(Exception):
+            client.unregister_worker_plugin(plugin)
+            client.unregister_scheduler_plugin(plugin)

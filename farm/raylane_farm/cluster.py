@@ -24,7 +24,7 @@ CLOSE_S = 10
 def connect(scheduler: Optional[str], workers: Optional[int]) -> Iterator[Client]:
     """A client; a local cluster ends with it."""
     # Dask reports each lost worker at length; what matters of it is said here.
-    for name in ("distributed", "tornado.application"):
+    for name in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     with contextlib.ExitStack() as stack:
         address = scheduler or stack.enter_context(_local(workers or 1))
@@ -50,6 +50,7 @@ def _local(workers: int) -> Iterator[str]:
         )},
         start_new_session=True,
     ) as process:
+        assert process.stdin is not None and process.stdout is not None
         try:
             address = process.stdout.readline().decode().strip()
             if not address:

@@ -7,7 +7,7 @@ import dataclasses
 import re
 from typing import List, Optional, Sequence
 
-from . import __version__, ranges, template
+from . import __version__, options, ranges, template
 from .errors import USAGE, FarmError
 
 DESCRIPTION = """\
@@ -45,7 +45,7 @@ class CommandLine:
     cache_bytes: int
     patience_s: float
     # For the program.
-    options: List[str]
+    options: options.Options
 
 
 class _Parser(argparse.ArgumentParser):
@@ -66,7 +66,10 @@ def read(arguments: Sequence[str]) -> CommandLine:
             "what to spread? --frames 1-240, --turntable 120, or --tiles 16 of a big picture", USAGE
         )
     frames = None if found.frames is None else ranges.parse(found.frames)
-    pattern = template.of(found.output, frames is not None, found.turntable is not None)
+    for_program = options.read(handed)
+    extension = for_program.format or "png"
+    has_views = found.turntable is not None
+    pattern = template.of(found.output, extension, frames is not None, has_views)
     for name, count in (("frame", len(frames or ())), ("view", found.turntable or 0)):
         if count > 1 and name not in template.fields(pattern):
             raise FarmError(f"-o {pattern}: {count} {name}s need {{{name}}} in the name", USAGE)
@@ -85,7 +88,7 @@ def read(arguments: Sequence[str]) -> CommandLine:
         quiet=found.quiet,
         cache_bytes=found.cache_size,
         patience_s=found.worker_timeout,
-        options=handed,
+        options=for_program,
     )
 
 

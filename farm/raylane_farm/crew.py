@@ -18,8 +18,8 @@ from distributed import Client
 from .errors import FarmError
 
 PIECE = 16 << 20
-# Tries until a worker has all files.
-TRIES = 4
+# Tries until a worker answers, and until it has all files.
+TRIES = 10
 ASK_TIMEOUT_S = 60
 
 

@@ -129,10 +129,11 @@ class Farm:
         self._events.put((future, result))
 
     def _finish(self, future: Future, result: Any) -> None:
-        entry = self._pending.get(future.key)
+        key = str(future.key)
+        entry = self._pending.get(key)
         if entry is None or entry[1] is not future:
             return
-        del self._pending[future.key]
+        del self._pending[key]
         task = entry[0]
         if isinstance(result, KilledWorker):
             raise FarmError(f"{self._scene.name}: every worker that tried was lost: {result}")
@@ -187,6 +188,8 @@ class Farm:
         self._fetchers.shutdown(wait=False)
         futures = [future for _, future, _ in self._pending.values()]
         self._pending.clear()
-        if futures:
-            self._client.cancel(futures, force=True)
-        self._client.run(self._station.leave, self._job_name, on_error="ignore")
+        # Where the cluster is lost nothing of it is left to end.
+        with contextlib.suppress(Exception):
+            if futures:
+                self._client.cancel(futures, force=True)
+            self._client.run(self._station.leave, self._job_name, on_error="ignore")

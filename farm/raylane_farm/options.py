@@ -16,7 +16,18 @@ from .errors import USAGE, FarmError
 LOAD_VALUES = {"--scene", "--material-variant", "--up-axis", "--format-in"}
 LOAD_FLAGS = {"--allow-outside"}
 # Options whose value is a file, unless it is one of these words.
-FILE_VALUES = {"--env": ("studio", "none"), "--hdri": ("studio", "none")}
+FILE_VALUES = {"--env": ("studio", "none")}
+# Names of other programs that the program understands, of the options here.
+ALSO = {
+    "--hdri": "--env",
+    "--hdri-file": "--env",
+    "--environment": "--env",
+    "--variant-name": "--material-variant",
+    "--outfile": "--output",
+    "--output-file": "--output",
+    "--license": "--licenses",
+    "--licence": "--licenses",
+}
 SHORTS_WITH_VALUE = {"o": "--output", "r": "--resolution", "t": "--threads"}
 SHORTS = {"V": "--version", "q": "--quiet", "v": "--verbose", "h": "--help"}
 
@@ -55,6 +66,8 @@ class Options:
     # Index of the word, text before the path in it, and the path.
     files: List[Tuple[int, str, str]] = dataclasses.field(default_factory=list)
     is_quiet: bool = False
+    # Of the files; None: as their names say.
+    format: Optional[str] = None
 
 
 def read(words: Sequence[str]) -> Options:
@@ -65,6 +78,8 @@ def read(words: Sequence[str]) -> Options:
             raise FarmError(f"{name} {REFUSED[name]}", USAGE)
         if name == "--quiet":
             options.is_quiet = True
+        elif name == "--format":
+            options.format = value
         elif name in LOAD_FLAGS:
             options.load.append(name)
         elif name in LOAD_VALUES and value is not None:
@@ -72,6 +87,8 @@ def read(words: Sequence[str]) -> Options:
         elif name in FILE_VALUES and value is not None and value not in FILE_VALUES[name]:
             word = options.words[index]
             options.files.append((index, word[: len(word) - len(value)], value))
+    if options.format == "y4m":
+        raise FarmError("y4m is one stream: render pictures, and join them where they are", USAGE)
     return options
 
 
@@ -83,12 +100,12 @@ def _flags(words: Sequence[str]) -> Iterator[Tuple[str, int, Optional[str]]]:
         following = words[index + 1] if index + 1 < len(words) else None
         if word.startswith("--"):
             name, equals, value = word.partition("=")
+            name = ALSO.get(name, name)
             if equals:
                 yield name, index, value
             else:
                 yield name, index + 1, following
-                takes_value = name in LOAD_VALUES or name in FILE_VALUES
-                index += takes_value
+                index += name in LOAD_VALUES or name in FILE_VALUES
         elif word.startswith("-"):
             for place, letter in enumerate(word[1:], 2):
                 if letter in SHORTS:

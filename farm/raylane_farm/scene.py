@@ -13,6 +13,7 @@ import os
 import posixpath
 from typing import Dict, List, Sequence, Tuple
 
+from . import template
 from .errors import FAILED, FarmError
 from .options import Options
 from .remote import program
@@ -41,11 +42,19 @@ class Scene:
     byte_count: int
 
 
-def find(path: str, options: Options, runner: program.Runner) -> Scene:
-    """Asks the program what the scene is made of. Raises `FarmError` as the program does."""
+def find(path: str, options: Options, pattern: str, runner: program.Runner) -> Scene:
+    """Asks the program what the scene is made of, for pictures by the names of `pattern`.
+
+    Raises `FarmError` as the program does.
+    """
     if path == "-":
         raise FarmError("standard input cannot be sent to workers: name a file", 2)
-    listed = _listed(path, options, runner)
+    found = _ask(path, options.load, runner)
+    listed = dict.fromkeys(found.files)
+    if "material_variant" in template.fields(pattern):
+        for index in range(found.variant_count):
+            own = [*options.load, "--material-variant", str(index)]
+            listed.update(dict.fromkeys(_ask(path, own, runner).files))
     depth = max((_ups(name) for name in listed), default=0)
     base = posixpath.join("scene", *["folder"] * depth)
     collected = _Collection()
@@ -78,14 +87,23 @@ def _stem(name: str) -> str:
     return os.path.splitext(stem)[0] or stem
 
 
-def _listed(path: str, options: Options, runner: program.Runner) -> List[str]:
-    run = runner.run(["info", "--json", "-q", *options.load, "--", path])
+@dataclasses.dataclass(frozen=True)
+class _Answer:
+    """What the program says of a scene."""
+
+    files: Sequence[str]
+    variant_count: int
+
+
+def _ask(path: str, words: Sequence[str], runner: program.Runner) -> _Answer:
+    run = runner.run(["info", "--json", "-q", *words, "--", path])
     if run.code != 0:
         raise FarmError(program.reason(run), run.code)
     found = json.loads(run.stdout)
     if "files" not in found:
         raise FarmError(f"raylane {found.get('version')} is too old: its info has no list of files")
-    return [entry["path"] for entry in found["files"]]
+    files = [entry["path"] for entry in found["files"]]
+    return _Answer(files, len(found.get("material_variants", ())))
 
 
 def _ups(path: str) -> int:

@@ -29,13 +29,13 @@ def fields(template: str) -> Set[str]:
     return {match[1] for match in _PIECE.finditer(template) if match[1] is not None}
 
 
-def of(chosen: Optional[str], has_frames: bool, has_views: bool) -> str:
+def of(chosen: Optional[str], extension: str, has_frames: bool, has_views: bool) -> str:
     """The template where a file, a folder or nothing is chosen; as the program does."""
     if chosen is not None and not chosen.endswith("/"):
         return chosen
     frame = "_{frame:4}" if has_frames else ""
     view = "_{view:3}" if has_views else ""
-    return f"{chosen or ''}{{model}}{frame}{view}.png"
+    return f"{chosen or ''}{{model}}{frame}{view}.{extension}"
 
 
 def expand(template: str, model: str, frame: Optional[int], view: Optional[int]) -> str:

@@ -88,8 +88,8 @@ class TemplateTest(unittest.TestCase):
         text = "o/{model}_{frame:4}-{view:3}{{}}.png"
         self.assertEqual("o/fox_-003-007{}.png", template.expand(text, "fox", -3, 7))
         self.assertEqual("_a_b.png", template.expand("{model}.png", ".a/b", None, None))
-        self.assertEqual("a/{model}_{frame:4}.png", template.of("a/", True, False))
-        self.assertEqual("{model}_{view:3}.png", template.of(None, False, True))
+        self.assertEqual("a/{model}_{frame:4}.png", template.of("a/", "png", True, False))
+        self.assertEqual("{model}_{view:3}.jpg", template.of(None, "jpg", False, True))
         for wrong in ("{camera}.png", "{frame}.png", "a}"):
             with self.assertRaises(FarmError):
                 template.expand(wrong, "fox", None, None)
@@ -136,7 +136,10 @@ class OptionsTest(unittest.TestCase):
         self.assertEqual([], options.read(["--env", "studio"]).files)
 
     def test_what_is_for_one_program_is_refused(self):
-        for words in (["-o", "a"], ["-qoa"], ["--frames=1"], ["--time-budget", "3"], ["--partial"]):
+        for words in (
+            ["-o", "a"], ["-qoa"], ["--frames=1"], ["--time-budget", "3"], ["--partial"],
+            ["--outfile=a"], ["--format", "y4m"],
+        ):
             with self.subTest(words), self.assertRaises(FarmError) as caught:
                 options.read(words)
             self.assertEqual(2, caught.exception.code)
@@ -145,7 +148,7 @@ class OptionsTest(unittest.TestCase):
         line = command_line.read(["a.glb", "--frames", "1-3", "--", "-r", "64", "--"])
         self.assertEqual([1, 2, 3], line.frames)
         self.assertEqual("{model}_{frame:4}.png", line.pattern)
-        self.assertEqual(["-r", "64", "--"], line.options)
+        self.assertEqual(["-r", "64", "--"], line.options.words)
         line = command_line.read(["a", "--tiles=4", "--cache-size=500M"])
         self.assertEqual(500 << 20, line.cache_bytes)
         for words in (
@@ -166,6 +169,7 @@ class _Program:
         self.code = code
         self.stderr = stderr
         self.calls = []
+        self.variant_count = 0
 
     def run(self, arguments, folder=None):
         self.calls.append(list(arguments))
@@ -173,7 +177,10 @@ class _Program:
             parts = [read(part) for part in arguments[3:]]
             with open(arguments[2], "wb") as file:
                 file.write(b"".join(parts))
-        found = {"files": [{"path": path, "bytes": 0} for path in self.files]}
+        found = {
+            "files": [{"path": path, "bytes": 0} for path in self.files],
+            "material_variants": ["name"] * self.variant_count,
+        }
         return program.Run(self.code, json.dumps(found).encode(), self.stderr)
 
 
@@ -207,7 +214,8 @@ class SceneTest(FolderTest):
         sky = self.put("sky.hdr", b"sky")
         os.makedirs(os.path.join(self.folder, "a/b/d"))
         listed = ["s.gltf.gz", "d/../c.bin", "../../t.png", "../same.png"]
-        found = scene.find(path, options.read(["--env", sky, "--scene=2"]), _Program(listed))
+        given = options.read(["--hdri", sky, "--scene=2"])
+        found = scene.find(path, given, "{frame}.png", _Program(listed))
         self.assertEqual("s", found.model.removesuffix(".gltf"))
         self.assertEqual("../files/scene/folder/folder/s.gltf.gz", found.argument)
         self.assertEqual(
@@ -218,22 +226,30 @@ class SceneTest(FolderTest):
             [file.path for file in found.files],
         )
         self.assertIn("scene/folder/folder/d", found.folders)
-        self.assertEqual(("--env", "../files/options/0/sky.hdr", "--scene=2"), found.options)
+        self.assertEqual(("--hdri", "../files/options/0/sky.hdr", "--scene=2"), found.options)
         self.assertEqual(4, len(found.sources))
         self.assertEqual(24, found.byte_count)
 
     def test_errors_are_the_programs(self):
         broken = _Program(code=3, stderr="raylane: warning\nraylane: a.glb: is broken\n")
         with self.assertRaises(FarmError) as caught:
-            scene.find("a.glb", options.read([]), broken)
+            scene.find("a.glb", options.read([]), "", broken)
         self.assertEqual(3, caught.exception.code)
         self.assertEqual("raylane: a.glb: is broken", str(caught.exception))
         for path, files in (("-", []), ("a.glb", ["/etc/hostname"]), ("no/a.glb", ["a.glb"])):
             with self.subTest(path), self.assertRaises(FarmError):
-                scene.find(path, options.read([]), _Program(files))
+                scene.find(path, options.read([]), "", _Program(files))
+
+    def test_names_by_variants_need_the_files_of_all(self):
+        path = self.put("s.glb")
+        asked = _Program(["s.glb"])
+        asked.variant_count = 2
+        scene.find(path, options.read(["--allow-outside"]), "{material_variant}.png", asked)
+        last = ["info", "--json", "-q", "--allow-outside", "--material-variant", "1", "--", path]
+        self.assertEqual((3, last), (len(asked.calls), asked.calls[-1]))
 
     def test_a_scene_without_files(self):
-        found = scene.find("builtin:nave", options.read([]), _Program())
+        found = scene.find("builtin:nave", options.read([]), "", _Program())
         self.assertEqual(("builtin:nave", "nave", ()), (found.argument, found.model, found.files))
 
 
