@@ -10,6 +10,7 @@ const manifest = @import("build.zig.zon");
 const Package = @import("build/package.zig");
 const Tests = @import("build/tests.zig");
 const libraries = @import("build/libraries.zig");
+const release = @import("build/release.zig");
 const variants = @import("build/variants.zig");
 const Compile = std.Build.Step.Compile;
 const Run = std.Build.Step.Run;
@@ -33,6 +34,7 @@ pub fn build(b: *std.Build) void {
         .test_fmt = b.step("test:fmt", "Check the formatting"),
         .test_tidy = b.step("test:tidy", "Check the style of the source tree"),
         .test_report = b.step("test:report", "Test the tools in Python"),
+        .test_release = b.step("test:release", "Test what is released on old and new processors"),
         .check = b.step("check", "Compile the program, its benchmarks and tests, write nothing"),
         .@"asm" = b.step("asm", "Write its assembly before linking to zig-out/raylane.s"),
         .scenes = b.step("scenes", "Regenerate scenes/cornell.gltf"),
@@ -44,6 +46,7 @@ pub fn build(b: *std.Build) void {
         .bench_light = b.step("bench:light", "Rays by bounce and traversal: -- SCENE [options]"),
         .compare = b.step("compare", "One program with all variants beside one for each: -- SCENE"),
         .lowering = b.step("lowering", "Regenerate docs/lowering.md from the compiler"),
+        .release = b.step("release", "Build programs for all processors, and packages of them"),
         .vendor = b.step("vendor", "Fetch and check the third-party files"),
     };
     const query = b.standardTargetOptionsQueryOnly(.{});
@@ -69,8 +72,7 @@ pub fn build(b: *std.Build) void {
         addBenchmark(steps.check, @field(steps, "bench_" ++ name), benchmark);
     }
     addBenchmark(steps.check, steps.bench_frames, package.renderer("frames", "bench/frames.zig"));
-    const full: Package = .init(b, target, optimize orelse .fast, vendor.headers, all);
-    addCompare(steps.compare, full, vendor.headers);
+    addCompare(steps.compare, .init(b, target, optimize orelse .fast, vendor.headers, all));
 
     const tests: Tests = .init(b, resolve(b, .{}), filters orelse &.{});
     const test_packages: TestPackages = .{
@@ -84,12 +86,12 @@ pub fn build(b: *std.Build) void {
     tests.addHere(steps.test_unit, steps.test_integration, targets[0]);
     tests.addFormat(steps.test_fmt);
     tests.addTidy(steps.test_tidy);
-    tests.addReport(steps.test_report);
+    tests.addReport(steps.test_report, targets[0]);
     tests.addCheck(steps.check, targets[0]);
     steps.check.dependOn(&package.program().step);
 
-    const here: Package = .init(b, resolve(b, .{}), .safe, vendor.headers, options);
-    addScenes(steps.scenes, here);
+    release.add(steps.release, steps.test_release, addVendor(b, release.optional).headers);
+    addScenes(steps.scenes, .init(b, resolve(b, .{}), .safe, vendor.headers, options));
     addLowering(steps.lowering);
 }
 
@@ -124,7 +126,7 @@ fn addScenes(step: *std.Build.Step, package: Package) void {
 
 /// Makes `step` build a program for each variant and compare them with the one that holds all, on
 /// the scene that follows `--`.
-fn addCompare(step: *std.Build.Step, package: Package, headers: std.Build.LazyPath) void {
+fn addCompare(step: *std.Build.Step, package: Package) void {
     const b = step.owner;
     const run = b.addSystemCommand(&.{"python3"});
     run.addFileArg(b.path("bench/compare.py"));
@@ -136,7 +138,7 @@ fn addCompare(step: *std.Build.Step, package: Package, headers: std.Build.LazyPa
     for (package.held) |variant| {
         const name = variant.name(b.allocator);
         if (std.mem.find(u8, name, wanted) == null) continue;
-        const single: Package = .init(b, package.target, package.optimize, headers, .{
+        const single: Package = .init(b, package.target, package.optimize, package.headers, .{
             .backend = variant.backend,
             .traversal = variant.traversal,
             .lanes = variant.lanes,

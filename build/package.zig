@@ -24,6 +24,7 @@ optional: libraries.Optional,
 /// The library, `@import("raylane")`.
 raylane: *Module,
 shows_searches: bool,
+part: Part,
 /// The variants of its programs, the default one first, and those that count for them.
 held: []const Variant,
 counting: []const Variant,
@@ -45,9 +46,19 @@ pub const Options = struct {
     extent: variants.Extent,
     /// Whether kernels show their searches, for tests of traversal.
     shows_searches: bool = false,
+    part: Part = .whole,
     /// Whether its programs do without what debuggers and traces of the stack read.
     is_stripped: bool = false,
     optional: libraries.Optional,
+};
+
+/// What of a program it is. One for all processors has a part for each level of them, and one that
+/// these share: libraries, and the kernels of the reference (see src/trace/link.zig).
+pub const Part = union(enum) {
+    whole,
+    /// With its name in src/processor.zig.
+    level: []const u8,
+    shared,
 };
 
 const own_c_flags: []const []const u8 = &.{
@@ -77,6 +88,7 @@ pub fn init(
         .is_stripped = options.is_stripped,
         .optional = options.optional,
         .shows_searches = options.shows_searches,
+        .part = options.part,
         .held = held,
         .counting = counting,
         .lit = variants.lit(b.allocator, held, options.extent),
@@ -117,8 +129,12 @@ fn withLibrary(package: Package, path: []const u8) *Module {
     const held = libraries.held(package.optional);
     const is_musl = package.target.result.isMuslLibC();
     root.addImport("licenses", libraries.licenses(package.owner, package.headers, held, is_musl));
-    for (package.third_party) |each| root.addObjectFile(each.getEmittedBin());
+    if (package.part == .whole) package.addThirdParty(root);
     return root;
+}
+
+fn addThirdParty(package: Package, root: *Module) void {
+    for (package.third_party) |each| root.addObjectFile(each.getEmittedBin());
 }
 
 /// The third-party libraries that a program holds: an archive of all that is C, for the compiler
@@ -144,6 +160,7 @@ fn moduleOfC(package: Package) *Module {
         .optimize = package.optimize,
         .link_libc = true,
         .strip = if (package.is_stripped) true else null,
+        .unwind_tables = if (package.is_stripped) .none else null,
         .omit_frame_pointer = if (package.optimize == .fast) true else null,
     });
 }
@@ -156,6 +173,7 @@ fn moduleOf(package: Package, root: []const u8) *Module {
         .optimize = package.optimize,
         .link_libc = true,
         .strip = if (package.is_stripped) true else null,
+        .unwind_tables = if (package.is_stripped) .none else null,
         // A failed test tells where its error came from, in safe mode too.
         .error_tracing = if (package.optimize == .safe) true else null,
         .omit_frame_pointer = if (package.optimize == .fast) true else null,
@@ -178,6 +196,10 @@ fn configOf(package: Package, told: Held) *std.Build.Step.Options {
     options.addOption([]const []const u8, "counting", package.names(told.counting));
     options.addOption([]const []const u8, "lit", package.names(told.lit));
     options.addOption(bool, "are_all", told.are_all);
+    options.addOption([]const u8, "level", switch (package.part) {
+        .level => |name| name,
+        .whole, .shared => "",
+    });
     options.addOption(bool, "shows_searches", package.shows_searches);
     return options;
 }
@@ -215,7 +237,12 @@ fn kernelObjects(package: Package) []*Compile {
             .lit => package.lit,
         };
         for (part) |variant| {
-            list.append(arena, package.kernel(variant, kind)) catch @panic("OOM");
+            const is_held = switch (package.part) {
+                .whole => true,
+                .level => variant.traversal != .single,
+                .shared => variant.traversal == .single and kind != .lit,
+            };
+            if (is_held) list.append(arena, package.kernel(variant, kind)) catch @panic("OOM");
         }
     }
     return list.items;
@@ -264,6 +291,41 @@ pub fn program(package: Package) *Compile {
     return package.renderer("raylane", "src/main.zig");
 }
 
+/// A program of `levels`, the lowest first, and what they share; it chooses among them at start.
+/// All else in it is compiled for `target`.
+pub fn dispatcher(
+    shared: Package,
+    target: std.Build.ResolvedTarget,
+    levels: []const Package,
+) *Compile {
+    const b = shared.owner;
+    var start = shared;
+    start.target = target;
+    const level_names = b.allocator.alloc([]const u8, levels.len) catch @panic("OOM");
+    for (level_names, levels) |*name, level| name.* = level.part.level;
+    const told = start.configOf(.{ .variants = shared.held });
+    told.addOption([]const []const u8, "levels", level_names);
+    start.config = told.createModule();
+    start.raylane = start.withLibrary("src/raylane.zig");
+    const exe = start.addProgram("raylane", "src/release.zig");
+    const root = exe.root_module;
+    root.addImport("config", start.config);
+    shared.addThirdParty(root);
+    for (shared.kernels) |object| root.addObjectFile(object.getEmittedBin());
+    for (levels) |level| {
+        for (level.kernels) |object| root.addObjectFile(object.getEmittedBin());
+        root.addObjectFile(level.whole().getEmittedBin());
+    }
+    return exe;
+}
+
+/// All but the kernels of a level.
+fn whole(package: Package) *Compile {
+    const root = package.moduleOf("src/level.zig");
+    root.addImport("raylane", package.raylane);
+    return package.archive(package.owner.fmt("level-{s}", .{package.part.level}), root);
+}
+
 /// A program that renders.
 pub fn renderer(package: Package, name: []const u8, root: []const u8) *Compile {
     const exe = package.addProgram(name, root);
@@ -289,6 +351,7 @@ pub fn addProgram(package: Package, name: []const u8, root: []const u8) *Compile
         .target = package.target,
         .optimize = package.optimize,
         .strip = package.is_stripped or package.optimize == .fast,
+        .unwind_tables = if (package.is_stripped) .none else null,
         .omit_frame_pointer = if (package.optimize == .fast) true else null,
         .imports = &.{.{ .name = "raylane", .module = package.raylane }},
     }) });

@@ -54,8 +54,16 @@ pub fn addAll(tests: Tests, step: *std.Build.Step, targets: []const Target) void
     var logs: std.ArrayList(LazyPath) = .empty;
     const arena = tests.owner.allocator;
     logs.appendSlice(arena, &.{
-        tests.format(), tests.tidy(), tests.machinery(), tests.report(), tests.fetcher(),
+        tests.format(),         tests.tidy(),    tests.machinery(),
+        tests.report(),         tests.fetcher(), tests.packages("Layout", null),
+        tests.farm(targets[0]),
     }) catch @panic("OOM");
+    if (targets[0].emulator.len == 0) {
+        const own = targets[0].package.program();
+        logs.appendSlice(arena, &.{
+            tests.packages("Deb", own), tests.packages("Wheel", own),
+        }) catch @panic("OOM");
+    }
     for (targets) |target| {
         const tested = tests.ofLibrary(target.package, null);
         logs.appendSlice(arena, &.{
@@ -91,9 +99,13 @@ pub fn addTidy(tests: Tests, step: *std.Build.Step) void {
     tests.close(step, &.{tests.tidy()}, .logs_only);
 }
 
-/// Makes `step` test the tools in Python: the report of the benchmark, and vendor/fetch.
-pub fn addReport(tests: Tests, step: *std.Build.Step) void {
-    tests.close(step, &.{ tests.report(), tests.fetcher() }, .logs_only);
+/// Makes `step` test the tools in Python: of the benchmark, of vendoring, of packages, and farm/
+/// with the program of `target`.
+pub fn addReport(tests: Tests, step: *std.Build.Step, target: Target) void {
+    tests.close(step, &.{
+        tests.report(),                 tests.fetcher(),
+        tests.packages("Layout", null), tests.farm(target),
+    }, .logs_only);
 }
 
 /// Makes `step` compile the test programs of `target` without a file as the result.
@@ -128,6 +140,31 @@ fn fetcher(tests: Tests) LazyPath {
     const run, const log = tests.start("fetch", "sources");
     run.addArgs(&.{ "--one", "--needs=python3", "--", "python3", "-m", "unittest", "discover" });
     run.addArgs(&.{ "-s", "vendor" });
+    return log;
+}
+
+/// Several machines: what needs Dask is tested where its environment can be made.
+fn farm(tests: Tests, target: Target) LazyPath {
+    const run, const log = tests.start("farm", "sources");
+    run.addArg("--needs=python3");
+    if (target.emulator.len == 0) run.addArtifactArg2(target.package.program(), .{
+        .prefix = "--env=RAYLANE_PROGRAM=",
+        .make_absolute = true,
+    });
+    run.addArgs(&.{ "--", "python3", "farm/tests/run.py", ".zig-cache/farm" });
+    return log;
+}
+
+/// What wraps programs up, and packages of this machine's program, installed where nothing else is.
+fn packages(tests: Tests, class: []const u8, packaged: ?*Compile) LazyPath {
+    const name = std.ascii.allocLowerString(tests.owner.allocator, class) catch @panic("OOM");
+    const run, const log = tests.start(name, if (packaged == null) "sources" else "native");
+    run.addArgs(&.{ "--one", "--needs=python3" });
+    if (packaged) |one| run.addArtifactArg2(one, .{
+        .prefix = "--env=RAYLANE_PROGRAM=",
+        .make_absolute = true,
+    });
+    run.addArgs(&.{ "--", "python3", "-B", "build/test_packages.py", class });
     return log;
 }
 

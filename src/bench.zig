@@ -8,6 +8,7 @@
 
 const std = @import("std");
 const energy = @import("energy.zig");
+const Alarm = @import("bench/alarm.zig").Alarm;
 const bounces = @import("bench/bounces.zig");
 const choices = @import("settings.zig");
 const machine = @import("bench/machine.zig");
@@ -18,7 +19,9 @@ const statistics = @import("bench/statistics.zig");
 const tables = @import("bench/tables.zig");
 const variant_file = @import("variant.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const Display = @import("display.zig").Display;
 const Identity = @import("identity.zig").Identity;
+const Progress = @import("progress.zig").Progress;
 const printable = @import("diagnostic.zig").printable;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -63,8 +66,9 @@ pub const Settings = struct {
     energy: ?energy.Wanted,
 };
 
-/// `ImagesDiffer`: a variant renders another image than the others.
-pub const Error = Stages.Error || error{ImagesDiffer};
+/// `ImagesDiffer`: a variant renders another image than the others. `TimeOver`: there is nothing to
+/// show for the time.
+pub const Error = Stages.Error || error{ ImagesDiffer, TimeOver };
 
 /// Share of the time that the numbers of threads get, where there is more than one.
 const scaling_share = 0.15;
@@ -82,7 +86,8 @@ pub const Bench = struct {
     io: Io,
     settings: *const Settings,
     diagnostic: *Diagnostic,
-    progress: std.Progress.Node,
+    /// Told of the scenes; null: nobody is.
+    display: ?*Display = null,
     /// What is being measured: for the message of an error.
     scene: []const u8 = "",
     /// The reference first, then as a reader would sort them.
@@ -218,34 +223,48 @@ pub const Bench = struct {
         const time_s: f64 = @floatFromInt(bench.settings.time_s);
         const scaling_ns: u64 = @trunc(share * time_s * 1e9);
         const scenes = try bench.arena.alloc(results_file.Scene, names.len);
-        for (scenes, names, 0..) |*scene, name, index| {
+        var measured_count: usize = 0;
+        for (names, 0..) |name, index| {
             bench.scene = name;
             const now_ns: u64 = @intCast(Io.Clock.awake.now(bench.io).nanoseconds);
             const left_ns = deadline_ns -| scaling_ns -| now_ns;
             const is_last = index + 1 == names.len;
             const scene_deadline_ns = now_ns + left_ns / (names.len - index);
-            scene.* = try bench.measureScene(
+            scenes[measured_count] = try bench.measureScene(
                 name,
                 scene_deadline_ns,
-                if (is_last) deadline_ns else null,
-                results,
-            );
+                deadline_ns,
+                if (is_last) results else null,
+            ) orelse {
+                bench.diagnostic.warn("no time was left for {f}", .{printable(name)});
+                continue;
+            };
+            measured_count += 1;
         }
-        results.scenes = scenes;
+        results.scenes = scenes[0..measured_count];
+        if (measured_count > 0) return;
+        bench.scene = names[0];
+        return bench.diagnostic.fail(
+            error.TimeOver,
+            "{d} s are not enough for one round of {d} variants: a longer --time-limit, " ++
+                "a smaller -r or fewer --variants may do",
+            .{ bench.settings.time_s, bench.order.len },
+        );
     }
 
-    /// Measures one scene; with a deadline for them, the numbers of threads as well.
+    /// Measures one scene until `deadline_ns`, for what has to be there until `end_ns`; in the last
+    /// one the numbers of threads as well, which `scaled` gets. Null: there is no time for a round.
     fn measureScene(
         bench: *Bench,
         name: []const u8,
         deadline_ns: u64,
-        scaling_deadline_ns: ?u64,
-        results: *Results,
-    ) Error!results_file.Scene {
+        end_ns: u64,
+        scaled: ?*Results,
+    ) Error!?results_file.Scene {
         const settings = bench.settings;
         const title = try bench.arena.print("{f}", .{printable(name)});
-        const progress = bench.progress.start(title, 0);
-        defer progress.end();
+        const progress = bench.beginScene(name, deadline_ns);
+        errdefer if (bench.display) |display| display.endFile(progress, .failed);
         var stages: Stages = .init(
             bench.gpa,
             bench.io,
@@ -256,6 +275,9 @@ pub const Bench = struct {
             progress,
         );
         defer stages.deinit();
+        var alarm: Alarm = .{ .io = bench.io, .session = &stages.session, .end_ns = end_ns };
+        alarm.start();
+        defer alarm.stop();
         var rounds = try Rounds.measure(bench.arena, &stages, .{
             .variants = bench.order,
             .thread_count = settings.thread_count,
@@ -264,12 +286,19 @@ pub const Bench = struct {
                 deadline_ns
             else
                 deadline_ns -| bounceTime(stages.now(), deadline_ns),
+            .end_ns = end_ns,
             .idle_w = bench.idle_w,
         }, bench.diagnostic);
+        if (rounds.round_count == 0) {
+            if (bench.display) |display| display.endFile(progress, .failed);
+            return null;
+        }
         const variants = try rounds.variants();
-        if (scaling_deadline_ns) |scaling_ns| if (settings.thread_count > 1) {
-            results.scaling = try bench.scale(&rounds, title, variants, scaling_ns);
+        const by_bounce = try bench.bouncesOf(&stages, variants, deadline_ns, end_ns);
+        if (scaled) |results| if (settings.thread_count > 1) {
+            results.scaling = try bench.scale(&rounds, title, variants, end_ns);
         };
+        if (bench.display) |display| display.endFile(progress, .done);
         return .{
             .scene = title,
             .triangles = stages.session.facts.triangle_count,
@@ -278,8 +307,23 @@ pub const Bench = struct {
             .rounds = rounds.round_count,
             .ended_by = rounds.end,
             .variants = variants,
-            .bounces = try bench.bouncesOf(&stages, deadline_ns),
+            .bounces = by_bounce,
         };
+    }
+
+    fn beginScene(bench: *const Bench, name: []const u8, deadline_ns: u64) ?*Progress {
+        const display = bench.display orelse return null;
+        const names = bench.settings.scenes;
+        const index = for (names, 1..) |*other, number| {
+            if (other.ptr == name.ptr) break number;
+        } else unreachable; // It is one of them.
+        const progress = display.beginFile(.{ .index = index, .count = names.len, .name = name });
+        const now_ns: u64 = @intCast(Io.Clock.awake.now(bench.io).nanoseconds);
+        Progress.begin(progress, .{
+            .stage = .measuring,
+            .budget_ns = @max(1, deadline_ns -| now_ns),
+        });
+        return progress;
     }
 
     /// What a scene is rendered with. The thesis's light is that of lamps alone.
@@ -308,16 +352,24 @@ pub const Bench = struct {
     fn bouncesOf(
         bench: *Bench,
         stages: *Stages,
+        variants: []const results_file.Variant,
         deadline_ns: u64,
+        end_ns: u64,
     ) Error![]const results_file.Bounce {
         const settings = bench.settings;
         if (settings.integrator == null) return &.{};
+        var frame_ms: f64 = 0;
+        for (variants) |*variant| for (variant.trace_ms) |time_ms| {
+            frame_ms = @max(frame_ms, time_ms);
+        };
         return bounces.measure(bench.arena, stages, .{
             .variants = bench.order,
             .thread_count = settings.thread_count,
             .depth_max = settings.depth,
             .round_count = settings.round_count,
             .deadline_ns = deadline_ns,
+            .end_ns = end_ns,
+            .frame_ns = @trunc(frame_ms * 1e6),
             .idle_w = bench.idle_w,
         }, bench.diagnostic);
     }
@@ -342,6 +394,7 @@ pub const Bench = struct {
         const lists = try bench.arena.alloc(std.ArrayList(f64), chosen.len * counts.len);
         @memset(lists, .empty);
         try rounds.scale(chosen, counts, deadline_ns, lists);
+        if (lists[0].items.len == 0) return &.{};
         const scaling = try bench.arena.alloc(results_file.Scaling, lists.len);
         for (scaling, lists, 0..) |*to, list, index| to.* = .{
             .scene = title,
@@ -383,6 +436,7 @@ pub fn writeJson(results: *const Results, writer: *Io.Writer) Io.Writer.Error!vo
 }
 
 test {
+    _ = @import("bench/alarm.zig");
     _ = bounces;
     _ = machine;
     _ = rounds_file;
@@ -405,7 +459,7 @@ fn settingsForTest(scenes: []const []const u8) Settings {
         .tree_quality = .default,
         .wanted = @splat(true),
         .round_count = 2,
-        .time_s = 1,
+        .time_s = 600,
         .energy = .{ .command = "echo 4 W" },
     };
 }
@@ -433,7 +487,6 @@ test "the built-in scene by all variants, with energy of a constant load" {
         .io = testing.io,
         .settings = &settings,
         .diagnostic = &diagnostic,
-        .progress = .none,
     };
     const results = try bench.run();
     const joules = results.scenes[0].variants[0].energy.?;
@@ -465,7 +518,6 @@ test "a scene that is not there is named, and the meter ends" {
         .io = testing.io,
         .settings = &settings,
         .diagnostic = &diagnostic,
-        .progress = .none,
     };
     try testing.expectError(error.InvalidInput, bench.run());
     try testing.expectEqualStrings("builtin:absent", bench.scene);

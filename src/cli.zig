@@ -5,20 +5,29 @@
 //! its description; limits and defaults come from `settings`.
 
 const std = @import("std");
+const batch_plan = @import("batch.zig");
+const batch = @import("cli/batch.zig");
 const bench = @import("cli/bench.zig");
 const compare = @import("cli/compare.zig");
 const info = @import("cli/info.zig");
+const merge = @import("cli/merge.zig");
 const colors = @import("cli/colors.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
+const completion = @import("cli/completion.zig");
+const man = @import("cli/man.zig");
+const scenario_file = @import("cli/scenario.zig");
 const settings = @import("settings.zig");
-const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const diagnostic_file = @import("diagnostic.zig");
+const Diagnostic = diagnostic_file.Diagnostic;
+const Page = @import("cli/page.zig").Page;
 const Section = arguments_file.Section;
 const comptimePrint = std.fmt.comptimePrint;
 const integer = arguments_file.integer;
 const namesOf = arguments_file.namesOf;
+const wordsOf = arguments_file.wordsOf;
 const nearest = @import("cli/nearest.zig").nearest;
-const quote = @import("diagnostic.zig").quote;
+const quote = diagnostic_file.quote;
 const variant_file = @import("variant.zig");
 const assert = std.debug.assert;
 
@@ -28,18 +37,33 @@ pub const version: []const u8 = config.version;
 /// What the user wants.
 pub const Command = union(enum) {
     help,
+    /// Nothing was asked for.
+    beginning,
     version,
     licenses,
     list_variants,
     render: Options,
+    scenario: ScenarioCall,
+    serve: []const [:0]const u8,
+    serve_help,
     bench: Bench,
     bench_help,
     compare: Compare,
     compare_help,
     info: Info,
     info_help,
+    merge: Merge,
+    merge_help,
+    completion: Shell,
+    completion_help,
+    man,
+    man_help,
 };
 
+/// What is asked for of several pictures.
+pub const Batch = batch.Batch;
+/// Names of their files, where nobody says them one by one.
+pub const templateOf = batch.templateOf;
 /// What `raylane bench` is to do.
 pub const Bench = bench.Bench;
 /// What `raylane bench --help` prints.
@@ -52,9 +76,48 @@ pub const compare_help = compare.help;
 pub const Info = info.Info;
 /// What `raylane info --help` prints.
 pub const info_help = info.help;
+/// What `raylane merge` is to do.
+pub const Merge = merge.Merge;
+/// What `raylane merge --help` prints.
+pub const merge_help = merge.help;
+
+/// What `raylane completion` is for.
+pub const Shell = completion.Shell;
+/// Writes what `raylane completion` prints.
+pub const writeCompletion = completion.write;
+
+/// All commands, that without a word first: what completions and the manual are made of.
+pub const pages: []const Page = &.{
+    .of("", help, sections, null),
+    .of("bench", bench_help, bench.sections, null),
+    .of("compare", compare_help, compare.sections, null),
+    .of("info", info_help, info.sections, null),
+    .of("merge", merge_help, merge.sections, null),
+    .of("serve", serve_help, sections, &.{}),
+    .of("completion", completion_help, &.{}, wordsOf(Shell)),
+    .of("man", man_help, &.{}, &.{}),
+};
+
+/// What `raylane completion --help` prints.
+pub const completion_help = completion.help;
+/// What `raylane man --help` prints.
+pub const man_help = man.help;
+
+/// Writes what `raylane man` prints.
+pub fn writeMan(writer: *std.Io.Writer) std.Io.Writer.Error!void {
+    return man.write(writer, version, pages);
+}
+
+/// Scenarios on the command line.
+pub const ScenarioCall = struct {
+    /// JSON, or the name of a file of it.
+    scenario: []const u8,
+    /// All arguments of `render`, `--scenario` among them.
+    arguments: []const [:0]const u8,
+};
 
 /// Words that stand before all others, but for `render`, which may stand among flags.
-const Word = enum { bench, compare, info };
+const Word = enum { bench, compare, info, merge, serve, completion, man, help };
 
 /// Form of the report.
 pub const Stats = enum { text, json, none };
@@ -68,11 +131,15 @@ const expected_size = std.fmt.comptimePrint("{s}, or {s} for the long side", .{
     expected_resolution, settings.long_side.text(),
 });
 
-/// How to render one scene.
+/// How to render scenes.
 pub const Options = struct {
+    /// The first that is named; of several, all are `inputs`.
     scene: []const u8,
-    /// Null: the scene's name in the working directory. See `isStdout`.
+    /// Null: the scene's name in the working directory. See `isStdout` and `templateOf`.
     output: ?[]const u8 = null,
+    /// What the command line was, for `inputs`.
+    arguments: []const [:0]const u8 = &.{},
+    batch: Batch = .{},
     /// Bytes of memory that may be allocated at a time; null: as much as there is.
     memory_max: ?u64 = null,
     /// Null: as many as the system has CPUs.
@@ -88,6 +155,7 @@ pub const Options = struct {
     progress_image: ?[]const u8 = null,
     /// A signal that ends tracing has what there is written.
     partial: bool = false,
+    progress: settings.Progress = .{},
     /// Null: not asked for.
     stats: ?Stats = null,
     count_tests: bool = false,
@@ -97,6 +165,47 @@ pub const Options = struct {
     /// Whether the image goes to standard output.
     pub fn toStdout(options: *const Options) bool {
         return isStdout(options.output orelse return false);
+    }
+
+    /// Whether there may be more than one picture, or none: not `scene` alone becomes `output`.
+    pub fn isBatch(options: *const Options) bool {
+        const chosen = &options.batch;
+        const is_made = if (options.output) |output| batch.isMade(output) else false;
+        return is_made or chosen.input_count != 1 or chosen.skip_existing or chosen.hasMany();
+    }
+
+    /// Scenes and folders as they are named, in that order. The diagnostic is not written to.
+    pub fn inputs(options: *const Options, diagnostic: *Diagnostic) Inputs {
+        return .{ .reader = .{
+            .arguments = options.arguments,
+            .diagnostic = diagnostic,
+            .help = "--help",
+        } };
+    }
+};
+
+/// The words of a command line that has been read.
+pub const Inputs = struct {
+    reader: Reader,
+    command: RenderWord = .{},
+
+    /// Null after the last.
+    pub fn next(inputs: *Inputs) ?[]const u8 {
+        while (inputs.reader.next() catch unreachable) |argument| switch (argument) {
+            .flag => {},
+            .word => |word| if (!inputs.command.isCommand(&inputs.reader, word)) return word,
+        };
+        return null;
+    }
+};
+
+/// Finds the word `render`, which is no scene: the first of all that stands before `--`.
+const RenderWord = struct {
+    is_first: bool = true,
+
+    fn isCommand(command: *RenderWord, reader: *const Reader, word: []const u8) bool {
+        defer command.is_first = false;
+        return command.is_first and !reader.flags_ended and std.mem.eql(u8, word, "render");
     }
 };
 
@@ -119,54 +228,149 @@ pub fn outputName(gpa: std.mem.Allocator, options: *const Options) error{OutOfMe
 
 const sections: []const Section = &.{
     .{ .title = "Image", .options = &.{
-        .{ .usage = "-o, --output FILE", .help = "name ending in a format; - is standard output" },
+        .{
+            .usage = "-o, --output FILE",
+            .help = "name ending in a format, or a template of names; - is\nstandard output",
+            .also = &.{ "--outfile", "--output-file" },
+        },
         .{
             .usage = "--format FORMAT",
-            .help = "png, jpg, tga, bmp or ppm, or linear: hdr, pfm or exr",
+            .words = wordsOf(settings.Format),
+            .help = "png, jpg, webp, tga, bmp or ppm, linear: hdr, pfm or\n" ++
+                "exr, or a film: y4m",
         },
         .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
+        .{
+            .usage = "--webp-quality N",
+            .help = settings.webp_quality.text() ++ ", with loss (default: without)",
+        },
+        .{
+            .usage = "--exr KIND",
+            .words = wordsOf(settings.ExrKind),
+            .help = "half or float: colours of an EXR file (default: half)",
+        },
         .{
             .usage = "-r, --resolution WxH|N",
             .help = comptimePrint("size in pixels, or of the long side in the camera's\n" ++
                 "aspect (default: the scene's own, or {d})", .{settings.long_side.default}),
+            .also = &.{"--size"},
+            .meant = &.{ "--geometry", "--res" },
+        },
+        .{ .usage = "--width N", .help = "with --height N: -r in two numbers" },
+        .{ .usage = "--height N", .help = "with --width N" },
+        .{
+            .usage = "--pixel-ratio N",
+            .help = "multiply both sides of that size, " ++ settings.pixel_ratio.textWithDefault(),
+            .also = &.{"--device-pixel-ratio"},
+        },
+        .{
+            .usage = "--crop X0,Y0,X1,Y1",
+            .help = "a part alone: pixels, or fractions where a dot is in\n" ++
+                "them; exr files of parts can be merged",
+        },
+        .{
+            .usage = "--tile I/N",
+            .help = "1/N of the picture in tiles all over it, an exr file;\n" ++
+                "'raylane merge' makes the picture of all I",
         },
         .{
             .usage = "--exposure EV|auto",
+            .words = &.{"auto"},
             .help = "brighten by EV stops, or by what is seen (default:\n" ++
                 "auto for scenes with lights of their own, else 0)",
         },
         .{
             .usage = "--tonemap CURVE",
+            .words = wordsOf(settings.ToneMapping),
             .help = namesOf(settings.ToneMapping) ++ " (default: neutral)",
+            .also = &.{ "--tone-mapping", "--tonemapping" },
         },
         .{
             .usage = "--background WHAT",
+            .words = &.{ "env", "studio", "transparent" },
             .help = "env, studio, transparent, a CSS colour (red, #rrggbb)\n" ++
                 "or radiance R,G,B (default: a grey gradient)",
+            .meant = &.{ "--bg", "--background-color" },
         },
         .{
             .usage = "--layers LIST",
-            .help = "of an EXR file: albedo,normal,depth,variance",
+            .words = wordsOf(settings.Layer),
+            .help = "depth,normal,albedo,uv,node,material,primitive,alpha,\n" ++
+                "position,cost,variance: channels of an EXR file, or\n" ++
+                "files of their own by {layer} in the output's name",
+        },
+        .{
+            .usage = "--shade LOOK",
+            .words = wordsOf(settings.Shade),
+            .help = "a quick look, not lit: ao, normal, uv or cost",
+        },
+    } },
+    .{ .title = "Several pictures (see docs/batch.md)", .options = &.{
+        .{
+            .usage = "--frames RANGE",
+            .help = "of the animation, 1-10,12,20-40:2, at frame / fps\nseconds",
+        },
+        .{ .usage = "--fps F", .help = "24 (default), 23.976 or 30000/1001, say" },
+        .{
+            .usage = "--reference-frame F",
+            .help = "whose exposure, framing and studio all frames have,\n" ++
+                "a range's first (default: the first of --frames)",
+        },
+        .{
+            .usage = "--turntable N",
+            .help = "views all around, from --orbit on (default: " ++
+                comptimePrint("{d},{d})", .{
+                    settings.orbit_turntable.theta_degrees, settings.orbit_turntable.phi_degrees,
+                }),
+        },
+        .{ .usage = "--views RANGE", .help = "only these of them, from 0 on" },
+        .{ .usage = "--skip-existing", .help = "leave pictures as they are that are there" },
+        .{
+            .usage = "--jobs N",
+            .help = "scenes side by side, " ++ settings.job_count.text() ++
+                "\n(default: by their number and the pictures' size)",
         },
     } },
     .{ .title = "Camera", .options = &.{
-        .{ .usage = "--camera WHICH", .help = "name or index of a camera, or auto: all in view" },
+        .{
+            .usage = "--camera WHICH",
+            .words = &.{"auto"},
+            .help = "name or index of a camera, or auto: all in view",
+            .also = &.{"--camera-index"},
+        },
         .{
             .usage = "--eye X,Y,Z",
             .help = "where the camera stands, in place of the file's",
+            .also = &.{"--camera-position"},
         },
         .{
             .usage = "--target X,Y,Z",
             .help = "what it looks at (default: the middle of the scene)",
+            .also = &.{"--camera-focal-point"},
+            .meant = &.{ "--look-at", "--camera-target" },
         },
-        .{ .usage = "--up X,Y,Z", .help = "what is upwards in the picture (default: 0,1,0)" },
+        .{
+            .usage = "--up X,Y,Z",
+            .help = "what is upwards in the picture (default: 0,1,0)",
+            .also = &.{"--camera-view-up"},
+        },
         .{
             .usage = "--orbit THETA,PHI,R",
             .help = "stand about the target, degrees from +z and from\n" ++
                 "above, R metres or percent (default: 100%, all seen)",
+            .meant = &.{"--camera-orbit"},
         },
-        .{ .usage = "--fov DEG", .help = "vertical angle of view, in place of the camera's" },
-        .{ .usage = "--ortho", .help = "no perspective" },
+        .{
+            .usage = "--fov DEG",
+            .help = "vertical angle of view, in place of the camera's",
+            .also = &.{"--camera-view-angle"},
+            .meant = &.{"--field-of-view"},
+        },
+        .{
+            .usage = "--ortho",
+            .help = "no perspective",
+            .also = &.{ "--orthographic", "--camera-orthographic" },
+        },
         .{
             .usage = "--frame-all",
             .help = "frame all that the animation shows at any time",
@@ -177,10 +381,13 @@ const sections: []const Section = &.{
         .{
             .usage = "--material-variant N",
             .help = "name or index of one of its variants of materials",
+            .also = &.{"--variant-name"},
         },
         .{
             .usage = "--animation WHICH",
+            .words = &.{"all"},
             .help = "name or index of an animation, or all (default: none)",
+            .also = &.{ "--animation-index", "--animation-name" },
         },
         .{
             .usage = "--animation-time S",
@@ -188,17 +395,22 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--up-axis AXIS",
+            .words = wordsOf(settings.UpAxis),
             .help = "y or z: which axis of the file points up (STL: z)",
         },
         .{
             .usage = "--format-in FORMAT",
+            .words = wordsOf(settings.SceneFormat),
             .help = namesOf(settings.SceneFormat) ++ ", whatever it holds",
         },
         .{
             .usage = "--env FILE",
+            .words = &.{ "studio", "none" },
             .help = "light from all around: an equirectangular image of\n" ++
                 "radiance (exr, hdr, png), studio or none (default:\n" ++
                 "the scene's, or studio, dim around its own lights)",
+            .also = &.{ "--hdri", "--hdri-file", "--environment" },
+            .meant = &.{ "--ibl", "--environment-image" },
         },
         .{ .usage = "--env-intensity X", .help = "multiplies its radiance (default: 1)" },
         .{
@@ -216,6 +428,7 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--floor WHAT",
+            .words = wordsOf(settings.Floor),
             .help = "shadow: a floor that shows it, or none (default)",
         },
         .{
@@ -264,6 +477,7 @@ const sections: []const Section = &.{
                 settings.sample_count_small,  settings.side_small,
                 settings.sample_count_path,
             }),
+            .also = &.{ "--samples", "--samples-per-pixel" },
         },
         .{
             .usage = "--noise E",
@@ -291,6 +505,7 @@ const sections: []const Section = &.{
                 "(default: {d}; path, all bounces of light: {d})", .{
                 settings.depth.text(), settings.depth.default, settings.depth_path,
             }),
+            .also = &.{ "--max-depth", "--maxdepth", "--bounces", "--max-bounces" },
         },
         .{
             .usage = "--thesis",
@@ -303,6 +518,7 @@ const sections: []const Section = &.{
         .{
             .usage = "-t, --threads N",
             .help = settings.thread_count.text() ++ " (default: as many as CPUs)",
+            .also = &.{ "--nthreads", "--num-threads" },
         },
         .{
             .usage = "--tile-size N",
@@ -314,17 +530,20 @@ const sections: []const Section = &.{
         },
         .{
             .usage = "--bvh QUALITY",
+            .words = wordsOf(settings.TreeQuality),
             .help = namesOf(settings.TreeQuality) ++ ": time to build the scene's tree\n" ++
                 "against time to trace; the image is always the same",
         },
         .{
             .usage = "--instances HOW",
+            .words = wordsOf(settings.Instances),
             .help = namesOf(settings.Instances) ++ ": whether a mesh is\n" ++
                 "held once for all its instances: less memory, more\n" ++
                 "time; the image is always the same",
         },
         .{
             .usage = "--integrator NAME",
+            .words = wordsOf(settings.Integrator),
             .help = namesOf(settings.Integrator) ++ " (default: whitted)",
         },
         .{
@@ -345,7 +564,11 @@ const sections: []const Section = &.{
                 "ninth of them and its neighbours' by a filter",
         },
         .{ .usage = "--denoise", .help = "filter the noise out" },
-        .{ .usage = "--variant NAME", .help = "how rays are traced; the image is always the same" },
+        .{
+            .usage = "--variant NAME",
+            .words = variant_file.names,
+            .help = "how rays are traced; the image is always the same",
+        },
         .{
             .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
@@ -355,10 +578,25 @@ const sections: []const Section = &.{
     .{ .title = "Messages", .options = &.{
         .{
             .usage = "--stats FORM",
+            .words = wordsOf(Stats),
             .help = "report as " ++ namesOf(Stats) ++ " (default: text, or none\n" ++
                 "when the image goes to standard output); when it is\n" ++
                 "given, a report that cannot be printed is an error",
+            .meant = &.{"--json"},
         },
+        .{
+            .usage = "--scenario FILE|JSON",
+            .help = "options as JSON (docs/json.md), or scenarios of\n" ++
+                "Khronos's render fidelity comparison; what else the\n" ++
+                "command line says counts more",
+        },
+        .{
+            .usage = "--progress HOW",
+            .words = wordsOf(settings.ProgressForm),
+            .help = "auto: a line on a terminal; json: lines for programs,\n" ++
+                "see docs/progress.md; or none",
+        },
+        .{ .usage = "--progress-fd N", .help = "json to that descriptor, not to stderr" },
         .{
             .usage = "--count-tests",
             .help = "count intersection tests, in a second, untimed pass",
@@ -366,32 +604,96 @@ const sections: []const Section = &.{
         .{ .usage = "-q, --quiet", .help = "no warnings, no progress, no report but by --stats" },
         .{ .usage = "-v, --verbose", .help = "say what was chosen by default" },
         .{ .usage = "-h, --help", .help = "print this" },
-        .{ .usage = "--version", .help = "print the version" },
-        .{ .usage = "--licenses", .help = "print the licence, and those of the libraries used" },
+        .{ .usage = "-V, --version", .help = "print the version" },
+        .{
+            .usage = "--licenses",
+            .help = "print the licence, and those of the libraries used",
+            .also = &.{ "--license", "--licence" },
+        },
     } },
 };
 
 const Reader = arguments_file.Arguments(sections);
 
+/// One of `--scenario`'s, or a job.
+pub const Scenario = scenario_file.Scenario;
+/// Where the text of scenarios is from.
+pub const ScenarioSource = scenario_file.Source;
+/// Longest text of scenarios.
+pub const scenario_bytes_max = scenario_file.bytes_max;
+/// The `id` of a job that is wrong otherwise.
+pub const idOf = scenario_file.idOf;
+/// Why scenarios cannot be read.
+pub const ScenarioError = scenario_file.Error;
+
+/// Reads scenarios; all memory is from `arena`. See `parseParts` for what becomes of them.
+pub fn readScenarios(
+    arena: std.mem.Allocator,
+    io: std.Io,
+    source: ScenarioSource,
+    diagnostic: *Diagnostic,
+) ScenarioError![]const Scenario {
+    return scenario_file.read(arena, io, Reader.flags, source, diagnostic);
+}
+
+/// Reads a job.
+pub fn readJob(
+    arena: std.mem.Allocator,
+    io: std.Io,
+    text: []const u8,
+    diagnostic: *Diagnostic,
+) ScenarioError!Scenario {
+    return scenario_file.readOne(arena, io, Reader.flags, text, diagnostic);
+}
+
 /// What `--help` prints.
 pub const help: []const u8 = "raylane " ++ version ++
     \\: renders glTF, PBRT, OBJ, STL or PLY to an image on the CPU
     \\
-    \\usage: raylane [render] SCENE [options]
+    \\usage: raylane [render] SCENE... [options]
     \\       raylane bench [SCENE...] [options]    (see raylane bench --help)
     \\       raylane compare IMAGE IMAGE [options] (see raylane compare --help)
     \\       raylane info SCENE [options]          (see raylane info --help)
+    \\       raylane merge -o FILE PART...         (see raylane merge --help)
+    \\       raylane serve [options]               (see raylane serve --help)
+    \\       raylane completion bash|zsh|fish      (a script for that shell)
+    \\       raylane man                           (the manual's page)
+    \\       raylane help [COMMAND]
     \\
-    \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, - for standard input, or
-    \\builtin:cornell, atrium, nave or handles. The image is written to the working
-    \\directory under the scene's name, as a whole or not at all, a report to stdout.
+    \\SCENE is a file in glTF 2.0, PBRT, OBJ, STL or PLY, a folder of such, - for
+    \\standard input, or builtin:cornell, atrium, nave or handles. The image goes to
+    \\the working directory under the scene's name, as a whole or not at all, a report
+    \\to stdout. Names of several come from a template: -o DIR/, or such as
+    \\-o 'DIR/{model}_{frame:4}.png', of {model}, {camera}, {material_variant},
+    \\{frame}, {view} and {layer}.
     \\
 ++ arguments_file.helpOf(sections) ++
     \\
+    \\Examples
+    \\  raylane model.glb
+    \\      model.png: all of it in view, in the light of a studio
+    \\  raylane model.glb -o a.png -r 800x600 --orbit 30,70 --env sky.hdr
+    \\      from the right and a little above, in the light of an image
+    \\  raylane room.pbrt -o room.exr --integrator path --spp 256 --denoise
+    \\      with all the light that bounces, as radiance
+    \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
-    \\supported, 128 + N ended by signal N (with --partial, the picture may be there).
+    \\supported, 4 images differ (bench, compare), 128 + N ended by signal N (with
+    \\--partial, the picture may be there).
     \\
 ;
+
+/// What `raylane` alone prints.
+pub const beginning: []const u8 =
+    \\usage: raylane SCENE [options]
+    \\
+    \\  raylane model.glb                        writes model.png
+    \\  raylane builtin:cornell -o box.png       a scene that needs no file
+    \\  raylane --help                           all options, and examples
+    \\
+;
+/// What `raylane serve --help` prints.
+pub const serve_help: []const u8 = @import("cli/serve.zig").help;
 
 pub const Error = error{UsageInvalid};
 
@@ -403,6 +705,7 @@ pub fn parse(
     diagnostic: *Diagnostic,
 ) Error!Command {
     assert(variant_names.len >= 1);
+    if (arguments.len == 0) return .beginning;
     const first = if (arguments.len > 0) std.meta.stringToEnum(Word, arguments[0]) else null;
     // Help wins over everything, for it is what somebody asks for who got the rest wrong.
     for (arguments) |argument| {
@@ -412,18 +715,111 @@ pub fn parse(
                 .bench => .bench_help,
                 .compare => .compare_help,
                 .info => .info_help,
+                .merge => .merge_help,
+                .completion => .completion_help,
+                .man => .man_help,
+                .serve => .serve_help,
+                .help => .help,
             } else .help;
     }
     if (first) |word| return switch (word) {
+        .help => helpWith(arguments[1..], diagnostic),
+        .serve => .{ .serve = try checkedDefaults(arguments[1..], variant_names, diagnostic) },
         .bench => .{ .bench = try bench.parse(arguments[1..], diagnostic) },
         .compare => .{ .compare = try compare.parse(arguments[1..], diagnostic) },
         .info => .{ .info = try info.parse(arguments[1..], diagnostic) },
+        .merge => .{ .merge = try merge.parse(arguments[1..], diagnostic) },
+        .completion => .{ .completion = try shellOf(arguments[1..], diagnostic) },
+        .man => if (arguments.len == 1) .man else diagnostic.fail(
+            error.UsageInvalid,
+            "'man' takes no arguments (see raylane man --help)",
+            .{},
+        ),
     };
-    var parser: Parser = .{
-        .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
-        .variant_names = variant_names,
-    };
+    var parser: Parser = .init(arguments, variant_names, diagnostic);
     return parser.run();
+}
+
+fn shellOf(words: []const [:0]const u8, diagnostic: *Diagnostic) Error!Shell {
+    const name = if (words.len == 1) words[0] else "";
+    return std.meta.stringToEnum(Shell, name) orelse diagnostic.fail(
+        error.UsageInvalid,
+        "'completion' takes a shell, " ++ comptime namesOf(Shell) ++
+            " (see raylane completion --help)",
+        .{},
+    );
+}
+
+/// What `--stats=json` is for, wherever it stands among arguments that may be wrong.
+pub fn wantsJson(arguments: []const [:0]const u8) bool {
+    for (arguments, 0..) |argument, index| {
+        if (std.mem.eql(u8, argument, "--stats=json")) return true;
+        if (!std.mem.eql(u8, argument, "--stats") or index + 1 == arguments.len) continue;
+        if (std.mem.eql(u8, arguments[index + 1], "json")) return true;
+    }
+    return false;
+}
+
+/// Reads arguments of `render` in two parts, of which the second counts where both say the same:
+/// a scenario and the command line, or the defaults of `serve` and a job.
+pub fn parseParts(
+    parts: [2][]const [:0]const u8,
+    variant_names: []const []const u8,
+    diagnostic: *Diagnostic,
+) Error!Options {
+    var parser: Parser = .init(parts[0], variant_names, diagnostic);
+    try parser.read();
+    const before = parser;
+    parser.scene = null;
+    parser.input_count = 0;
+    parser.command = .{};
+    parser.reader = .{ .arguments = parts[1], .diagnostic = diagnostic, .help = "--help" };
+    try parser.read();
+    if (parser.scene != null) {
+        parser.named_in = parts[1];
+    } else {
+        parser.scene = before.scene;
+        parser.input_count = before.input_count;
+    }
+    return parser.finish();
+}
+
+/// Refuses defaults of `serve` that no job could do with.
+fn checkedDefaults(
+    arguments: []const [:0]const u8,
+    variant_names: []const []const u8,
+    diagnostic: *Diagnostic,
+) Error![]const [:0]const u8 {
+    var parser: Parser = .init(arguments, variant_names, diagnostic);
+    parser.reader.help = "raylane serve --help";
+    try parser.read();
+    if (parser.scene) |scene| return parser.reader.fail("{f}: scenes come by standard input", .{
+        quote(scene),
+    });
+    if (parser.other != null or parser.scenario != null)
+        return parser.reader.fail("one of the options is no default of pictures", .{});
+    return arguments;
+}
+
+/// `help`, `help WORD`.
+fn helpWith(words: []const [:0]const u8, diagnostic: *Diagnostic) Error!Command {
+    if (words.len == 0 or std.mem.eql(u8, words[0], "render")) return .help;
+    return switch (std.meta.stringToEnum(Word, words[0]) orelse {
+        const candidates = comptime std.meta.fieldNames(Word);
+        const name = nearest(words[0], candidates) orelse "--help";
+        return diagnostic.fail(error.UsageInvalid, "no command {f}, did you mean '{s}'?", .{
+            quote(words[0]), name,
+        });
+    }) {
+        .bench => .bench_help,
+        .compare => .compare_help,
+        .info => .info_help,
+        .merge => .merge_help,
+        .serve => .serve_help,
+        .completion => .completion_help,
+        .man => .man_help,
+        .help => .help,
+    };
 }
 
 const Parser = struct {
@@ -431,48 +827,92 @@ const Parser = struct {
     variant_names: []const []const u8,
     options: Options = .{ .scene = "" },
     scene: ?[]const u8 = null,
+    input_count: usize = 0,
+    command: RenderWord = .{},
     /// A time is asked for.
     has_time: bool = false,
+    has_variant: bool = false,
     /// The explicit `--format`.
     format: ?settings.Format = null,
+    /// The explicit `--progress`.
+    progress: ?settings.ProgressForm = null,
     /// Set by the flags that print something and end.
     other: ?Command = null,
+    /// Arguments that name the inputs.
+    named_in: []const [:0]const u8,
+    /// The explicit `--scenario`.
+    scenario: ?[]const u8 = null,
+    /// The explicit `--width` and `--height`.
+    sides: [2]?u32 = .{ null, null },
+    pixel_ratio: u32 = settings.pixel_ratio.default,
+
+    fn init(
+        arguments: []const [:0]const u8,
+        variant_names: []const []const u8,
+        diagnostic: *Diagnostic,
+    ) Parser {
+        return .{
+            .reader = .{ .arguments = arguments, .diagnostic = diagnostic, .help = "--help" },
+            .variant_names = variant_names,
+            .named_in = arguments,
+        };
+    }
 
     fn run(parser: *Parser) Error!Command {
+        try parser.read();
+        if (parser.other) |command| return command;
+        if (parser.scenario) |scenario| return .{ .scenario = .{
+            .scenario = scenario,
+            .arguments = parser.reader.arguments,
+        } };
+        return .{ .render = try parser.finish() };
+    }
+
+    /// Reads all arguments.
+    fn read(parser: *Parser) Error!void {
         const reader = &parser.reader;
-        var command_seen = false;
         while (try reader.next()) |argument| switch (argument) {
             .flag => |flag| try parser.set(flag),
-            .word => |word| {
-                const is_command = std.mem.eql(u8, word, "render") and !reader.flags_ended and
-                    !command_seen and parser.scene == null;
-                if (is_command) command_seen = true else try parser.positional(word);
-            },
+            .word => |word| if (!parser.command.isCommand(reader, word))
+                try parser.positional(word),
         };
-        if (parser.other) |command| return command;
+    }
+
+    /// Checks them together.
+    fn finish(parser: *Parser) Error!Options {
+        const reader = &parser.reader;
         parser.options.scene = parser.scene orelse return reader.fail("no scene given", .{});
+        try parser.settleSize();
         const animation = &parser.options.animation;
-        if (parser.has_time and animation.which == .default) animation.which = .{ .index = 0 };
+        parser.options.arguments = parser.named_in;
+        parser.options.batch.input_count = parser.input_count;
+        const is_timed = parser.has_time or parser.options.batch.frames != null;
+        if (is_timed and animation.which == .default) animation.which = .{ .index = 0 };
+        try parser.checkBatch();
         try parser.checkViewpoint();
         try parser.settleFormat();
         try parser.checkSampling();
+        try parser.checkShade();
+        try parser.checkPart();
+        try parser.settleProgress();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
-        return .{ .render = parser.options };
+        return parser.options;
     }
 
     fn positional(parser: *Parser, argument: []const u8) Error!void {
         if (argument.len == 0) return parser.reader.fail("the scene's name is empty", .{});
-        if (parser.scene) |scene| {
-            if (nearest(scene, comptime std.meta.fieldNames(Word))) |word|
-                return parser.reader.fail("no command {f}, did you mean '{s}'?", .{
-                    quote(scene), word,
-                });
-            return parser.reader.fail("one scene at a time: {f} and {f}", .{
-                quote(scene), quote(argument),
+        parser.input_count += 1;
+        const scene = parser.scene orelse {
+            parser.scene = argument;
+            return;
+        };
+        // No command is shorter; folders often are.
+        if (parser.input_count > 2 or scene.len < 4) return;
+        if (nearest(scene, comptime std.meta.fieldNames(Word))) |word|
+            return parser.reader.fail("no command {f}, did you mean '{s}'?", .{
+                quote(scene), word,
             });
-        }
-        parser.scene = argument;
     }
 
     fn set(parser: *Parser, given: Reader.Given) Error!void {
@@ -480,22 +920,18 @@ const Parser = struct {
         const reader = &parser.reader;
         switch (given.id) {
             .output => options.output = try reader.text(given, "a file name or -"),
+            .frames, .fps, .reference_frame, .turntable => try parser.setBatch(given),
+            .views, .skip_existing, .jobs => try parser.setBatch(given),
             .format => parser.format = formatOf(given.value) orelse
                 return reader.bad(given, comptime namesOf(settings.Format)),
             .denoise => options.render.denoise = true,
-            .layers => options.render.layers = layersOf(given.value) orelse
-                return reader.bad(given, comptime namesOf(settings.Layer)),
-            .jpeg_quality => {
-                options.write.jpeg_quality = try reader.number(given, settings.jpeg_quality);
-            },
+            .shade => options.view.shade = try reader.choice(given, settings.Shade),
+            .layers, .jpeg_quality, .webp_quality, .exr => try parser.setWriting(given),
+            .exposure, .tonemap => try parser.setWriting(given),
             .max_memory => options.memory_max = bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
-            .resolution => {
-                options.view.long_side = integer(given.value, settings.long_side);
-                options.view.resolution = resolutionOf(given.value);
-                if (options.view.long_side == null and options.view.resolution == null)
-                    return reader.bad(given, expected_size);
-            },
+            .crop, .tile => try parser.setPart(given),
+            .resolution, .width, .height, .pixel_ratio => try parser.setSize(given),
             .threads => options.thread_count = try reader.number(given, settings.thread_count),
             .spp => options.render.sample_count = try reader.number(given, settings.sample_count),
             .noise, .time_budget, .progress_image, .partial => try parser.setSampling(given),
@@ -516,33 +952,168 @@ const Parser = struct {
             .floor => options.view.floor = try reader.choice(given, settings.Floor),
             .ambient => options.view.ambient = radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
-            .exposure => options.write.exposure = exposureOf(given.value) orelse
-                return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
-                    settings.exposure_ev_max, settings.exposure_ev_max,
-                })),
-            .tonemap => {
-                options.write.tone_mapping = try reader.choice(given, settings.ToneMapping);
-            },
-            .stats => options.stats = try reader.choice(given, Stats),
+            .stats, .count_tests, .quiet, .verbose => try parser.setMessages(given),
+            .progress, .progress_fd => try parser.setMessages(given),
+            .scenario => try parser.setScenario(given),
             .thesis => parser.setThesis(),
             .bvh => options.tree_quality = try reader.choice(given, settings.TreeQuality),
             .instances => options.instances = try reader.choice(given, settings.Instances),
-            .variant => options.render.variant = try parser.variantOf(given.value),
+            .variant => {
+                options.render.variant = try parser.variantOf(given.value);
+                parser.has_variant = true;
+            },
             .integrator => options.render.integrator =
                 try reader.choice(given, settings.Integrator),
             .virtual_lights, .sky_lights, .all_lights => try parser.setLights(given),
-            .count_tests => options.count_tests = true,
             .point_size => options.view.point_size =
                 numberWithin(given.value, settings.point_size) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
                     settings.point_size.min, settings.point_size.max,
                 })),
-            .quiet => options.quiet = true,
-            .verbose => options.verbose = true,
             .help => parser.other = .help,
             .version => parser.other = parser.other orelse .version,
             .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
+        }
+    }
+
+    fn setScenario(parser: *Parser, given: Reader.Given) Error!void {
+        if (parser.scenario != null)
+            return parser.reader.fail("'--scenario' is there twice", .{});
+        parser.scenario = try parser.reader.text(given, "a file name or JSON");
+    }
+
+    fn setPart(parser: *Parser, given: Reader.Given) Error!void {
+        const part = &parser.options.render.part;
+        switch (given.id) {
+            .crop => part.* = .{ .crop = cropOf(given.value) orelse
+                return parser.reader.bad(given, "four pixels, or fractions from 0.0 to 1.0, of " ++
+                    "a rectangle's left, upper, right and lower edge") },
+            .tile => part.* = .{ .tile = tileOf(given.value) orelse
+                return parser.reader.bad(given, comptimePrint("I/N, N {s}, I 1 to N", .{
+                    settings.part_count.text(),
+                })) },
+            else => unreachable,
+        }
+    }
+
+    fn setSize(parser: *Parser, given: Reader.Given) Error!void {
+        const view = &parser.options.view;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .resolution => {
+                parser.sides = .{ null, null };
+                view.long_side = integer(given.value, settings.long_side);
+                view.resolution = resolutionOf(given.value);
+                if (view.long_side == null and view.resolution == null)
+                    return reader.bad(given, expected_size);
+            },
+            .width => parser.sides[0] = try reader.number(given, settings.side),
+            .height => parser.sides[1] = try reader.number(given, settings.side),
+            .pixel_ratio => parser.pixel_ratio = try reader.number(given, settings.pixel_ratio),
+            else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    /// Makes one size of what may be said in several options.
+    fn settleSize(parser: *Parser) Error!void {
+        const view = &parser.options.view;
+        const reader = &parser.reader;
+        if (parser.sides[0] != null or parser.sides[1] != null) {
+            view.long_side = null;
+            view.resolution = .{
+                parser.sides[0] orelse return reader.fail("'--height' without '--width'; " ++
+                    "-r N is the long side alone", .{}),
+                parser.sides[1] orelse return reader.fail("'--width' without '--height'; " ++
+                    "-r N is the long side alone", .{}),
+            };
+        }
+        const ratio = parser.pixel_ratio;
+        if (view.resolution) |*sides| {
+            for (sides) |*length| length.* *= ratio;
+            const is_large = for (sides) |length| {
+                if (!settings.side.holds(length)) break true;
+            } else @as(u64, sides[0]) * sides[1] > settings.pixel_count_max;
+            if (is_large) return reader.fail("a picture of {d}x{d} is not " ++
+                expected_resolution, .{ sides[0], sides[1] });
+        } else if (view.long_side) |*length| {
+            length.* *= ratio;
+            if (!settings.long_side.holds(length.*))
+                return reader.fail("a long side of {d} is not {s}", .{
+                    length.*, comptime settings.long_side.text(),
+                });
+        } else if (ratio != 1) return reader.fail("'--pixel-ratio' multiplies a size: say it " ++
+            "by '--resolution'", .{});
+    }
+
+    fn setBatch(parser: *Parser, given: Reader.Given) Error!void {
+        const chosen = &parser.options.batch;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .frames => chosen.frames = try parser.rangeOf(given),
+            .views => chosen.views = try parser.rangeOf(given),
+            .fps => parser.options.write.frame_rate = batch.frameRateOf(given.value) orelse
+                return reader.bad(given, "a number above 0, up to 1000, or a fraction"),
+            .reference_frame => chosen.reference_frame =
+                batch_plan.frames.first(try parser.rangeOf(given)),
+            .turntable => chosen.view_count = try reader.number(given, settings.view_count),
+            .skip_existing => chosen.skip_existing = true,
+            .jobs => chosen.job_count = try reader.number(given, settings.job_count),
+            else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    fn rangeOf(parser: *Parser, given: Reader.Given) Error![]const u8 {
+        const fault = batch_plan.frames.check(given.value) orelse return given.value;
+        return parser.reader.fail("option '{s}': {f} {s}", .{
+            given.long, quote(given.value), fault.text(),
+        });
+    }
+
+    /// What belongs to several pictures goes together.
+    fn checkBatch(parser: *Parser) Error!void {
+        const reader = &parser.reader;
+        const options = &parser.options;
+        const chosen = &options.batch;
+        if (chosen.frames != null and parser.has_time)
+            return reader.fail("'--frames' and '--animation-time' both choose the time", .{});
+        if (chosen.reference_frame != null and chosen.frames == null)
+            return reader.fail("'--reference-frame' needs '--frames'", .{});
+        if (chosen.views != null and chosen.view_count == null)
+            return reader.fail("'--views' are those of '--turntable'", .{});
+        const viewpoint = &options.view.viewpoint;
+        if (chosen.view_count != null) {
+            if (viewpoint.eye != null)
+                return reader.fail("'--eye' and '--turntable' both place the camera", .{});
+            if (viewpoint.orbit == null) viewpoint.orbit = settings.orbit_turntable;
+        }
+        if (options.progress_image != null and options.isBatch())
+            return reader.fail("'--progress-image' is for one picture", .{});
+        const output = options.output orelse return;
+        var message: diagnostic_file.Message = .{};
+        if (batch.contradiction(chosen, output, &message))
+            return reader.fail("{s}", .{message.text()});
+        if (batch_plan.template.holds(output, .camera) and viewpoint.replacesCamera()) return reader
+            .fail("'{{camera}}' stands for the file's, in whose place the options put one", .{});
+    }
+
+    fn setWriting(parser: *Parser, given: Reader.Given) Error!void {
+        const write = &parser.options.write;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .layers => parser.options.render.layers = layersOf(given.value) orelse
+                return reader.bad(given, comptime namesOf(settings.Layer)),
+            .jpeg_quality => write.jpeg_quality =
+                try reader.number(given, settings.jpeg_quality),
+            .webp_quality => write.webp_quality =
+                try reader.number(given, settings.webp_quality),
+            .exr => write.exr_kind = try reader.choice(given, settings.ExrKind),
+            .exposure => write.exposure = exposureOf(given.value) orelse
+                return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
+                    settings.exposure_ev_max, settings.exposure_ev_max,
+                })),
+            .tonemap => write.tone_mapping = try reader.choice(given, settings.ToneMapping),
+            else => unreachable, // `set` hands over the above.
         }
     }
 
@@ -604,6 +1175,35 @@ const Parser = struct {
         noise.exposure = parser.options.write.exposure;
         if (!render.integrator.isOpen())
             return parser.reader.fail("'--noise' is for '--integrator path'", .{});
+    }
+
+    fn setMessages(parser: *Parser, given: Reader.Given) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .stats => options.stats = try reader.choice(given, Stats),
+            .count_tests => options.count_tests = true,
+            .quiet => options.quiet = true,
+            .verbose => options.verbose = true,
+            .progress => parser.progress = try reader.choice(given, settings.ProgressForm),
+            .progress_fd => {
+                options.progress.file = try reader.number(given, settings.progress_file);
+            },
+            else => unreachable, // `set` hands over the above.
+        }
+    }
+
+    fn settleProgress(parser: *Parser) Error!void {
+        const progress = &parser.options.progress;
+        const quiet: settings.ProgressForm = if (parser.options.quiet) .none else .auto;
+        progress.form = parser.progress orelse if (progress.file != null) .json else quiet;
+        const file = progress.file orelse return;
+        if (progress.form != .json)
+            return parser.reader.fail("'--progress-fd' is for '--progress json'", .{});
+        if (file == std.posix.STDOUT_FILENO and parser.options.toStdout())
+            return parser.reader.fail("'--progress-fd 1' is where the image goes", .{});
+        if (std.c.fcntl(@intCast(file), std.c.F.GETFD) < 0)
+            return parser.reader.fail("'--progress-fd {d}' is not open", .{file});
     }
 
     fn setLoad(parser: *Parser, given: Reader.Given) Error!void {
@@ -729,10 +1329,41 @@ const Parser = struct {
     fn settleFormat(parser: *Parser) Error!void {
         try parser.findFormat();
         const options = &parser.options;
-        if (options.render.layers.count() == 0 or options.write.format == .exr) return;
-        return parser.reader.fail("'--layers' has a place in an exr file, not in a {t} file", .{
-            options.write.format,
-        });
+        const format = options.write.format;
+        if (options.output) |output| options.write.layers_apart =
+            batch_plan.template.isTemplate(output) and
+            batch_plan.template.holds(output, .layer);
+        if (options.render.layers.count() == 0 or format == .exr) return;
+        if (options.write.layers_apart and format != .y4m) return;
+        return parser.reader.fail("'--layers' has a place in an exr file, not in a {t} file, or " ++
+            "in files of their own, by {{layer}} in the output's name", .{format});
+    }
+
+    /// What some integrators alone can tell, or is told in place of them. Where rays are traced one
+    /// by one, each pixel has tests of its own: nothing else is as good for these.
+    fn checkShade(parser: *Parser) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        const is_whitted = options.render.integrator == .whitted;
+        if (options.render.layers.contains(.cost) and !is_whitted)
+            return reader.fail("'--layers cost' counts tests of '--integrator whitted'", .{});
+        const has_cost = options.render.layers.contains(.cost) or options.view.shade == .cost;
+        if (has_cost and !parser.has_variant) for (parser.variant_names, 0..) |name, index| {
+            if (std.mem.find(u8, name, "-single-") == null) continue;
+            options.render.variant = index;
+            break;
+        };
+        const part = options.render.part;
+        if (options.write.layers_apart and part == .tile) return reader.fail(
+            "'--tile' puts layers into one file: no {{layer}} in the output's name",
+            .{},
+        );
+        if (options.view.shade == null) return;
+        if (options.view.shade == .cost and part != .whole) return reader
+            .fail("'--shade cost' has colours by the whole picture: no '--crop' or '--tile'", .{});
+        if (!is_whitted) return reader.fail("'--shade' contradicts '--integrator'", .{});
+        if (options.render.denoise) return reader.fail("'--shade' contradicts '--denoise'", .{});
+        if (options.count_tests) return reader.fail("'--shade' contradicts '--count-tests'", .{});
     }
 
     fn findFormat(parser: *Parser) Error!void {
@@ -743,24 +1374,91 @@ const Parser = struct {
             return parser.reader.fail("a scene from standard input has no name for the image: " ++
                 "say one by -o", .{});
         };
-        if (options.toStdout()) return;
-        const extension = std.fs.path.extension(output);
-        const implied = if (extension.len == 0) null else formatOf(extension[1..]);
-        if (parser.format) |format| {
-            if (implied == null or implied == format) return;
-            return parser.reader.fail("'--format {t}' contradicts the name {f}", .{
-                format, quote(output),
-            });
+        if (options.toStdout() or std.mem.endsWith(u8, output, "/")) return;
+        options.write.format = try formatFor(&parser.reader, parser.format, output);
+    }
+
+    /// Refuses what is of whole pictures.
+    fn checkPart(parser: *Parser) Error!void {
+        const reader = &parser.reader;
+        const options = &parser.options;
+        const part = options.render.part;
+        if (part == .whole) return;
+        if (options.render.time_budget_s != null) return reader.fail(
+            "'--time-budget' does not go with '--{t}': parts have as many samples as the whole",
+            .{part},
+        );
+        if (options.render.layers.contains(.cost)) return reader.fail(
+            "'--layers cost' does not go with '--{t}': it is of pixels that are traced together",
+            .{part},
+        );
+        if (options.write.format == .exr) {
+            options.render.is_merged = true;
+            if (options.progress_image == null) return;
+            return reader.fail("'--progress-image' does not go with parts that are merged", .{});
         }
-        options.write.format = implied orelse return parser.reader.fail(
-            "the name {f} ends in no image format's extension, and no --format says which",
-            .{quote(output)},
+        if (part == .tile) return reader.fail(
+            "'--tile' makes an exr file, not a {t} file: 'raylane merge' makes that of all parts",
+            .{options.write.format},
         );
     }
 };
 
+/// The format of a file called `name`: the one chosen, or by its extension; png on standard output.
+/// An error of the reader where they contradict each other, or there is neither.
+pub fn formatFor(
+    reader: anytype,
+    chosen: ?settings.Format,
+    name: []const u8,
+) Error!settings.Format {
+    if (isStdout(name)) return chosen orelse .png;
+    const extension = std.fs.path.extension(name);
+    const implied = if (extension.len == 0) null else formatOf(extension[1..]);
+    if (chosen) |format| {
+        if (implied == null or implied == format) return format;
+        return reader.fail("'--format {t}' contradicts the name {f}", .{ format, quote(name) });
+    }
+    return implied orelse reader.fail(
+        "the name {f} ends in no image format's extension, no --format says which, and a " ++
+            "folder's ends in /",
+        .{quote(name)},
+    );
+}
+
+/// A rectangle of at least one pixel; with a dot anywhere, all are fractions.
+fn cropOf(text: []const u8) ?settings.Part.Crop {
+    const has_dot = std.mem.findScalar(u8, text, '.') != null;
+    var pixels: [4]u32 = undefined;
+    var shares: [4]f32 = undefined;
+    var numbers = std.mem.splitScalar(u8, text, ',');
+    for (&pixels, &shares) |*pixel, *share| {
+        const number = numbers.next() orelse return null;
+        if (has_dot)
+            share.* = numberWithin(number, crop_shares) orelse return null
+        else
+            pixel.* = integer(number, .{ .min = 0, .max = settings.side.max }) orelse return null;
+    }
+    if (numbers.next() != null) return null;
+    if (has_dot) {
+        const is_some = shares[0] < shares[2] and shares[1] < shares[3];
+        return if (is_some) .{ .shares = shares } else null;
+    }
+    const is_some = pixels[0] < pixels[2] and pixels[1] < pixels[3];
+    return if (is_some) .{ .pixels = pixels } else null;
+}
+
+const crop_shares: struct { min: f32, max: f32 } = .{ .min = 0, .max = 1 };
+
+/// I/N.
+fn tileOf(text: []const u8) ?settings.Part.Tile {
+    const slash = std.mem.findScalar(u8, text, '/') orelse return null;
+    const number = integer(text[0..slash], settings.part_count) orelse return null;
+    const count = integer(text[slash + 1 ..], settings.part_count) orelse return null;
+    return if (number <= count) .{ .number = number, .count = count } else null;
+}
+
 /// A format by its extension, in either case; JPEG has two.
-fn formatOf(extension: []const u8) ?settings.Format {
+pub fn formatOf(extension: []const u8) ?settings.Format {
     if (std.ascii.eqlIgnoreCase(extension, "jpeg")) return .jpg;
     for (std.enums.values(settings.Format)) |format| {
         if (std.ascii.eqlIgnoreCase(extension, @tagName(format))) return format;
@@ -769,7 +1467,7 @@ fn formatOf(extension: []const u8) ?settings.Format {
 }
 
 /// A number of bytes above 0, or of K, M, G or T, each 1024 times the one before.
-fn bytesOf(text: []const u8) ?u64 {
+pub fn bytesOf(text: []const u8) ?u64 {
     if (text.len == 0) return null;
     const units = "KMGT";
     const unit = std.mem.findScalar(u8, units, std.ascii.toUpper(text[text.len - 1]));
@@ -945,15 +1643,73 @@ fn expectUsage(needle: []const u8, arguments: []const [:0]const u8) !void {
 
 test "a scene alone is rendered by the defaults" {
     const options = try optionsForTest(&.{});
-    try std.testing.expectEqualDeep(Options{ .scene = "s.glb" }, options);
+    try std.testing.expectEqual(1, options.arguments.len);
+    try std.testing.expect(!options.isBatch());
+    var compared = options;
+    compared.arguments = &.{};
+    try std.testing.expectEqualDeep(Options{ .scene = "s.glb" }, compared);
     const named = try parseForTest(&.{ "render", "render" });
     try std.testing.expectEqualStrings("render", named.render.scene);
     try expectUsage("no scene", &.{"render"});
-    try expectUsage("no scene", &.{});
+    try std.testing.expectEqual(.beginning, try parseForTest(&.{}));
     try expectUsage("no scene", &.{ "-q", "--" });
     try expectUsage("empty", &.{""});
-    try expectUsage("'a' and 'b'", &.{ "a", "b" });
-    try expectUsage("'a' and 'render'", &.{ "a", "render" });
+}
+
+test "several scenes are a batch, in their order" {
+    for ([_][]const [:0]const u8{
+        &.{ "a", "-q", "b", "--spp", "2", "render" },
+        &.{ "render", "-r", "2x2", "a", "b", "--", "render" },
+        &.{ "--", "a", "b", "render" },
+    }) |arguments| {
+        const options = (try parseForTest(arguments)).render;
+        try std.testing.expect(options.isBatch());
+        try std.testing.expectEqual(3, options.batch.input_count);
+        var diagnostic: Diagnostic = .{};
+        var inputs = options.inputs(&diagnostic);
+        for ([_][]const u8{ "a", "b", "render" }) |input|
+            try std.testing.expectEqualStrings(input, inputs.next().?);
+        try std.testing.expectEqual(null, inputs.next());
+    }
+}
+
+test "frames, views and names of pictures" {
+    const options = try optionsForTest(&.{
+        "--frames=1-3,7", "--fps=12.5", "--reference-frame", "-1", "-o{model}_{frame:4}.jpg",
+    });
+    try std.testing.expectEqualStrings("1-3,7", options.batch.frames.?);
+    try std.testing.expectEqual(-1, options.batch.reference_frame.?);
+    try std.testing.expectEqual(0.08, options.write.frame_rate.timeOf(1));
+    try std.testing.expectEqual(0, options.animation.which.index);
+    try std.testing.expectEqual(.jpg, options.write.format);
+    try std.testing.expect(options.isBatch());
+    const part = try optionsForTest(&.{ "--frames=8", "--reference-frame=5-9,4-2:-1" });
+    try std.testing.expectEqual(2, part.batch.reference_frame.?);
+    const turned = try optionsForTest(&.{ "--turntable=8", "--views=0-3", "-oa/", "--jobs=2" });
+    try std.testing.expectEqual(30, turned.view.viewpoint.orbit.?.theta_degrees);
+    try std.testing.expectEqual(8, turned.batch.view_count.?);
+    try std.testing.expectEqual(.png, turned.write.format);
+    try std.testing.expect((try optionsForTest(&.{"--skip-existing"})).isBatch());
+    try std.testing.expect((try optionsForTest(&.{"-oa/"})).isBatch());
+    inline for ([_]struct { []const u8, []const [:0]const u8 }{
+        .{ "'1-' is not a range such as", &.{"--frames=1-"} },
+        .{ "has more than 1000000", &.{"--frames=0-1000000"} },
+        .{ "both choose the time", &.{ "--frames=1", "--animation-time=2" } },
+        .{ "needs '--frames'", &.{"--reference-frame=2"} },
+        .{ "'x' is not a range", &.{ "--frames=1", "--reference-frame=x" } },
+        .{ "those of '--turntable'", &.{"--views=2"} },
+        .{ "both place the camera", &.{ "--turntable=2", "--eye=1,2,3" } },
+        .{ "'--camera' contradicts", &.{ "--turntable=2", "--camera=0" } },
+        .{ "'--fps': '0' is not", &.{"--fps=0"} },
+        .{ "for one picture", &.{ "--frames=1", "--progress-image=a.png" } },
+        .{ "no placeholder {modle} in 'a{modle}.png'; there are {model}, ", &.{"-oa{modle}.png"} },
+        .{ "1 to 9, of a number", &.{"-oa{model:3}.png"} },
+        .{ "{{ is a brace", &.{"-oa{model.png"} },
+        .{ "'{frame}' in '{frame}.png' needs '--frames'", &.{"-o{frame}.png"} },
+        .{ "needs '--turntable'", &.{"-o{view}.png"} },
+        .{ "'{camera}' stands for", &.{ "-o{camera}.png", "--eye=1,2,3" } },
+        .{ "a folder's ends in /", &.{"-oa"} },
+    }) |case| try expectUsage(case[0], case[1] ++ &[_][:0]const u8{"s.glb"});
 }
 
 test "after -- everything is a scene, and a lone dash always" {
@@ -996,6 +1752,96 @@ test "a long option takes its value joined or apart, a short one also attached" 
     }
     try expectUsage("'-t' needs a value", &.{ "s", "-t" });
     try expectUsage("'--threads': '' is not 1 to 256", &.{ "s", "--threads=" });
+}
+
+test "names of other programs are understood or answered with ours" {
+    const options = try optionsForTest(&.{
+        "--samples=3", "--hdri=none", "--nthreads", "2", "--camera-position=1,2,3", "--max-depth=4",
+    });
+    try std.testing.expectEqual(3, options.render.sample_count);
+    try std.testing.expectEqual(.none, options.view.environment.source);
+    try std.testing.expectEqual(2, options.thread_count.?);
+    try std.testing.expectEqual([3]f32{ 1, 2, 3 }, options.view.viewpoint.eye.?);
+    try std.testing.expectEqual(4, options.render.depth);
+    try expectUsage("option '--camera-orbit' is '--orbit' here", &.{"--camera-orbit=1deg 2deg 3m"});
+    try expectUsage("'--background-color' is '--background'", &.{"--background-color=0,0,0"});
+    try std.testing.expectEqual(.version, try parseForTest(&.{"-V"}));
+    // No name may be that of two options.
+    for (Reader.flags, 0..) |*flag, index| for ([_][]const []const u8{
+        flag.also, flag.meant, &.{flag.long},
+    }) |names| for (names) |name| {
+        for (Reader.flags[index + 1 ..]) |*other|
+            try std.testing.expect(!other.isNamed(name[2..]) and !other.isMeant(name[2..]));
+    };
+}
+
+test "help for a command by a word" {
+    try std.testing.expectEqual(.help, try parseForTest(&.{"help"}));
+    try std.testing.expectEqual(.help, try parseForTest(&.{ "help", "render" }));
+    try std.testing.expectEqual(.bench_help, try parseForTest(&.{ "help", "bench" }));
+    try std.testing.expectEqual(.serve_help, try parseForTest(&.{ "help", "serve" }));
+    try std.testing.expectEqual(.serve_help, try parseForTest(&.{ "serve", "-h" }));
+    var diagnostic: Diagnostic = .{};
+    const result = parse(&.{ "help", "benhc" }, test_names, &diagnostic);
+    try std.testing.expectError(error.UsageInvalid, result);
+    const expected = "no command 'benhc', did you mean 'bench'?";
+    try std.testing.expectEqualStrings(expected, diagnostic.message.text());
+}
+
+test "a size in two options, and pixels of pixels" {
+    const view = (try optionsForTest(&.{ "-r512", "--width=8", "--height=4" })).view;
+    try std.testing.expectEqual([2]u32{ 8, 4 }, view.resolution.?);
+    try std.testing.expectEqual(null, view.long_side);
+    const later = (try optionsForTest(&.{ "--width=8", "--height=4", "-r3x2" })).view;
+    try std.testing.expectEqual([2]u32{ 3, 2 }, later.resolution.?);
+    const doubled = (try optionsForTest(&.{ "--pixel-ratio=2", "-r8x4" })).view;
+    try std.testing.expectEqual([2]u32{ 16, 8 }, doubled.resolution.?);
+    const long = (try optionsForTest(&.{ "-r100", "--pixel-ratio=3" })).view;
+    try std.testing.expectEqual(300, long.long_side.?);
+    try expectUsage("'--width' without '--height'", &.{ "s", "--width=8" });
+    try expectUsage("'--height' without '--width'", &.{ "s", "--height=8" });
+    try expectUsage("multiplies a size", &.{ "s", "--pixel-ratio=2" });
+    try expectUsage("is not 1 to 8", &.{ "s", "--pixel-ratio=9" });
+    try expectUsage("32768x32768 is not WxH", &.{ "s", "--pixel-ratio=2", "-r16384x16384" });
+    try expectUsage("131072x2 is not WxH", &.{ "s", "--pixel-ratio=2", "-r65536x1" });
+    try expectUsage("side of 32768 is not 1 to", &.{ "s", "--pixel-ratio=2", "-r16384" });
+    try expectUsage("65536x65536 is not WxH", &.{ "s", "--width=65536", "--height=65536" });
+}
+
+test "scenarios are kept for whoever reads them, and what comes after counts" {
+    const call = (try parseForTest(&.{ "--scenario={}", "-q", "a.glb" })).scenario;
+    try std.testing.expectEqualStrings("{}", call.scenario);
+    try std.testing.expectEqual(3, call.arguments.len);
+    try expectUsage("twice", &.{ "--scenario=a", "--scenario=b" });
+    try expectUsage("'--scenario'", &.{"--scenario="});
+    var diagnostic: Diagnostic = .{};
+    const scenario: []const [:0]const u8 = &.{ "--spp=2", "--depth=3", "--", "-a", "b" };
+    const own = try parseParts(.{ scenario, &.{ "--spp=4", "-q" } }, test_names, &diagnostic);
+    try std.testing.expectEqual(4, own.render.sample_count);
+    try std.testing.expectEqual(3, own.render.depth);
+    try std.testing.expectEqualStrings("-a", own.scene);
+    try std.testing.expectEqual(2, own.batch.input_count);
+    var inputs = own.inputs(&diagnostic);
+    for ([_][]const u8{ "-a", "b" }) |name|
+        try std.testing.expectEqualStrings(name, inputs.next().?);
+    const other = try parseParts(.{ scenario, &.{"c"} }, test_names, &diagnostic);
+    try std.testing.expectEqualStrings("c", other.scene);
+    try std.testing.expectEqual(1, other.batch.input_count);
+    inputs = other.inputs(&diagnostic);
+    try std.testing.expectEqualStrings("c", inputs.next().?);
+    try std.testing.expectEqual(2, (try parseForTest(&.{ "serve", "-q", "-t2" })).serve.len);
+    const bad = parse(&.{ "serve", "--spp=0" }, test_names, &diagnostic);
+    try std.testing.expectError(error.UsageInvalid, bad);
+    const named = parse(&.{ "serve", "a.glb" }, test_names, &diagnostic);
+    try std.testing.expectError(error.UsageInvalid, named);
+    const text = diagnostic.message.text();
+    try std.testing.expectStringEndsWith(text, "(see raylane serve --help)");
+}
+
+test wantsJson {
+    try std.testing.expect(wantsJson(&.{ "a", "--stats=json" }));
+    try std.testing.expect(wantsJson(&.{ "--stats", "json", "--spp=0" }));
+    try std.testing.expect(!wantsJson(&.{ "--stats=text", "json", "--stats" }));
 }
 
 test "unknown options are named, misspelt ones are recognised" {
@@ -1062,9 +1908,14 @@ test "numbers keep to their ranges" {
         .{ .flag = "--integrator", .good = &.{ "whitted", "lights", "path" }, .bad = &.{"bdpt"} },
         .{
             .flag = "--format",
-            .good = &.{ "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr" },
+            .good = &.{
+                "png", "ppm", "pfm", "jpg", "jpeg", "JPEG", "tga", "bmp", "hdr", "exr", "webp",
+            },
             .bad = &.{ "tiff", "" },
         },
+        .{ .flag = "--shade", .good = &.{ "ao", "normal", "uv", "cost" }, .bad = &.{ "", "AO" } },
+        .{ .flag = "--webp-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "" } },
+        .{ .flag = "--exr", .good = &.{ "half", "float" }, .bad = &.{ "Half", "double", "" } },
         .{ .flag = "--jpeg-quality", .good = &.{ "1", "100" }, .bad = &.{ "0", "101", "", "x" } },
         .{
             .flag = "--max-memory",
@@ -1253,9 +2104,21 @@ test "the format follows the name, unless said otherwise" {
     try expectUsage("contradicts", &.{ "--format=pfm", "-oa.png", "s" });
     try expectUsage("not in a png file", &.{ "--layers=depth", "s" });
     for ([_][:0]const u8{ "--layers=", "--layers=depht", "--layers=depth,", "--layers=a b" }) |bad|
-        try expectUsage("albedo, normal, depth", &.{ bad, "-oa.exr", "s" });
+        try expectUsage("depth, normal, albedo", &.{ bad, "-oa.exr", "s" });
     const layered = try optionsForTest(&.{ "--layers=depth,albedo,depth", "-oa.exr" });
     try std.testing.expectEqual(2, layered.render.layers.count());
+    const each = try optionsForTest(&.{
+        "--layers=depth,normal,albedo,uv,node,material,primitive,alpha,position,cost,variance",
+        "-oa-{layer}.png",
+    });
+    try std.testing.expectEqual(11, each.render.layers.count());
+    try expectUsage("counts", &.{ "--layers=cost", "--integrator=path", "-oa.exr", "s" });
+    const alone = try optionsForTest(&.{"--shade=cost"});
+    try std.testing.expectEqualStrings("scalar-single-4", test_names[alone.render.variant]);
+    const chosen = try optionsForTest(&.{ "--variant=vector-beam-8", "--layers=cost", "-oa.exr" });
+    try std.testing.expectEqual(0, chosen.render.variant);
+    for ([_][:0]const u8{ "--denoise", "--count-tests", "--integrator=lights" }) |other|
+        try expectUsage("'--shade' contradicts", &.{ "--shade=ao", other, "s" });
     try expectUsage("'a.tiff' ends in no image format", &.{ "-oa.tiff", "s" });
 }
 
@@ -1297,6 +2160,27 @@ test "noise is told of path tracing alone, as the picture is exposed" {
     }
 }
 
+test "parts are rectangles or shares of tiles" {
+    const Crop = settings.Part.Crop;
+    const pixels = (try optionsForTest(&.{"--crop=0,8,16,24"})).render.part;
+    try std.testing.expectEqual(Crop{ .pixels = .{ 0, 8, 16, 24 } }, pixels.crop);
+    const shares = (try optionsForTest(&.{"--crop=0,0.25,1,1"})).render.part;
+    try std.testing.expectEqual(Crop{ .shares = .{ 0, 0.25, 1, 1 } }, shares.crop);
+    const tile = (try optionsForTest(&.{ "--tile=3/4", "-oa.exr" })).render.part.tile;
+    try std.testing.expectEqual(settings.Part.Tile{ .number = 3, .count = 4 }, tile);
+    for ([_][:0]const u8{
+        "--crop=",        "--crop=1,2,3",    "--crop=1,2,1,3",    "--crop=1,2,3,4,5",
+        "--crop=0,0,1.5", "--crop=-1,0,1,1", "--crop=0,0,1.01,1", "--crop=0.5,0,0.5,1",
+        "--tile=0/1",     "--tile=2/1",      "--tile=1",          "--tile=1/0",
+        "--tile=/",       "--tile=1/70000",  "--crop=nan.,0,1,1",
+    }) |bad| try expectUsage(bad[0..6], &.{ bad, "-oa.exr", "s" });
+    try expectUsage("makes an exr file", &.{ "--tile=1/2", "s" });
+    try expectUsage("'--time-budget'", &.{ "--crop=0,0,1,1", "--time-budget=1", "s" });
+    const merged = try optionsForTest(&.{ "--crop=0,0,1,1", "-oa.exr" });
+    const alone = try optionsForTest(&.{"--crop=0,0,1,1"});
+    try std.testing.expect(merged.render.is_merged and !alone.render.is_merged);
+}
+
 test "points and lines are as wide as they may be" {
     try std.testing.expectEqual(1.5, (try optionsForTest(&.{})).view.point_size);
     const wide = try optionsForTest(&.{"--point-size=4.25"});
@@ -1307,7 +2191,7 @@ test "points and lines are as wide as they may be" {
 }
 
 test "the help fits a screen and says what flags take and may be" {
-    try std.testing.expect(try @import("cli/testing.zig").expectFits(help) <= 120);
+    try std.testing.expect(try @import("cli/testing.zig").expectFits(help) <= 190);
     for ([_][]const u8{
         "\n  -o, --output FILE        name ending in",
         "\n                           4 to 1024 (default: 32)\n",
@@ -1316,13 +2200,86 @@ test "the help fits a screen and says what flags take and may be" {
     }) |text| try std.testing.expect(std.mem.find(u8, help, text) != null);
 }
 
+test "completions and the manual have every option of every command, and its words" {
+    for (std.enums.values(Shell)) |shell| {
+        var script: std.Io.Writer.Allocating = .init(std.testing.allocator);
+        defer script.deinit();
+        try writeCompletion(&script.writer, shell, pages);
+        var manual: std.Io.Writer.Allocating = .init(std.testing.allocator);
+        defer manual.deinit();
+        try writeMan(&manual.writer);
+        for (std.meta.fieldNames(Word)) |word| for (pages) |*page| {
+            if (std.mem.eql(u8, page.word, word)) break;
+        } else try std.testing.expectEqualStrings("help", word);
+        for (pages) |*page| {
+            try expectFinds(script.written(), "{s}", page.name());
+            try expectFinds(manual.written(), "raylane {s}", page.word);
+            var options = page.iterate();
+            while (options.next()) |entry| {
+                const long = entry.flag.long;
+                if (shell == .fish)
+                    try expectFinds(script.written(), " -l {s} ", long[2..])
+                else
+                    try expectFinds(script.written(), "{s}", long);
+                for (entry.option.words) |word| try expectFinds(script.written(), "{s}", word);
+                var escaped: std.Io.Writer.Allocating = .init(std.testing.allocator);
+                defer escaped.deinit();
+                for (long) |byte| try escaped.writer.print("{s}", .{
+                    if (byte == '-') "\\-" else &[_]u8{byte},
+                });
+                try expectFinds(manual.written(), "\\fB{s}\\fR", escaped.written());
+            }
+        }
+    }
+}
+
+fn expectFinds(text: []const u8, comptime format: []const u8, part: []const u8) !void {
+    const needle = try std.testing.allocator.print(format, .{part});
+    defer std.testing.allocator.free(needle);
+    errdefer std.debug.print("not found: {s}\n", .{needle});
+    try std.testing.expect(std.mem.find(u8, text, needle) != null);
+}
+
+test "completion takes a shell, the manual nothing" {
+    try std.testing.expectEqual(.zsh, (try parseForTest(&.{ "completion", "zsh" })).completion);
+    try std.testing.expectEqual(.man, try parseForTest(&.{"man"}));
+    try std.testing.expectEqual(.man_help, try parseForTest(&.{ "man", "-h" }));
+    try std.testing.expectEqual(.completion_help, try parseForTest(&.{ "completion", "--help" }));
+    const common = @import("cli/testing.zig");
+    for ([_][]const [:0]const u8{ &.{}, &.{"tcsh"}, &.{ "bash", "zsh" } }) |words|
+        try common.expectUsage("completion", shellOf, "bash, zsh or fish", words);
+    try std.testing.expectError(error.UsageInvalid, parseForTest(&.{ "man", "1" }));
+}
+
 test {
+    _ = batch;
     _ = bench;
     _ = compare;
     _ = info;
+    _ = merge;
     _ = @import("cli/arguments.zig");
     _ = colors;
     _ = @import("cli/nearest.zig");
+    _ = @import("cli/page.zig");
+    _ = scenario_file;
+    _ = @import("cli/serve.zig");
+}
+
+test "progress: its form, its descriptor, and what contradicts it" {
+    const none: settings.Progress = .{ .form = .none };
+    try std.testing.expectEqual(none, (try parseForTest(&.{ "a", "-q" })).render.progress);
+    try std.testing.expectEqual(.auto, (try parseForTest(&.{"a"})).render.progress.form);
+    const json: settings.Progress = .{ .form = .json, .file = 2 };
+    for ([_][]const [:0]const u8{
+        &.{ "a", "--progress-fd=2" }, &.{ "a", "-q", "--progress=json", "--progress-fd", "2" },
+    }) |arguments| {
+        try std.testing.expectEqual(json, (try parseForTest(arguments)).render.progress);
+    }
+    try expectUsage("'--progress'", &.{ "a", "--progress=bar" });
+    try expectUsage("'--progress-fd'", &.{ "a", "--progress-fd=0" });
+    try expectUsage("for '--progress json'", &.{ "a", "--progress=none", "--progress-fd=2" });
+    try expectUsage("where the image goes", &.{ "a", "-o-", "--progress-fd=1" });
+    try expectUsage("'--progress-fd 65536' is not open", &.{ "a", "--progress-fd=65536" });
 }
 
 test "info is a command where it comes first, and where it is misspelt" {
@@ -1331,7 +2288,8 @@ test "info is a command where it comes first, and where it is misspelt" {
     try std.testing.expectEqualStrings("info", command.info.scene);
     try expectUsage("no command 'inof', did you mean 'info'?", &.{ "inof", "a.glb" });
     try expectUsage("no command 'benhc', did you mean 'bench'?", &.{ "benhc", "a.glb" });
-    try expectUsage("one scene at a time: 'in.glb' and 'a.glb'", &.{ "in.glb", "a.glb" });
+    const both = try parseForTest(&.{ "in", "a.glb" });
+    try std.testing.expectEqual(2, both.render.batch.input_count);
 }
 
 test "bench is a command where it comes first" {

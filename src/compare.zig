@@ -6,7 +6,7 @@
 
 const std = @import("std");
 const flip = @import("compare/flip.zig");
-const heat = @import("compare/heat.zig");
+const heat = @import("math.zig").magma;
 const elementary = @import("math/elementary.zig");
 const parse_resource = @import("parse/resource.zig");
 const picture_file = @import("compare/picture.zig");
@@ -171,7 +171,6 @@ fn differences(first: *const Picture, second: *const Picture) Metrics {
 
 test {
     _ = flip;
-    _ = heat;
     _ = picture_file;
     _ = ssim;
     _ = @import("compare/filter.zig");

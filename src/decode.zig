@@ -10,7 +10,6 @@ const std = @import("std");
 const Allocator = std.mem.Allocator;
 const jpeg = @import("decode/jpeg.zig");
 const ktx2 = @import("decode/ktx2.zig");
-const openexr = @import("decode/openexr.zig");
 const png = @import("decode/png.zig");
 const stb_image = @import("decode/stb_image.zig");
 const texels = @import("decode/texels.zig");
@@ -19,6 +18,7 @@ const webp = @import("decode/webp.zig");
 pub const draco = @import("decode/draco.zig");
 pub const gzip = @import("decode/gzip.zig");
 pub const meshopt = @import("decode/meshopt.zig");
+pub const openexr = @import("decode/openexr.zig");
 
 pub const Error = texels.Error;
 pub const Format = texels.Format;

@@ -13,6 +13,7 @@ const planes_file = @import("denoise/planes.zig");
 const filter = @import("denoise/filter.zig");
 const Film = film_file.Film;
 const Planes = planes_file.Planes;
+const Progress = @import("progress.zig").Progress;
 const assert = std.debug.assert;
 
 /// Layers that a film has to have besides its image.
@@ -25,8 +26,14 @@ pub const needed: film_file.Layers = .init(.{
     .halves = true,
 });
 
+/// A pixel depends on others no further away, along each side.
+pub const reach = filter.margin + planes_file.ratio_radius;
+
 /// Fewer do not say how noisy they are.
 pub const sample_count_min = 2;
+
+/// What is said then.
+pub const too_few_samples = "it is not denoised: one sample a pixel does not tell its noise";
 
 /// `Canceled`: the image is filtered in part.
 pub const Error = error{OutOfMemory} || parallel.Error;
@@ -48,7 +55,9 @@ pub fn run(gpa: std.mem.Allocator, film: *Film, pool: *parallel.Pool) Error!void
         .planes = &planes,
         .columns = columns,
         .scratches = scratches,
+        .progress = pool.progress,
     };
+    Progress.begin(pool.progress, .{ .stage = .denoising, .total = tile_count });
     try pool.forEach(tile_count, &work, Work.filterTile);
 }
 
@@ -57,6 +66,7 @@ const Work = struct {
     planes: *const Planes,
     columns: u32,
     scratches: []filter.Scratch,
+    progress: ?*Progress,
 
     fn filterTile(work: *const Work, number: usize, thread_index: usize) void {
         const scratch = &work.scratches[thread_index];
@@ -77,6 +87,7 @@ const Work = struct {
                 to.* = @max(light[column], 0) * by;
             }
         };
+        Progress.add(work.progress, 1);
     }
 };
 

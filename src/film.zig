@@ -5,7 +5,10 @@
 //! `output` reads.
 
 const std = @import("std");
-const Image = @import("image.zig").Image;
+/// What layers are made of.
+pub const Image = @import("image.zig").Image;
+const settings = @import("settings.zig");
+const layout_file = @import("film/layout.zig");
 const assert = std.debug.assert;
 
 /// Radiance of a sample at most, so that sums and exposure stay finite.
@@ -38,12 +41,45 @@ pub const Layer = enum {
     /// Half of what the mean of the samples `isInFirstHalf` has more than that of the others; 0
     /// where there is but one sample.
     halves,
+    /// What the first sample shows. A survey (`integrate/survey.zig`) leaves bits of a triangle's
+    /// number, `no_triangle` where there is none, weights of its corners 1 and 2, and 0; these
+    /// become bits of the file's numbers of node, material and primitive, all ones where there is
+    /// none, and 0. As the next two it is no mean, and left alone by `finish`.
+    origin,
+    /// Where that is, in the world's axes, and fourth 1; 0 where there is nothing.
+    position,
+    /// Its texture coordinates, of the first set.
+    texcoord,
+    /// Tests of rays with boxes and with triangles that all samples took, by kernels that count
+    /// them; of pixels that are traced together, the mean.
+    cost,
+
+    /// Whether it is of the first sample alone.
+    fn isSurveyed(layer: Layer) bool {
+        return layer == .origin or layer == .position or layer == .texcoord;
+    }
 
     /// Whether it has an image of its own.
     pub fn isApart(layer: Layer) bool {
         return layer != .color and layer != .alpha;
     }
 };
+
+/// See `Layer.origin`.
+pub const no_triangle: u32 = std.math.maxInt(u32);
+
+/// The film's that has one that users choose, or some of its channels do.
+pub fn layerOf(layer: settings.Layer) Layer {
+    return switch (layer) {
+        .depth, .alpha => .depth,
+        .uv => .texcoord,
+        .node, .material, .primitive => .origin,
+        inline .normal, .albedo, .position, .cost, .variance => |same| @field(
+            Layer,
+            @tagName(same),
+        ),
+    };
+}
 
 /// See `Layer`.
 pub const Layers = std.EnumSet(Layer);
@@ -64,8 +100,53 @@ fn firstHalfCount(count: u32) u32 {
     return power / 2 + @min(count - power, power / 2);
 }
 
-/// Pixels x0 <= x < x1, y0 <= y < y1; of a bundle's every `step`th in either direction.
-pub const Rectangle = struct { x0: u32, y0: u32, x1: u32, y1: u32, step: u32 = 1 };
+/// Pixels x0 <= x < x1, y0 <= y < y1 of a picture; of a bundle's every `step`th in either
+/// direction.
+pub const Rectangle = struct {
+    x0: u32,
+    y0: u32,
+    x1: u32,
+    y1: u32,
+    step: u32 = 1,
+    /// What is added to a pixel's column and row, modulo 2^32, for where it is on the film.
+    shift: [2]u32 = .{ 0, 0 },
+
+    /// Column and row of a pixel on the film.
+    pub inline fn placeOf(rectangle: *const Rectangle, x: u32, y: u32) [2]u32 {
+        return .{ x +% rectangle.shift[0], y +% rectangle.shift[1] };
+    }
+
+    /// The same pixels by their places on the film.
+    pub fn onFilm(rectangle: *const Rectangle) Rectangle {
+        const x0, const y0 = rectangle.placeOf(rectangle.x0, rectangle.y0);
+        const x1, const y1 = rectangle.placeOf(rectangle.x1, rectangle.y1);
+        return .{ .x0 = x0, .y0 = y0, .x1 = x1, .y1 = y1, .step = rectangle.step };
+    }
+
+    /// A part of it, given by places on the film, by its pixels of the picture.
+    pub fn ofFilm(rectangle: *const Rectangle, part: Rectangle) Rectangle {
+        return .{
+            .x0 = part.x0 -% rectangle.shift[0],
+            .y0 = part.y0 -% rectangle.shift[1],
+            .x1 = part.x1 -% rectangle.shift[0],
+            .y1 = part.y1 -% rectangle.shift[1],
+            .step = part.step,
+            .shift = rectangle.shift,
+        };
+    }
+
+    /// How many pixels are within it.
+    pub fn pixelCount(rectangle: *const Rectangle) u64 {
+        return @as(u64, rectangle.x1 - rectangle.x0) * (rectangle.y1 - rectangle.y0);
+    }
+};
+
+/// Which pixels of a picture a film has.
+pub const Layout = layout_file.Layout;
+/// See `Layout`.
+pub const Surroundings = layout_file.Surroundings;
+/// See `Layout`.
+pub const Window = layout_file.Window;
 
 /// Sums of samples.
 pub const Film = struct {
@@ -127,6 +208,32 @@ pub const Film = struct {
         return if (film.apart.getPtrConst(layer).*) |*image| image else null;
     }
 
+    /// A film of the same part of the picture without what is around it; to be freed as this one.
+    pub fn cut(
+        film: *const Film,
+        gpa: std.mem.Allocator,
+        layout: *const Layout,
+    ) error{OutOfMemory}!Film {
+        const bare = layout.bare();
+        var result: Film = try .init(gpa, bare.film_width, bare.film_height, film.layers);
+        result.clear();
+        for (0..layout.count()) |number| {
+            const from = layout.windowAt(@intCast(number)).own.onFilm();
+            const to = bare.windowAt(@intCast(number)).own.onFilm();
+            copyPixels(&film.image, from, &result.image, to);
+            for (&film.apart.values, &result.apart.values) |*source, *target| {
+                if (source.*) |*image| copyPixels(image, from, &target.*.?, to);
+            }
+        }
+        return result;
+    }
+
+    /// Makes all pixels of all layers 0.
+    pub fn clear(film: *Film) void {
+        @memset(film.image.pixels, @splat(0));
+        for (&film.apart.values) |*apart| if (apart.*) |*image| @memset(image.pixels, @splat(0));
+    }
+
     /// Adds a sample to a pixel: its radiance and, fourth, the share of it that saw nothing. The
     /// samples of a pixel come in order; number 0 begins it anew. Variance and halves come with it.
     pub inline fn add(film: *Film, x: u32, y: u32, number: u32, sample: [4]f32) void {
@@ -145,7 +252,7 @@ pub const Film = struct {
         number: u32,
         sample: [4]f32,
     ) void {
-        assert(layer != .variance and layer != .halves);
+        assert(layer != .variance and layer != .halves and !layer.isSurveyed());
         addTo(film.apart.getPtr(layer).*.?.at(x, y), number, sample);
     }
 
@@ -221,9 +328,12 @@ pub const Film = struct {
         const count: V4 = @splat(@floatFromInt(sample_count));
         for (&film.apart.values, std.enums.values(Layer)) |*apart, layer| {
             const image = if (apart.*) |*image| image else continue;
+            if (layer.isSurveyed()) continue;
             const sums: V4 = image.pixels[at];
             const means: [4]f32 = switch (layer) {
                 .color, .alpha => unreachable, // They are not apart.
+                .origin, .position, .texcoord => unreachable, // See above.
+                .cost => sums,
                 .display, .albedo, .normal => sums / count,
                 .depth => depthOf(sums, count[0]),
                 .variance => sums / (count * @as(V4, @splat(@max(count[0] - 1, 1)))),
@@ -277,6 +387,22 @@ pub const Film = struct {
         return std.hash.XxHash64.hash(of_image, std.mem.sliceAsBytes(display.pixels));
     }
 };
+
+/// Makes pixels of an image those of another; both rectangles are of one size.
+pub fn copyPixels(from: *const Image, source: Rectangle, to: *Image, target: Rectangle) void {
+    const width = source.x1 - source.x0;
+    assert(target.x1 - target.x0 == width);
+    assert(target.y1 - target.y0 == source.y1 - source.y0);
+    for (source.y0..source.y1, target.y0..target.y1) |from_row, to_row| {
+        const from_start = from_row * from.width + source.x0;
+        const to_start = to_row * to.width + target.x0;
+        @memcpy(to.pixels[to_start..][0..width], from.pixels[from_start..][0..width]);
+    }
+}
+
+test {
+    _ = layout_file;
+}
 
 test "means of samples, alpha where it is wanted, black for what is not a number" {
     const nan = std.math.nan(f32);
@@ -350,8 +476,9 @@ test "layers of what is seen: means, depth of what is hit, variance of the mean,
         film.addApart(.albedo, 0, 0, n, .{ share, 0.5, 1, 0 });
         film.addApart(.normal, 0, 0, n, .{ 0, share, 0, 0 });
         film.addApart(.depth, 0, 0, n, .{ 7 * share, 0, 0, share });
+        film.addApart(.cost, 0, 0, n, .{ 3, 2, 0, 0 });
         film.addApart(.display, 0, 0, n, @splat(0));
-        for ([_]Layer{ .albedo, .normal, .depth }) |layer| {
+        for ([_]Layer{ .albedo, .normal, .depth, .cost }) |layer| {
             film.addApart(layer, 1, 0, n, @splat(nan));
         }
         film.addApart(.display, 1, 0, n, @splat(0));
@@ -364,6 +491,7 @@ test "layers of what is seen: means, depth of what is hit, variance of the mean,
         .depth = .{ 7, 0, 0, 0.5 },
         // Squares of 3, 1, 1, 3 make 20, by 3 and by 4.
         .variance = .{ 20.0 / 12.0, 0, 0, 0 },
+        .cost = .{ 12, 8, 0, 0 },
         // 0 and 2 against 1 and 3.
         .halves = .{ -1, 0, 0, 0 },
     });

@@ -20,6 +20,8 @@ const Scene = scene_data.Scene;
 pub const writeText = @import("info/text.zig").write;
 /// Writes one JSON object and a line end.
 pub const writeJson = @import("info/json.zig").write;
+/// Writes why there is nothing to describe.
+pub const writeFailure = @import("info/json.zig").writeFailure;
 
 /// `SceneTooLarge`: it could not be rendered, for its textures; the diagnostic says more.
 pub const Error = prepare.LoadError || prepare.AnimateError;
@@ -243,8 +245,10 @@ test "the text" {
 test "the JSON has every key, and what another scene draws" {
     const Parsed = struct {
         version: []const u8,
+        @"error": ?u8,
         file: []const u8,
         bytes: u64,
+        files: []const struct { path: []const u8, bytes: u64 },
         format: []const u8,
         format_version: ?[]const u8,
         generator: ?[]const u8,

@@ -1,9 +1,9 @@
 //! A kernel: the tracer of one variant, compiled into an object of its own.
 //!
-//! In: the build options, which name the variant, and whether it counts tests or holds the
-//! integrators besides Whitted's. Out: a symbol for each integrator, behind pointers. Nothing in it
-//! is mutable but what it is handed, and no thread is started: the program that it is linked to
-//! does that, and panics for it.
+//! In: the build options, which name the variant, and whether it counts tests and surveys pictures
+//! or holds the integrators besides Whitted's. Out: a symbol for each integrator, behind pointers.
+//! Nothing in it is mutable but what it is handed, and no thread is started: the program that it is
+//! linked to does that, and panics for it.
 
 const std = @import("std");
 const config = @import("config");
@@ -19,6 +19,7 @@ comptime {
         show(trace.PathTracer(Kernel), "path");
     } else {
         show(trace.Whitted(Kernel), if (is_counting) "counting" else "whitted");
+        if (is_counting) show(trace.Survey(Kernel), "survey");
         if (config.shows_searches and !is_counting) {
             const Searches = trace.searches.Searches(Kernel);
             const name = trace.link.symbolOf(Searches, variant.default, "searches");
@@ -38,6 +39,6 @@ fn show(comptime Integrator: type, comptime what: []const u8) void {
 /// The program's: what prints a trace of the stack is large and has state.
 pub const panic = std.debug.FullPanic(struct {
     fn panic(message: []const u8, address: ?usize) noreturn {
-        trace.link.rl_kernel_panic(message.ptr, message.len, address orelse @returnAddress());
+        trace.link.kernelPanic(message.ptr, message.len, address orelse @returnAddress());
     }
 }.panic);

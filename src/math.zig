@@ -16,6 +16,8 @@ pub const octahedral = @import("math/octahedral.zig");
 pub const elementary = @import("math/elementary.zig");
 /// Directions on a square.
 pub const equal_area = @import("math/equal_area.zig");
+/// Values as colours.
+pub const magma = @import("math/magma.zig");
 /// The sRGB transfer function.
 pub const srgb = @import("math/srgb.zig");
 
@@ -34,6 +36,7 @@ test {
     _ = @import("math/vec3.zig");
     _ = @import("math/affine.zig");
     _ = box3;
+    _ = magma;
     _ = octahedral;
     _ = elementary;
     _ = equal_area;

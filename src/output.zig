@@ -1,6 +1,6 @@
 //! Stage 4: `Image` -> file.
 //!
-//! In: a finished picture. Out: a file in one of eight formats, whole and in its place, or nothing
+//! In: a finished picture. Out: a file in one of nine formats, whole and in its place, or nothing
 //! at all. Colours are made by all threads; the bytes depend on the picture and the settings alone.
 
 const std = @import("std");
@@ -10,9 +10,13 @@ const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const Image = @import("image.zig").Image;
 const huge_pages = @import("huge_pages.zig");
 const parallel = @import("parallel.zig");
-const openexr = @import("output/openexr.zig");
+const layer_picture = @import("output/layer_picture.zig");
+const layers_file = @import("output/layers.zig");
+const Manifest = @import("manifest.zig").Manifest;
 const stb_image_write = @import("output/stb_image_write.zig");
+const webp = @import("output/webp.zig");
 const target_file = @import("output/target.zig");
+const y4m = @import("output/y4m.zig");
 const encode_file = @import("output/encode.zig");
 const exposure_file = @import("output/exposure.zig");
 const assert = std.debug.assert;
@@ -25,7 +29,13 @@ pub const Background = @import("output/background.zig").Background;
 /// What is written: the layers of a film.
 pub const Picture = encode_file.Picture;
 /// What a file may hold besides the picture.
-pub const Further = openexr.Further;
+pub const Further = layers_file.Further;
+/// Writes channels of any kind with texts beside them.
+pub const openexr = @import("output/openexr.zig");
+/// Makes colours of a layer.
+pub const paintLayer = layer_picture.paint;
+/// Rows of a picture that has more.
+pub const Extent = encode_file.Extent;
 /// How many pixels look like nothing.
 pub const Tally = encode_file.Tally;
 /// The exposure that suits a picture.
@@ -42,17 +52,25 @@ fn sideMax(format: choices.Format) u32 {
     return switch (format) {
         .jpg, .tga => 65_535,
         .exr => openexr.width_max,
+        .webp => webp.side_max,
         else => std.math.maxInt(u31),
     };
 }
 
-fn formOf(format: choices.Format, transparent: bool) encode_file.Form {
+fn formOf(
+    format: choices.Format,
+    transparent: bool,
+    exr_kind: choices.ExrKind,
+) encode_file.Form {
     return switch (format) {
-        .png, .tga => if (transparent) .rgba else .rgb,
-        .jpg, .bmp, .ppm => .rgb,
+        .png, .tga, .webp => if (transparent) .rgba else .rgb,
+        .jpg, .bmp, .ppm, .y4m => .rgb,
         .hdr => .radiance,
         .pfm => .linear,
-        .exr => if (transparent) .half_alpha else .half,
+        .exr => switch (exr_kind) {
+            .half => if (transparent) .half_alpha else .half,
+            .float => if (transparent) .linear_alpha else .linear,
+        },
     };
 }
 
@@ -65,10 +83,22 @@ pub const Settings = struct {
     /// Keep alpha, where the format has it.
     transparent: bool = false,
     background: Background = .none,
+    /// Which of a picture's rows these are; null: all.
+    rows: ?Extent = null,
     /// Within `settings.jpeg_quality`.
     jpeg_quality: u8 = choices.jpeg_quality.default,
+    /// Within `settings.webp_quality`; null: without loss.
+    webp_quality: ?u8 = null,
+    /// Of the colours in an OpenEXR file.
+    exr_kind: choices.ExrKind = .half,
+    /// Of a film.
+    frame_rate: choices.FrameRate = .{},
+    /// The film has frames already.
+    is_continued: bool = false,
     /// Layers of the picture's size, each once at most; only a file in OpenEXR holds them.
     further: []const Further = &.{},
+    /// What such a file is to have; null: no layer has numbers.
+    manifest: ?*const Manifest = null,
     pool: *parallel.Pool,
 };
 
@@ -105,8 +135,11 @@ pub fn check(
         "a {t} file has {d} pixels on a side at most",
         .{ format, sideMax(format) },
     );
-    const channel_count: u64 = channelCount(formOf(format, transparent));
-    const by_library = format != .ppm and format != .pfm;
+    const channel_count: u64 = channelCount(formOf(format, transparent, .half));
+    const by_library = switch (format) {
+        .ppm, .pfm, .y4m, .webp => false,
+        .png, .jpg, .tga, .bmp, .hdr, .exr => true,
+    };
     const value_count = (width * channel_count + 1) * height;
     if (by_library and value_count > stb_image_write.value_count_max) return diagnostic.fail(
         error.InputOutput,
@@ -117,15 +150,15 @@ pub fn check(
 
 fn channelCount(form: encode_file.Form) u8 {
     return switch (form) {
-        .rgba, .half_alpha => 4,
+        .rgba, .half_alpha, .linear_alpha => 4,
         .rgb, .linear, .radiance, .half => 3,
     };
 }
 
 /// Whether a format keeps radiance as it is, without exposure and tone mapping.
 pub fn isLinear(format: choices.Format) bool {
-    return switch (formOf(format, false)) {
-        .linear, .radiance, .half, .half_alpha => true,
+    return switch (formOf(format, false, .half)) {
+        .linear, .linear_alpha, .radiance, .half, .half_alpha => true,
         .rgb, .rgba => false,
     };
 }
@@ -143,7 +176,7 @@ pub fn write(
     const format = settings.format;
     const image = picture.image;
     try check(format, settings.transparent, image.width, image.height, diagnostic);
-    const form = formOf(format, settings.transparent);
+    const form = formOf(format, settings.transparent, settings.exr_kind);
     var work: Work = .{
         .rows = .{
             .picture = picture,
@@ -151,6 +184,7 @@ pub fn write(
             .scale = exposure_file.scaleOf(settings.exposure_ev),
             .tone_mapping = settings.tone_mapping,
             .background = settings.background,
+            .extent = settings.rows orelse .{ .first = 0, .of = image.height },
         },
         .from_bottom = format == .pfm,
     };
@@ -168,6 +202,7 @@ pub fn write(
         .pfm => try target.finish(&.{
             std.mem.print(&buffer, "PF\n{d} {d}\n-1.0\n", size) catch unreachable, pixels,
         }, diagnostic),
+        .y4m => try writeFrame(gpa, size, pixels, &settings, target, diagnostic),
         inline .png, .jpg, .tga, .bmp, .hdr => |coded| {
             const file = try stb_image_write.encode(gpa, @field(
                 stb_image_write.Codec,
@@ -182,19 +217,118 @@ pub fn write(
             defer gpa.free(file);
             try target.finish(&.{file}, diagnostic);
         },
+        .webp => try writeWebp(gpa, size, pixels, &settings, target, diagnostic),
         .exr => {
-            const file = try openexr.encode(gpa, .{
-                .width = image.width,
-                .height = image.height,
-                .channel_count = channelCount(form),
-                .pixels = pixels,
-                .further = settings.further,
-            });
-            defer gpa.free(file);
-            try target.finish(&.{file}, diagnostic);
+            var channels: layers_file.Channels = .{};
+            channels.addPicture(pixels, channelCount(form), settings.exr_kind);
+            for (settings.further) |*further| channels.addLayer(further);
+            try writeExr(gpa, image, channels.all(), &settings, target, diagnostic);
         },
     }
     return work.tally;
+}
+
+fn writeWebp(
+    gpa: Allocator,
+    size: [2]u32,
+    pixels: []const u8,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const file = try webp.encode(gpa, .{
+        .width = size[0],
+        .height = size[1],
+        .channel_count = channelCount(formOf(.webp, settings.transparent, .half)),
+        .pixels = pixels,
+        .quality = settings.webp_quality,
+    });
+    defer gpa.free(file);
+    return target.finish(&.{file}, diagnostic);
+}
+
+/// Encodes channels as an OpenEXR file and moves it to its place. Closes the target in any case.
+pub fn writeChannels(
+    gpa: Allocator,
+    picture: openexr.Picture,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    defer target.abandon();
+    const file = try openexr.encode(gpa, picture);
+    defer gpa.free(file);
+    try target.finish(&.{file}, diagnostic);
+}
+
+fn writeFrame(
+    gpa: Allocator,
+    size: [2]u32,
+    pixels: []const u8,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const planes = try y4m.planes(gpa, pixels);
+    defer gpa.free(planes);
+    var buffer: [y4m.header_bytes_max]u8 = undefined;
+    const header = y4m.header(&buffer, size, settings.frame_rate, !settings.is_continued);
+    return target.finish(&.{ header, planes }, diagnostic);
+}
+
+/// A file of these channels, of an image's size.
+fn writeExr(
+    gpa: Allocator,
+    image: *const Image,
+    channels: []const openexr.Channel,
+    settings: *const Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    const text = if (settings.manifest) |manifest| try manifest.text(gpa) else null;
+    defer if (text) |some| gpa.free(some);
+    return writeChannels(gpa, .{
+        .width = image.width,
+        .height = image.height,
+        .channels = channels,
+        .attributes = if (text) |some|
+            &.{.{ .name = layers_file.manifest_name, .text = some }}
+        else
+            &.{},
+    }, target, diagnostic);
+}
+
+/// Encodes a layer alone and moves it to its place: its channels in OpenEXR, its numbers as they
+/// are in the other linear formats, else colours (`paintLayer`). Closes the target in any case.
+pub fn writeLayer(
+    gpa: Allocator,
+    further: *const Further,
+    settings: Settings,
+    target: *Target,
+    diagnostic: *Diagnostic,
+) Error!void {
+    defer target.abandon();
+    const from = further.image;
+    try check(settings.format, false, from.width, from.height, diagnostic);
+    if (settings.format == .exr) {
+        var channels: layers_file.Channels = .{};
+        channels.addLayer(further);
+        return writeExr(gpa, from, channels.all(), &settings, target, diagnostic);
+    }
+    var chosen = settings;
+    chosen.transparent = false;
+    chosen.background = .none;
+    var image: Image = try .init(gpa, from.width, from.height);
+    defer image.deinit(gpa);
+    if (isLinear(settings.format)) {
+        layer_picture.copy(further, &image);
+        _ = try write(gpa, .{ .image = &image }, chosen, target, diagnostic);
+        return;
+    }
+    var display: Image = try .init(gpa, from.width, from.height);
+    defer display.deinit(gpa);
+    @memset(image.pixels, .{ 0, 0, 0, 1 });
+    try layer_picture.paint(gpa, further, &display);
+    _ = try write(gpa, .{ .image = &image, .display = &display }, chosen, target, diagnostic);
 }
 
 const Work = struct {
@@ -229,7 +363,11 @@ const Work = struct {
 
 test {
     _ = openexr;
+    _ = y4m;
     _ = stb_image_write;
+    _ = webp;
+    _ = layers_file;
+    _ = layer_picture;
     _ = target_file;
     _ = @import("output/temporary.zig");
     _ = @import("output/background.zig");

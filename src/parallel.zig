@@ -13,6 +13,7 @@
 const std = @import("std");
 const builtin = @import("builtin");
 const settings = @import("settings.zig");
+const Progress = @import("progress.zig").Progress;
 const simd = @import("simd.zig");
 const assert = std.debug.assert;
 const linux = std.os.linux;
@@ -34,6 +35,8 @@ pub const Pool = struct {
     thread_count: usize,
     /// Makes loops end before the next index. Any thread may set it.
     cancelled: std.atomic.Value(bool) = .init(false),
+    /// Told of what they work at, by those who give it to them; null: nobody is.
+    progress: ?*Progress = null,
     /// Somebody is using the threads.
     is_taken: std.atomic.Value(bool) = .init(false),
     started_count: usize = 0,

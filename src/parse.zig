@@ -6,6 +6,7 @@
 
 const std = @import("std");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
+const File = @import("scene.zig").File;
 const Scene = @import("scene.zig").Scene;
 const gzip = @import("decode.zig").gzip;
 const format_file = @import("parse/format.zig");
@@ -13,6 +14,7 @@ const gltf = @import("parse/gltf.zig");
 const obj = @import("parse/obj.zig");
 const pbrt = @import("parse/pbrt.zig");
 const ply_scene = @import("parse/ply_scene.zig");
+const progress_file = @import("progress.zig");
 const settings_file = @import("settings.zig");
 const stl = @import("parse/stl.zig");
 const Settings = settings_file.Load;
@@ -76,6 +78,13 @@ pub fn parseNamed(
 /// Reads what has been opened, by its contents.
 fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Error!Scene {
     diagnostic.strict = opened.resources.settings.strict;
+    const gpa = opened.resources.gpa;
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    defer arena.deinit();
+    var listing: Resources.Listing = .{ .arena = arena.allocator() };
+    opened.resources.listing = &listing;
+    defer opened.resources.listing = null;
+    try listing.add(std.fs.path.basename(path), opened.main.bytes.len);
     try unpack(opened, path, diagnostic);
     const main = &opened.main;
     const resources = &opened.resources;
@@ -92,7 +101,21 @@ fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Err
     errdefer scene.deinit();
     try diagnostic.failIfRefused();
     scene.file.byte_count = resources.bytes_read;
+    scene.file.files = try filesOf(scene.arena.allocator(), &listing);
     return scene;
+}
+
+/// What was read, in memory from `arena`.
+fn filesOf(
+    arena: Allocator,
+    listing: *const Resources.Listing,
+) Allocator.Error![]const File.Source {
+    const files = try arena.alloc(File.Source, listing.byte_counts.count());
+    const paths = listing.byte_counts.keys();
+    for (files, paths, listing.byte_counts.values()) |*file, path, byte_count| {
+        file.* = .{ .path = try arena.dupe(u8, path), .byte_count = byte_count };
+    }
+    return files;
 }
 
 /// Puts what a gzip file holds in its place.
@@ -200,4 +223,27 @@ test "what does not exist is of no format" {
         const missing = parse(gpa, io, path, .{}, &diagnostic);
         try std.testing.expectError(error.InputOutput, missing);
     }
+}
+
+test "the text of a PBRT scene tells how far it is read" {
+    const Reading = struct {
+        stage: ?progress_file.Stage = null,
+
+        fn begun(context: *anyopaque, work: *const progress_file.Work) void {
+            const reading: *@This() = @ptrCast(@alignCast(context));
+            reading.stage = work.stage;
+        }
+    };
+    var reading: Reading = .{};
+    var progress: progress_file.Progress = .{ .context = &reading, .begun = Reading.begun };
+    var diagnostic: Diagnostic = .{};
+    const text = "WorldBegin Shape \"sphere\" WorldEnd";
+    const gpa = std.testing.allocator;
+    const io = std.testing.io;
+    var scene = try parsePbrt(gpa, io, text, .cwd(), .{ .progress = &progress }, &diagnostic);
+    defer scene.deinit();
+    try std.testing.expectEqual(.parsing, reading.stage.?);
+    try std.testing.expectEqual(text.len + 1, progress.total.load(.monotonic));
+    const done = progress.done.load(.monotonic);
+    try std.testing.expect(done > "WorldBegin Shape".len and done <= text.len);
 }

@@ -35,6 +35,7 @@ const light_sampler = @import("prepare/light_sampler.zig");
 const material = @import("prepare/material.zig");
 const motion_file = @import("prepare/motion.zig");
 const place_file = @import("prepare/pose.zig");
+const reference_file = @import("prepare/reference.zig");
 const tangents = @import("prepare/tangents.zig");
 const texture = @import("prepare/texture.zig");
 const strokes = @import("prepare/strokes.zig");
@@ -42,6 +43,7 @@ const view_file = @import("prepare/view.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Clock = std.Io.Clock;
+const Progress = @import("progress.zig").Progress;
 const Scene = scene.Scene;
 const StageTimes = statistics.StageTimes;
 const TreeQuality = choices.TreeQuality;
@@ -79,9 +81,24 @@ pub const PoseSettings = struct {
     sharing: SharingRule = .{},
     /// Diameter of points and width of lines, in pixels of the automatic view.
     point_size: f32 = choices.point_size.default,
+    /// The first set of texture coordinates is there, whatever textures want.
+    keeps_texcoords: bool = false,
     /// What decides how large these are.
     view: WantedView = .{},
 };
+
+/// What of the file each triangle is.
+pub const Origins = @import("prepare/origins.zig");
+
+/// Of the triangles of a world that was made with this cache. `from` is the scene that it shows.
+pub fn originsOf(
+    gpa: Allocator,
+    from: *const Scene,
+    loaded: *const Loaded,
+    cache: *const PoseCache,
+) error{OutOfMemory}!Origins {
+    return .init(gpa, from, &loaded.parts, cache.plan.detail);
+}
 
 /// See `PoseSettings`.
 pub const SharingRule = sharing_file.Rule;
@@ -131,6 +148,8 @@ pub const ViewSettings = struct {
     backdrop: ?light.EnvironmentSettings = null,
     /// What is framed in place of the world.
     motion: ?*const Motion = null,
+    /// Of an earlier view, with the shift of this pose.
+    reference: ?*const Reference = null,
 };
 
 /// `SceneTooLarge`: more than some 2 billion triangles or vertices; the diagnostic says more.
@@ -150,6 +169,8 @@ pub const AnimatedScene = animate.Posed;
 pub const animateScene = animate.pose;
 /// All moments of animations at once.
 pub const Motion = motion_file;
+/// What the pictures of a film have of one of them.
+pub const Reference = reference_file;
 
 /// Makes what does not depend on where things are: textures, and tangents for them. The memory is
 /// the result's and comes from `gpa`. Fills `texture_ns` of `times`.
@@ -208,8 +229,12 @@ fn visibleInstances(
 }
 
 /// What of the vertices the materials ask for.
-fn attributesOf(textures: *const texture.TextureSet) flatten.Attributes {
+fn attributesOf(
+    textures: *const texture.TextureSet,
+    settings: *const PoseSettings,
+) flatten.Attributes {
     var attributes: flatten.Attributes = .{};
+    attributes.texcoord_sets[0] = settings.keeps_texcoords;
     for (textures.lookups) |lookup| attributes.texcoord_sets[lookup.texcoord_set] = true;
     for (textures.materials) |use| if (use.tangents != null) {
         attributes.tangents = true;
@@ -260,6 +285,7 @@ pub const PoseCache = struct {
     lanes: u8,
     tree_quality: TreeQuality,
     point_size: f32,
+    keeps_texcoords: bool,
 
     /// Frees it.
     pub fn deinit(cache: *PoseCache) void {
@@ -273,7 +299,8 @@ pub const PoseCache = struct {
     pub fn fits(cache: *const PoseCache, settings: *const PoseSettings) bool {
         return cache.sharing.instances.len == 0 and cache.lanes == settings.lanes and
             cache.tree_quality == settings.tree_quality and
-            cache.point_size == settings.point_size;
+            cache.point_size == settings.point_size and
+            cache.keeps_texcoords == settings.keeps_texcoords;
     }
 };
 
@@ -297,7 +324,7 @@ pub fn pose(
     errdefer posed.world.deinit();
     const parts = &loaded.parts;
     const point_size = settings.point_size;
-    const attributes = attributesOf(&loaded.textures);
+    const attributes = attributesOf(&loaded.textures, &settings);
     const snapshot: Snapshot = try .of(posed.world.pose_arena.allocator(), from, loaded);
     const sharing = try shareMeshes(&posed.world, gpa, &snapshot, loaded, settings);
     var plan: flatten.Plan = try .init(gpa, sharing.flat, parts.meshes, point_size, diagnostic);
@@ -311,6 +338,7 @@ pub fn pose(
         .lanes = settings.lanes,
         .tree_quality = settings.tree_quality,
         .point_size = point_size,
+        .keeps_texcoords = settings.keeps_texcoords,
     };
     const planned_ns = nanoseconds(start.durationTo(Clock.awake.now(io)));
     try placeAll(
@@ -377,7 +405,7 @@ noinline fn shareMeshes(
         gpa,
         posed.arena.allocator(),
         &snapshot.drawn.parts,
-        attributesOf(&loaded.textures),
+        attributesOf(&loaded.textures, &settings),
         &snapshot.place,
         &.{
             .rule = settings.sharing,
@@ -425,6 +453,7 @@ fn placeAll(
     const mode = simd.setFlushToZero();
     defer simd.setFloatControl(mode);
     const start = Clock.awake.now(io);
+    Progress.begin(settings.pool.progress, .{ .stage = .geometry });
     const gpa = cache.gpa;
     const arena = posed.pose_arena.allocator();
     const place = &snapshot.place;
@@ -453,7 +482,7 @@ fn placeAll(
         &cache.sharing,
         parts,
         &soup,
-        attributesOf(&loaded.textures),
+        attributesOf(&loaded.textures, &settings),
     );
     const materials = try material.place(arena, parts, &snapshot.drawn.textures, &geometry);
     const tree_start = Clock.awake.now(io);
@@ -562,27 +591,10 @@ noinline fn chooseView(
     seen.lights = &.{};
     _ = seen.view_arena.reset(.retain_capacity);
     const arena = seen.view_arena.allocator();
-    // The scene as triangles refer to it: with a material for each of the world's.
-    const sources = seen.materials.sources;
-    var shown = from.*;
-    const materials = try gpa.alloc(scene.Material, sources.len);
-    defer gpa.free(materials);
-    for (materials, sources) |*to, source| to.* = from.materials[source];
-    shown.materials = materials;
-    const framed = framedOf(&seen.geometry, settings.motion);
-    const chosen = try view_file.choose(
-        gpa,
-        &shown,
-        seen.node_maps,
-        &framed,
-        &.{
-            .camera = settings.camera,
-            .viewpoint = settings.viewpoint,
-            .resolution = settings.resolution,
-            .long_side = settings.long_side,
-        },
-        diagnostic,
-    );
+    const reference = settings.reference;
+    const kept = if (reference) |first| first.view else null;
+    const chosen = kept orelse try chooseCamera(seen, from, &settings, diagnostic);
+    const facing = if (reference) |first| &first.facing else &chosen.camera;
     seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };
     seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
     const shining = if (settings.emitters or from.has_area_lights)
@@ -596,7 +608,7 @@ noinline fn chooseView(
     seen.facts.own_light_count = seen.lights.len;
     const has_map = settings.environment.map != null;
     const lights_are_default = seen.lights.len == 0 and from.ambient == null and !has_map;
-    if (lights_are_default) seen.lights = try light.placeRig(arena, &seen.view.camera);
+    if (lights_are_default) seen.lights = try light.placeRig(arena, facing);
     seen.facts.emitter_count = if (from.has_area_lights) 0 else shining.len;
     if (seen.facts.emitter_count > 0) seen.lights = try std.mem.concat(arena, world.Light, &.{
         seen.lights, shining,
@@ -607,17 +619,44 @@ noinline fn chooseView(
         settings.ambient,
         settings.background orelse from.background,
     );
-    light.addMap(&seen.environment, &settings.environment, &seen.view.camera);
-    if (settings.floor == .shadow) seen.environment.floor_height = light.floorOf(&seen.geometry);
+    light.addMap(&seen.environment, &settings.environment, facing);
+    if (settings.floor == .shadow) seen.environment.floor_height = if (reference) |first|
+        first.floor_height
+    else
+        light.floorOf(&seen.geometry);
     if (settings.backdrop) |*chosen_backdrop| {
         const backdrop = try arena.create(world.Environment);
         backdrop.* = .{ .ambient = 0, .background = @splat(0) };
-        light.addMap(backdrop, chosen_backdrop, &seen.view.camera);
+        light.addMap(backdrop, chosen_backdrop, facing);
         seen.environment.backdrop = backdrop;
     }
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
     seen.facts.environment_is_default = settings.environment.is_default;
+}
+
+fn chooseCamera(
+    seen: *const World,
+    from: *const Scene,
+    settings: *const ViewSettings,
+    diagnostic: *Diagnostic,
+) ViewError!view_file.View {
+    const gpa = seen.view_arena.child_allocator;
+    // The scene as triangles refer to it: with a material for each of the world's.
+    const sources = seen.materials.sources;
+    var shown = from.*;
+    const materials = try gpa.alloc(scene.Material, sources.len);
+    defer gpa.free(materials);
+    for (materials, sources) |*to, source| to.* = from.materials[source];
+    shown.materials = materials;
+    const framed = framedOf(&seen.geometry, settings.motion);
+    const wanted: view_file.Wanted = .{
+        .camera = settings.camera,
+        .viewpoint = settings.viewpoint,
+        .resolution = settings.resolution,
+        .long_side = settings.long_side,
+    };
+    return view_file.choose(gpa, &shown, seen.node_maps, &framed, &wanted, diagnostic);
 }
 
 fn framedOf(geometry: *const world.Geometry, motion: ?*const Motion) world.Geometry {
@@ -728,6 +767,7 @@ noinline fn growTree(
     const kept = if (geometry.dropped_count > 0) try listKept(gpa, geometry) else null;
     defer if (kept) |numbers| gpa.free(numbers);
     const input = inputOf(geometry, settings, kept);
+    Progress.begin(settings.pool.progress, bvh_wide.workOf(input.count(), input.quality));
     return switch (settings.lanes) {
         4 => .{ .w4 = .{ .built = try bvh_wide.build(gpa, arena, &input, 4) } },
         8 => .{ .w8 = .{ .built = try bvh_wide.build(gpa, arena, &input, 8) } },
@@ -1632,6 +1672,7 @@ test "memory that runs out when a scene is posed again is an error that leaks no
 
 test {
     _ = animate;
+    _ = reference_file;
     _ = Drawn;
     _ = motion_file;
     _ = environment;
@@ -1651,6 +1692,7 @@ test {
     _ = tangents;
     _ = texture;
     _ = extent_file;
+    _ = Origins;
     _ = @import("prepare/relief.zig");
     _ = @import("prepare/layers.zig");
     _ = @import("prepare/texture_use.zig");

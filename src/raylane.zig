@@ -6,6 +6,7 @@
 
 const std = @import("std");
 
+pub const batch = @import("batch.zig");
 pub const bench = @import("bench.zig");
 pub const builtin = @import("builtin.zig");
 pub const cli = @import("cli.zig");
@@ -13,6 +14,7 @@ pub const compare = @import("compare.zig");
 pub const decode = @import("decode.zig");
 pub const denoise = @import("denoise.zig");
 pub const diagnostic = @import("diagnostic.zig");
+pub const display = @import("display.zig");
 pub const energy = @import("energy.zig");
 pub const film = @import("film.zig");
 pub const huge_pages = @import("huge_pages.zig");
@@ -21,12 +23,18 @@ pub const image = @import("image.zig");
 /// The project's licence and those of what a program is made of.
 pub const licenses = @import("licenses").text;
 pub const info = @import("info.zig");
+pub const json_text = @import("json_text.zig");
+pub const manifest = @import("manifest.zig");
 pub const math = @import("math.zig");
 pub const memory_account = @import("memory_account.zig");
 pub const output = @import("output.zig");
+pub const merge = @import("merge.zig");
 pub const parallel = @import("parallel.zig");
 pub const parse = @import("parse.zig");
+pub const part = @import("part.zig");
 pub const prepare = @import("prepare.zig");
+pub const processor = @import("processor.zig");
+pub const progress = @import("progress.zig");
 pub const report = @import("report.zig");
 pub const scene = @import("scene.zig");
 pub const session = @import("session.zig");
@@ -38,7 +46,7 @@ pub const variant = @import("variant.zig");
 pub const world = @import("world.zig");
 
 comptime {
-    @export(&trace.link.panicOfKernel, .{ .name = "rl_kernel_panic" });
+    @export(&trace.link.panicOfKernel, .{ .name = trace.link.panic_symbol });
 }
 
 test {

@@ -1,17 +1,29 @@
-//! What a frame cost, as text for people and as JSON for programs.
+//! What a frame cost, as text for people and as JSON for programs, or why there is none.
 //!
 //! In: plain values that the session collects. Out: a few aligned lines, or one JSON object in one
-//! line. Keys of the JSON grow in number but never change their meaning.
+//! line, whose keys docs/json.md and docs/stats.schema.json describe. They grow in number but never
+//! change their meaning.
 
 const std = @import("std");
 const Stringify = std.json.Stringify;
 const Writer = std.Io.Writer;
+const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const printable = @import("diagnostic.zig").printable;
+const Manifest = @import("manifest.zig").Manifest;
+const json_text = @import("json_text.zig");
 const settings = @import("settings.zig");
 const statistics = @import("statistics.zig");
 
+/// What a job of `raylane serve` is known by; null: there are no jobs.
+pub const Id = ?std.json.Value;
+/// See `json_text.zig`.
+pub const Text = json_text.Text;
+/// See `json_text.zig`.
+pub const Texts = json_text.Texts;
+
 /// One frame.
 pub const Report = struct {
+    id: Id = null,
     /// Of the program.
     version: []const u8 = "",
     /// As on the command line.
@@ -19,8 +31,11 @@ pub const Report = struct {
     /// Where the image went, as on the command line.
     output: []const u8 = "",
     triangle_count: u64,
+    /// Of a crop, if it is one.
     width: u32,
     height: u32,
+    /// A crop in pixels.
+    part: settings.Part = .whole,
     /// Samples a pixel, of those that have the most.
     sample_count: u32,
     /// Of all pixels.
@@ -43,6 +58,8 @@ pub const Report = struct {
     image_hash: u64,
     /// Null: the picture keeps radiance as it is.
     appearance: ?Appearance = null,
+    /// Names of what layers have numbers of; null: there are no such layers.
+    manifest: ?Manifest = null,
     warnings: []const []const u8 = &.{},
 
     /// What images became.
@@ -68,6 +85,12 @@ pub const Report = struct {
     /// or none does.
     fn again(report: *const Report) ?u32 {
         return if (report.is_timed and !report.is_partial) report.sample_count else null;
+    }
+
+    /// Which part of a picture it is, in `room` for four numbers; null: all of it.
+    fn partText(report: *const Report, room: []u8) ?[]const u8 {
+        if (report.part == .whole) return null;
+        return std.mem.print(room, "{f}", .{report.part}) catch unreachable;
     }
 
     fn rayCount(report: *const Report) u64 {
@@ -123,10 +146,14 @@ pub fn writeText(report: *const Report, writer: *Writer) Writer.Error!void {
     try writer.print("scene        {f}, {d} triangles\n", .{
         printable(report.scene), report.triangle_count,
     });
-    try writer.print("image        {f}, {d} x {d}, {d} {s} a pixel", .{
+    var part: [64]u8 = undefined;
+    const shown = report.partText(&part);
+    try writer.print("image        {f}, {d} x {d}{s}{s}, {d} {s} a pixel", .{
         printable(report.output),
         report.width,
         report.height,
+        if (shown == null) "" else ", ",
+        shown orelse "",
         report.sample_count,
         if (report.sample_count == 1) "sample" else "samples",
     });
@@ -199,15 +226,22 @@ fn writeRate(writer: *Writer, count: u64, time_ns: u64) Writer.Error!void {
 pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
     const times = &report.times;
     const cost = report.bvh.sah_cost;
+    var part: [64]u8 = undefined;
     var hash: [16]u8 = undefined;
     var hash_writer: Writer = .fixed(&hash);
     try hash_writer.print("{x:0>16}", .{report.image_hash});
-    try Stringify.value(.{
+    var json: Stringify = .{ .writer = writer };
+    try json.beginObject();
+    if (report.id) |id| try writeFields(&json, .{ .id = id });
+    try writeFields(&json, .{
         .version = Text{ .bytes = report.version },
+        .@"error" = null,
         .scene = Text{ .bytes = report.scene },
+        .output = Text{ .bytes = report.output },
         .triangles = report.triangle_count,
         .width = report.width,
         .height = report.height,
+        .part = report.partText(&part),
         .samples = report.sample_count,
         .samples_mean = report.sample_mean,
         .partial = report.is_partial,
@@ -239,45 +273,99 @@ pub fn writeJson(report: *const Report, writer: *Writer) Writer.Error!void {
         },
         .memory_peak_bytes = report.memory_peak_bytes,
         .image_hash = Text{ .bytes = &hash },
+        .manifest = report.manifest,
         .warnings = Texts{ .list = report.warnings },
-    }, .{}, writer);
+    });
+    try json.endObject();
     try writer.writeByte('\n');
 }
 
-/// A JSON string of any bytes. Those that are not UTF-8, which a file name may hold, become
-/// U+FFFD.
-pub const Text = struct {
-    bytes: []const u8,
+/// The fields of a structure as keys of the object that is open.
+pub fn writeFields(json: *Stringify, fields: anytype) Writer.Error!void {
+    inline for (comptime std.meta.fieldNames(@TypeOf(fields))) |name| {
+        try json.objectField(name);
+        try json.write(@field(fields, name));
+    }
+}
 
-    /// Called by `Stringify`.
-    pub fn jsonStringify(text: Text, json: *Stringify) Writer.Error!void {
-        try json.beginWriteRaw();
-        try json.writer.writeByte('"');
-        var rest = text.bytes;
-        while (rest.len > 0) {
-            const length = std.unicode.utf8ByteSequenceLength(rest[0]) catch 1;
-            const sequence = rest[0..@min(length, rest.len)];
-            const is_valid = std.unicode.utf8ValidateSlice(sequence);
-            const shown = if (is_valid) sequence else "\u{fffd}";
-            try Stringify.encodeJsonStringChars(shown, .{}, json.writer);
-            rest = rest[if (is_valid) sequence.len else 1..];
+/// Why there is no picture.
+pub const Failure = struct {
+    id: Id = null,
+    /// Of the program.
+    version: []const u8,
+    /// As on the command line; null: none was understood.
+    scene: ?[]const u8 = null,
+    /// Where the picture would have gone.
+    output: ?[]const u8 = null,
+    problem: Problem,
+    warnings: []const []const u8 = &.{},
+};
+
+/// What was wrong, and where.
+pub const Problem = struct {
+    message: []const u8,
+    /// Empty: no file's.
+    file: []const u8 = "",
+    /// From 1, as far as known.
+    line: ?u32 = null,
+    column: ?u32 = null,
+    /// Of the program, where it ends by it.
+    exit_code: u8,
+
+    /// Of the error that a diagnostic holds; `file` where that names no other.
+    pub fn of(diagnostic: *const Diagnostic, file: []const u8, exit_code: u8) Problem {
+        const message = diagnostic.message.text();
+        var problem: Problem = .{ .message = message, .file = file, .exit_code = exit_code };
+        var place = diagnostic.place.text();
+        if (place.len == 0) {
+            // Formats whose text is one file begin with it.
+            const line = std.mem.cutPrefix(u8, message, "JSON line ") orelse
+                std.mem.cutPrefix(u8, message, "line ") orelse return problem;
+            const end = std.mem.findNone(u8, line, "0123456789") orelse line.len;
+            problem.line = std.fmt.parseInt(u32, line[0..end], 10) catch null;
+            return problem;
         }
-        try json.writer.writeByte('"');
-        json.endWriteRaw();
+        problem.column = cutNumber(&place);
+        problem.line = cutNumber(&place);
+        problem.file = place;
+        return problem;
     }
-};
-
-/// An array of them.
-pub const Texts = struct {
-    list: []const []const u8,
 
     /// Called by `Stringify`.
-    pub fn jsonStringify(texts: Texts, json: *Stringify) Writer.Error!void {
-        try json.beginArray();
-        for (texts.list) |bytes| try json.write(Text{ .bytes = bytes });
-        try json.endArray();
+    pub fn jsonStringify(problem: *const Problem, json: *Stringify) Writer.Error!void {
+        try json.write(.{
+            .message = Text{ .bytes = problem.message },
+            .file = if (problem.file.len > 0) Text{ .bytes = problem.file } else null,
+            .line = problem.line,
+            .column = problem.column,
+            .exit_code = problem.exit_code,
+        });
     }
 };
+
+/// The number behind the last colon of a place, which loses both.
+fn cutNumber(place: *[]const u8) ?u32 {
+    const colon = std.mem.findScalarLast(u8, place.*, ':') orelse return null;
+    const number = std.fmt.parseInt(u32, place.*[colon + 1 ..], 10) catch return null;
+    place.* = place.*[0..colon];
+    return number;
+}
+
+/// Writes what is known of a picture that there is not as one JSON object and a line end.
+pub fn writeFailure(failure: *const Failure, writer: *Writer) Writer.Error!void {
+    var json: Stringify = .{ .writer = writer };
+    try json.beginObject();
+    if (failure.id) |id| try writeFields(&json, .{ .id = id });
+    try writeFields(&json, .{
+        .version = Text{ .bytes = failure.version },
+        .@"error" = &failure.problem,
+        .scene = if (failure.scene) |scene| Text{ .bytes = scene } else null,
+        .output = if (failure.output) |output| Text{ .bytes = output } else null,
+        .warnings = Texts{ .list = failure.warnings },
+    });
+    try json.endObject();
+    try writer.writeByte('\n');
+}
 
 fn milliseconds(time_ns: u64) f64 {
     return float(time_ns) / 1e6;
@@ -372,10 +460,13 @@ test "the text, with and without tests counted" {
 test "the JSON has every key and nothing else" {
     const Parsed = struct {
         version: []const u8,
+        @"error": ?u8,
         scene: []const u8,
+        output: []const u8,
         triangles: u64,
         width: u32,
         height: u32,
+        part: ?[]const u8,
         samples: u32,
         samples_mean: f64,
         partial: bool,
@@ -401,14 +492,23 @@ test "the JSON has every key and nothing else" {
         bvh: struct { nodes: u64, depth: u32, sah_cost: ?f64, bytes: u64 },
         memory_peak_bytes: u64,
         image_hash: []const u8,
+        manifest: ?struct {
+            none: u32,
+            node: struct { @"1": []const u8 },
+            mesh: struct {},
+            material: struct {},
+        },
         warnings: []const []const u8,
     };
     const gpa = std.testing.allocator;
     for ([_]bool{ false, true }) |is_bare| {
         var report = report_for_test;
+        report.manifest = .{ .node = &.{.{ .number = 1, .name = "a" }} };
         if (is_bare) {
             report.tests = null;
             report.appearance = null;
+            report.manifest = null;
+            report.part = .{ .tile = .{ .number = 1, .count = 2 } };
             report.bvh.sah_cost = std.math.inf(f64);
             report.warnings = &.{};
         }
@@ -422,9 +522,14 @@ test "the JSON has every key and nothing else" {
         defer parsed.deinit();
         const value = parsed.value;
         try std.testing.expectEqualStrings("a \"b\"\n\u{fffd}.glb", value.scene);
+        try std.testing.expectEqualStrings("a.png", value.output);
+        try std.testing.expectEqual(null, value.@"error");
         try std.testing.expectEqualStrings("0000000000000abc", value.image_hash);
         try std.testing.expectEqual(@as(?f32, if (is_bare) null else -9.31), value.exposure_ev);
         try std.testing.expectEqual(is_bare, value.tonemap == null);
+        try std.testing.expectEqual(is_bare, value.part != null);
+        if (value.part) |part| try std.testing.expectEqualStrings("tile 1/2", part);
+        if (!is_bare) try std.testing.expectEqualStrings("a", value.manifest.?.node.@"1");
         if (value.tonemap) |name| try std.testing.expectEqualStrings("neutral", name);
         try std.testing.expectEqual(1.5, value.time_ms.parse);
         try std.testing.expectEqual(0.000001, value.time_ms.prepare);
@@ -435,6 +540,47 @@ test "the JSON has every key and nothing else" {
         try std.testing.expectEqualDeep(report.tests, value.tests);
         try std.testing.expectEqualDeep(report.warnings, value.warnings);
         try std.testing.expectEqual(@as(?f64, if (is_bare) null else 12.3456), value.bvh.sah_cost);
+    }
+}
+
+test "the JSON of a failure says where, as far as that is known" {
+    const Case = struct { place: []const u8, message: []const u8, json: []const u8 };
+    for ([_]Case{
+        .{ .place = "", .message = "no such file", .json =
+        \\"message":"no such file","file":"s.glb","line":null,"column":null,"exit_code":3
+        },
+        .{ .place = "a:b.pbrt:12:7", .message = "no", .json =
+        \\"message":"no","file":"a:b.pbrt","line":12,"column":7,"exit_code":3
+        },
+        .{ .place = "", .message = "line 31: odd", .json =
+        \\"message":"line 31: odd","file":"s.glb","line":31,"column":null,"exit_code":3
+        },
+        .{ .place = "", .message = "JSON line 2, byte 9: odd", .json =
+        \\"message":"JSON line 2, byte 9: odd","file":"s.glb","line":2,"column":null,"exit_code":3
+        },
+        .{ .place = "", .message = "line by line", .json =
+        \\"message":"line by line","file":"s.glb","line":null,"column":null,"exit_code":3
+        },
+    }) |case| {
+        var diagnostic: Diagnostic = .{};
+        diagnostic.place.set("{s}", .{case.place});
+        diagnostic.message.set("{s}", .{case.message});
+        var text: Writer.Allocating = .init(std.testing.allocator);
+        defer text.deinit();
+        try writeFailure(&.{
+            .id = .{ .string = "a" },
+            .version = "1",
+            .scene = "s.glb",
+            .problem = .of(&diagnostic, "s.glb", 3),
+            .warnings = &.{"one"},
+        }, &text.writer);
+        var buffer: [512]u8 = undefined;
+        try std.testing.expectEqualStrings(try std.mem.print(
+            &buffer,
+            "{{\"id\":\"a\",\"version\":\"1\",\"error\":{{{s}}},\"scene\":\"s.glb\"," ++
+                "\"output\":null,\"warnings\":[\"one\"]}}\n",
+            .{case.json},
+        ), text.written());
     }
 }
 

@@ -49,6 +49,8 @@ pub const Node = struct {
     parent: u32,
     /// Map from this node's space into its parent's.
     local: AffineD,
+    /// The file's number of it, or `none`.
+    origin: u32 = none,
 };
 
 /// A picture in a file: as it came, not decoded.
@@ -175,6 +177,9 @@ pub const Mesh = struct {
     segments: []const [2]u32 = &.{},
     /// Index into `Scene.materials`.
     material: u32,
+    /// The file's number of what it is a part of, or `none`; and its place there.
+    origin: u32 = none,
+    primitive: u32 = 0,
 
     /// Whether there is nothing to draw.
     pub fn isEmpty(mesh: *const Mesh) bool {
@@ -276,6 +281,14 @@ pub const Camera = struct {
     };
 };
 
+/// What a file calls things, by its own numbers (`origin`); empty ones where it gives no name, and
+/// no list where the format has none.
+pub const Names = struct {
+    nodes: []const []const u8 = &.{},
+    meshes: []const []const u8 = &.{},
+    materials: []const []const u8 = &.{},
+};
+
 /// A whole file. Everything lives in the arena.
 pub const Scene = struct {
     arena: std.heap.ArenaAllocator,
@@ -290,6 +303,7 @@ pub const Scene = struct {
     textures: []const Texture = &.{},
     environment: ?EnvironmentMap = null,
     file: File = .{},
+    names: Names = .{},
     /// In the order of the file, those that move nothing as well.
     animations: []const Animation = &.{},
     moving: Moving = .{},

@@ -19,13 +19,19 @@ const srgb = math.srgb;
 const statistics = @import("statistics.zig");
 const trace = @import("trace.zig");
 const variant = @import("variant.zig");
+const Clay = @import("session/clay.zig");
 const Environment = @import("session/environment.zig").Environment;
+const Manifest = @import("manifest.zig").Manifest;
+const hit_layers = @import("session/hit_layers.zig");
 const emission = @import("session/emission.zig");
 const course_file = @import("session/course.zig");
 const Diagnostic = @import("diagnostic.zig").Diagnostic;
 const film_file = @import("film.zig");
+const fingerprint = @import("session/fingerprint.zig");
+const part_file = @import("part.zig");
 const Film = film_file.Film;
 const Identity = @import("identity.zig").Identity;
+const Progress = @import("progress.zig").Progress;
 const Report = @import("report.zig").Report;
 const memoryPeakBytes = @import("report.zig").memoryPeakBytes;
 const Scene = @import("scene.zig").Scene;
@@ -77,8 +83,32 @@ pub const Pose = struct {
     sharing: prepare.SharingRule = .{},
     animation: settings.Animation = .{},
     /// What `view` will be asked for: points and lines are as large as its pixels want them, and
-    /// stay so until the next pose.
+    /// stay so until the next pose. What `shade` wants is there for the next views.
     view: settings.View = .{},
+    /// What these want is there for the next pictures.
+    layers: std.EnumSet(settings.Layer) = .empty,
+
+    fn keepsTexcoords(pose: *const Pose) bool {
+        return pose.layers.contains(.uv) or pose.view.shade == .uv;
+    }
+
+    fn keepsOrigins(pose: *const Pose) bool {
+        const layers = &pose.layers;
+        return layers.contains(.node) or layers.contains(.material) or
+            layers.contains(.primitive);
+    }
+};
+
+/// What the pictures of a film have of one of them: a film neither jumps nor flickers.
+pub const Reference = struct {
+    view: prepare.Reference,
+    /// What the light of surfaces that emit is worth; null: it was not weighed.
+    emission: ?emission.Weight,
+    /// In stops, of formats that are exposed.
+    exposure_ev: f32,
+    is_metered: bool,
+    /// What a dimmed studio is multiplied by.
+    studio_scale: ?f32,
 };
 
 /// One scene, its threads, and what has been made so far. Must stay where it is.
@@ -88,8 +118,6 @@ pub const Session = struct {
     /// What the stages have to say: the line of an error, and warnings.
     diagnostic: *Diagnostic,
     pool: parallel.Pool,
-    /// Told of every finished tile.
-    progress: std.Progress.Node = .none,
     /// Where pictures are shown on which `render` is at work; the caller's.
     progress_image: ?*ProgressImage = null,
     /// Set, it ends what `render` traces when every pixel has a sample.
@@ -113,21 +141,42 @@ pub const Session = struct {
     world: ?World = null,
     /// What the next pose has a use for; there with the world.
     pose_cache: ?prepare.PoseCache = null,
+    /// Of the world's triangles, where layers want them.
+    origins: ?prepare.Origins = null,
     environment: Environment = .{},
     /// The studio, where it is seen but something else lights the scene.
     backdrop: Environment = .{},
     /// The file that the picture is to replace.
     output: ?Identity = null,
     film: ?Film = null,
+    /// Names of what a layer of it has numbers of; the memory is that of `origins`.
+    manifest: ?Manifest = null,
+    /// Which pixels the film has.
+    layout: ?film_file.Layout = null,
+    /// What parts say of what they are of.
+    identity: ?PictureIdentity = null,
+    /// Of the scene, once it is known.
+    scene_fingerprint: ?u64 = null,
     traced: trace.Statistics = .{},
     /// What the film was traced with.
     rendered: settings.Render = .{},
     /// What the view shows, for the exposure; null: not metered yet.
     metered: ?output.Metered = null,
+    /// What `view` and `render` take from another picture; the caller's.
+    reference: ?*const Reference = null,
+    /// What the light of surfaces that emit is worth in the view; null: not weighed.
+    weight: ?emission.Weight = null,
     /// What it was written with, where that is not linear.
     appearance: ?Report.Appearance = null,
 
-    pub const Error = LoadError || prepare.Error || @import("session/environment.zig").Error;
+    pub const Error = LoadError || prepare.Error || @import("session/environment.zig").Error ||
+        PartError;
+
+    /// `PartUnknown`: the picture has no such part.
+    pub const PartError = error{ OutOfMemory, PartUnknown };
+
+    /// See `identify`.
+    const PictureIdentity = struct { version: []const u8, scene: u64, moment: u64 };
 
     /// Whether the scene is freed with the session, or only looked at: then it must live on until
     /// the last `view`.
@@ -161,6 +210,7 @@ pub const Session = struct {
         session.dropLoaded();
         session.dropScene();
         if (session.film) |*film| film.deinit(session.gpa);
+        if (session.layout) |*layout| layout.deinit(session.gpa);
         session.environment.deinit();
         session.backdrop.deinit();
         session.pool.deinit();
@@ -178,7 +228,10 @@ pub const Session = struct {
         session.dropWorld();
         session.dropScene();
         const start = Io.Clock.awake.now(session.io);
-        const scene = try loadScene(session.gpa, session.io, name, choices, session.diagnostic);
+        Progress.begin(session.pool.progress, .{ .stage = .reading });
+        var told = choices;
+        told.progress = session.pool.progress;
+        const scene = try loadScene(session.gpa, session.io, name, told, session.diagnostic);
         session.adopt(scene, .owned);
         session.output = choices.output;
         session.texture_side_max = choices.texture_side_max;
@@ -193,6 +246,7 @@ pub const Session = struct {
         session.dropScene();
         session.start = Io.Clock.awake.now(session.io);
         session.environment.dropScene();
+        session.scene_fingerprint = null;
         session.scene = scene;
         session.ownership = ownership;
         session.facts = .{
@@ -207,12 +261,40 @@ pub const Session = struct {
         };
     }
 
+    /// Frees the scene and all that is made of it. Threads, film and environments stay for another.
+    pub fn drop(session: *Session) void {
+        session.dropWorld();
+        session.dropLoaded();
+        session.dropScene();
+        session.reference = null;
+    }
+
+    /// Notes what parts of pictures of this view, by a program of this version, are to say of what
+    /// they are of. Before the scene is dropped; asserts that there is a view.
+    pub fn identify(session: *Session, version: []const u8) void {
+        const known = session.scene_fingerprint;
+        const scene = known orelse fingerprint.ofScene(&session.scene.?);
+        session.scene_fingerprint = scene;
+        const is_file = session.seen.environment.source == .file;
+        const around = if (is_file) fingerprint.of(session.environment.made.?.map) else 0;
+        session.identity = .{
+            .version = version,
+            .scene = fingerprint.of([2]u64{ scene, around }),
+            .moment = fingerprint.of(session.posed.?.moment),
+        };
+    }
+
     /// Frees the scene, for which there is no use after the last `view`.
     pub fn dropScene(session: *Session) void {
         session.dropPosed();
         session.dropMotion();
         if (session.ownership == .owned) if (session.scene) |*scene| scene.deinit();
         session.scene = null;
+    }
+
+    /// Has the next view read its environment's file again.
+    pub fn forgetEnvironment(session: *Session) void {
+        session.environment.deinit();
     }
 
     fn dropPosed(session: *Session) void {
@@ -230,6 +312,9 @@ pub const Session = struct {
         session.world = null;
         if (session.pose_cache) |*cache| cache.deinit();
         session.pose_cache = null;
+        if (session.origins) |*origins| origins.deinit();
+        session.origins = null;
+        session.manifest = null;
     }
 
     fn dropLoaded(session: *Session) void {
@@ -259,6 +344,7 @@ pub const Session = struct {
             .tree_quality = chosen.tree_quality,
             .sharing = chosen.sharing,
             .point_size = chosen.view.point_size,
+            .keeps_texcoords = chosen.keepsTexcoords(),
             .view = .{
                 .camera = chosen.view.camera,
                 .viewpoint = chosen.view.viewpoint,
@@ -266,7 +352,8 @@ pub const Session = struct {
                 .long_side = chosen.view.long_side,
             },
         };
-        if (session.pose_cache) |*cache| if (cache.fits(&pose_settings)) {
+        const has_origins = session.origins != null or !chosen.keepsOrigins();
+        if (session.pose_cache) |*cache| if (has_origins and cache.fits(&pose_settings)) {
             return prepare.poseAgain(
                 &session.world.?,
                 cache,
@@ -290,6 +377,8 @@ pub const Session = struct {
         );
         session.world = posed.world;
         session.pose_cache = posed.cache;
+        if (chosen.keepsOrigins()) session.origins =
+            try prepare.originsOf(session.gpa, shown, loaded, &session.pose_cache.?);
     }
 
     /// The scene at a moment, until the next one.
@@ -307,8 +396,15 @@ pub const Session = struct {
 
     /// Chooses what is seen, from where and by what light; the tree stays. Asserts that there is a
     /// pose.
-    pub fn view(session: *Session, choices: settings.View) Error!void {
+    pub fn view(session: *Session, chosen: settings.View) Error!void {
         if (session.pool.cancelled.load(.monotonic)) return error.Canceled;
+        var choices = chosen;
+        if (choices.shade == .ao) {
+            choices.environment.source = .white;
+            choices.environment.intensity = Clay.radiance;
+            choices.ambient = null;
+            choices.emitters = false;
+        }
         session.seen = choices;
         session.seen.background = session.backgroundOf(&choices);
         const background = session.seen.background;
@@ -316,6 +412,7 @@ pub const Session = struct {
         session.world.?.environment.map = null;
         session.world.?.environment.backdrop = null;
         const start = Io.Clock.awake.now(session.io);
+        Progress.begin(session.pool.progress, .{ .stage = .view });
         var environment = try session.chooseFor(&session.environment, &choices.environment);
         environment.is_seen = background == .env or background == .studio;
         environment.shadow_count = choices.shadowCount();
@@ -336,6 +433,9 @@ pub const Session = struct {
             &session.motion,
         );
         session.times.prepare_ns += session.since(start);
+        session.weight = null;
+        const shift = session.pose_cache.?.shift;
+        const reference = if (session.reference) |first| first.view.shiftedBy(shift) else null;
         try prepare.view(&session.world.?, session.io, &session.posed.?.scene, .{
             .camera = choices.camera,
             .viewpoint = choices.viewpoint,
@@ -351,7 +451,33 @@ pub const Session = struct {
                 motion
             else
                 null,
+            .reference = if (reference) |*first| first else null,
         }, session.diagnostic, &session.times);
+    }
+
+    /// The view as what other pictures of a film go by that are rendered and written like this.
+    /// Asserts that there is a view, which is to be chosen anew before it is rendered.
+    pub fn refer(
+        session: *Session,
+        choices: settings.Render,
+        written: settings.Write,
+    ) Error!Reference {
+        session.reference = null;
+        session.rendered = choices;
+        session.metered = null;
+        try session.weighEmitters();
+        try session.dimStudio();
+        const world = &session.world.?;
+        // The file of a part says how all of the picture is exposed.
+        const is_exposed = !output.isLinear(written.format) or choices.noise != null or
+            choices.is_merged;
+        return .{
+            .view = session.framing(),
+            .emission = session.weight,
+            .exposure_ev = if (is_exposed) try session.exposureOf(written.exposure) else 0,
+            .is_metered = session.isMetered(written.exposure),
+            .studio_scale = if (session.isStudioDimmed()) world.environment.scale[0] else null,
+        };
     }
 
     fn chooseFor(
@@ -371,6 +497,14 @@ pub const Session = struct {
         );
     }
 
+    /// How the view is framed. Asserts that there is one.
+    pub fn framing(session: *const Session) prepare.Reference {
+        const world = &session.world.?;
+        const is_framed = world.facts.camera_is_default or
+            session.seen.viewpoint.replacesCamera();
+        return .of(world, is_framed, session.pose_cache.?.shift);
+    }
+
     /// Traces the picture. Asserts that there is a view, and a tree of the variant's width.
     pub fn render(session: *Session, choices: settings.Render) Error!void {
         const film = try session.sizedFilm(choices);
@@ -379,9 +513,17 @@ pub const Session = struct {
         session.appearance = null;
         session.metered = null;
         session.times.denoise_ns = 0;
-        try session.weighEmitters();
-        try session.dimStudio();
+        session.manifest = null;
+        const shade = session.seen.shade;
+        if (shade == null) {
+            try session.weighEmitters();
+            try session.dimStudio();
+        }
         var frame = session.world.?.frame();
+        var clay: ?Clay =
+            if (shade == .ao) try .init(session.gpa, &session.world.?) else null;
+        defer if (clay) |*made| made.deinit();
+        if (clay) |*made| made.dress(&frame);
         var lights = try session.makeLightSampler(choices.integrator, &frame);
         defer if (lights) |*made| made.deinit();
         if (lights) |*made| frame.light_sampler = &made.sampler;
@@ -393,12 +535,57 @@ pub const Session = struct {
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
-        if (choices.denoise) try session.denoiseFilm();
+        if (choices.denoise and !choices.is_merged) try session.denoiseFilm();
+        try session.cutFilm();
+        try session.survey(&frame);
+        if (shade == .cost) try session.paintCost();
+    }
+
+    /// Leaves of the film what was asked for.
+    fn cutFilm(session: *Session) error{OutOfMemory}!void {
+        const layout = &session.layout.?;
+        if (!layout.hasSurroundings()) return;
+        const cut = try session.film.?.cut(session.gpa, layout);
+        session.film.?.deinit(session.gpa);
+        session.film = cut;
+        layout.* = layout.bare();
+    }
+
+    /// Makes layers of what the picture's first samples see, if the film has any.
+    fn survey(session: *Session, frame: *const Frame) trace.Error!void {
+        const film = &session.film.?;
+        if (!film.layers.contains(.origin)) return;
+        const start = Io.Clock.awake.now(session.io);
+        const choices = &session.rendered;
+        var chosen = session.traceSettings(choices.*);
+        chosen.sample_count = @max(session.traced.sample_count, 1);
+        chosen.layout = &session.layout.?;
+        try trace.fillHits(session.gpa, choices.variant, frame, film, chosen);
+        const origins = if (session.origins) |*origins| origins else null;
+        if (origins) |made| {
+            const arena = made.arena.allocator();
+            session.manifest =
+                try hit_layers.manifestOf(arena, film.imageOf(.origin).?, made);
+        }
+        try hit_layers.fill(film, .{
+            .geometry = frame.geometry,
+            .shift = session.pose_cache.?.shift,
+            .origins = origins,
+        }, &session.pool);
+        session.times.trace_ns += session.since(start);
+    }
+
+    /// Makes the picture a map of what it took.
+    fn paintCost(session: *Session) error{OutOfMemory}!void {
+        const film = &session.film.?;
+        const display = film.imageOf(.display).?;
+        try output.paintLayer(session.gpa, &session.furtherOf(.cost), display);
+        @memset(film.image.pixels, .{ 0, 0, 0, 1 });
     }
 
     fn denoiseFilm(session: *Session) denoise.Error!void {
-        if (session.traced.sample_count < denoise.sample_count_min) return session
-            .diagnostic.warn("it is not denoised: one sample a pixel does not tell its noise", .{});
+        if (session.traced.sample_count < denoise.sample_count_min)
+            return session.diagnostic.warn(denoise.too_few_samples, .{});
         const start = Io.Clock.awake.now(session.io);
         try denoise.run(session.gpa, &session.film.?, &session.pool);
         session.times.denoise_ns = session.since(start);
@@ -412,6 +599,7 @@ pub const Session = struct {
     ) trace.Error!void {
         var chosen = session.traceSettings(choices);
         chosen.stop = session.stop;
+        chosen.layout = &session.layout.?;
         if (choices.noise) |noise| chosen.noise = .{
             .error_max = noise.error_max,
             .exposure_scale = output.exposureScale(try session.exposureOf(noise.exposure)),
@@ -445,8 +633,20 @@ pub const Session = struct {
         film: *Film,
         chosen: trace.Settings,
     ) trace.Error!void {
-        const variant_index = session.rendered.variant;
-        session.traced = try trace.trace(session.gpa, variant_index, frame, film, chosen);
+        const gpa = session.gpa;
+        const index = session.rendered.variant;
+        var settled = chosen;
+        if (session.seen.shade) |shade| switch (shade) {
+            .normal => settled.look = .normals,
+            .uv => settled.look = .texcoords,
+            .ao, .cost => {},
+        };
+        session.traced = if (settled.look != .hits)
+            try trace.look(gpa, index, frame, film, settled)
+        else if (film.layers.contains(.cost))
+            try trace.traceCounting(gpa, index, frame, film, settled)
+        else
+            try trace.trace(gpa, index, frame, film, settled);
     }
 
     /// Traces a picture of one sample, to find how many fit into the time, and chooses so many;
@@ -474,7 +674,12 @@ pub const Session = struct {
         standing.copyTo(&image.film.?) catch return;
         const appearance = session.appearanceOf(image.choices) catch return;
         const chosen = session.outputSettings(image.choices, appearance);
-        image.write(session.gpa, chosen, session.diagnostic);
+        const layout = &session.layout.?;
+        if (!layout.hasSurroundings())
+            return image.write(session.gpa, &image.film.?, chosen, session.diagnostic);
+        var cut = image.film.?.cut(session.gpa, layout) catch return;
+        defer cut.deinit(session.gpa);
+        image.write(session.gpa, &cut, chosen, session.diagnostic);
     }
 
     /// The list of an integrator that chooses lights at random; null for others.
@@ -506,6 +711,7 @@ pub const Session = struct {
     pub fn countTests(session: *Session, choices: settings.Render) Error!statistics.TestCounts {
         var chosen = session.traceSettings(choices);
         chosen.sample_count = session.traced.sample_count;
+        chosen.layout = &session.layout.?;
         const counted = try trace.traceCounting(
             session.gpa,
             choices.variant,
@@ -517,44 +723,150 @@ pub const Session = struct {
         return counted.tests.?;
     }
 
-    /// Refuses what a file cannot hold of the view; best asked before `render`.
-    pub fn checkWrite(session: *Session, choices: settings.Write) error{InputOutput}!void {
+    /// Refuses a part that the view does not have, and what a file cannot hold of it; best asked
+    /// before `render`.
+    pub fn checkWrite(
+        session: *Session,
+        choices: settings.Write,
+        part: settings.Part,
+    ) (error{InputOutput} || PartError)!void {
         const seen = &session.world.?.view;
+        var layout: film_file.Layout =
+            try .init(session.gpa, seen.width, seen.height, part, .{}, session.diagnostic);
+        defer layout.deinit(session.gpa);
         return output.check(
             choices.format,
             session.seen.background == .transparent,
-            seen.width,
-            seen.height,
+            layout.film_width,
+            layout.film_height,
             session.diagnostic,
         );
     }
 
-    /// Encodes the picture and moves it to its place. Closes the target in any case. Asserts that
-    /// there is a picture.
+    /// Encodes the picture and moves it to its place; a part that is to be merged in OpenEXR, as
+    /// `merge` takes it. Closes the target in any case. Asserts that there is a picture, and that
+    /// `identify` has been called for a part.
     pub fn write(
         session: *Session,
         target: *output.Target,
         choices: settings.Write,
     ) output.Error!void {
         defer target.abandon();
+        if (session.rendered.is_merged) return session.writePart(target, choices);
         session.appearance = try session.appearanceOf(choices);
         const start = Io.Clock.awake.now(session.io);
         const film = &session.film.?;
         var further: [std.enums.values(settings.Layer).len]output.Further = undefined;
         var chosen = session.outputSettings(choices, session.appearance);
-        chosen.further = session.furtherLayers(&further);
+        if (!choices.layers_apart) {
+            chosen.further = session.furtherLayers(&further);
+            chosen.manifest = if (session.manifest) |*manifest| manifest else null;
+        }
+        Progress.begin(session.pool.progress, .{ .stage = .writing });
         const tally = try output.write(session.gpa, .{
             .image = &film.image,
             .display = film.imageOf(.display),
         }, chosen, target, session.diagnostic);
         session.times.output_ns = session.since(start);
         session.times.total_ns = session.since(session.start);
-        session.hint(tally);
+        if (session.rendered.part == .whole) session.hint(tally);
+    }
+
+    fn writePart(
+        session: *Session,
+        target: *output.Target,
+        choices: settings.Write,
+    ) output.Error!void {
+        const film = &session.film.?;
+        const layout = &session.layout.?;
+        const ev = try session.exposureOf(choices.exposure);
+        const start = Io.Clock.awake.now(session.io);
+        const chosen = session.outputSettings(choices, null);
+        var layers: [std.enums.values(film_file.Layer).len]film_file.Layer = undefined;
+        var further: [std.enums.values(settings.Layer).len]settings.Layer = undefined;
+        const identity = &session.identity.?;
+        try part_file.write(session.gpa, film, layout, &.{
+            .version = identity.version,
+            .width = layout.width,
+            .height = layout.height,
+            .part = session.partOf(),
+            .scene = part_file.hexOf(identity.scene),
+            .options = part_file.hexOf(session.optionsFingerprint(choices)),
+            .sample_count = session.traced.sample_count,
+            .is_partial = session.traced.is_partial,
+            .layers = listOf(film_file.Layer, film.layers, &layers),
+            .further = listOf(settings.Layer, session.rendered.layers, &further),
+            .denoise = session.rendered.denoise,
+            .exposure_ev = ev,
+            .tone_mapping = chosen.tone_mapping,
+            .transparent = chosen.transparent,
+            .background = chosen.background,
+            .manifest = if (session.manifest) |*manifest| .of(manifest) else null,
+            .jpeg_quality = chosen.jpeg_quality,
+            .webp_quality = chosen.webp_quality,
+            .exr_kind = chosen.exr_kind,
+            .frame_rate = chosen.frame_rate,
+        }, target, session.diagnostic);
+        session.times.output_ns = session.since(start);
+        session.times.total_ns = session.since(session.start);
+    }
+
+    /// What the film has, of crops the pixels.
+    fn partOf(session: *const Session) settings.Part {
+        return switch (session.rendered.part) {
+            .crop => .{ .crop = .{ .pixels = session.layout.?.form.window } },
+            .whole, .tile => session.rendered.part,
+        };
+    }
+
+    /// Of all that the picture depends on besides what was read.
+    fn optionsFingerprint(session: *const Session, choices: settings.Write) u64 {
+        var seen = session.seen;
+        // A file's contents count, not its name.
+        if (seen.environment.source == .file) seen.environment.source = .{ .file = "" };
+        const rendered = &session.rendered;
+        return fingerprint.of(.{
+            session.identity.?.moment,
+            if (session.reference) |reference| fingerprint.of(reference.*) else 0,
+            session.texture_side_max,
+            seen,
+            rendered.integrator,
+            rendered.lights,
+            session.sampleCount(rendered.*),
+            rendered.noise,
+            session.depthOf(rendered.*),
+            rendered.denoise,
+            rendered.layers,
+            choices.exposure,
+            choices.tone_mapping,
+            choices.jpeg_quality,
+            choices.webp_quality,
+            choices.exr_kind,
+        });
+    }
+
+    /// Encodes a layer alone, as numbers or as colours, whichever the format holds, and moves it to
+    /// its place. Closes the target in any case. Asserts that the picture was made with the layer.
+    pub fn writeLayer(
+        session: *Session,
+        layer: settings.Layer,
+        target: *output.Target,
+        choices: settings.Write,
+    ) output.Error!void {
+        defer target.abandon();
+        const start = Io.Clock.awake.now(session.io);
+        var chosen = session.outputSettings(choices, null);
+        chosen.manifest = if (session.manifest) |*manifest| manifest else null;
+        const further = session.furtherOf(layer);
+        try output.writeLayer(session.gpa, &further, chosen, target, session.diagnostic);
+        session.times.output_ns += session.since(start);
     }
 
     /// Null: the format keeps radiance as it is.
     fn appearanceOf(session: *Session, choices: settings.Write) trace.Error!?Report.Appearance {
         if (output.isLinear(choices.format)) return null;
+        if (session.seen.shade != null)
+            return .{ .exposure_ev = 0, .is_automatic = false, .tone_mapping = .linear };
         return .{
             .exposure_ev = try session.exposureOf(choices.exposure),
             .is_automatic = session.isMetered(choices.exposure),
@@ -570,11 +882,25 @@ pub const Session = struct {
         return .{
             .format = choices.format,
             .exposure_ev = if (appearance) |chosen| chosen.exposure_ev else 0,
-            .tone_mapping = choices.tone_mapping,
+            .tone_mapping = if (session.seen.shade == null) choices.tone_mapping else .linear,
             .transparent = session.seen.background == .transparent,
             .background = session.behind(),
             .jpeg_quality = @intCast(choices.jpeg_quality),
+            .webp_quality = if (choices.webp_quality) |quality| @intCast(quality) else null,
+            .rows = session.rowsWritten(),
+            .exr_kind = choices.exr_kind,
+            .frame_rate = choices.frame_rate,
+            .is_continued = choices.is_continued,
             .pool = &session.pool,
+        };
+    }
+
+    /// Null: all.
+    fn rowsWritten(session: *const Session) ?output.Extent {
+        const layout = &session.layout.?;
+        return switch (layout.form) {
+            .window => |own| .{ .first = own[1], .of = layout.height },
+            .share => null,
         };
     }
 
@@ -582,14 +908,17 @@ pub const Session = struct {
     fn furtherLayers(session: *const Session, room: []output.Further) []const output.Further {
         var count: usize = 0;
         var chosen = session.rendered.layers.iterator();
-        while (chosen.next()) |layer| : (count += 1) room[count] = .{
-            .layer = layer,
-            .image = session.film.?.imageOf(layerOf(layer)).?,
-        };
+        while (chosen.next()) |layer| : (count += 1) room[count] = session.furtherOf(layer);
         return room[0..count];
     }
 
+    fn furtherOf(session: *const Session, layer: settings.Layer) output.Further {
+        const image = session.film.?.imageOf(film_file.layerOf(layer)).?;
+        return .{ .layer = layer, .image = image };
+    }
+
     fn isMetered(session: *const Session, exposure: settings.Exposure) bool {
+        if (session.reference) |reference| return reference.is_metered;
         return switch (exposure) {
             .ev => false,
             .auto => true,
@@ -599,6 +928,8 @@ pub const Session = struct {
 
     /// In stops: as chosen, or metered. That time counts as tracing.
     fn exposureOf(session: *Session, exposure: settings.Exposure) trace.Error!f32 {
+        if (session.seen.shade != null) return 0;
+        if (session.reference) |reference| return reference.exposure_ev;
         if (!session.isMetered(exposure)) return if (exposure == .ev) exposure.ev else 0;
         const start = Io.Clock.awake.now(session.io);
         const metered = try session.meter();
@@ -617,6 +948,12 @@ pub const Session = struct {
     /// scene's own lights, whichever exposure is chosen; all of it where these light next to
     /// nothing.
     fn dimStudio(session: *Session) trace.Error!void {
+        if (session.reference) |reference| {
+            const scale = reference.studio_scale orelse return;
+            const environment = &session.world.?.environment;
+            if (session.world.?.facts.environment_is_default) environment.scale = @splat(scale);
+            return;
+        }
         if (!session.isStudioDimmed()) return;
         const metered = try session.meter();
         const share: f32 = if (metered.is_black) 1 else studio_share;
@@ -660,7 +997,7 @@ pub const Session = struct {
         var chosen = session.traceSettings(session.rendered);
         chosen.integrator = .whitted;
         chosen.sample_count = 1;
-        chosen.progress = .none;
+        chosen.progress = null;
         const variant_index = session.rendered.variant;
         _ = try trace.trace(session.gpa, variant_index, &world.frame(), &film, chosen);
         return film;
@@ -675,23 +1012,10 @@ pub const Session = struct {
         if (facts.emitter_count == 0) return;
         const count = facts.emitter_count;
         const all = world.lights;
-        errdefer world.lights = all;
         const others = all[0 .. all.len - count];
-        world.lights = others;
-        var besides = try session.traceSmall();
-        defer besides.deinit(session.gpa);
-        const around = world.environment;
-        errdefer world.environment = around;
-        world.environment.map = null;
-        world.environment.ambient = 0;
-        world.lights = &.{};
-        var glow = try session.traceSmall();
-        defer glow.deinit(session.gpa);
-        world.lights = all[others.len..];
-        var lit = try session.traceSmall();
-        defer lit.deinit(session.gpa);
-        world.environment = around;
-        const share = emission.weigh(besides.image.pixels, glow.image.pixels, lit.image.pixels);
+        const known = if (session.reference) |reference| reference.emission else null;
+        const share = known orelse try session.weigh(others, all[others.len..]);
+        session.weight = share;
         world.lights = if (share.shows) all else others;
         facts.emitter_count = 0;
         if (!share.prevails) return;
@@ -702,8 +1026,34 @@ pub const Session = struct {
         world.environment.ambient = session.seen.ambient orelse 0;
     }
 
+    /// Weighs some of the lights against the others, and all else that shines.
+    fn weigh(
+        session: *Session,
+        others: []const Light,
+        own: []const Light,
+    ) trace.Error!emission.Weight {
+        const world = &session.world.?;
+        const all = world.lights;
+        defer world.lights = all;
+        world.lights = others;
+        var besides = try session.traceSmall();
+        defer besides.deinit(session.gpa);
+        const around = world.environment;
+        defer world.environment = around;
+        world.environment.map = null;
+        world.environment.ambient = 0;
+        world.lights = &.{};
+        var glow = try session.traceSmall();
+        defer glow.deinit(session.gpa);
+        world.lights = own;
+        var lit = try session.traceSmall();
+        defer lit.deinit(session.gpa);
+        return emission.weigh(besides.image.pixels, glow.image.pixels, lit.image.pixels);
+    }
+
     /// Says so where the picture shows next to nothing, and what may help.
     fn hint(session: *Session, tally: output.Tally) void {
+        if (session.seen.shade != null) return;
         const total = session.film.?.image.pixels.len;
         if (isNearlyAll(tally.clear, total)) return session.hintOf(
             "background",
@@ -753,17 +1103,17 @@ pub const Session = struct {
 
     /// What the picture took; what the user called things is the caller's to fill in.
     pub fn report(session: *const Session, choices: settings.Render) Report {
-        const image = &session.film.?.image;
+        const layout = &session.layout.?;
         const tree = &session.world.?.facts.tree;
         const textures = &session.loaded.?.textures;
         return .{
             .triangle_count = session.facts.triangle_count +
                 session.world.?.facts.stroke_triangle_count,
-            .width = image.width,
-            .height = image.height,
+            .width = if (layout.form == .window) layout.film_width else layout.width,
+            .height = if (layout.form == .window) layout.film_height else layout.height,
+            .part = session.partOf(),
             .sample_count = session.traced.sample_count,
-            .sample_mean = float(session.traced.sample_sum) /
-                float(@as(u64, image.width) * image.height),
+            .sample_mean = float(session.traced.sample_sum) / float(session.traced.pixel_count),
             .is_partial = session.traced.is_partial,
             .is_timed = choices.time_budget_s != null,
             .depth = session.depthOf(choices),
@@ -785,11 +1135,15 @@ pub const Session = struct {
             .memory_peak_bytes = memoryPeakBytes(),
             .image_hash = session.film.?.hash(),
             .appearance = session.appearance,
+            .manifest = session.manifest,
         };
     }
 
-    fn sampleCount(session: *const Session, choices: settings.Render) u32 {
+    /// Samples a pixel that `render` takes at most. Asserts that there is a view.
+    pub fn sampleCount(session: *const Session, choices: settings.Render) u32 {
         if (choices.sample_count) |count| return count;
+        // One tells as much of what rays cost.
+        if (session.seen.shade == .cost) return 1;
         if (choices.noise != null) return settings.noise_sample_count;
         if (choices.time_budget_s != null) return settings.sample_count.max;
         const seen = &session.world.?.view;
@@ -810,7 +1164,7 @@ pub const Session = struct {
             .sample_count = session.sampleCount(choices),
             .depth_max = session.depthOf(choices),
             .tile_size = choices.tile_size,
-            .progress = session.progress,
+            .progress = session.pool.progress,
             .cancel = &session.pool.cancelled,
         };
     }
@@ -829,6 +1183,8 @@ pub const Session = struct {
     fn layersOf(session: *const Session) film_file.Layers {
         const seen = &session.seen;
         const facts = &session.facts;
+        if (seen.shade) |shade| if (shade != .ao)
+            return .init(.{ .color = true, .alpha = true, .display = true });
         return .init(.{
             .color = true,
             .alpha = switch (seen.background) {
@@ -852,18 +1208,34 @@ pub const Session = struct {
     }
 
     /// A film of the view's size.
-    fn sizedFilm(session: *Session, choices: settings.Render) error{OutOfMemory}!*Film {
+    fn sizedFilm(session: *Session, choices: settings.Render) PartError!*Film {
         const view_size = &session.world.?.view;
         var layers = session.layersOf();
         if (choices.denoise) layers.setUnion(denoise.needed);
         var further = choices.layers.iterator();
-        while (further.next()) |layer| layers.insert(layerOf(layer));
+        while (further.next()) |layer| layers.insert(film_file.layerOf(layer));
+        // Where hits are before they become numbers.
+        if (layers.contains(.position) or layers.contains(.texcoord)) layers.insert(.origin);
+        if (session.seen.shade == .cost) layers.insert(.cost);
+        const layout: film_file.Layout = try .init(
+            session.gpa,
+            view_size.width,
+            view_size.height,
+            choices.part,
+            surroundingsOf(&choices),
+            session.diagnostic,
+        );
+        if (session.layout) |*before| before.deinit(session.gpa);
+        session.layout = layout;
+        const width, const height = .{ layout.film_width, layout.film_height };
         if (session.film) |*film| {
-            if (film.become(view_size.width, view_size.height, layers)) return film;
+            if (film.become(width, height, layers)) return film;
             film.deinit(session.gpa);
             session.film = null;
         }
-        session.film = try .init(session.gpa, view_size.width, view_size.height, layers);
+        session.film = try .init(session.gpa, width, height, layers);
+        // Between tiles that the picture's edge cuts there are pixels that nobody writes.
+        if (layout.form == .share) session.film.?.clear();
         return &session.film.?;
     }
 
@@ -872,15 +1244,25 @@ pub const Session = struct {
     }
 };
 
-/// The film's, as users choose them.
-fn layerOf(layer: settings.Layer) film_file.Layer {
-    return switch (layer) {
-        inline else => |same| @field(film_file.Layer, @tagName(same)),
-    };
-}
-
 fn float(count: u64) f64 {
     return @floatFromInt(count);
+}
+
+/// What has to be traced around the pixels that are asked for.
+fn surroundingsOf(choices: *const settings.Render) film_file.Surroundings {
+    assert(choices.is_merged or choices.part != .tile);
+    var around = trace.surroundingsOf(choices);
+    if (choices.denoise and !choices.is_merged) around.margin += denoise.reach;
+    return around;
+}
+
+/// The members of a set, in `room`.
+fn listOf(comptime T: type, set: std.EnumSet(T), room: []T) []const T {
+    var count: usize = 0;
+    var all = set;
+    var members = all.iterator();
+    while (members.next()) |member| : (count += 1) room[count] = member;
+    return room[0..count];
 }
 
 /// Threads where nobody says how many.
@@ -961,6 +1343,41 @@ test "a scene that is loaded once gives each view the picture it has alone" {
     try testing.expectEqual(2, made.depth);
     try testing.expectEqual(24 * 16 * settings.sample_count_small, made.rays.primary);
     try testing.expectEqual(hashes[2], made.image_hash);
+}
+
+test "layers leave the picture as it is, and places are as far away as depths say" {
+    var diagnostic: Diagnostic = .{};
+    var session: Session = .init(testing.allocator, testing.io, 2, &diagnostic);
+    defer session.deinit();
+    try session.load("builtin:cornell", .{});
+    const layers: std.EnumSet(settings.Layer) = .full;
+    try session.pose(.{ .lanes = variant.compiled[0].lanes, .layers = layers });
+    const seen: settings.View = .{
+        .resolution = .{ 8, 8 },
+        .camera = .auto,
+        .environment = .{ .source = .none },
+        .background = .transparent,
+    };
+    try session.view(seen);
+    try session.render(.{ .sample_count = 2 });
+    const hash = session.film.?.hash();
+    try session.render(.{ .sample_count = 2, .layers = layers });
+    try testing.expectEqual(hash, session.film.?.hash());
+    try testing.expect(session.report(.{}).manifest != null);
+    const camera = &session.world.?.view.camera;
+    const forward = math.vec3.normalize(camera.forward).?;
+    const alpha = session.furtherOf(.alpha);
+    var hit_count: usize = 0;
+    for (session.film.?.imageOf(.position).?.pixels, 0..) |place, at| {
+        if (place[3] == 0) continue;
+        // Depths of other samples of the pixel are much the same.
+        const shifted = math.vec3.sub(place[0..3].*, camera.origin);
+        const depth = math.vec3.dot(shifted, forward);
+        if (alpha.valuesAt(at)[0] < 1) continue;
+        try testing.expectApproxEqRel(session.furtherOf(.depth).valuesAt(at)[0], depth, 0.5);
+        hit_count += 1;
+    }
+    try testing.expect(hit_count > 8);
 }
 
 test "every stage ends when it is cancelled, and no file is left" {

@@ -5,6 +5,7 @@
 
 const std = @import("std");
 const Identity = @import("identity.zig").Identity;
+const progress = @import("progress.zig");
 
 /// Whole numbers to choose from.
 pub const Range = struct {
@@ -29,6 +30,10 @@ pub const Range = struct {
     }
 };
 
+/// Longest line of a job, in bytes.
+pub const job_bytes_max = 1 << 20;
+/// Pixels on the side of one that a size is given in.
+pub const pixel_ratio: Range = .{ .min = 1, .max = 8, .default = 1 };
 /// Threads; by default as many as there are processors.
 pub const thread_count: Range = .{ .min = 1, .max = 256 };
 /// Samples a pixel; in small pictures each pixel has more to show.
@@ -62,12 +67,24 @@ pub const side: Range = .{ .min = 1, .max = 65_536, .default = 1024 };
 pub const pixel_count_max = 1 << 28;
 /// The longer side where it alone is given: a square one has as many pixels as there may be.
 pub const long_side: Range = .{ .min = 1, .max = 1 << 14, .default = side.default };
+/// Parts of a picture that are tiles.
+pub const part_count: Range = .{ .min = 1, .max = 1 << 16 };
+/// Quality of a WebP that loses information.
+pub const webp_quality: Range = .{ .min = 1, .max = 100 };
+/// Frames of a film, and pictures that are numbered.
+pub const frame_count_max = 1_000_000;
+/// Files that are rendered side by side.
+pub const job_count: Range = .{ .min = 1, .max = 64 };
+/// Views around a scene.
+pub const view_count: Range = .{ .min = 1, .max = 36_000 };
 /// Quality of a JPEG.
 pub const jpeg_quality: Range = .{ .min = 1, .max = 100, .default = 90 };
 /// Largest exposure either way, in stops.
 pub const exposure_ev_max = 64;
 /// Directional lights a sample that stand for an environment, to find how much of it arrives.
 pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4 };
+/// And where they are all the light there is.
+pub const occlusion_shadow_count = 16;
 /// And where a floor catches their shadows, unless the user says.
 pub const floor_shadow_count = 16;
 /// See `Lights`.
@@ -98,20 +115,52 @@ pub const Format = enum {
     ppm,
     /// Its relative for floats, linear: the picture itself, bit for bit, without alpha.
     pfm,
-    /// OpenEXR: linear, halves, with alpha where the background is transparent.
+    /// Lossless, unless a quality is asked for.
+    webp,
+    /// OpenEXR: linear, halves or floats, with alpha where the background is transparent.
     exr,
+    /// YUV4MPEG2: frames of a film, one after the other.
+    y4m,
 };
 
-/// What is known of pixels besides their colours, for other programs: channels of an OpenEXR file.
+/// What colours are in an OpenEXR file.
+pub const ExrKind = enum { half, float };
+
+/// What is known of pixels besides their colours, for other programs: channels of an OpenEXR file,
+/// or files of their own.
 pub const Layer = enum {
-    /// Share of white light that what is seen sends to the camera.
-    albedo,
-    /// Its unit normal in the world's axes.
-    normal,
     /// Distance from the camera's plane in metres.
     depth,
+    /// Unit normal in the world's axes.
+    normal,
+    /// Share of white light that what is seen sends to the camera.
+    albedo,
+    /// Texture coordinates of the first set.
+    uv,
+    /// Numbers that the file gives to the node, to the material, and to the primitive of the mesh.
+    node,
+    material,
+    primitive,
+    /// Share of the pixel that surfaces cover.
+    alpha,
+    /// Place in the world's axes in metres.
+    position,
+    /// Tests of rays with boxes and triangles.
+    cost,
     /// Variance of the mean of the pixel's samples, before it is denoised.
     variance,
+};
+
+/// Quick looks, in place of what light makes of a scene.
+pub const Shade = enum {
+    /// Ambient occlusion: light from everywhere on white clay.
+    ao,
+    /// Unit normals in the world's axes as colours.
+    normal,
+    /// Texture coordinates as colours.
+    uv,
+    /// Tests of rays with boxes and triangles as a heat map.
+    cost,
 };
 
 /// Care taken over the tree of the scene: time to build it against time to trace rays through it.
@@ -167,6 +216,9 @@ pub const Orbit = struct {
         pub const default: Radius = .{ .share = 1 };
     };
 };
+
+/// Where a turntable begins: as the automatic view does of what has no better front.
+pub const orbit_turntable: Orbit = .{ .theta_degrees = 30, .phi_degrees = 70 };
 
 /// A camera of the user's own; what is null follows from a framing of the scene. Numbers are
 /// finite; not both `eye` and `orbit`; `orthographic` without `fov_degrees`.
@@ -264,6 +316,8 @@ pub const Environment = struct {
         default,
         none,
         studio,
+        /// As much from everywhere, for quick looks.
+        white,
         /// An image by its name.
         file: []const u8,
     };
@@ -337,7 +391,21 @@ pub const Load = struct {
     up_axis: ?UpAxis = null,
     /// A file that is about to be replaced: a scene that is read from it is refused.
     output: ?Identity = null,
+    /// Told how far reading has come; null: nobody is.
+    progress: ?*progress.Progress = null,
 };
+
+/// How the work under way is shown.
+pub const ProgressForm = enum { auto, json, none };
+
+/// And where.
+pub const Progress = struct {
+    form: ProgressForm = .auto,
+    /// Of JSON, an open descriptor; null: standard error.
+    file: ?u32 = null,
+};
+/// Descriptors for it.
+pub const progress_file: Range = .{ .min = 1, .max = 1 << 16 };
 
 /// What is seen of a scene, and by what light.
 pub const View = struct {
@@ -364,10 +432,13 @@ pub const View = struct {
     display_referred: bool = true,
     /// Within `point_size`.
     point_size: f32 = point_size.default,
+    /// Null: what light makes of it. Asserts that the integrator is Whitted's.
+    shade: ?Shade = null,
 
     /// Directional lights a sample that stand for the environment.
     pub fn shadowCount(view: *const View) u32 {
         if (view.environment.shadow_count) |count| return count;
+        if (view.shade == .ao) return occlusion_shadow_count;
         return if (view.floor == .shadow) floor_shadow_count else environment_shadow_count.default;
     }
 };
@@ -409,8 +480,57 @@ pub const Lights = struct {
     is_interleaved: bool = true,
 };
 
+/// Which pixels of a picture are rendered: they are the same as in all of it.
+pub const Part = union(enum) {
+    whole,
+    crop: Crop,
+    tile: Tile,
+
+    /// A rectangle: left, upper, right and lower edge.
+    pub const Crop = union(enum) {
+        /// The first of each, and the end behind the last.
+        pixels: [4]u32,
+        /// Of the picture's sides, 0 to 1.
+        shares: [4]f32,
+
+        /// In pixels of a picture of that size; a share's is the nearest, so that crops that touch
+        /// leave none out.
+        pub fn pixelsOf(crop: Crop, width: u32, height: u32) [4]u32 {
+            const shares = switch (crop) {
+                .pixels => |pixels| return pixels,
+                .shares => |shares| shares,
+            };
+            var pixels: [4]u32 = undefined;
+            for (&pixels, shares, [_]u32{ width, height, width, height }) |*pixel, share, length| {
+                pixel.* = @round(@as(f64, share) * @as(f64, @floatFromInt(length)));
+            }
+            return pixels;
+        }
+    };
+
+    /// One of `count` shares of tiles that are spread all over the picture, from 1 on.
+    pub const Tile = struct { number: u32, count: u32 };
+
+    /// `crop 0,0,4,3` or `tile 1/2`.
+    pub fn format(part: Part, writer: *std.Io.Writer) std.Io.Writer.Error!void {
+        switch (part) {
+            .whole => try writer.writeAll("whole"),
+            .crop => |crop| switch (crop) {
+                inline else => |edges| try writer.print("crop {d},{d},{d},{d}", .{
+                    edges[0], edges[1], edges[2], edges[3],
+                }),
+            },
+            .tile => |tile| try writer.print("tile {d}/{d}", .{ tile.number, tile.count }),
+        }
+    }
+};
+
 /// How rays are traced.
 pub const Render = struct {
+    part: Part = .whole,
+    /// It is to be merged with the others: what needs all of the picture is left to that. Of tiles
+    /// always.
+    is_merged: bool = false,
     integrator: Integrator = .whitted,
     lights: Lights = .{},
     /// Index into `variant.compiled`.
@@ -431,14 +551,42 @@ pub const Render = struct {
     layers: std.EnumSet(Layer) = .empty,
 };
 
+/// Frames of a film a second, as a fraction of numbers of 1 or more.
+pub const FrameRate = struct {
+    numerator: u32 = 24,
+    denominator: u32 = 1,
+
+    /// When a frame is seen, in seconds.
+    pub fn timeOf(rate: FrameRate, frame: i32) f32 {
+        const numerator: f64 = @floatFromInt(rate.numerator);
+        const denominator: f64 = @floatFromInt(rate.denominator);
+        return @floatCast(@as(f64, @floatFromInt(frame)) * denominator / numerator);
+    }
+};
+
 /// How a picture is encoded.
 pub const Write = struct {
     format: Format = .png,
+    /// Of a format that holds a film.
+    frame_rate: FrameRate = .{},
+    /// The film has frames already.
+    is_continued: bool = false,
     exposure: Exposure = .default,
     tone_mapping: ToneMapping = .neutral,
     /// Within `jpeg_quality`.
     jpeg_quality: u32 = jpeg_quality.default,
+    /// Within `webp_quality`; null: without loss.
+    webp_quality: ?u32 = null,
+    exr_kind: ExrKind = .half,
+    /// Layers are in files of their own.
+    layers_apart: bool = false,
 };
+
+test FrameRate {
+    const film: FrameRate = .{ .numerator = 24_000, .denominator = 1001 };
+    try std.testing.expectEqual(1.001, film.timeOf(24));
+    try std.testing.expectEqual(-0.5, (FrameRate{}).timeOf(-12));
+}
 
 test Range {
     try std.testing.expect(depth.holds(0) and depth.holds(32) and !depth.holds(33));

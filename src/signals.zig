@@ -1,4 +1,5 @@
-//! Signals that end the program: its temporary files go with it.
+//! Signals that end the program: its temporary files go with it, and so does its line of progress;
+//! one line says what was kept.
 //!
 //! While a picture is awaited that may be written before it is finished, the first INT or TERM asks
 //! for it and no more.
@@ -12,12 +13,63 @@ const raylane = @import("raylane");
 const SIG = std.posix.SIG;
 const Sigaction = std.posix.Sigaction;
 
-/// All that the program has open. This and `stop` are its only global variables that change, for a
-/// signal handler has no argument to find them by.
+/// All that the program has open. This and the other variables here are its only global ones that
+/// change, for a signal handler has no argument to find them by.
 pub var temporary_files: raylane.output.TemporaryFiles = .{};
 
 /// How a signal stops the work rather than the program.
 pub var stop: Stop = .{};
+
+/// Whether a line of progress is on the terminal.
+pub var progress_line: raylane.display.Line = .{};
+
+/// What is said of files when a signal ends the program.
+pub var outcome: Outcome = .{};
+
+/// See `outcome`. Has one writer; a signal may come at any moment.
+pub const Outcome = struct {
+    texts: [2]raylane.diagnostic.Message = @splat(.{}),
+    /// 0: nothing is said; else one more than the index of the text.
+    current: std.atomic.Value(u8) = .init(0),
+
+    /// Chooses what would be said from now on.
+    pub fn set(chosen: *Outcome, comptime format: []const u8, arguments: anytype) void {
+        const other = 1 - chosen.current.load(.monotonic) / 2;
+        chosen.texts[other].set(format, arguments);
+        chosen.current.store(@intCast(other + 1), .release);
+    }
+
+    /// From now on nothing would.
+    pub fn clear(chosen: *Outcome) void {
+        chosen.current.store(0, .release);
+    }
+
+    /// Async-signal-safe.
+    fn say(chosen: *const Outcome, signal: SIG) void {
+        const current = chosen.current.load(.acquire);
+        if (current == 0) return;
+        var line: [raylane.diagnostic.message_bytes_max + 64]u8 = undefined;
+        var length: usize = 0;
+        const text = chosen.texts[current - 1].text();
+        for ([_][]const u8{ "raylane: ", verbOf(signal), ": ", text, "\n" }) |part| {
+            @memcpy(line[length..][0..part.len], part);
+            length += part.len;
+        }
+        _ = std.c.write(std.posix.STDERR_FILENO, &line, length);
+    }
+};
+
+/// What a signal does.
+pub fn verbOf(signal: SIG) []const u8 {
+    return switch (signal) {
+        .INT => "interrupted",
+        .TERM => "terminated",
+        .HUP => "hung up",
+        .QUIT => "quit",
+        .XCPU => "out of CPU time",
+        else => "ended",
+    };
+}
 
 /// See `stop`.
 pub const Stop = struct {
@@ -57,5 +109,7 @@ fn end(signal: SIG) callconv(.c) void {
         return;
     }
     temporary_files.discardAll();
+    progress_line.close(std.posix.STDERR_FILENO);
+    outcome.say(signal);
     std.c._exit(@intCast(128 + @backingInt(signal)));
 }

@@ -8,8 +8,11 @@ const std = @import("std");
 const choices = @import("settings.zig");
 const world_file = @import("world.zig");
 const variant_file = @import("variant.zig");
+const adaptive = @import("trace/integrate/adaptive.zig");
+const interleave = @import("trace/integrate/interleave.zig");
 const tiles = @import("trace/integrate/tiles.zig");
 const Film = @import("film.zig").Film;
+const Surroundings = @import("film.zig").Surroundings;
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Frame = world_file.Frame;
@@ -23,6 +26,10 @@ pub const Whitted = @import("trace/integrate/whitted.zig").Whitted;
 pub const Lights = @import("trace/integrate/instant_radiosity.zig").InstantRadiosity;
 /// Path tracing, by one kernel.
 pub const PathTracer = @import("trace/integrate/path_tracer.zig").PathTracer;
+/// What primary rays see, by one kernel that counts tests.
+pub const Survey = @import("trace/integrate/survey.zig").Survey;
+/// What a survey makes.
+pub const Look = @import("trace/integrate/survey.zig").Look;
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
 pub const kernel = @import("trace/traverse/kernel.zig");
 /// Rays in lanes.
@@ -81,9 +88,18 @@ pub const Standing = tiles.Standing;
 pub const Statistics = tiles.Statistics;
 pub const Error = tiles.Error;
 
+/// What has to be traced around the pixels that are asked for.
+pub fn surroundingsOf(render: *const choices.Render) Surroundings {
+    const is_filtered = render.integrator == .lights and render.lights.is_interleaved;
+    return .{
+        .margin = if (is_filtered) interleave.reach else 0,
+        .step = if (render.noise != null) adaptive.block_side else 1,
+    };
+}
+
 /// Traces the picture with variant `variant_index` of `variant.compiled`. Asserts that the film has
-/// the view's size, the tree the variant's width, and that the variant holds the integrator. The
-/// film may hold an earlier picture.
+/// the layout's size, without one the view's, the tree the variant's width, and that the variant
+/// holds the integrator. The film may hold an earlier picture.
 pub fn trace(
     gpa: Allocator,
     variant_index: usize,
@@ -106,6 +122,42 @@ pub fn traceCounting(
     return run(true, gpa, variant_index, frame, film, &settings);
 }
 
+/// Leaves hits on the film's layer of origins, see `tiles.fillHits`.
+pub fn fillHits(
+    gpa: Allocator,
+    variant_index: usize,
+    frame: *const Frame,
+    film: *Film,
+    settings: Settings,
+) Error!void {
+    return tiles.fillHits(surveyOf(variant_index), gpa, frame, film, &settings);
+}
+
+/// Makes a picture of what `settings.look` names, of colours of the display: not one of hits, and
+/// the film has a layer for those colours.
+pub fn look(
+    gpa: Allocator,
+    variant_index: usize,
+    frame: *const Frame,
+    film: *Film,
+    settings: Settings,
+) Error!Statistics {
+    assert(settings.look != .hits and film.layers.contains(.display));
+    return tiles.render(surveyOf(variant_index), gpa, frame, film, &settings);
+}
+
+fn surveyOf(variant_index: usize) *const Integrator {
+    return (comptime integratorsOf("survey", counting_variants))[variant_index];
+}
+
+/// By variant, those that count its tests.
+const counting_variants: []const Variant = list: {
+    var list: [variant_file.compiled.len]Variant = variant_file.compiled[0..].*;
+    for (&list) |*variant| variant.* = variant_file.countingOf(variant.*);
+    const all = list;
+    break :list &all;
+};
+
 fn run(
     comptime counting: bool,
     gpa: Allocator,
@@ -114,15 +166,16 @@ fn run(
     film: *Film,
     settings: *const Settings,
 ) Error!Statistics {
-    assert(film.image.width == frame.view.width and film.image.height == frame.view.height);
+    const view = frame.view;
+    if (settings.layout) |layout|
+        assert(layout.width == view.width and layout.height == view.height)
+    else
+        assert(film.image.width == view.width and film.image.height == view.height);
     assert(settings.sample_count >= 1 and choices.depth.holds(settings.depth_max));
-    const whitted = comptime integratorsOf(if (counting) "counting" else "whitted", list: {
-        var list: [variant_file.compiled.len]Variant = variant_file.compiled[0..].*;
-        if (counting) for (&list) |*variant| {
-            variant.* = variant_file.countingOf(variant.*);
-        };
-        break :list &list;
-    });
+    const whitted = comptime if (counting)
+        integratorsOf("counting", counting_variants)
+    else
+        integratorsOf("whitted", variant_file.compiled);
     const integrator = switch (settings.integrator) {
         .whitted => whitted[variant_index],
         inline .lights, .path => |which| integrator: {
@@ -162,7 +215,7 @@ test {
     _ = bundle;
     _ = dispatch;
     _ = @import("trace/integrate/environment_lights.zig");
-    _ = @import("trace/integrate/interleave.zig");
+    _ = interleave;
     _ = @import("trace/integrate/light_emission.zig");
     _ = @import("trace/integrate/virtual_lights.zig");
     _ = @import("trace/integrate/camera.zig");
@@ -170,7 +223,7 @@ test {
     _ = @import("trace/integrate/path.zig");
     _ = @import("trace/integrate/path_records.zig");
     _ = tiles;
-    _ = @import("trace/integrate/adaptive.zig");
+    _ = adaptive;
     _ = @import("trace/traverse/beam/budget.zig");
     _ = @import("trace/traverse/beam/tile_depth_buffer.zig");
     _ = @import("trace/traverse/beam/grid.zig");

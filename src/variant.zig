@@ -39,6 +39,9 @@ pub const Variant = struct {
     }
 };
 
+/// Which level of processors this is compiled for, in a program that holds several; else empty.
+pub const level: []const u8 = config.level;
+
 /// Every variant in this binary, the default first.
 pub const compiled: []const Variant = listOf(config.variants);
 

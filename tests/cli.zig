@@ -23,31 +23,35 @@ const Ending = struct {
     stderr: []const u8,
 };
 
+test {
+    _ = @import("json.zig");
+}
+
 /// A fresh folder in which the program runs; everything is freed by `deinit`.
-const Sandbox = struct {
+pub const Sandbox = struct {
     folder: testing.TmpDir,
     arena_state: std.heap.ArenaAllocator,
 
-    fn init() Sandbox {
+    pub fn init() Sandbox {
         return .{
             .folder = testing.tmpDir(.{ .iterate = true }),
             .arena_state = .init(testing.allocator),
         };
     }
 
-    fn deinit(sandbox: *Sandbox) void {
+    pub fn deinit(sandbox: *Sandbox) void {
         sandbox.arena_state.deinit();
         sandbox.folder.cleanup();
         sandbox.* = undefined;
     }
 
     /// Runs the program with `arguments` in the folder. Death by a signal is an error.
-    fn run(sandbox: *Sandbox, arguments: []const []const u8) !Ending {
+    pub fn run(sandbox: *Sandbox, arguments: []const []const u8) !Ending {
         return sandbox.runShell("exec \"$@\"", arguments);
     }
 
     /// Runs a shell script in the folder, whose arguments are the program and its `arguments`.
-    fn runShell(
+    pub fn runShell(
         sandbox: *Sandbox,
         script: []const u8,
         arguments: []const []const u8,
@@ -89,7 +93,7 @@ const Sandbox = struct {
     }
 
     /// Runs the program and expects this exit code; shows stderr where it is another.
-    fn expectExit(sandbox: *Sandbox, exit_code: u8, arguments: []const []const u8) !Ending {
+    pub fn expectExit(sandbox: *Sandbox, exit_code: u8, arguments: []const []const u8) !Ending {
         const ending = try sandbox.run(arguments);
         if (ending.exit_code != exit_code) std.debug.print("{s}", .{ending.stderr});
         try testing.expectEqual(exit_code, ending.exit_code);
@@ -102,7 +106,7 @@ const Sandbox = struct {
     }
 
     /// Expects that the folder holds these files and nothing else.
-    fn expectFiles(sandbox: *Sandbox, expected: []const []const u8) !void {
+    pub fn expectFiles(sandbox: *Sandbox, expected: []const []const u8) !void {
         const found = try sandbox.names();
         for (found) |name| {
             for (expected) |other| {
@@ -126,11 +130,13 @@ const Sandbox = struct {
         return found.items;
     }
 
-    fn write(sandbox: *Sandbox, name: []const u8, bytes: []const u8) !void {
+    /// Writes a file.
+    pub fn write(sandbox: *Sandbox, name: []const u8, bytes: []const u8) !void {
         try sandbox.folder.dir.writeFile(io, .{ .sub_path = name, .data = bytes });
     }
 
-    fn read(sandbox: *Sandbox, name: []const u8) ![]const u8 {
+    /// What a file holds.
+    pub fn read(sandbox: *Sandbox, name: []const u8) ![]const u8 {
         const arena = sandbox.arena_state.allocator();
         return sandbox.folder.dir.readFileAlloc(io, name, arena, .unlimited);
     }
@@ -306,8 +312,9 @@ test "an unknown flag is a usage error" {
 test "mistakes on the command line are usage errors in one line" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
+    const alone = try sandbox.expectExit(2, &.{});
+    try testing.expect(std.mem.startsWith(u8, alone.stderr, "usage: raylane SCENE"));
     for ([_][]const []const u8{
-        &.{},
         &.{"render"},
         &.{ "builtin:cornell", "builtin:cornell" },
         &.{ "builtin:cornell", "-o", "a.tif" },
@@ -411,7 +418,7 @@ test "help is for everybody, fits a screen and keeps its promises" {
     defer sandbox.deinit();
     const help = try sandbox.expectExit(0, &.{"--help"});
     try testing.expectEqualStrings("", help.stderr);
-    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 120);
+    try testing.expect(std.mem.countScalar(u8, help.stdout, '\n') <= 190);
     const again = try sandbox.expectExit(0, &.{ "absent.glb", "--no-such-flag", "-h" });
     try testing.expectEqualStrings(help.stdout, again.stdout);
     // The built-in scenes that the help names are those that there are.
@@ -598,6 +605,95 @@ test "-o - puts the image and nothing else on stdout" {
     try testing.expectEqual(11 + 8 * 8 * 3, ppm.stdout.len);
     try testing.expectEqual(8, (try statsOf(&sandbox, ppm.stderr)).width);
     try sandbox.expectEmpty();
+}
+
+test "of several scenes each is a picture, is there already, or is a line" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const scene = try triangleScene(sandbox.arena_state.allocator());
+    try sandbox.folder.dir.createDirPath(io, "in/more");
+    try sandbox.folder.dir.createDirPath(io, "out");
+    for ([_][2][]const u8{
+        .{ "in/a.glb", scene },   .{ "in/b.gltf", "no" },  .{ "in/c.GLB", scene },
+        .{ "in/d.txt", "notes" }, .{ "out/c.png", "old" },
+    }) |file| try sandbox.write(file[0], file[1]);
+    const ending = try sandbox.expectExit(3, &.{
+        "in", "--skip-existing", "-oout/", "-r4", dark, "--jobs=2", "in/none.ply",
+    });
+    try testing.expectEqualStrings("", ending.stdout);
+    for ([_][]const u8{
+        "raylane: in: warning: not looked into 1 folder in it\n",
+        "raylane: in/b.gltf: ",
+        "raylane: in/none.ply: does not exist\n",
+        "raylane: in/a.glb: out/a.png, 4x3, ",
+        "raylane: 1 picture in ",
+        ", 1 kept, 2 failures\n",
+    }) |part| {
+        errdefer std.debug.print("{s}\n", .{ending.stderr});
+        try testing.expect(std.mem.find(u8, ending.stderr, part) != null);
+    }
+    try testing.expectEqualStrings("old", try sandbox.read("out/c.png"));
+    try testing.expectEqualStrings("\x89PNG", (try sandbox.read("out/a.png"))[0..4]);
+}
+
+/// A triangle that moves along x by one in a second.
+const moving_scene =
+    \\{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+    \\"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"bufferViews":[{"buffer":0,
+    \\"byteLength":68}],"accessors":[{"bufferView":0,"count":3,"componentType":5126,"type":"VEC3",
+    \\"min":[0,0,0],"max":[1,1,0]},{"bufferView":0,"byteOffset":36,"count":2,"min":[0],"max":[1],
+    \\"componentType":5126,"type":"SCALAR"},{"bufferView":0,"byteOffset":44,"count":2,
+    \\"componentType":5126,"type":"VEC3"}],"animations":[{"channels":[{"sampler":0,"target":
+    \\{"node":0,"path":"translation"}}],"samplers":[{"input":1,"output":2}]}],"buffers":[{
+    \\"byteLength":68,"uri":"data:application/octet-stream;base64,
+++ "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAA" ++
+    \\AAA="}]}
+;
+
+test "frames are the pictures of their moments, and a film has them in a row" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("m.gltf", moving_scene);
+    const place = [_][]const u8{ "m.gltf", "-q", "-r4x4", dark, "--eye=0,0,4", "--target=0,0,0" };
+    _ = try sandbox.expectExit(0, &place ++ [_][]const u8{
+        "--frames=0,6", "--fps=12", "-omade/{model}_{frame:2}.ppm",
+    });
+    _ = try sandbox.expectExit(0, &place ++ [_][]const u8{ "--animation-time=0.5", "-oone.ppm" });
+    const later = try sandbox.read("made/m_06.ppm");
+    try testing.expectEqualStrings(try sandbox.read("one.ppm"), later);
+    const first = try sandbox.read("made/m_00.ppm");
+    try testing.expect(!std.mem.eql(u8, first, later));
+    const film = try sandbox.expectExit(0, &.{
+        "m.gltf", "--turntable=2", "--format=y4m", "-o-", "-r4x4", dark,
+    });
+    const header = "YUV4MPEG2 W4 H4 F24:1 Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
+    try testing.expectEqual(header.len + 2 * ("FRAME\n".len + 3 * 16), film.stdout.len);
+    try testing.expect(std.mem.startsWith(u8, film.stdout, header ++ "FRAME\n"));
+}
+
+test "parts merge into the picture's file, wherever the scene lies; without one it stays" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.folder.dir.createDirPath(io, "there");
+    try sandbox.write("s.pbrt", pbrt_scene);
+    try sandbox.write("there/t.pbrt", pbrt_scene);
+    _ = try sandbox.expectExit(0, &.{ "s.pbrt", "-owhole.ppm" });
+    _ = try sandbox.expectExit(0, &.{ "s.pbrt", "--tile=1/2", "-o1.exr" });
+    _ = try sandbox.expectExit(0, &.{
+        "there/t.pbrt", "--tile", "2/2", "-o2.exr", "-t1", "--tile-size=8",
+    });
+    try sandbox.write("merged.ppm", "old");
+    const missing = try sandbox.expectExit(3, &.{ "merge", "1.exr", "-omerged.ppm" });
+    const reason = "raylane: merged.ppm: part 2 of 2 is missing\n";
+    try testing.expectEqualStrings(reason, missing.stderr);
+    try testing.expectEqualStrings("old", try sandbox.read("merged.ppm"));
+    const merged = try sandbox.expectExit(0, &.{ "merge", "2.exr", "1.exr", "-omerged.ppm" });
+    try testing.expectEqualStrings("", merged.stderr);
+    const whole = try sandbox.read("whole.ppm");
+    try testing.expectEqualStrings(whole, try sandbox.read("merged.ppm"));
+    const outside = try sandbox.expectExit(2, &.{ "s.pbrt", "--crop=30,0,31,1" });
+    try testing.expectStringEndsWith(outside.stderr, "in a picture of 30x20\n");
+    try sandbox.expectFiles(&.{ "1.exr", "2.exr", "merged.ppm", "s.pbrt", "there", "whole.ppm" });
 }
 
 test "every format by its name or by --format, JPEG smaller with less quality" {
@@ -1152,6 +1248,11 @@ test "a signal has the picture so far written where that is asked for" {
     } else return error.NotStarted;
     try expectEndedBy(&child, &.{}, .INT);
     const gpa = testing.allocator;
+    const log = try sandbox.folder.dir.readFileAlloc(io, "log", gpa, .unlimited);
+    defer gpa.free(log);
+    const needle = "raylane: interrupted: a.png written with ";
+    try testing.expect(std.mem.find(u8, log, needle) != null);
+    try testing.expectStringEndsWith(log, " of 4096 samples\n");
     const picture = try sandbox.folder.dir.readFileAlloc(io, "a.png", gpa, .unlimited);
     defer gpa.free(picture);
     try testing.expectEqualStrings("IEND", picture[picture.len - 8 ..][0..4]);
@@ -1165,7 +1266,100 @@ test "the limit of CPU time ends a render like a signal" {
         "builtin:cornell", "-r512x512", "--spp=4096",
     });
     try testing.expectEqual(152, ending.exit_code);
+    const said = "raylane: out of CPU time: cornell.png not written\n";
+    try testing.expectEqualStrings(said, ending.stderr);
     try sandbox.expectEmpty();
+}
+
+test "progress for programs is one JSON object a line, and nothing of it is anywhere else" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const ending = try sandbox.runShell("exec \"$@\" 3>log", &.{
+        "builtin:cornell", "-r16x16", "--spp=1", "-oa.png", "-t2", "--stats=none",
+        "--progress-fd=3",
+    });
+    try testing.expectEqual(0, ending.exit_code);
+    try testing.expectEqualStrings("", ending.stderr);
+    try testing.expectEqualStrings("", ending.stdout);
+    const gpa = testing.allocator;
+    const log = try sandbox.folder.dir.readFileAlloc(io, "log", gpa, .unlimited);
+    defer gpa.free(log);
+    const Told = struct { stage: []const u8, file: []const u8, index: u32, elapsed_s: f64 };
+    var lines = std.mem.tokenizeScalar(u8, log, '\n');
+    // Others stand between them where the machine is slow.
+    for ([_][]const u8{
+        "reading", "textures", "tree", "view", "tracing", "writing", "done",
+    }) |stage| {
+        while (lines.next()) |line| {
+            const told = try std.json.parseFromSlice(Told, gpa, line, .{
+                .ignore_unknown_fields = true,
+            });
+            defer told.deinit();
+            try testing.expectEqualStrings("builtin:cornell", told.value.file);
+            try testing.expectEqual(1, told.value.index);
+            if (std.mem.eql(u8, told.value.stage, stage)) break;
+        } else {
+            std.debug.print("{s} is not told of\n", .{stage});
+            return error.NotTold;
+        }
+    }
+    try testing.expectEqual(null, lines.next());
+}
+
+/// Completes words in bash, as it calls the function of a script. 77: there is no bash.
+const complete_script =
+    \\command -v bash >/dev/null || exit 77
+    \\"$@" completion bash >script || exit 1
+    \\exec bash -c '. ./script
+    \\t() { COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _raylane; echo "${COMPREPLY[@]}"; }
+    \\t raylane --tonem
+    \\t raylane a.glb --tonemap = ag
+    \\t raylane --up-axis ""
+    \\t raylane my
+    \\t raylane compa
+    \\t raylane compare --thre
+    \\t raylane completion ""
+    \\t raylane --spp ""
+    \\'
+;
+
+test "bash completes options, their words, files and commands" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("my model.glb", "");
+    const ending = try sandbox.runShell(complete_script, &.{});
+    if (ending.exit_code == 77) return error.SkipZigTest;
+    errdefer std.debug.print("{s}", .{ending.stderr});
+    try testing.expectEqual(0, ending.exit_code);
+    try testing.expectEqualStrings(
+        "--tonemap\nagx\ny z\nmy model.glb\ncompare\n--threshold\nbash zsh fish\n\n",
+        ending.stdout,
+    );
+    try testing.expectEqualStrings("", ending.stderr);
+}
+
+test "scripts for shells and the manual are what their programs read" {
+    var any = false;
+    for ([_]struct { []const u8, []const u8 }{
+        .{ "zsh", "\"$@\" completion zsh >script && zsh -n script" },
+        .{ "fish", "\"$@\" completion fish >script && fish -n script" },
+        .{ "groff", "\"$@\" man >raylane.1 && groff -man -ww -Tutf8 raylane.1 >/dev/null" },
+    }) |case| {
+        var sandbox: Sandbox = .init();
+        defer sandbox.deinit();
+        const reader, const script = case;
+        const arena = sandbox.arena_state.allocator();
+        const known = try arena.print("command -v {s} >/dev/null || exit 77; {s}", .{
+            reader, script,
+        });
+        const ending = try sandbox.runShell(known, &.{});
+        if (ending.exit_code == 77) continue;
+        any = true;
+        errdefer std.debug.print("{s}: {s}", .{ reader, ending.stderr });
+        try testing.expectEqual(0, ending.exit_code);
+        try testing.expectEqualStrings("", ending.stderr);
+    }
+    if (!any) return error.SkipZigTest;
 }
 
 test "signals that are ignored at the start stay so" {
@@ -1370,7 +1564,7 @@ fn benchResultsOf(sandbox: *Sandbox, json: []const u8) !BenchResults {
 }
 
 const small_bench = [_][]const u8{
-    "bench", "-r16x16", "-t2", "--rounds=2", "--time-limit=2", "-q", "builtin:cornell",
+    "bench", "-r16x16", "-t2", "--rounds=2", "--time-limit=600", "-q", "builtin:cornell",
 };
 
 /// The argument that measures one variant alone, whichever the program holds.
@@ -1490,17 +1684,29 @@ test "info: text, JSON, and the line that rendering ends with" {
         "file         builtin:cornell\nformat       built in\n",
     );
     try testing.expectEqualStrings("", text.stderr);
-    const document = "{\"asset\":{\"version\":\"2.0\"},\"extensionsUsed\":[\"A_b\"]}";
+    const document = "{\"asset\":{\"version\":\"2.0\"},\"extensionsUsed\":[\"A_b\"]," ++
+        "\"buffers\":[{\"byteLength\":3,\"uri\":\"b%20c.bin\"}]}";
     try sandbox.write("a.gltf", document);
+    try sandbox.write("b c.bin", "four");
     const json = try sandbox.expectExit(0, &.{ "info", "a.gltf", "--json" });
     const found = try std.json.parseFromSliceLeaky(
-        struct { file: []const u8, bytes: u64, warnings: []const []const u8 },
+        struct {
+            file: []const u8,
+            bytes: u64,
+            files: []const struct { path: []const u8, bytes: u64 },
+            warnings: []const []const u8,
+        },
         sandbox.arena_state.allocator(),
         json.stdout,
         .{ .ignore_unknown_fields = true },
     );
     try testing.expectEqualStrings("a.gltf", found.file);
-    try testing.expectEqual(document.len, found.bytes);
+    try testing.expectEqual(document.len + 4, found.bytes);
+    try testing.expectEqual(2, found.files.len);
+    try testing.expectEqualStrings("a.gltf", found.files[0].path);
+    try testing.expectEqual(document.len, found.files[0].bytes);
+    try testing.expectEqualStrings("b c.bin", found.files[1].path);
+    try testing.expectEqual(4, found.files[1].bytes);
     try testing.expectEqual(2, found.warnings.len);
     try testing.expectStringStartsWith(
         json.stderr,
@@ -1509,7 +1715,7 @@ test "info: text, JSON, and the line that rendering ends with" {
     const absent = try sandbox.expectExit(1, &.{ "info", "b.gltf" });
     try testing.expectEqualStrings("raylane: b.gltf: does not exist\n", absent.stderr);
     _ = try sandbox.expectExit(2, &.{ "info", "a.gltf", "--scene=7" });
-    try sandbox.expectFiles(&.{"a.gltf"});
+    try sandbox.expectFiles(&.{ "a.gltf", "b c.bin" });
 }
 
 test "compare: figures, a map, thresholds, and images that cannot be compared" {

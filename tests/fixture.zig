@@ -157,6 +157,9 @@ pub const Options = struct {
     display_referred: bool = false,
     /// Index into `variant.compiled`.
     variant: usize = 0,
+    /// That pictures of the pose may have.
+    layers: std.EnumSet(raylane.settings.Layer) = .empty,
+    shade: ?raylane.settings.Shade = null,
 };
 
 /// The world of a scene in the given width of tree.
@@ -178,6 +181,8 @@ pub fn view(session: *Session, scene: *const Scene, lanes: u8, options: Options)
         .lanes = lanes,
         .tree_quality = options.tree_quality,
         .sharing = options.sharing,
+        .layers = options.layers,
+        .view = .{ .shade = options.shade },
     });
     try look(session, options);
 }
@@ -192,6 +197,7 @@ pub fn look(session: *Session, options: Options) !void {
         .environment = options.environment,
         .floor = options.floor,
         .display_referred = options.display_referred,
+        .shade = options.shade,
         .background = if (options.see_environment)
             .env
         else if (options.transparent)

@@ -30,6 +30,7 @@ test {
     _ = @import("meshes.zig");
     _ = @import("offset.zig");
     _ = @import("output.zig");
+    _ = @import("parts.zig");
     _ = @import("path.zig");
     _ = @import("pbrt.zig");
     _ = @import("pbrt_forgiven.zig");

@@ -6,13 +6,16 @@
 //! `summary.zig` from counting the others; only a log that cannot be written is an error.
 //!
 //! Options: `--needs=PROGRAM` logs `::missing PROGRAM` where there is none; `--env=NAME=VALUE`;
-//! `--one` makes the command itself the test, passed by exit code 0.
+//! `--one` makes the command itself the test, passed by exit code 0 and skipped by 77.
 
 const std = @import("std");
 const Io = std.Io;
 
 /// A program that says more on one stream is ended.
 const output_bytes_max = 16 << 20;
+
+/// With which Automake's tests, too, say that they lack what they need.
+const skipped_code = 77;
 
 const Options = struct {
     log: []const u8,
@@ -55,6 +58,8 @@ pub fn main(init: std.process.Init) !void {
     if (options.one) {
         if (result.term.success()) {
             try writer.writeAll("\n::pass\n::end\n");
+        } else if (std.meta.eql(result.term, .{ .exited = skipped_code })) {
+            try writer.writeAll("\n::skip\n::end\n");
         } else {
             try writer.print("\n::fail {f}\n::end\n", .{result.term});
         }

@@ -51,6 +51,8 @@ const Settings = struct {
     transparent: bool = false,
     background: raylane.output.Background = .none,
     jpeg_quality: u8 = raylane.settings.jpeg_quality.default,
+    webp_quality: ?u8 = null,
+    exr_kind: raylane.settings.ExrKind = .half,
     thread_count: usize = 1,
 };
 
@@ -84,6 +86,8 @@ fn written(image: *const Image, settings: Settings) ![]u8 {
         .transparent = settings.transparent,
         .background = settings.background,
         .jpeg_quality = settings.jpeg_quality,
+        .webp_quality = settings.webp_quality,
+        .exr_kind = settings.exr_kind,
         .pool = &pool,
     }, &target, &diagnostic);
     return folder.dir.readFileAlloc(io, "a.png", gpa, .unlimited);
@@ -248,6 +252,57 @@ test "OpenEXR holds radiance to its eleven bits, with alpha where there is no ba
     };
 }
 
+test "OpenEXR of floats holds every bit" {
+    var image = try testImage(testing.allocator, 5, 40);
+    defer image.deinit(testing.allocator);
+    image.pixels[0] = .{ 1e30, 0, std.math.floatMin(f32), 0.5 };
+    const file =
+        try written(&image, .{ .format = .exr, .exr_kind = .float, .transparent = true });
+    defer testing.allocator.free(file);
+    var reason: raylane.decode.Reason = .{};
+    var texels = try raylane.decode.decode(testing.allocator, file, &reason);
+    defer texels.deinit(testing.allocator);
+    const floats = std.mem.bytesAsSlice(f32, std.mem.sliceAsBytes(image.pixels));
+    for (texels.data.floats, floats) |found, wanted| try testing.expectEqual(wanted, found);
+}
+
+test "WebP holds the encoded colours, or comes near to them, and alpha in any case" {
+    for (odd_sizes[0..4]) |size| for ([_]?u8{ null, 90 }) |quality| {
+        errdefer std.debug.print("{d}x{d}\n", .{ size[0], size[1] });
+        var image: Image = try .init(testing.allocator, size[0], size[1]);
+        defer image.deinit(testing.allocator);
+        for (image.pixels, 0..) |*pixel, index| {
+            const x: f32 = @floatFromInt(index % size[0]);
+            const alpha: f32 = if (index / 40 % 2 == 0) 1 else 0.5;
+            pixel.* = .{ x / 1000 * alpha, 0.25 * alpha, 0.5 * alpha, alpha };
+        }
+        const file = try written(&image, .{
+            .format = .webp,
+            .webp_quality = quality,
+            .transparent = true,
+        });
+        defer testing.allocator.free(file);
+        var reason: raylane.decode.Reason = .{};
+        var texels = try raylane.decode.decode(testing.allocator, file, &reason);
+        defer texels.deinit(testing.allocator);
+        const has_alpha = image.pixels.len > 40;
+        const channel_count: usize = if (has_alpha) 4 else 3;
+        try testing.expectEqual(channel_count, texels.channel_count);
+        var sum: f64 = 0;
+        for (image.pixels, 0..) |pixel, index| {
+            const codes = texels.data.bytes[index * channel_count ..][0..channel_count];
+            const code_of_alpha: u8 = if (pixel[3] == 1) 255 else 128;
+            if (has_alpha) try testing.expectEqual(code_of_alpha, codes[3]);
+            for (codes[0..3], pixel[0..3]) |code, value| {
+                const expected = srgb.encode(value / pixel[3]);
+                if (quality == null) try testing.expectEqual(expected, code);
+                sum += @abs(@as(f64, @floatFromInt(code)) - @as(f64, @floatFromInt(expected)));
+            }
+        }
+        try testing.expect(sum / @as(f64, @floatFromInt(3 * image.pixels.len)) < 6);
+    };
+}
+
 /// Colours and alpha of integers alone: no random numbers, no rounding.
 fn checkers(gpa: std.mem.Allocator) !Image {
     const image: Image = try .init(gpa, 61, 47);
@@ -267,10 +322,11 @@ test "every format has the same bytes on every machine" {
     var image = try checkers(testing.allocator);
     defer image.deinit(testing.allocator);
     const expected = [_]struct { raylane.settings.Format, u64 }{
-        .{ .png, 0xd9aa232445eb57fd }, .{ .jpg, 0xf6f4e06efab8dc20 },
-        .{ .tga, 0x27a4b70272305b9a }, .{ .bmp, 0xc0a9f1c2ed9ec202 },
-        .{ .hdr, 0x7e1e5a338bf0dcc9 }, .{ .ppm, 0x90c7a2393d5f932d },
-        .{ .pfm, 0x1434cae8ac8e82c3 }, .{ .exr, 0x44df47690cac64bf },
+        .{ .png, 0xd9aa232445eb57fd },  .{ .jpg, 0xf6f4e06efab8dc20 },
+        .{ .tga, 0x27a4b70272305b9a },  .{ .bmp, 0xc0a9f1c2ed9ec202 },
+        .{ .hdr, 0x7e1e5a338bf0dcc9 },  .{ .ppm, 0x90c7a2393d5f932d },
+        .{ .pfm, 0x1434cae8ac8e82c3 },  .{ .exr, 0x44df47690cac64bf },
+        .{ .webp, 0x7fc894f2550bb7fb },
     };
     for (expected) |case| for ([_]usize{ 1, 3 }) |thread_count| {
         const file = try written(&image, .{
@@ -283,6 +339,17 @@ test "every format has the same bytes on every machine" {
         errdefer std.debug.print("{t}: 0x{x}, {d} bytes\n", .{ case[0], hash, file.len });
         try testing.expectEqual(case[1], hash);
     };
+}
+
+test "WebP that loses information has the same bytes on every machine" {
+    var image = try checkers(testing.allocator);
+    defer image.deinit(testing.allocator);
+    const file =
+        try written(&image, .{ .format = .webp, .webp_quality = 60, .transparent = true });
+    defer testing.allocator.free(file);
+    const hash = std.hash.XxHash64.hash(0, file);
+    errdefer std.debug.print("0x{x}, {d} bytes\n", .{ hash, file.len });
+    try testing.expectEqual(0xa4577ee66282d42c, hash);
 }
 
 test "what a format cannot hold is refused" {
@@ -299,6 +366,7 @@ test "what a format cannot hold is refused" {
         .{ .bmp, 30_000, 30_000, "too many for a bmp file; .ppm and .pfm hold them" },
         .{ .hdr, 30_000, 30_000, "too many for a hdr file" },
         .{ .pfm, 65_536, 65_536, null },
+        .{ .webp, 16_384, 1, "a webp file has 16383 pixels" },
     }) |case| {
         var diagnostic: raylane.diagnostic.Diagnostic = .{};
         const result = raylane.output.check(case[0], false, case[1], case[2], &diagnostic);

@@ -6,6 +6,7 @@
 
 const raylane = @import("tests").raylane;
 
+pub const batch = raylane.batch;
 pub const bench = raylane.bench;
 pub const builtin = raylane.builtin;
 pub const cli = raylane.cli;
@@ -22,6 +23,7 @@ pub const licenses = raylane.licenses;
 pub const info = raylane.info;
 pub const math = raylane.math;
 pub const memory_account = raylane.memory_account;
+pub const merge = raylane.merge;
 pub const output = raylane.output;
 pub const parallel = raylane.parallel;
 pub const parse = raylane.parse;

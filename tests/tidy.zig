@@ -17,23 +17,36 @@ const Row = struct { part: []const u8, may_import: []const []const u8 };
 /// file of `src` with the folder of the same name; `module:` begins the name of a module of the
 /// build other than the language's own.
 const directions = [_]Row{
-    .{ .part = "main", .may_import = &.{ "module:raylane", "signals" } },
+    .{ .part = "main", .may_import = &.{ "module:raylane", "signals", "commands" } },
+    .{ .part = "commands", .may_import = &.{ "module:raylane", "signals" } },
     .{ .part = "signals", .may_import = &.{"module:raylane"} },
-    .{ .part = "cli", .may_import = &.{ "module:config", "variant" } },
+    .{ .part = "cli", .may_import = &.{ "module:config", "batch", "variant" } },
+    .{ .part = "batch", .may_import = &.{} },
     .{
         // The one that leads scenes through all stages.
         .part = "session",
         .may_import = &.{
             "builtin", "parse",    "scene",   "prepare", "world",  "trace",
             "film",    "parallel", "variant", "output",  "report", "denoise",
+            "part",    "manifest",
         },
     },
+    .{ .part = "level", .may_import = &.{ "main", "module:raylane" } },
+    .{ .part = "release", .may_import = &.{ "module:config", "module:raylane" } },
+    .{ .part = "processor", .may_import = &.{} },
     .{ .part = "kernel", .may_import = &.{ "module:config", "trace", "variant" } },
-    .{ .part = "bench", .may_import = &.{ "session", "variant", "energy" } },
+    .{ .part = "bench", .may_import = &.{ "display", "session", "variant", "energy" } },
     .{ .part = "compare", .may_import = &.{ "decode", "parse" } },
     .{
         .part = "info",
         .may_import = &.{ "decode", "parse", "prepare", "report", "scene", "world" },
+    },
+    .{ .part = "part", .may_import = &.{ "film", "manifest", "output" } },
+    .{
+        .part = "merge",
+        .may_import = &.{
+            "decode", "denoise", "film", "manifest", "output", "parallel", "parse", "part",
+        },
     },
     .{ .part = "variant", .may_import = &.{"module:config"} },
     .{ .part = "simd", .may_import = &.{"variant"} },
@@ -51,21 +64,26 @@ const directions = [_]Row{
     .{ .part = "denoise", .may_import = &.{ "film", "parallel" } },
     .{ .part = "image", .may_import = &.{} },
     .{ .part = "memory_account", .may_import = &.{} },
-    .{ .part = "output", .may_import = &.{ "image", "memory_account", "parallel" } },
-    .{ .part = "report", .may_import = &.{} },
+    .{ .part = "output", .may_import = &.{ "image", "manifest", "memory_account", "parallel" } },
+    .{ .part = "report", .may_import = &.{"manifest"} },
+    .{ .part = "manifest", .may_import = &.{} },
+    .{ .part = "display", .may_import = &.{"report"} },
     .{ .part = "energy", .may_import = &.{} },
     .{ .part = "decode", .may_import = &.{ "module:config", "memory_account" } },
     .{ .part = "diagnostic", .may_import = &.{} },
     .{ .part = "huge_pages", .may_import = &.{} },
     .{ .part = "identity", .may_import = &.{} },
+    .{ .part = "json_text", .may_import = &.{} },
     .{ .part = "math", .may_import = &.{} },
+    .{ .part = "progress", .may_import = &.{} },
     .{ .part = "settings", .may_import = &.{} },
     .{ .part = "statistics", .may_import = &.{} },
 };
 
 /// Parts that import no other part and that all may import; `raylane` re-exports everything.
 const leaves = [_][]const u8{
-    "diagnostic", "huge_pages", "identity", "math", "settings", "statistics",
+    "diagnostic", "huge_pages", "identity", "json_text",
+    "math",       "progress",   "settings", "statistics",
 };
 
 /// Rooms of a part, and which others of its files each may import besides its own, and does. How a
@@ -88,8 +106,10 @@ const roots = [_][]const u8{
     "bench/rays.zig",
     "bench/structures.zig",
     "src/kernel.zig",
+    "src/level.zig",
     "src/main.zig",
     "src/raylane.zig",
+    "src/release.zig",
     "scenes/make.zig",
     "tests.zig",
     "tests/cli.zig",

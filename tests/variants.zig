@@ -142,11 +142,15 @@ test "colours of the display and what is seen are the same by every variant, and
     try builder.addCamera(.{ 0, 0, 0 }, 0.5);
     var scene = try builder.finish();
     defer scene.deinit();
+    var layers: std.EnumSet(raylane.settings.Layer) = .full;
+    // Of kernels that count.
+    layers.remove(.cost);
     const options: fixture.Options = .{
         .width = 21,
         .height = 14,
         .transparent = true,
         .display_referred = true,
+        .layers = layers,
     };
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
     var first: ?u64 = null;
@@ -155,12 +159,14 @@ test "colours of the display and what is seen are the same by every variant, and
         var session: raylane.session.Session = .init(gpa, std.testing.io, 1, &diagnostic);
         defer session.deinit();
         try fixture.view(&session, &scene, variant.lanes, options);
-        try session.render(.{ .variant = index, .sample_count = 4, .layers = .full });
+        try session.render(.{ .variant = index, .sample_count = 4, .layers = layers });
         const film = &session.film.?;
         try std.testing.expectEqual(first orelse film.hash(), film.hash());
         first = film.hash();
         var hash: u64 = 0;
-        for ([_]raylane.film.Layer{ .albedo, .normal, .depth, .variance }) |layer| {
+        for ([_]raylane.film.Layer{
+            .albedo, .normal, .depth, .variance, .origin, .position, .texcoord,
+        }) |layer| {
             hash = hash *% 31 +% film.imageOf(layer).?.hash();
         }
         try std.testing.expectEqual(features orelse hash, hash);
@@ -185,6 +191,65 @@ test "colours of the display and what is seen are the same by every variant, and
         try std.testing.expectEqual([4]f32{ 0.8, 0.475, 0.2, 1 }, veiled);
         const before_mirror = film.imageOf(.display).?.at(9, 7).*;
         try std.testing.expectEqual([4]f32{ 0.05, 0.1, 0.2, 0.25 }, before_mirror);
+        // What most is seen of is behind it.
+        const places = film.imageOf(.position).?;
+        const numbers = film.imageOf(.origin).?;
+        for ([_][2]u32{ .{ 9, 7 }, .{ 11, 7 } }, [_][2]u32{ .{ 3, 2 }, .{ 17, 2 } }) |at, same| {
+            try std.testing.expectApproxEqAbs(-3, places.at(at[0], at[1])[2], 1e-5);
+            const number: [4]u32 = @bitCast(numbers.at(at[0], at[1]).*);
+            const other: [4]u32 = @bitCast(numbers.at(same[0], same[1]).*);
+            try std.testing.expectEqual(other, number);
+        }
+    }
+}
+
+test "quick looks are the same by every variant, and tests of pixels those of the picture" {
+    var builder: fixture.Builder = try .init();
+    const red = fixture.matte(.{ 0.8, 0, 0 });
+    try builder.addQuad(red, .{ 0, 0, -2 }, .{ 0.5, 0, 0 }, .{ 0, 0.5, 0 });
+    try builder.addCamera(.{ 0, 0, 0 }, 0.5);
+    var scene = try builder.finish();
+    defer scene.deinit();
+    var options: fixture.Options = .{ .width = 18, .height = 17, .shade = .normal };
+    var diagnostic: raylane.diagnostic.Diagnostic = .{};
+    var first: ?u64 = null;
+    for (raylane.variant.compiled, 0..) |variant, index| {
+        var session: raylane.session.Session = .init(gpa, std.testing.io, 1, &diagnostic);
+        defer session.deinit();
+        options.shade = .normal;
+        try fixture.view(&session, &scene, variant.lanes, options);
+        try session.render(.{ .variant = index, .sample_count = 2 });
+        const film = &session.film.?;
+        try std.testing.expectEqual(first orelse film.hash(), film.hash());
+        first = film.hash();
+        const decoded = &raylane.math.srgb.decoded;
+        const facing = [4]f32{ decoded[128], decoded[128], decoded[255], 1 };
+        try std.testing.expectEqual(facing, film.imageOf(.display).?.at(9, 8).*);
+        try std.testing.expectEqual([4]f32{ 0, 0, 0, 0 }, film.image.at(0, 0).*);
+
+        options.shade = .cost;
+        try fixture.look(&session, options);
+        try session.render(.{ .variant = index, .sample_count = 2 });
+        const tests = session.traced.tests.?;
+        var sums: [2]f64 = @splat(0);
+        for (session.film.?.imageOf(.cost).?.pixels) |pixel| {
+            for (&sums, pixel[0..2]) |*sum, value| sum.* += value;
+        }
+        const boxes: f64 = @floatFromInt(tests.box_useful);
+        const triangles: f64 = @floatFromInt(tests.triangle_useful);
+        try std.testing.expect(boxes > 0 and triangles > 0);
+        try std.testing.expectApproxEqRel(boxes, sums[0], 1e-5);
+        try std.testing.expectApproxEqRel(triangles, sums[1], 1e-5);
+        try std.testing.expectEqual([4]f32{ 0, 0, 0, 1 }, session.film.?.image.at(0, 0).*);
+
+        // Nothing hides the light, whatever the colour.
+        if (index > 0) continue;
+        options.shade = .ao;
+        try fixture.look(&session, options);
+        try session.render(.{ .sample_count = 2 });
+        for (session.film.?.image.at(9, 8)[0..3]) |value| {
+            try std.testing.expectApproxEqRel(1, value, 2e-2);
+        }
     }
 }
 

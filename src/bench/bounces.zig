@@ -15,7 +15,7 @@ const assert = std.debug.assert;
 
 /// Rounds when nothing is said.
 const round_count_default = 5;
-/// Rounds whatever the time: fewer have no interval.
+/// Rounds beyond the scene's share of the time, if there is any left: fewer have no interval.
 const round_count_min = 2;
 
 /// What to measure, and for how long.
@@ -26,8 +26,12 @@ pub const Plan = struct {
     depth_max: u32,
     /// Null: some, as far as the time goes.
     round_count: ?usize,
-    /// By the subject's clock.
+    /// End of the scene's share of the time, by the subject's clock.
     deadline_ns: u64,
+    /// What nothing is begun for that would end later.
+    end_ns: u64 = std.math.maxInt(u64),
+    /// What a frame of all bounces takes, by the slowest variant.
+    frame_ns: u64 = 0,
     /// What the machine takes at rest, in watts.
     idle_w: f64,
 };
@@ -36,7 +40,8 @@ pub const Plan = struct {
 ///
 ///     fn setDepth(*Subject, depth: u32) void
 ///
-/// In `arena`. `ImagesDiffer`: the diagnostic names the variant.
+/// In `arena`; nothing where there is no time for a round. `ImagesDiffer`: the diagnostic names the
+/// variant.
 pub fn measure(
     arena: Allocator,
     subject: anytype,
@@ -50,10 +55,18 @@ pub fn measure(
     while (round < (plan.round_count orelse round_count_default)) : (round += 1) {
         const start_ns = subject.now();
         for (plan.variants, 0..) |variant, index| {
-            _ = try subject.prepare(variant);
+            _ = subject.prepare(variant) catch |err| return switch (err) {
+                error.Canceled => listOf(arena, subject, &plan, cells, round),
+                else => |other| other,
+            };
             for (cells[index * depth_count ..][0..depth_count], 0..) |*cell, depth| {
+                if (subject.now() +| plan.frame_ns +| subject.windowNs() > plan.end_ns)
+                    return listOf(arena, subject, &plan, cells, round);
                 subject.setDepth(@intCast(depth));
-                try cell.repeat(arena, subject, variant, &plan);
+                cell.repeat(arena, subject, variant, &plan) catch |err| return switch (err) {
+                    error.Canceled => listOf(arena, subject, &plan, cells, round),
+                    else => |other| other,
+                };
                 subject.step();
                 if (cell.hash == cells[depth].hash) continue;
                 return diagnostic.fail(
@@ -65,8 +78,27 @@ pub fn measure(
         }
         const end_ns = subject.now();
         const is_over = end_ns + (end_ns - start_ns) > plan.deadline_ns;
-        if (is_over and round + 1 >= round_count_min) break;
+        if (is_over and round + 1 >= round_count_min) return listOf(
+            arena,
+            subject,
+            &plan,
+            cells,
+            round + 1,
+        );
     }
+    return listOf(arena, subject, &plan, cells, round);
+}
+
+/// What so many whole rounds have found.
+fn listOf(
+    arena: Allocator,
+    subject: anytype,
+    plan: *const Plan,
+    cells: []const Cell,
+    round_count: usize,
+) error{OutOfMemory}![]const results.Bounce {
+    if (round_count == 0) return &.{};
+    const depth_count = plan.depth_max + 1;
     const list = try arena.alloc(results.Bounce, cells.len);
     for (list, cells, 0..) |*to, *cell, index| {
         const depth = index % depth_count;
@@ -77,8 +109,9 @@ pub fn measure(
             .closest = cell.rays.primary + cell.rays.secondary -| before.primary -|
                 before.secondary,
             .shadow = cell.rays.shadow -| before.shadow,
-            .frame_ms = cell.frame_ms.items,
-            .frame_j = cell.frame_j.items,
+            .frame_ms = cell.frame_ms.items[0..round_count],
+            // A source may have been lost half way.
+            .frame_j = cell.frame_j.items[0..@min(round_count, cell.frame_j.items.len)],
         };
     }
     return list;
@@ -133,13 +166,13 @@ const Fake = struct {
     last: usize = 0,
     differs: bool = false,
 
-    pub fn prepare(_: *Fake, _: usize) error{}!void {}
+    pub fn prepare(_: *Fake, _: usize) error{ OutOfMemory, Canceled }!void {}
 
     pub fn setDepth(fake: *Fake, depth: u32) void {
         fake.depth = depth;
     }
 
-    pub fn trace(fake: *Fake, variant: usize, _: usize) error{}!rounds.Traced {
+    pub fn trace(fake: *Fake, variant: usize, _: usize) error{Canceled}!rounds.Traced {
         fake.last = variant;
         const trace_ns = (10 + 4 * fake.depth * (1 + variant)) * std.time.ns_per_ms;
         fake.now_ns += trace_ns;
@@ -208,6 +241,17 @@ test "rays, time and energy by bounce, within the time" {
     try testing.expectEqual(40, last.shadow);
     try testing.expectApproxEqAbs(26, last.frame_ms[0], 1e-9);
     try testing.expectApproxEqAbs(0.026 * (5 - 2), last.frame_j[0], 1e-9);
+
+    var late = planForTest(std.time.ns_per_s);
+    late.frame_ns = 26 * std.time.ns_per_ms;
+    late.end_ns = fake.now_ns;
+    try testing.expectEqual(0, (try measure(arena.allocator(), &fake, late, &diagnostic)).len);
+    // A round takes 96 ms; the third would end too late.
+    late.end_ns = fake.now_ns + 270 * std.time.ns_per_ms;
+    const two = try measure(arena.allocator(), &fake, late, &diagnostic);
+    try testing.expectEqual(2, two[0].frame_ms.len);
+    try testing.expectEqual(2, two[5].frame_ms.len);
+    try testing.expect(fake.now_ns <= late.end_ns);
 
     const hasty = try measure(arena.allocator(), &fake, planForTest(0), &diagnostic);
     try testing.expectEqual(round_count_min, hasty[0].frame_ms.len);

@@ -19,8 +19,10 @@ const assert = std.debug.assert;
 pub const precision = 0.02;
 /// Rounds before an interval may be called narrow: two samples that agree may do so by chance.
 const narrow_round_count_min = 5;
-/// Rounds whatever the time: fewer have no interval.
+/// Rounds beyond the scene's share of the time, if there is any left: fewer have no interval.
 const round_count_min = 2;
+/// What a piece of work may take over the longest before it, for all that is known.
+const margin = 1.25;
 
 /// When to stop.
 pub const Plan = struct {
@@ -29,8 +31,10 @@ pub const Plan = struct {
     thread_count: usize,
     /// Exactly so many; null: until intervals are narrow.
     round_count: ?usize,
-    /// By the subject's clock.
+    /// End of the scene's share of the time, by the subject's clock.
     deadline_ns: u64,
+    /// What nothing is begun for that would end later.
+    end_ns: u64 = std.math.maxInt(u64),
     /// What the machine takes at rest, in watts.
     idle_w: f64 = 0,
 };
@@ -55,6 +59,15 @@ const Series = struct {
     trace_gross_j: Column = .empty,
     trace_s: Column = .empty,
     tests: statistics.TestCounts = .{},
+
+    /// Forgets what is of a round that was not finished.
+    fn shrink(series: *Series, round_count: usize) void {
+        inline for (comptime std.meta.fieldNames(Series)) |name| {
+            const column = &@field(series, name);
+            if (@TypeOf(column.*) != Column) continue;
+            column.shrinkRetainingCapacity(@min(round_count, column.items.len));
+        }
+    }
 
     fn result(series: *const Series, name: []const u8) results.Variant {
         return .{
@@ -134,7 +147,8 @@ pub fn Rounds(comptime Subject: type) type {
         round_count: usize = 0,
         end: results.End = .rounds,
 
-        /// Runs all rounds of a scene. `ImagesDiffer`: the diagnostic names the variant.
+        /// Runs all rounds of a scene; none where there is no time for one. `ImagesDiffer`: the
+        /// diagnostic names the variant.
         pub fn measure(
             arena: Allocator,
             subject: *Subject,
@@ -151,13 +165,20 @@ pub fn Rounds(comptime Subject: type) type {
                 .diagnostic = diagnostic,
                 .series = series,
             };
-            try rounds.warmUp();
-            var is_done = false;
-            while (!is_done) {
+            var last_round_ns = try rounds.warmUp() orelse {
+                rounds.end = .time;
+                return rounds;
+            };
+            while (!rounds.isDone(last_round_ns)) {
                 const start_ns = subject.now();
-                for (plan.variants, series) |variant, *one| try rounds.repeat(variant, one);
+                rounds.repeatAll() catch |err| {
+                    if (err != error.Canceled) return err;
+                    for (series) |*one| one.shrink(rounds.round_count);
+                    rounds.end = .time;
+                    return rounds;
+                };
                 rounds.round_count += 1;
-                is_done = rounds.isDone(subject.now() - start_ns);
+                last_round_ns = subject.now() - start_ns;
             }
             return rounds;
         }
@@ -171,17 +192,40 @@ pub fn Rounds(comptime Subject: type) type {
             return list;
         }
 
-        fn warmUp(rounds: *Self) !void {
+        /// What a round takes, about, in nanoseconds; null: there is no time for one.
+        fn warmUp(rounds: *Self) !?u64 {
             const subject = rounds.subject;
+            const energy_ns = if (subject.mark() == null) 0 else 2 * subject.windowNs();
+            var longest_ns: u64 = 0;
+            var round_ns: u64 = 0;
             for (rounds.plan.variants, rounds.series) |variant, *one| {
-                _ = try subject.prepare(variant);
-                const traced = try subject.trace(variant, rounds.plan.thread_count);
-                try rounds.check(variant, rounds.plan.thread_count);
-                rounds.rays = traced.rays;
-                one.tests = try subject.count(variant);
-                try rounds.check(variant, rounds.plan.thread_count);
+                if (!rounds.hasTime(longest_ns)) return null;
+                const start_ns = subject.now();
+                rounds.warmUpOne(variant, one) catch |err|
+                    return if (err == error.Canceled) null else err;
                 subject.step();
+                const taken_ns = subject.now() - start_ns;
+                longest_ns = @max(longest_ns, taken_ns);
+                round_ns += taken_ns + energy_ns;
             }
+            return round_ns;
+        }
+
+        fn warmUpOne(rounds: *Self, variant: usize, one: *Series) !void {
+            const subject = rounds.subject;
+            _ = try subject.prepare(variant);
+            const traced = try subject.trace(variant, rounds.plan.thread_count);
+            try rounds.check(variant, rounds.plan.thread_count);
+            rounds.rays = traced.rays;
+            one.tests = try subject.count(variant);
+            try rounds.check(variant, rounds.plan.thread_count);
+        }
+
+        /// Whether what takes about so long ends in time.
+        fn hasTime(rounds: *const Self, expected_ns: u64) bool {
+            const expected: f64 = @floatFromInt(expected_ns);
+            const with_margin: u64 = @trunc(margin * expected);
+            return rounds.subject.now() +| with_margin <= rounds.plan.end_ns;
         }
 
         fn check(rounds: *Self, variant: usize, thread_count: usize) error{ImagesDiffer}!void {
@@ -200,6 +244,11 @@ pub fn Rounds(comptime Subject: type) type {
                     expected,
                 },
             );
+        }
+
+        fn repeatAll(rounds: *Self) !void {
+            for (rounds.plan.variants, rounds.series) |variant, *one|
+                try rounds.repeat(variant, one);
         }
 
         /// One sample of one variant: a frame, or as many as the energy's window takes.
@@ -255,31 +304,26 @@ pub fn Rounds(comptime Subject: type) type {
         }
 
         fn isDone(rounds: *Self, last_round_ns: u64) bool {
-            if (rounds.round_count < round_count_min) return false;
-            if (rounds.plan.round_count) |count| {
-                rounds.end = .rounds;
-                if (rounds.round_count >= count) return true;
-            } else if (rounds.isNarrow()) {
-                rounds.end = .precision;
-                return true;
+            const has_interval = rounds.round_count >= round_count_min;
+            if (has_interval) {
+                if (rounds.plan.round_count) |count| {
+                    rounds.end = .rounds;
+                    if (rounds.round_count >= count) return true;
+                } else if (isNarrow(rounds.series)) {
+                    rounds.end = .precision;
+                    return true;
+                }
+                if (rounds.round_count == student.round_count_max) return true;
             }
-            if (rounds.round_count == student.round_count_max) return true;
-            if (rounds.subject.now() + last_round_ns <= rounds.plan.deadline_ns) return false;
+            const is_late = rounds.subject.now() + last_round_ns > rounds.plan.deadline_ns;
+            if (rounds.hasTime(last_round_ns) and !(has_interval and is_late)) return false;
             rounds.end = .time;
             return true;
         }
 
-        fn isNarrow(rounds: *const Self) bool {
-            if (rounds.round_count < narrow_round_count_min) return false;
-            for (rounds.series) |*one| {
-                if (student.estimate(one.trace_ms.items).relative() > precision) return false;
-            }
-            return true;
-        }
-
         /// Traces by each number of threads in turn, until the deadline: `lists` gets, for each
-        /// variant and each number of threads, the render times in milliseconds. The images are
-        /// checked against the one of `measure`.
+        /// variant and each number of threads, the render times in milliseconds, of whole rounds.
+        /// The images are checked against the one of `measure`.
         pub fn scale(
             rounds: *Self,
             scaled_variants: []const usize,
@@ -292,16 +336,12 @@ pub fn Rounds(comptime Subject: type) type {
             var round: usize = 0;
             while (round < student.round_count_max) : (round += 1) {
                 const start_ns = subject.now();
-                for (scaled_variants, 0..) |variant, variant_index| {
-                    _ = try subject.prepare(variant);
-                    for (thread_counts, 0..) |thread_count, count_index| {
-                        const traced = try subject.trace(variant, thread_count);
-                        try rounds.check(variant, thread_count);
-                        subject.step();
-                        const list = &lists[variant_index * thread_counts.len + count_index];
-                        try list.append(rounds.arena, milliseconds(traced.trace_ns, 1));
-                    }
-                }
+                rounds.scaleOnce(scaled_variants, thread_counts, lists) catch |err| {
+                    if (err != error.Canceled) return err;
+                    for (lists) |*list|
+                        list.shrinkRetainingCapacity(@min(round, list.items.len));
+                    return;
+                };
                 if (round + 1 < round_count_min) continue;
                 if (rounds.plan.round_count) |count| if (round + 1 >= count) return;
                 const end_ns = subject.now();
@@ -310,13 +350,67 @@ pub fn Rounds(comptime Subject: type) type {
             }
         }
 
-        fn areNarrow(lists: []const Column) bool {
-            for (lists) |list| {
-                if (student.estimate(list.items).relative() > precision) return false;
+        /// `Canceled`: there is no time for all of it.
+        fn scaleOnce(
+            rounds: *Self,
+            scaled_variants: []const usize,
+            thread_counts: []const usize,
+            lists: []Column,
+        ) !void {
+            const subject = rounds.subject;
+            for (scaled_variants, 0..) |variant, variant_index| {
+                _ = try subject.prepare(variant);
+                for (thread_counts, 0..) |thread_count, count_index| {
+                    if (!rounds.hasTime(expectedNs(
+                        &rounds.plan,
+                        rounds.series,
+                        variant,
+                        thread_count,
+                    )))
+                        return error.Canceled;
+                    const traced = try subject.trace(variant, thread_count);
+                    try rounds.check(variant, thread_count);
+                    subject.step();
+                    const list = &lists[variant_index * thread_counts.len + count_index];
+                    try list.append(rounds.arena, milliseconds(traced.trace_ns, 1));
+                }
             }
-            return true;
         }
     };
+}
+
+/// What a frame may take by fewer threads than it was measured with.
+fn expectedNs(
+    plan: *const Plan,
+    series: []const Series,
+    variant: usize,
+    thread_count: usize,
+) u64 {
+    for (plan.variants, series) |other, *one| {
+        if (other != variant) continue;
+        const slower = @as(f64, @floatFromInt(plan.thread_count)) /
+            @as(f64, @floatFromInt(thread_count));
+        const time_ms = student.estimate(one.trace_ms.items).mean;
+        return @trunc(time_ms * 1e6 * @max(1, slower));
+    }
+    return 0;
+}
+
+fn areNarrow(lists: []const Column) bool {
+    for (lists) |list| {
+        if (student.estimate(list.items).relative() > precision) return false;
+    }
+    return true;
+}
+
+/// Whether all render times have narrow intervals, by enough samples.
+fn isNarrow(series: []const Series) bool {
+    for (series) |*one| {
+        const samples = one.trace_ms.items;
+        if (samples.len < narrow_round_count_min) return false;
+        if (student.estimate(samples).relative() > precision) return false;
+    }
+    return true;
 }
 
 fn milliseconds(time_ns: u64, count: usize) f64 {
@@ -344,6 +438,8 @@ const Fake = struct {
     energy_j: f64 = 0,
     window_ms: u64 = 0,
     meter_is_there: bool = false,
+    /// When it is cancelled.
+    end_ns: u64 = std.math.maxInt(u64),
 
     fn spend(fake: *Fake, time_ms: f64, power_w: f64) u64 {
         const time_ns: u64 = @trunc(time_ms * 1e6);
@@ -352,20 +448,27 @@ const Fake = struct {
         return time_ns;
     }
 
-    pub fn prepare(fake: *Fake, variant: usize) error{OutOfMemory}!Prepared {
+    pub fn prepare(fake: *Fake, variant: usize) error{ OutOfMemory, Canceled }!Prepared {
         fake.last_variant = variant;
         _ = fake.spend(6, fake.idle_w + 3);
+        if (fake.now_ns > fake.end_ns) return error.Canceled;
         return .{ .parse_ns = 1_000_000, .prepare_ns = 2_000_000, .bvh_build_ns = 3_000_000 };
     }
 
-    pub fn trace(fake: *Fake, variant: usize, thread_count: usize) error{OutOfMemory}!Traced {
+    pub fn trace(
+        fake: *Fake,
+        variant: usize,
+        thread_count: usize,
+    ) error{ OutOfMemory, Canceled }!Traced {
         try fake.order.append(testing.allocator, @intCast(variant));
         fake.frame_count += 1;
         const noise = fake.noise * (2 * fake.random.random().float(f64) - 1);
         const time_ms = fake.trace_ms[variant] * (1 + noise) /
             @as(f64, @floatFromInt(thread_count));
+        const trace_ns = fake.spend(time_ms, fake.idle_w + fake.trace_w);
+        if (fake.now_ns > fake.end_ns) return error.Canceled;
         return .{
-            .trace_ns = fake.spend(time_ms, fake.idle_w + fake.trace_w),
+            .trace_ns = trace_ns,
             .rays = .{ .primary = 7 },
         };
     }
@@ -451,11 +554,62 @@ test "narrow intervals end the rounds, wide ones the time" {
         try testing.expect(fake.now_ns <= 2_000_000_000);
         if (case[1] == .precision) try testing.expectEqual(5, rounds.round_count);
     }
-    // Two rounds at least, however late it is.
+    // Two rounds at least, beyond the scene's share of the time.
     var fake: Fake = .{ .trace_ms = &.{ 30, 10, 20 } };
     defer fake.order.deinit(testing.allocator);
     const rounds = try FakeRounds.measure(arena.allocator(), &fake, planFor(null, 0), &diagnostic);
     try testing.expectEqual(2, rounds.round_count);
+}
+
+test "what would end too late is not begun" {
+    var arena: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer arena.deinit();
+    var diagnostic: Diagnostic = .{};
+    // Variants take 36, 16 and 26 ms, and so does the round that does not count.
+    const Case = struct { end_ms: u64, round_count: usize, scaled_count: usize };
+    for ([_]Case{
+        .{ .end_ms = 20, .round_count = 0, .scaled_count = 0 },
+        .{ .end_ms = 150, .round_count = 0, .scaled_count = 0 },
+        .{ .end_ms = 180, .round_count = 1, .scaled_count = 0 },
+        .{ .end_ms = 260, .round_count = 2, .scaled_count = 0 },
+        .{ .end_ms = 500, .round_count = 5, .scaled_count = 0 },
+        .{ .end_ms = 640, .round_count = 5, .scaled_count = 2 },
+    }) |case| {
+        var fake: Fake = .{ .trace_ms = &.{ 30, 10, 20 } };
+        defer fake.order.deinit(testing.allocator);
+        var plan = planFor(null, 1 << 20);
+        plan.end_ns = case.end_ms * 1_000_000;
+        var rounds = try FakeRounds.measure(arena.allocator(), &fake, plan, &diagnostic);
+        try testing.expectEqual(case.round_count, rounds.round_count);
+        try testing.expectEqual(case.round_count < 5, rounds.end == .time);
+        if (case.round_count > 0) {
+            var lists: [2]Column = @splat(.empty);
+            try rounds.scale(&.{0}, &.{ 1, 2 }, plan.end_ns, &lists);
+            for (lists) |list| try testing.expectEqual(case.scaled_count, list.items.len);
+        }
+        // But for the very first frame, which nothing is known of.
+        try testing.expect(fake.now_ns <= @max(36_000_000, plan.end_ns));
+    }
+}
+
+test "a round that is cancelled does not count" {
+    var arena: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer arena.deinit();
+    var diagnostic: Diagnostic = .{};
+    for ([_]u64{ 20, 60, 140, 200, 300 }, [_]usize{ 0, 0, 0, 1, 2 }) |end_ms, round_count| {
+        var fake: Fake = .{ .trace_ms = &.{ 30, 10, 20 }, .end_ns = end_ms * 1_000_000 };
+        defer fake.order.deinit(testing.allocator);
+        const plan = planFor(9, 1 << 20);
+        var rounds = try FakeRounds.measure(arena.allocator(), &fake, plan, &diagnostic);
+        try testing.expectEqual(round_count, rounds.round_count);
+        try testing.expectEqual(.time, rounds.end);
+        for (try rounds.variants()) |*variant|
+            try testing.expectEqual(round_count, variant.trace_ms.len);
+        if (round_count == 0) continue;
+        var lists: [1]Column = @splat(.empty);
+        try rounds.scale(&.{0}, &.{1}, 1 << 60, &lists);
+        try testing.expectEqual(0, lists[0].items.len);
+    }
 }
 
 test "another image is an error that names its variant, early or late" {

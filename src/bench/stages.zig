@@ -10,6 +10,7 @@ const settings_file = @import("../settings.zig");
 const statistics = @import("../statistics.zig");
 const variant_file = @import("../variant.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
+const Progress = @import("../progress.zig").Progress;
 const Session = @import("../session.zig").Session;
 const Allocator = std.mem.Allocator;
 const Io = std.Io;
@@ -29,7 +30,8 @@ pub const Stages = struct {
     session: Session,
     settings: Settings,
     meter: ?*energy.Meter,
-    progress: std.Progress.Node,
+    /// Told of every rendering.
+    progress: ?*Progress,
     /// By variant; tests depend on traversal and lanes alone.
     counts: [variant_file.compiled.len]?statistics.TestCounts = @splat(null),
 
@@ -43,7 +45,7 @@ pub const Stages = struct {
         thread_count: usize,
         diagnostic: *Diagnostic,
         meter: ?*energy.Meter,
-        progress: std.Progress.Node,
+        progress: ?*Progress,
     ) Stages {
         return .{
             .session = .init(gpa, io, thread_count, diagnostic),
@@ -147,6 +149,6 @@ pub const Stages = struct {
     }
 
     pub fn step(stages: *const Stages) void {
-        stages.progress.completeOne();
+        Progress.add(stages.progress, 1);
     }
 };

@@ -13,26 +13,58 @@ const Range = @import("../settings.zig").Range;
 pub const Option = struct {
     /// `-f, --flag VALUE`, perhaps without a letter or a value.
     usage: []const u8,
+    /// Words that its value may be, for shells to offer: all, or those that are not names.
+    words: []const []const u8 = &.{},
     /// What it does: lines of the help's right column.
     help: []const u8,
+    /// Names that other programs have for it, with their dashes: understood.
+    also: []const []const u8 = &.{},
+    /// Names of options of theirs that take something else: the answer is this one.
+    meant: []const []const u8 = &.{},
 };
 
 /// What the usage of an option says.
-const Flag = struct {
+pub const Flag = struct {
     /// With its dashes.
     long: []const u8,
     /// 0: none.
     short: u8,
     takes_value: bool,
+    /// What the help calls its value; empty: it takes none.
+    value: []const u8,
+    also: []const []const u8,
+    meant: []const []const u8,
 
-    fn of(comptime usage: []const u8) Flag {
+    /// Of an option.
+    pub fn of(comptime option: Option) Flag {
+        const usage = option.usage;
         const has_short = usage[1] != '-';
         var words = std.mem.tokenizeScalar(u8, usage[if (has_short) 4 else 0..], ' ');
+        const name = words.next().?;
+        const value = words.next() orelse "";
         return .{
-            .long = words.next().?,
+            .long = name,
             .short = if (has_short) usage[1] else 0,
-            .takes_value = words.next() != null,
+            .takes_value = value.len > 0,
+            .value = value,
+            .also = option.also,
+            .meant = option.meant,
         };
+    }
+
+    /// Whether that is one of its names, but for the dashes in front.
+    pub fn isNamed(flag: *const Flag, name: []const u8) bool {
+        return std.mem.eql(u8, flag.long[2..], name) or holds(flag.also, name);
+    }
+
+    /// Whether it is the answer to that name.
+    pub fn isMeant(flag: *const Flag, name: []const u8) bool {
+        return holds(flag.meant, name);
+    }
+
+    fn holds(names: []const []const u8, name: []const u8) bool {
+        for (names) |other| if (std.mem.eql(u8, other[2..], name)) return true;
+        return false;
     }
 };
 
@@ -62,6 +94,11 @@ pub fn helpOf(comptime sections: []const Section) []const u8 {
         }
         return text;
     }
+}
+
+/// The names of an enumeration, for an option's `words`.
+pub fn wordsOf(comptime Enum: type) []const []const u8 {
+    return comptime std.meta.fieldNames(Enum);
 }
 
 /// `png, ppm or pfm`: the names of an enumeration, for messages.
@@ -94,7 +131,7 @@ pub fn Arguments(comptime sections: []const Section) type {
             @setEvalBranchQuota(1 << 16);
             var all: []const Flag = &.{};
             for (sections) |section| {
-                for (section.options) |option| all = all ++ .{Flag.of(option.usage)};
+                for (section.options) |option| all = all ++ .{Flag.of(option)};
             }
             break :flags all;
         };
@@ -208,11 +245,13 @@ pub fn Arguments(comptime sections: []const Section) type {
             const name = argument[0 .. equals orelse argument.len];
             const value = if (equals) |at| argument[at + 1 ..] else null;
             for (flags, 0..) |flag, index| {
-                if (!std.mem.eql(u8, flag.long, name)) continue;
+                if (!flag.isNamed(name[2..])) continue;
                 if (!flag.takes_value and value != null)
                     return reader.fail("option '{s}' takes no value", .{name});
                 return reader.give(index, value, name);
             }
+            for (flags) |flag| if (flag.isMeant(name[2..]))
+                return reader.fail("option {f} is '{s}' here", .{ quote(name), flag.long });
             var names: [flags.len][]const u8 = undefined;
             for (&names, flags) |*candidate, flag| candidate.* = flag.long;
             if (nearest(name, &names)) |candidate| {

@@ -50,7 +50,8 @@ pub const Bench = struct {
     }
 };
 
-const sections: []const Section = &.{
+/// What it understands.
+pub const sections: []const Section = &.{
     .{ .title = "Settings: those of the thesis unless changed", .options = &.{
         .{
             .usage = "-r, --resolution WxH",
@@ -71,9 +72,14 @@ const sections: []const Section = &.{
             }),
         },
         .{ .usage = "-t, --threads N", .help = "threads (default: as many as CPUs)" },
-        .{ .usage = "--bvh QUALITY", .help = arguments_file.namesOf(settings.TreeQuality) },
+        .{
+            .usage = "--bvh QUALITY",
+            .words = arguments_file.wordsOf(settings.TreeQuality),
+            .help = arguments_file.namesOf(settings.TreeQuality),
+        },
         .{
             .usage = "--integrator NAME",
+            .words = arguments_file.wordsOf(settings.Integrator),
             .help = arguments_file.namesOf(settings.Integrator) ++ ", and what each\n" ++
                 "bounce costs; with all the light of a scene, not that\n" ++
                 "of its lamps alone (default: whitted, without these)",

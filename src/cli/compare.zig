@@ -24,7 +24,8 @@ pub const Compare = struct {
     thresholds: std.EnumArray(Metric, ?f32) = .initFill(null),
 };
 
-const sections: []const Section = &.{
+/// What it understands.
+pub const sections: []const Section = &.{
     .{ .title = "Options", .options = &.{
         .{
             .usage = "--threshold METRIC=X",
@@ -40,7 +41,11 @@ const sections: []const Section = &.{
             .usage = "--exposure EV",
             .help = "brighten images of radiance by EV stops (default: 0)",
         },
-        .{ .usage = "--stats FORM", .help = "text (default), json or none" },
+        .{
+            .usage = "--stats FORM",
+            .words = arguments_file.wordsOf(cli.Stats),
+            .help = "text (default), json or none",
+        },
         .{ .usage = "-h, --help", .help = "print this" },
     } },
 };

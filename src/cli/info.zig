@@ -16,7 +16,8 @@ pub const Info = struct {
     quiet: bool = false,
 };
 
-const sections: []const Section = &.{
+/// What it understands.
+pub const sections: []const Section = &.{
     .{ .title = "Options", .options = &.{
         .{ .usage = "--json", .help = "one JSON object in one line, see docs/info.md" },
         .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
@@ -24,9 +25,14 @@ const sections: []const Section = &.{
             .usage = "--material-variant N",
             .help = "name or index of one of its variants of materials",
         },
-        .{ .usage = "--up-axis AXIS", .help = "y or z: which axis of the file points up" },
+        .{
+            .usage = "--up-axis AXIS",
+            .words = arguments_file.wordsOf(settings.UpAxis),
+            .help = "y or z: which axis of the file points up",
+        },
         .{
             .usage = "--format-in FORMAT",
+            .words = arguments_file.wordsOf(settings.SceneFormat),
             .help = arguments_file.namesOf(settings.SceneFormat) ++ ", whatever it holds",
         },
         .{

@@ -11,7 +11,8 @@ pub fn nearest(name: []const u8, candidates: []const []const u8) ?[]const u8 {
     var best_distance: usize = misspelling_distance_max + 1;
     for (candidates) |candidate| {
         const distance = editDistance(name, candidate) orelse continue;
-        if (distance >= best_distance) continue;
+        // Where all of it would change, it is another name.
+        if (distance >= best_distance or distance >= name.len) continue;
         best_distance = distance;
         best = candidate;
     }
@@ -36,6 +37,12 @@ fn editDistance(a: []const u8, b: []const u8) ?usize {
         }
     }
     return row[b.len];
+}
+
+test nearest {
+    try std.testing.expectEqualStrings("man", nearest("mna", &.{ "info", "man" }).?);
+    try std.testing.expectEqual(null, nearest("a", &.{ "info", "man" }));
+    try std.testing.expectEqual(null, nearest("scene.glb", &.{ "info", "man" }));
 }
 
 test editDistance {

@@ -26,8 +26,8 @@ const inflation_max = 1040;
 
 const Compression = enum(u8) { none, rle, zips, zip, piz, pxr24, b44, b44a, dwaa, dwab, _ };
 
-/// One letter each.
-const Names = []const [*:0]const u8;
+/// Of channels.
+pub const Names = []const [*:0]const u8;
 
 const Header = struct { width: u32, height: u32, names: Names };
 
@@ -67,25 +67,7 @@ pub fn decode(gpa: Allocator, file: []const u8, reason: *Reason) texels.Error!Te
     const memory = try huge_pages.alloc(gpa, u8, bytes);
     errdefer huge_pages.free(gpa, memory);
     const floats: []f32 = @ptrCast(memory);
-    var heap: memory_account.LibraryHeap = .{ .gpa = gpa };
-    defer heap.deinit();
-    const hooks = heap.hooks();
-    var text: [*:0]const u8 = undefined;
-    switch (rl_exr_decode(
-        &hooks,
-        file.ptr,
-        file.len,
-        header.names.ptr,
-        @intCast(header.names.len),
-        @intCast(header.width),
-        @intCast(header.height),
-        floats.ptr,
-        &text,
-    )) {
-        .done => {},
-        .exhausted => return error.OutOfMemory,
-        .broken => return invalid(reason, "{s}", .{text}),
-    }
+    try readFloats(gpa, file, header.names, header.width, header.height, floats, reason);
     for (floats) |*value| {
         // Of a NaN, zero.
         value.* = if (value.* > 0) (if (value.* < std.math.inf(f32)) value.* else value_max) else 0;
@@ -99,7 +81,128 @@ pub fn decode(gpa: Allocator, file: []const u8, reason: *Reason) texels.Error!Te
     };
 }
 
-fn parse(file: []const u8, reason: *Reason) error{InvalidImage}!Header {
+/// The named channels of all pixels, side by side.
+fn readFloats(
+    gpa: Allocator,
+    file: []const u8,
+    names: Names,
+    width: u32,
+    height: u32,
+    floats: []f32,
+    reason: *Reason,
+) texels.Error!void {
+    var heap: memory_account.LibraryHeap = .{ .gpa = gpa };
+    defer heap.deinit();
+    const hooks = heap.hooks();
+    var text: [*:0]const u8 = undefined;
+    return switch (rl_exr_decode(
+        &hooks,
+        file.ptr,
+        file.len,
+        names.ptr,
+        @intCast(names.len),
+        @intCast(width),
+        @intCast(height),
+        floats.ptr,
+        &text,
+    )) {
+        .done => {},
+        .exhausted => error.OutOfMemory,
+        .broken => invalid(reason, "{s}", .{text}),
+    };
+}
+
+/// Floats of a part of a picture, and what its header says of it.
+pub const Part = struct {
+    /// Size of the picture: the display window.
+    whole: [2]u32,
+    /// Upper left pixel, and size: the data window.
+    origin: [2]u32,
+    width: u32,
+    height: u32,
+    /// Of the attribute that is asked for, in the file; null: it has none.
+    text: ?[]const u8,
+    /// The attribute that lists channels.
+    channels: []const u8,
+};
+
+/// The header of a part with a text as one of its attributes; `side_limit` and `pixel_limit` bound
+/// its size.
+pub fn partInfo(
+    file: []const u8,
+    text_name: []const u8,
+    side_limit: u32,
+    pixel_limit: u64,
+    reason: *Reason,
+) error{InvalidImage}!Part {
+    const header = try scan(file, text_name, reason);
+    var channels: Channels = .{};
+    const pixel_bytes = try parseChannels(header.channels, &channels, reason);
+    const window = header.window orelse return invalid(reason, "bad header", .{});
+    const display = header.display orelse return invalid(reason, "bad header", .{});
+    const is_inside = display[0] == 0 and display[1] == 0 and window[0] >= 0 and window[1] >= 0 and
+        window[0] <= window[2] and window[1] <= window[3] and window[2] <= display[2] and
+        window[3] <= display[3] and display[2] < side_limit and display[3] < side_limit;
+    if (!is_inside) return invalid(reason, "its windows are not those of a part", .{});
+    const width: u32, const height: u32 =
+        .{ @intCast(window[2] - window[0] + 1), @intCast(window[3] - window[1] + 1) };
+    const most = inflation_max * @as(u64, file.len) / pixel_bytes;
+    if (@as(u64, width) * height > @min(most, pixel_limit)) return invalid(
+        reason,
+        "{d}x{d} pixels are more than its bytes can hold",
+        .{ width, height },
+    );
+    return .{
+        .whole = .{ @intCast(display[2] + 1), @intCast(display[3] + 1) },
+        .origin = .{ @intCast(window[0]), @intCast(window[1]) },
+        .width = width,
+        .height = height,
+        .text = header.text,
+        .channels = header.channels,
+    };
+}
+
+/// Floats of these channels of all pixels of a part, as they are, side by side; the caller frees
+/// them by `huge_pages.free`. The part is the file's.
+pub fn decodePart(
+    gpa: Allocator,
+    file: []const u8,
+    part: *const Part,
+    names: Names,
+    reason: *Reason,
+) texels.Error![]align(64) f32 {
+    for (names) |name| if (!try hasFloats(part.channels, std.mem.span(name), reason))
+        return invalid(reason, "it has no channel {s} of floats", .{name});
+    const row = std.math.mul(usize, part.width, names.len) catch return error.OutOfMemory;
+    const count = std.math.mul(usize, row, part.height) catch return error.OutOfMemory;
+    const floats = try huge_pages.alloc(gpa, f32, count);
+    errdefer huge_pages.free(gpa, floats);
+    try readFloats(gpa, file, names, part.width, part.height, floats, reason);
+    return floats;
+}
+
+fn hasFloats(list: []const u8, wanted: []const u8, reason: *Reason) error{InvalidImage}!bool {
+    var rest: Rest = .{ .bytes = list };
+    while (true) {
+        const name = try rest.text(reason);
+        if (name.len == 0) return false;
+        const kind = try rest.word(reason);
+        _ = try rest.take(4, reason);
+        const is_sampled = try rest.word(reason) == 1 and try rest.word(reason) == 1;
+        if (std.mem.eql(u8, name, wanted)) return kind == 2 and is_sampled;
+    }
+}
+
+/// What headers have that matters here.
+const Scan = struct {
+    window: ?[4]i32 = null,
+    display: ?[4]i32 = null,
+    channels: []const u8 = "",
+    text: ?[]const u8 = null,
+};
+
+fn scan(file: []const u8, text_name: []const u8, reason: *Reason) error{InvalidImage}!Scan {
+    if (!std.mem.startsWith(u8, file, signature)) return invalid(reason, "not OpenEXR", .{});
     var rest: Rest = .{ .bytes = file };
     _ = try rest.take(signature.len, reason);
     const version = try rest.word(reason);
@@ -108,23 +211,26 @@ fn parse(file: []const u8, reason: *Reason) error{InvalidImage}!Header {
     if (version & 0xff != 2 or is_deep) return invalid(reason, "deep EXR is not supported", .{});
     if (has_parts) return invalid(reason, "EXR of several parts is not supported", .{});
     if (version & 0x200 != 0) return invalid(reason, "tiled EXR is not supported", .{});
-    var window: ?[4]i32 = null;
+    var found: Scan = .{};
     var compression: ?Compression = null;
-    var channels: Channels = .{};
-    var pixel_bytes: u64 = 0;
     while (true) {
         const name = try rest.text(reason);
         if (name.len == 0) break;
-        _ = try rest.text(reason);
+        const kind = try rest.text(reason);
         const value = try rest.take(try rest.word(reason), reason);
         if (std.mem.eql(u8, name, "channels")) {
-            pixel_bytes = try parseChannels(value, &channels, reason);
+            found.channels = value;
+        } else if (std.mem.eql(u8, name, text_name) and std.mem.eql(u8, kind, "string")) {
+            found.text = value;
         } else if (std.mem.eql(u8, name, "compression")) {
             if (value.len != 1) return invalid(reason, "bad header", .{});
             compression = @fromBackingInt(value[0]);
         } else if (std.mem.eql(u8, name, "dataWindow")) {
             if (value.len != 16) return invalid(reason, "bad header", .{});
-            window = @bitCast(value[0..16].*);
+            found.window = @bitCast(value[0..16].*);
+        } else if (std.mem.eql(u8, name, "displayWindow")) {
+            if (value.len != 16) return invalid(reason, "bad header", .{});
+            found.display = @bitCast(value[0..16].*);
         }
     }
     switch (compression orelse return invalid(reason, "bad header", .{})) {
@@ -140,9 +246,16 @@ fn parse(file: []const u8, reason: *Reason) error{InvalidImage}!Header {
             .{@backingInt(kind)},
         ),
     }
+    return found;
+}
+
+fn parse(file: []const u8, reason: *Reason) error{InvalidImage}!Header {
+    const header = try scan(file, "", reason);
+    var channels: Channels = .{};
+    const pixel_bytes = try parseChannels(header.channels, &channels, reason);
     const names = channels.names() orelse
         return invalid(reason, "it has no channels R, G and B, nor Y", .{});
-    const edges = window orelse return invalid(reason, "bad header", .{});
+    const edges = header.window orelse return invalid(reason, "bad header", .{});
     const width = @as(i64, edges[2]) - edges[0] + 1;
     const height = @as(i64, edges[3]) - edges[1] + 1;
     const most = inflation_max * @as(u64, file.len) / pixel_bytes;

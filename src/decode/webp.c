@@ -1,4 +1,4 @@
-/* The calls of libwebp that we make, and its allocator.
+/* The calls of libwebp's decoder that we make, and the library's allocator.
  *
  * In: a file. Out: its size, and its pixels where the caller wants them. The library is compiled
  * with malloc, calloc and free under names of ours (build/libraries.zig); the call in progress is
@@ -22,6 +22,14 @@ void *rl_webp_malloc(size_t size) {
     void *memory = rl_memory_now->allocate(rl_memory_now->user, size);
     if (memory == NULL) rl_is_exhausted = true;
     return memory;
+}
+
+void rl_webp_use(const rl_memory *memory);
+
+/* Sets what this thread's calls allocate by. */
+void rl_webp_use(const rl_memory *memory) {
+    rl_memory_now = memory;
+    rl_is_exhausted = false;
 }
 
 /* The library has checked that the product is one. */
@@ -77,8 +85,7 @@ int rl_webp_decode(const rl_memory *memory, const uint8_t *file, size_t file_byt
         .stride = width * channels,
         .size = (size_t)width * (size_t)height * (size_t)channels,
     };
-    rl_memory_now = memory;
-    rl_is_exhausted = false;
+    rl_webp_use(memory);
     const VP8StatusCode status = WebPDecode(file, file_bytes, &config);
     WebPFreeDecBuffer(&config.output);
     if (status == VP8_STATUS_OK) return rl_done;

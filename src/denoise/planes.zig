@@ -57,8 +57,9 @@ const depth_slope_reach = 4.0;
 /// Halves may outshine the mean of every neighbour so many times.
 const cut_factor = 4.0;
 
-/// Side of the square in which the halves say how far the samples' variance is right.
-const ratio_radius = 4;
+/// Side of the square in which the halves say how far the samples' variance is right: planes depend
+/// on pixels no further away.
+pub const ratio_radius = 4;
 
 /// Planes of one picture.
 pub const Planes = struct {

@@ -9,6 +9,7 @@ const Info = info_file.Info;
 const Stringify = std.json.Stringify;
 const Text = report.Text;
 const Writer = std.Io.Writer;
+const writeFields = report.writeFields;
 
 /// Writes all that is known, and a line end.
 pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
@@ -19,8 +20,12 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     try json.beginObject();
     try writeFields(&json, .{
         .version = Text{ .bytes = info.version },
+        .@"error" = null,
         .file = Text{ .bytes = info.name },
         .bytes = file.byte_count,
+    });
+    try writeFiles(&json, file.files);
+    try writeFields(&json, .{
         .format = file.format,
         .format_version = optional(file.version),
         .generator = optional(file.generator),
@@ -62,16 +67,38 @@ pub fn write(info: *const Info, writer: *Writer) Writer.Error!void {
     try writer.writeByte('\n');
 }
 
-/// The fields of a structure as keys of the object that is open.
-fn writeFields(json: *Stringify, fields: anytype) Writer.Error!void {
-    inline for (comptime std.meta.fieldNames(@TypeOf(fields))) |name| {
-        try json.objectField(name);
-        try json.write(@field(fields, name));
-    }
+/// Writes why a file cannot be described, and a line end.
+pub fn writeFailure(
+    version: []const u8,
+    file: []const u8,
+    problem: *const report.Problem,
+    warnings: []const []const u8,
+    writer: *Writer,
+) Writer.Error!void {
+    var json: Stringify = .{ .writer = writer };
+    try json.beginObject();
+    try writeFields(&json, .{
+        .version = Text{ .bytes = version },
+        .@"error" = problem,
+        .file = Text{ .bytes = file },
+        .warnings = report.Texts{ .list = warnings },
+    });
+    try json.endObject();
+    try writer.writeByte('\n');
 }
 
 fn optional(text: []const u8) ?Text {
     return if (text.len > 0) .{ .bytes = text } else null;
+}
+
+fn writeFiles(json: *Stringify, files: []const scene_data.File.Source) Writer.Error!void {
+    try json.objectField("files");
+    try json.beginArray();
+    for (files) |*source| try json.write(.{
+        .path = Text{ .bytes = source.path },
+        .bytes = source.byte_count,
+    });
+    try json.endArray();
 }
 
 fn writeScenes(json: *Stringify, file: *const scene_data.File) Writer.Error!void {

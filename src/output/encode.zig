@@ -21,6 +21,8 @@ pub const Form = enum {
     rgba,
     /// Floats as they are, over the background.
     linear,
+    /// Floats as they are, multiplied by alpha, and alpha.
+    linear_alpha,
     /// Floats that a pixel of Radiance HDR can hold: none below 0, none that has no exponent there.
     radiance,
     /// Floats that a half can hold, over the background.
@@ -34,7 +36,7 @@ pub const Form = enum {
             .rgb => 3,
             .rgba => 4,
             .linear, .radiance, .half => @sizeOf([3]f32),
-            .half_alpha => @sizeOf([4]f32),
+            .half_alpha, .linear_alpha => @sizeOf([4]f32),
         };
     }
 };
@@ -72,6 +74,9 @@ pub const Tally = struct {
     }
 };
 
+/// Rows of a picture, from `first` on, that has `of`.
+pub const Extent = struct { first: u32, of: u32 };
+
 /// The picture as rows of bytes.
 pub const Rows = struct {
     picture: Picture,
@@ -80,6 +85,7 @@ pub const Rows = struct {
     scale: f32 = 1,
     tone_mapping: settings.ToneMapping = .linear,
     background: Background = .none,
+    extent: Extent,
 
     /// Bytes of a row.
     pub fn byteCount(rows: *const Rows) usize {
@@ -97,17 +103,17 @@ pub const Rows = struct {
                 display.pixels[start..][0..image.width]
             else
                 null,
-            .behind = rows.background.at(y, image.height),
+            .behind = rows.background.at(rows.extent.first + y, rows.extent.of),
             .scale = rows.scale,
         };
         switch (rows.tone_mapping) {
             inline else => |mapping| switch (rows.form) {
                 .rgb => return row.encode(mapping, 3, std.mem.bytesAsSlice([3]u8, bytes)),
                 .rgba => return row.encode(mapping, 4, std.mem.bytesAsSlice([4]u8, bytes)),
-                .linear, .radiance, .half, .half_alpha => {},
+                .linear, .linear_alpha, .radiance, .half, .half_alpha => {},
             },
         }
-        if (rows.form == .half_alpha)
+        if (rows.form == .half_alpha or rows.form == .linear_alpha)
             row.copy(4, std.mem.bytesAsSlice([4]f32, bytes))
         else
             row.copy(3, std.mem.bytesAsSlice([3]f32, bytes));
@@ -283,7 +289,11 @@ fn encodeForTest(
     return all.encode(0, std.mem.sliceAsBytes(bytes));
 }
 
-const rows_for_test: Rows = .{ .picture = undefined, .form = .rgb };
+const rows_for_test: Rows = .{
+    .picture = undefined,
+    .form = .rgb,
+    .extent = .{ .first = 0, .of = 1 },
+};
 
 test "linear light over black, however many pixels a row has" {
     const some = [_][4]f32{

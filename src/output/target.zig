@@ -33,6 +33,8 @@ pub const Target = struct {
         closed,
         /// Written where it stands.
         stream: Io.File,
+        /// What is written to it comes behind all that has been written to another.
+        part: *Target,
         file: Place,
     },
     /// The file that is there already: nobody should read it while this target is open.
@@ -93,6 +95,7 @@ pub const Target = struct {
         defer target.abandon();
         switch (target.state) {
             .closed => unreachable,
+            .part => |whole| whole.append(parts) catch |err| return fail(err, diagnostic),
             .stream => |file| writeAll(target.io, file, parts) catch |err|
                 return fail(err, diagnostic),
             .file => |*place| place.replace(target.io, parts) catch |err|
@@ -100,10 +103,29 @@ pub const Target = struct {
         }
     }
 
+    /// The next part of the target: what is written to it and finished comes behind all before it.
+    /// The last part is what the target itself is finished with.
+    pub fn part(target: *Target) Target {
+        return .{ .io = target.io, .state = .{ .part = target }, .replaces = target.replaces };
+    }
+
+    fn append(target: *Target, parts: []const []const u8) Io.File.Writer.Error!void {
+        switch (target.state) {
+            .closed, .part => unreachable,
+            .stream => |file| try writeAll(target.io, file, parts),
+            .file => |*place| {
+                const temporary = place.temporary;
+                const file = if (temporary) |made| made.file else place.existing.?;
+                try writeAll(target.io, file, parts);
+                for (parts) |bytes| place.length += bytes.len;
+            },
+        }
+    }
+
     /// Closes the target and removes what has not taken its place. Does nothing on a closed one.
     pub fn abandon(target: *Target) void {
         switch (target.state) {
-            .closed => {},
+            .closed, .part => {},
             .stream => |file| if (file.handle != Io.File.stdout().handle) file.close(target.io),
             .file => |*place| place.close(target.io),
         }
@@ -120,6 +142,8 @@ const Place = struct {
     existing: ?Io.File = null,
     /// Null: the existing file is overwritten.
     temporary: ?*TemporaryFile = null,
+    /// Bytes that are written already.
+    length: u64 = 0,
 
     fn name(place: *const Place) []const u8 {
         return place.name_buffer[0..place.name_length];
@@ -188,7 +212,7 @@ const Place = struct {
         }
         const existing = place.existing.?;
         try writeAll(io, existing, parts);
-        var length: u64 = 0;
+        var length = place.length;
         for (parts) |part| length += part.len;
         try existing.setLength(io, length);
         try flush(io, existing);
@@ -320,6 +344,24 @@ const TestFolder = struct {
         try std.testing.expect(std.mem.find(u8, text, needle) != null);
     }
 };
+
+test "parts are one file, which is there when the last one is" {
+    const io = std.testing.io;
+    var folder: TestFolder = .init();
+    defer folder.folder.cleanup();
+    var whole = try folder.open("a.y4m");
+    defer whole.abandon();
+    for ([_][]const u8{ "one", "two" }) |text| {
+        var part = whole.part();
+        try part.finish(&.{ text, "," }, &folder.diagnostic);
+        try std.testing.expectError(
+            error.FileNotFound,
+            folder.folder.dir.access(io, "a.y4m", .{}),
+        );
+    }
+    try whole.finish(&.{}, &folder.diagnostic);
+    try folder.expectOnly("a.y4m", "one,two,");
+}
 
 test "a file is replaced as a whole, or not at all" {
     const io = std.testing.io;

@@ -17,8 +17,8 @@ const assert = std.debug.assert;
 
 /// Bytes of a file name at most, as on all usual file systems.
 pub const name_bytes_max = 255;
-/// How many may be open at once.
-pub const open_count_max = 32;
+/// How many may be open at once: one for each file that is rendered side by side, and some.
+pub const open_count_max = 2 * @import("../settings.zig").job_count.max;
 /// Tries for a name that is free, and for a file that no other run removes before it is locked.
 const attempt_count_max = 100;
 const host_digit_count = 16;
@@ -30,12 +30,14 @@ const suffix_bytes = mark.len + host_digit_count + 1 + random_digit_count + exte
 /// `Canceled`: a signal is ending the program.
 pub const CreateError = Io.File.OpenError;
 
-/// All temporary files of the program, for the handler of its signals. Has one owner, and files
-/// are opened and closed by one thread at a time; `discardAll` may come at any moment.
+/// All temporary files of the program, for the handler of its signals. Any thread may open and
+/// close files; `discardAll` may come at any moment.
 pub const TemporaryFiles = struct {
     files: [open_count_max]TemporaryFile = @splat(.{}),
     is_ending: std.atomic.Value(bool) = .init(false),
-    /// The folder that was last looked through for leftovers.
+    /// Somebody looks for leftovers.
+    is_cleaning: std.atomic.Value(bool) = .init(false),
+    /// The folder that was last looked through for them.
     cleaned: ?Identity = null,
 
     /// Unlinks all that are open, and lets no new ones be created. Async-signal-safe; the program
@@ -54,7 +56,8 @@ pub const TemporaryFiles = struct {
     }
 
     /// Creates a file beside `name`, with `permissions` less those that the process withholds, and
-    /// locks it. Leftovers in the folder go first. `folder` must stay open as long as the file.
+    /// locks it. Leftovers in the folder go first, unless another thread is at it. `folder` must
+    /// stay open as long as the file.
     pub fn create(
         temporaries: *TemporaryFiles,
         io: Io,
@@ -63,9 +66,13 @@ pub const TemporaryFiles = struct {
         permissions: Io.File.Permissions,
     ) CreateError!*TemporaryFile {
         const file = for (&temporaries.files) |*file| {
-            if (file.state.load(.monotonic) == .free) break file;
+            if (file.state.cmpxchgStrong(.free, .taken, .acquire, .monotonic) == null) break file;
         } else return error.ProcessFdQuotaExceeded;
-        temporaries.clean(io, folder);
+        errdefer file.state.store(.free, .seq_cst);
+        if (!temporaries.is_cleaning.swap(true, .acquire)) {
+            defer temporaries.is_cleaning.store(false, .release);
+            temporaries.clean(io, folder);
+        }
         file.folder = folder;
         for (0..attempt_count_max) |_| {
             file.setName(io, name);
@@ -74,7 +81,7 @@ pub const TemporaryFiles = struct {
                 else => return err,
             };
             if (file.lock(io)) return file;
-            file.discard(io);
+            file.remove(io, .taken);
         }
         return error.PathAlreadyExists;
     }
@@ -92,7 +99,7 @@ pub const TemporaryFiles = struct {
         std.posix.sigprocmask(std.posix.SIG.BLOCK, &all, &before);
         defer std.posix.sigprocmask(std.posix.SIG.SETMASK, &before, null);
         file.state.store(.creating, .seq_cst);
-        errdefer file.state.store(.free, .seq_cst);
+        errdefer file.state.store(.taken, .seq_cst);
         if (temporaries.is_ending.load(.seq_cst)) return error.Canceled;
         // Exclusive creation does not follow a symbolic link either.
         file.file = try file.folder.createFile(io, file.path(), .{
@@ -130,10 +137,12 @@ pub const TemporaryFiles = struct {
 
 /// One of `TemporaryFiles`.
 pub const TemporaryFile = struct {
-    state: std.atomic.Value(enum(u8) { free, creating, exists }) = .init(.free),
+    state: std.atomic.Value(State) = .init(.free),
     folder: Io.Dir = .{ .handle = -1 },
     file: Io.File = .{ .handle = -1, .flags = .{ .nonblocking = false } },
     buffer: [name_bytes_max:0]u8 = @splat(0),
+
+    const State = enum(u8) { free, taken, creating, exists };
 
     /// Its name for the time being.
     pub fn path(file: *const TemporaryFile) []const u8 {
@@ -172,8 +181,13 @@ pub const TemporaryFile = struct {
     /// Removes the file.
     pub fn discard(file: *TemporaryFile, io: Io) void {
         assert(file.state.load(.monotonic) == .exists);
+        file.remove(io, .free);
+    }
+
+    fn remove(file: *TemporaryFile, io: Io, next: State) void {
         file.folder.deleteFile(io, file.path()) catch {}; // A signal or a person was faster.
-        file.close(io);
+        file.file.close(io);
+        file.state.store(next, .seq_cst);
     }
 
     /// Until here the lock is held.

@@ -10,6 +10,7 @@ const SceneBuilder = @import("pbrt/scene_builder.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Input = @import("pbrt/input.zig");
 const Reader = @import("pbrt/reader.zig");
+const Progress = @import("../progress.zig").Progress;
 const Resources = @import("resource.zig");
 const Scene = scene_data.Scene;
 
@@ -32,6 +33,7 @@ pub fn read(
         .diagnostic = diagnostic,
     };
     defer input.deinit();
+    Progress.begin(resources.settings.progress, .{ .stage = .parsing });
     try input.push(path, main);
     try input.start();
     var scene_builder: scene_data.Builder = .init(gpa);

@@ -20,6 +20,7 @@ const Allocator = std.mem.Allocator;
 const Diagnostic = diagnostic_data.Diagnostic;
 const Identity = @import("../identity.zig").Identity;
 const Io = std.Io;
+const Progress = @import("../progress.zig").Progress;
 const Reason = diagnostic_data.Message;
 const Settings = @import("../settings.zig").Load;
 const format = @import("format.zig");
@@ -50,8 +51,25 @@ folder: Io.Dir,
 settings: Settings,
 /// Bytes of all files so far.
 bytes_read: u64 = 0,
+/// Where the files that the scene names are noted as they are read; null: nowhere.
+listing: ?*Listing = null,
 /// Entries of folders that may still be looked at for names in another letter case.
 entries_left: u32 = 1 << 18,
+
+/// Files that were read, each path once, with its bytes.
+pub const Listing = struct {
+    arena: Allocator,
+    byte_counts: std.array_hash_map.String(u64) = .empty,
+
+    /// Notes a file; of one that is noted already, nothing.
+    pub fn add(listing: *Listing, path: []const u8, byte_count: u64) Allocator.Error!void {
+        const entry = try listing.byte_counts.getOrPut(listing.arena, path);
+        if (entry.found_existing) return;
+        errdefer _ = listing.byte_counts.pop();
+        entry.key_ptr.* = try listing.arena.dupe(u8, path);
+        entry.value_ptr.* = byte_count;
+    }
+};
 
 /// A scene file and what it takes to read those that it names.
 pub const Scene = struct {
@@ -236,7 +254,10 @@ fn load(
 ) LoadError!File {
     const file = try resources.openFile(path, reason);
     defer file.close(resources.io);
-    return resources.loadFile(allocator, file, reason);
+    const loaded = try resources.loadFile(allocator, file, reason);
+    errdefer allocator.free(loaded.bytes);
+    if (resources.listing) |listing| try listing.add(path, loaded.bytes.len);
+    return loaded;
 }
 
 fn openFile(resources: *const Resources, path: []const u8, reason: *Reason) LoadError!Io.File {
@@ -257,6 +278,9 @@ fn identify(resources: *const Resources, file: Io.File, reason: *Reason) LoadErr
     return identity;
 }
 
+/// Bytes of a file that are read between one time that the progress is told of them and the next.
+const told_bytes = 16 << 20;
+
 fn loadFile(
     resources: *Resources,
     allocator: Allocator,
@@ -276,9 +300,16 @@ fn loadFile(
     if (stat.size > bytesMax()) return refuseSize(reason);
     const bytes = try allocator.allocSentinel(u8, @intCast(stat.size), 0);
     errdefer allocator.free(bytes);
-    const count = file.readPositionalAll(io, bytes, 0) catch |err|
-        return refuseError(reason, err);
-    if (count < bytes.len) return refuse(reason, error.InputOutput, "changed while it was read");
+    var done: usize = 0;
+    while (done < bytes.len) {
+        const part = bytes[done..@min(done + told_bytes, bytes.len)];
+        const count = file.readPositionalAll(io, part, done) catch |err|
+            return refuseError(reason, err);
+        if (count < part.len)
+            return refuse(reason, error.InputOutput, "changed while it was read");
+        done += count;
+        Progress.add(resources.settings.progress, count);
+    }
     resources.bytes_read += bytes.len;
     return .{ .bytes = bytes, .identity = identity };
 }
@@ -386,10 +417,19 @@ test "regular files of the scene's folder only, and the reason in words" {
     try inner.symLink(io, "../a", "link", .{});
     var resources: Resources = .{ .gpa = gpa, .io = io, .folder = temporary.dir, .settings = .{} };
     var reason: Reason = .{};
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    defer arena.deinit();
+    var listing: Listing = .{ .arena = arena.allocator() };
+    resources.listing = &listing;
     const file = try resources.read("a", &reason);
     defer gpa.free(file.bytes);
     try std.testing.expectEqualStrings("hello", file.bytes);
     try std.testing.expectEqual(5, resources.bytes_read);
+    gpa.free((try resources.readOptional(gpa, "a", &reason)).bytes);
+    try std.testing.expectError(error.Unreadable, resources.readOptional(gpa, "no", &reason));
+    try std.testing.expectEqual(1, listing.byte_counts.count());
+    try std.testing.expectEqual(5, listing.byte_counts.get("a"));
+    resources.listing = null;
 
     try temporary.dir.writeFile(io, .{ .sub_path = "p", .data = "version https://git-lfs.x" });
     try std.testing.expectError(error.InvalidInput, resources.read("p", &reason));

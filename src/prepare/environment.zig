@@ -34,6 +34,8 @@ pub const Error = error{OutOfMemory} || parallel.Error;
 /// Where the radiance comes from.
 pub const Source = union(enum) {
     studio,
+    /// Radiance of 1 from everywhere.
+    white,
     image: Image,
 
     /// A file, and how its image shows directions.
@@ -67,11 +69,11 @@ pub fn make(
     const mode = simd.setFlushToZero();
     defer simd.setFloatControl(mode);
     var sky: ?Sky = switch (source) {
-        .studio => null,
+        .studio, .white => null,
         .image => |*image| try readSky(gpa, image, reason),
     };
     defer if (sky) |*image| image.deinit(gpa);
-    return makeOf(gpa, if (sky) |*image| image else null, pool);
+    return makeOf(gpa, if (sky) |*image| image else null, source == .white, pool);
 }
 
 fn readSky(gpa: Allocator, image: *const Source.Image, reason: *decode.Reason) decode.Error!Sky {
@@ -87,13 +89,18 @@ fn readSky(gpa: Allocator, image: *const Source.Image, reason: *decode.Reason) d
     return .init(gpa, &texels, image.projection);
 }
 
-/// Of the studio, where there is no image; that is changed. Not inlined, so that no arithmetic
-/// moves before the mode is set.
-noinline fn makeOf(gpa: Allocator, sky: ?*Sky, pool: *parallel.Pool) Error!OwnedMap {
+/// Of the studio or white, where there is no image; that is changed. Not inlined, so that no
+/// arithmetic moves before the mode is set.
+noinline fn makeOf(
+    gpa: Allocator,
+    sky: ?*Sky,
+    is_white: bool,
+    pool: *parallel.Pool,
+) Error!OwnedMap {
     var arena_state: std.heap.ArenaAllocator = .init(gpa);
     errdefer arena_state.deinit();
     const arena = arena_state.allocator();
-    const pyramid = try makePyramid(arena, sky, pool);
+    const pyramid = try makePyramid(arena, sky, is_white, pool);
     var scratch: std.heap.ArenaAllocator = .init(gpa);
     defer scratch.deinit();
     const tree: filter.Tree = try .init(scratch.allocator(), pyramid);
@@ -116,7 +123,12 @@ noinline fn makeOf(gpa: Allocator, sky: ?*Sky, pool: *parallel.Pool) Error!Owned
 }
 
 /// The radiance, from the finest level to one of `filter.Tree.size_min`.
-fn makePyramid(arena: Allocator, sky: ?*Sky, pool: *parallel.Pool) Error![]const Level {
+fn makePyramid(
+    arena: Allocator,
+    sky: ?*Sky,
+    is_white: bool,
+    pool: *parallel.Pool,
+) Error![]const Level {
     if (sky) |image| image.shrink(2 * size_max);
     const size = if (sky) |image| image.levelSize(parts_size, size_max) else studio_size;
     const count = std.math.log2_int(u32, size / filter.Tree.size_min) + 1;
@@ -124,17 +136,21 @@ fn makePyramid(arena: Allocator, sky: ?*Sky, pool: *parallel.Pool) Error![]const
     for (pyramid, 0..) |*level, index| level.* = try .init(arena, size >> @intCast(index));
     const First = struct {
         sky: ?*const Sky,
+        is_white: bool,
         level: Level,
 
         fn fillRow(first: *const @This(), row: usize, _: usize) void {
             if (first.sky) |image| return image.resampleRow(first.level, row);
             for (0..first.level.size) |column| {
-                const value = studio.radiance(first.level.pointAt(column, row));
+                const value = if (first.is_white)
+                    1
+                else
+                    studio.radiance(first.level.pointAt(column, row));
                 first.level.at(column, row).* = .{ value, value, value, 0 };
             }
         }
     };
-    const first: First = .{ .sky = sky, .level = pyramid[0] };
+    const first: First = .{ .sky = sky, .is_white = is_white, .level = pyramid[0] };
     try pool.forEach(size, &first, First.fillRow);
     const Halving = struct {
         finer: Level,
@@ -223,7 +239,7 @@ fn meanOf(
 test "the studio has no hue, and a white sphere is 0.75 in the mean" {
     var pool: parallel.Pool = .init(2);
     defer pool.deinit();
-    var owned = try makeOf(testing.allocator, null, &pool);
+    var owned = try makeOf(testing.allocator, null, false, &pool);
     defer owned.deinit();
     const towards = struct {
         fn weigh(_: void, direction: math.Vec3) f64 {
@@ -256,7 +272,7 @@ test "lobes and irradiance are those of all texels, and the light in parts is th
     defer pool.deinit();
     var sky = try testSky(gpa);
     defer sky.deinit(gpa);
-    var owned = try makeOf(gpa, &sky, &pool);
+    var owned = try makeOf(gpa, &sky, false, &pool);
     defer owned.deinit();
     const map = &owned.map;
     const Case = struct {
@@ -316,7 +332,7 @@ test "the map does not depend on how many threads make it" {
         defer pool.deinit();
         var sky = try testSky(gpa);
         defer sky.deinit(gpa);
-        var owned = try makeOf(gpa, &sky, &pool);
+        var owned = try makeOf(gpa, &sky, false, &pool);
         defer owned.deinit();
         var hasher: std.hash.Wyhash = .init(0);
         for (owned.map.radiance) |level| hasher.update(std.mem.sliceAsBytes(level.texels));

@@ -325,7 +325,8 @@ fn layOut(
     return size;
 }
 
-fn countStrokes(
+/// Of a mesh that uses this stretch of its vertices.
+pub fn countStrokes(
     gpa: std.mem.Allocator,
     mesh: *const scene.Mesh,
     range: VertexRange,

@@ -27,6 +27,7 @@ const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const AnyTree = world.AnyTree;
 const Parts = @import("alpha.zig").Parts;
+const Progress = @import("../progress.zig").Progress;
 const Box3 = math.Box3;
 const Geometry = world.Geometry;
 const Vec3 = math.Vec3;
@@ -104,6 +105,11 @@ pub fn share(
         .mesh_places = try gpa.alloc(u32, meshes.len),
     };
     defer maker.deinit();
+    var triangle_count: u64 = 0;
+    for (meshes, chosen) |*mesh, is_chosen| {
+        if (is_chosen) triangle_count += mesh.triangles.len;
+    }
+    Progress.begin(settings.pool.progress, bvh_wide.workOf(triangle_count, settings.quality));
     for (meshes, chosen, maker.mesh_places) |*mesh, is_chosen, *place| {
         place.* = if (is_chosen) try maker.addMesh(mesh, attributes) else world.none;
     }

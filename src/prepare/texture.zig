@@ -24,6 +24,7 @@ const channelsOf = texture_use.channelsOf;
 const missing = texture_use.missing;
 const viewOf = texture_use.viewOf;
 const Allocator = std.mem.Allocator;
+const Progress = @import("../progress.zig").Progress;
 const Pyramid = pyramid_file.Pyramid;
 const Texels = decode.Texels;
 const Use = texture_use.Use;
@@ -143,6 +144,8 @@ pub fn load(
     errdefer work.dropPyramids();
     try work.collect();
     const byte_count = try work.plan(diagnostic);
+    work.progress = settings.pool.progress;
+    Progress.begin(work.progress, .{ .stage = .textures, .total = work.tasks.items.len });
     const at_once = @max(decode_bytes_max, byte_count / 2);
     var rest: []const Task = work.tasks.items;
     while (rest.len > 0) {
@@ -215,6 +218,7 @@ const Work = struct {
     reasons: []?decode.Reason = &.{},
     batch: []const Task = &.{},
     exhausted: std.atomic.Value(bool) = .init(false),
+    progress: ?*Progress = null,
 
     fn deinit(work: *Work) void {
         work.gpa.free(work.is_drawn);
@@ -350,6 +354,7 @@ const Work = struct {
     fn run(work: *Work, index: usize, _: usize) void {
         const task = &work.batch[index];
         if (work.exhausted.load(.monotonic)) return;
+        defer Progress.add(work.progress, 1);
         var reason: decode.Reason = .{};
         work.make(task, &reason) catch |err| switch (err) {
             error.InvalidImage => work.reasons[task.image] = reason,

@@ -13,6 +13,8 @@ pub const File = struct {
     generator: []const u8 = "",
     /// Of the file and of all that was read because it names it.
     byte_count: u64 = 0,
+    /// What was read, each file once, that of the scene first; empty: built in.
+    files: []const Source = &.{},
     /// Names of its scenes, empty ones where it gives none.
     scenes: []const []const u8 = &.{},
     /// Index of the one that is shown; `none`: there are none, and all is shown.
@@ -25,6 +27,9 @@ pub const File = struct {
     counts: ?Counts = null,
 
     pub const Format = enum { builtin, gltf, glb, pbrt, obj, stl, ply };
+
+    /// A file, as it lies on the disk. The path begins at the folder of the scene.
+    pub const Source = struct { path: []const u8, byte_count: u64 };
 
     /// An extension of glTF that the file uses.
     pub const Extension = struct { name: []const u8, required: bool };

@@ -5,6 +5,7 @@
 
 const std = @import("std");
 const math = @import("../math.zig");
+const none = @import("../scene.zig").none;
 const TextureView = @import("../scene.zig").TextureView;
 const Vec3 = math.Vec3;
 
@@ -13,6 +14,8 @@ pub const AlphaMode = enum { @"opaque", mask, blend };
 
 /// glTF's metallic-roughness material with its extensions.
 pub const Material = struct {
+    /// The file's number of it, or `none`.
+    origin: u32 = none,
     /// Linear RGB and alpha, 0..1.
     base_color: [4]f32 = .{ 1, 1, 1, 1 },
     metallic: f32 = 1,

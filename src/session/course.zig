@@ -34,7 +34,7 @@ pub const Course = struct {
 
     /// To be asked while rays are traced. The course must stay where it is.
     pub fn asked(course: *Course) trace.Course {
-        return .{ .context = course, .next = next };
+        return .{ .context = course, .next = next, .budget_ns = course.budget_ns };
     }
 
     fn next(context: *anyopaque, standing: *const trace.Standing) u32 {

@@ -63,6 +63,7 @@ pub const Environment = struct {
             environment.made = switch (source) {
                 .none => null,
                 .studio => try make(gpa, pool, .studio, diagnostic),
+                .white => try make(gpa, pool, .white, diagnostic),
                 .file => |path| try fromFile(gpa, io, pool, path, output, diagnostic),
                 .default => try ofScene(gpa, pool, scene, diagnostic),
             };

@@ -62,17 +62,18 @@ pub const ProgressImage = struct {
         image.film = null;
     }
 
-    /// Writes the film.
+    /// Writes a film, as `chosen`.
     pub fn write(
         image: *ProgressImage,
         gpa: std.mem.Allocator,
+        film: *const Film,
         chosen: output.Settings,
         diagnostic: *Diagnostic,
     ) void {
         if (image.has_failed) return;
         // What it says would be taken for what ends the program.
         var own: Diagnostic = .{};
-        image.tryWrite(gpa, chosen, &own) catch |err| {
+        image.tryWrite(gpa, film, chosen, &own) catch |err| {
             image.has_failed = true;
             if (err != error.Canceled) diagnostic.warn("no more pictures of work under way: {s}", .{
                 if (err == error.OutOfMemory) "out of memory" else own.message.text(),
@@ -83,13 +84,13 @@ pub const ProgressImage = struct {
     fn tryWrite(
         image: *ProgressImage,
         gpa: std.mem.Allocator,
+        film: *const Film,
         chosen: output.Settings,
         own: *Diagnostic,
     ) output.Error!void {
         if (image.target == null)
             image.target = try .openFile(image.io, image.temporaries, image.path, own);
         defer image.close();
-        const film = &image.film.?;
         _ = try output.write(gpa, .{
             .image = &film.image,
             .display = film.imageOf(.display),

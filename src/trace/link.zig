@@ -2,10 +2,12 @@
 //!
 //! Kernels are compiled by themselves, and what they share with the program are Zig's structures,
 //! whose layout is the compiler's choice. So the name of a kernel's symbol ends with a hash of all
-//! layouts that its functions lead to: where the two sides do not agree, linking fails.
+//! layouts that its functions lead to: where the two sides do not agree, linking fails. Where one
+//! program holds code for several levels of processors, names tell these apart as well.
 
 const std = @import("std");
-const Variant = @import("../variant.zig").Variant;
+const variant_file = @import("../variant.zig");
+const Variant = variant_file.Variant;
 
 /// Name of the symbol of a variant's `Face`, through which it is called; `what` tells those of one
 /// variant apart.
@@ -15,13 +17,41 @@ pub fn symbolOf(
     comptime what: []const u8,
 ) [:0]const u8 {
     const layout = LayoutOf(Face).hash;
-    return std.fmt.comptimePrint("rl_{s}_{s}_{x:0>16}", .{ variant.name(), what, layout });
+    return std.fmt.comptimePrint("rl_{s}_{s}_{x:0>16}{s}", .{
+        variant.name(), what, layout, suffixOf(if (isShared(variant)) "" else variant_file.level),
+    });
 }
 
-/// Ends the program with a message; exported by the program, for its kernels.
-pub extern fn rl_kernel_panic(message: [*]const u8, byte_count: usize, address: usize) noreturn;
+/// Whether the levels of a program have one kernel of a variant: single rays are the reference.
+fn isShared(comptime variant: Variant) bool {
+    return variant.traversal == .single;
+}
 
-/// `rl_kernel_panic` as programs export it.
+/// A program for a level: numbers and lists of arguments and of variables, as C has them, to an
+/// exit code.
+pub const Program = fn (
+    argument_count: usize,
+    arguments: [*]const [*:0]const u8,
+    variable_count: usize,
+    variables: [*:null]const ?[*:0]const u8,
+) callconv(.c) u8;
+
+/// Name of its symbol.
+pub fn programOf(comptime level: []const u8) [:0]const u8 {
+    return "rl_program" ++ suffixOf(level);
+}
+
+fn suffixOf(comptime level: []const u8) []const u8 {
+    return if (level.len == 0) "" else "_" ++ level;
+}
+
+/// Name of the symbol by which kernels of this level end the program with a message.
+pub const panic_symbol = "rl_kernel_panic" ++ suffixOf(variant_file.level);
+
+/// Ends the program with a message; exported by the program, for its kernels.
+pub const kernelPanic = @extern(*const @TypeOf(panicOfKernel), .{ .name = panic_symbol });
+
+/// `kernelPanic` as programs export it.
 pub fn panicOfKernel(message: [*]const u8, byte_count: usize, _: usize) callconv(.c) noreturn {
     @panic(message[0..byte_count]);
 }

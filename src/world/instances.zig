@@ -303,6 +303,35 @@ pub const Face = struct {
         return orElse(list, face.corner[corner], .{ 0, 0 });
     }
 
+    /// Between the corners, of which 1 and 2 have these weights.
+    pub fn texcoordAt(
+        face: *const Face,
+        geometry: *const Geometry,
+        set: u32,
+        weights: [2]f32,
+    ) [2]f32 {
+        const first = face.texcoord(geometry, set, 0);
+        const second = face.texcoord(geometry, set, 1);
+        const third = face.texcoord(geometry, set, 2);
+        var at = first;
+        for (&at, first, second, third) |*to, a, b, c| {
+            to.* += (b - a) * weights[0] + (c - a) * weights[1];
+        }
+        return at;
+    }
+
+    /// The same of positions, in world space.
+    pub fn positionAt(face: *const Face, geometry: *const Geometry, weights: [2]f32) Vec3 {
+        const first = face.position(geometry, 0);
+        const second = face.position(geometry, 1);
+        const third = face.position(geometry, 2);
+        var at = first;
+        for (&at, first, second, third) |*to, a, b, c| {
+            to.* += (b - a) * weights[0] + (c - a) * weights[1];
+        }
+        return at;
+    }
+
     /// See `Geometry.tangents`; asserts that there are some.
     pub inline fn tangent(face: *const Face, geometry: *const Geometry, corner: usize) [4]f32 {
         const vertex = face.corner[corner];

@@ -1,6 +1,8 @@
-//! What a glTF file says of itself: generator, scenes, extensions, and how much there is of what.
+//! What a glTF file says of itself: generator, scenes, extensions, how much there is of what, and
+//! what it calls things.
 //!
-//! In: a document that has been checked. Out: `scene.File`, its texts in the scene's memory.
+//! In: a document that has been checked. Out: `scene.File` and `scene.Names`, their texts in the
+//! scene's memory.
 
 const std = @import("std");
 const choice = @import("choice.zig");
@@ -10,8 +12,8 @@ const scene = @import("../../scene.zig");
 const Source = @import("source.zig");
 const Error = error{OutOfMemory};
 
-/// Completes the description of the file whose scene `shown` is read; null: all of its nodes are.
-/// Of animations cgltf may not know.
+/// Completes the description, and gathers the names, of the file whose scene `shown` is read; null:
+/// all of its nodes are. Of animations cgltf may not know.
 pub fn read(
     source: *const Source,
     shown: ?*const c.cgltf_scene,
@@ -43,6 +45,17 @@ pub fn read(
             .lights = data.lights_count,
         },
     };
+    source.builder.scene.names = .{
+        .nodes = try namesOf(source, Source.slice(data.nodes, data.nodes_count)),
+        .meshes = try namesOf(source, Source.slice(data.meshes, data.meshes_count)),
+        .materials = try namesOf(source, Source.slice(data.materials, data.materials_count)),
+    };
+}
+
+fn namesOf(source: *const Source, list: anytype) Error![]const []const u8 {
+    const names = try source.arena.alloc([]const u8, list.len);
+    for (names, list) |*name, *one| name.* = try choice.nameOf(source.arena, one) orelse "";
+    return names;
 }
 
 fn textOf(source: *const Source, raw: [*c]const u8) Error![]const u8 {

@@ -117,7 +117,8 @@ fn addNodes(source: *Source, origin: u32, parent: u32, used: *const Used, count:
             rotation,
             if (scales.len > 0) widen(3, scales[index]) else .{ 1, 1, 1 },
         );
-        _ = try source.builder.addNode(parent, local);
+        const index_of = try source.builder.addNode(parent, local);
+        source.builder.nodes.items[index_of].origin = origin;
     }
     if (odd_count > 0 and !is_rounded) source.forgive(
         "node {d}: {d} rotations of EXT_mesh_gpu_instancing are no unit quaternions, made such",

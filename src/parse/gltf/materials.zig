@@ -195,6 +195,7 @@ fn read(materials: *const Materials, index: usize, textures: ?*Textures) Error!s
         try extensions.readTextures(all, raw, index, &material);
     }
     try extensions.readScatter(factors, textures, raw, &material);
+    material.origin = @intCast(index);
     material.in_motion = materials.moved.len > 0 and materials.moved[index];
     return material;
 }

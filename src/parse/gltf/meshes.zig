@@ -174,6 +174,8 @@ pub fn get(meshes: *Meshes, mesh_index: u32, deformation: Deformation) Error!Ran
         } orelse continue;
         const index_of = try builder.addMesh(decoded.mesh);
         const drawn = &builder.meshes.items[index_of];
+        drawn.origin = place.mesh;
+        drawn.primitive = place.primitive;
         drawn.morph_targets =
             try meshes.decodeTargets(drawn, primitive, deformation.targets, place);
         if (deformation.has_skin) {

@@ -41,6 +41,7 @@ pub fn collect(source: *Source, shown: ?*const c.cgltf_scene) Error![]const u32 
     while (stack.pop()) |pending| {
         const local = try localTransform(source, pending.origin);
         const index = try source.builder.addNode(pending.parent, local);
+        source.builder.nodes.items[index].origin = pending.origin;
         try origins.append(gpa, pending.origin);
         try hide(source, pending, index);
         const node = Source.item(source.data.nodes, pending.origin);

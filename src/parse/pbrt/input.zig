@@ -17,6 +17,7 @@ const number = @import("../number.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = diagnostic_file.Diagnostic;
 const Identity = @import("../../identity.zig").Identity;
+const Progress = @import("../../progress.zig").Progress;
 const Resources = @import("../resource.zig");
 const markBytes = @import("../format.zig").markBytes;
 const assert = std.debug.assert;
@@ -111,6 +112,7 @@ pub fn pop(input: *Input) void {
 pub fn beginDirective(input: *Input) void {
     input.freeEnded();
     input.directive = input.offset();
+    Progress.reach(input.resources.settings.progress, input.directive, input.next_start);
 }
 
 fn freeEnded(input: *Input) void {

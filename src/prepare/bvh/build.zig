@@ -23,6 +23,7 @@ const Binning = split.Binning(split.bin_count_large);
 const Cells = cells_file.Cells;
 const Input = bvh_input.Input;
 const Item = cells_file.Item;
+const Progress = @import("../../progress.zig").Progress;
 const Box = split.Box;
 const Box3 = math.Box3;
 const Side = split.Side;
@@ -450,6 +451,7 @@ fn Builder(comptime pack_size: u32) type {
                 var pair = task.pair;
                 for (sets) |*set| pair = work.cut(set.*, pair);
                 assert(pair <= task.end);
+                Progress.add(work.builder.input.pool.progress, task.end - task.begin);
                 return .{ .begin = task.begin + 1, .end = pair };
             }
 

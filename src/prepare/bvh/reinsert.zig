@@ -23,6 +23,7 @@ const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Box = split.Box;
 const Node = bvh_build.Node;
+const Progress = @import("../../progress.zig").Progress;
 const Tree = bvh_build.Tree;
 
 const none: u32 = std.math.maxInt(u32);
@@ -40,8 +41,9 @@ const Move = struct {
     }
 };
 
-/// Passes over all nodes at most. The first saves two thirds of what ten would, three 95 %.
-const pass_count_max = 3;
+/// Passes over all nodes at most. The first saves two thirds of what ten would, three 95 %. Each
+/// counts for the progress as building does: a triangle for two nodes.
+pub const pass_count_max = 3;
 
 /// What a pass must save of the whole cost for another one to follow.
 const saving_min = 0.002;
@@ -65,10 +67,12 @@ pub fn optimize(
 ) bvh_input.Error!void {
     var optimizer: Optimizer(pack_size) = try .init(gpa, tree);
     defer optimizer.deinit(gpa);
-    for (0..pass_count_max) |_| {
+    for (1..pass_count_max + 1) |pass_count| {
         const before = optimizer.costs[0];
         try optimizer.pass(gpa, pool);
-        if (!(optimizer.costs[0] < before * (1 - saving_min))) break;
+        if (optimizer.costs[0] < before * (1 - saving_min)) continue;
+        Progress.add(pool.progress, (pass_count_max - pass_count) * tree.nodes.len / 2);
+        break;
     }
     try optimizer.layOut(gpa, tree);
 }
@@ -182,7 +186,7 @@ fn Optimizer(comptime pack_size: u32) type {
         fn pass(optimizer: *Self, gpa: Allocator, pool: *parallel.Pool) bvh_input.Error!void {
             const moves = try gpa.alloc(Move, optimizer.nodes.len);
             defer gpa.free(moves);
-            var work: SearchWork = .{ .optimizer = optimizer, .moves = moves };
+            var work: SearchWork = .{ .optimizer = optimizer, .moves = moves, .pool = pool };
             try pool.forEach(@divCeil(moves.len, chunk_size), &work, SearchWork.run);
             var count: usize = 0;
             for (moves) |move| {
@@ -199,6 +203,7 @@ fn Optimizer(comptime pack_size: u32) type {
         const SearchWork = struct {
             optimizer: *const Self,
             moves: []Move,
+            pool: *const parallel.Pool,
 
             fn run(work: *SearchWork, chunk: usize, _: usize) void {
                 const begin = chunk_size * chunk;
@@ -206,6 +211,7 @@ fn Optimizer(comptime pack_size: u32) type {
                 for (work.moves[begin..end], begin..) |*move, index| {
                     move.* = work.optimizer.search(@intCast(index));
                 }
+                Progress.add(work.pool.progress, (end - begin) / 2);
             }
         };
 

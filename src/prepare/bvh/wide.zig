@@ -19,7 +19,9 @@ const huge_pages = @import("../../huge_pages.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Box3 = math.Box3;
+const TreeQuality = @import("../../settings.zig").TreeQuality;
 const Vec3 = math.Vec3;
+const Work = @import("../../progress.zig").Work;
 
 /// What is to be built on.
 pub const Input = bvh_input.Input;
@@ -51,6 +53,16 @@ pub fn Built(comptime width: u32) type {
         pub fn tree(built: *const @This()) world.Tree(width) {
             return .{ .nodes = built.nodes, .packs = built.packs };
         }
+    };
+}
+
+/// What building trees of so many triangles is, for the progress.
+pub fn workOf(triangle_count: u64, quality: TreeQuality) Work {
+    const times: u64 = if (quality == .high) 1 + bvh_reinsert.pass_count_max else 1;
+    return .{
+        .stage = .tree,
+        .total = times * triangle_count,
+        .pieces_per_unit = times,
     };
 }
 

@@ -10,6 +10,7 @@
 const std = @import("std");
 const film_file = @import("../../film.zig");
 const Film = film_file.Film;
+const Layout = film_file.Layout;
 const Rectangle = film_file.Rectangle;
 const assert = std.debug.assert;
 
@@ -28,11 +29,11 @@ pub const Noise = struct {
     exposure_scale: f32,
 };
 
-/// All blocks of a picture. Those of a tile are changed by whoever has the tile.
+/// All blocks of a film, on which windows begin with whole ones of the picture's grid. Those of a
+/// tile are changed by whoever has the tile.
 pub const Blocks = struct {
     noise: Noise,
     width: u32,
-    height: u32,
     columns: u32,
     states: []State,
     /// By pixel: sums of samples when these were a power of two for the last time.
@@ -47,22 +48,28 @@ pub const Blocks = struct {
     /// To be freed by `deinit`.
     pub fn init(
         gpa: std.mem.Allocator,
-        width: u32,
-        height: u32,
+        layout: *const Layout,
         noise: Noise,
     ) error{OutOfMemory}!Blocks {
+        const width, const height = .{ layout.film_width, layout.film_height };
         const columns = @divCeil(width, block_side);
         const states = try gpa.alloc(State, @as(usize, columns) * @divCeil(height, block_side));
         errdefer gpa.free(states);
         @memset(states, .{});
+        var active_count: u32 = 0;
+        for (0..layout.count()) |number| {
+            const traced = layout.windowAt(@intCast(number)).traced;
+            assert(traced.x0 % block_side == 0 and traced.y0 % block_side == 0);
+            active_count += @divCeil(traced.x1 - traced.x0, block_side) *
+                @divCeil(traced.y1 - traced.y0, block_side);
+        }
         return .{
             .noise = noise,
             .width = width,
-            .height = height,
             .columns = columns,
             .states = states,
             .first_half = try gpa.alloc(@Vector(4, f32), @as(usize, width) * height),
-            .active_count = .init(@intCast(states.len)),
+            .active_count = .init(active_count),
         };
     }
 
@@ -73,7 +80,8 @@ pub const Blocks = struct {
         blocks.* = undefined;
     }
 
-    /// The blocks of a tile, which has only whole ones but at the picture's edge, row by row.
+    /// The blocks of a tile of the film, which has only whole ones but at the picture's edge, row
+    /// by row.
     pub fn of(blocks: *const Blocks, tile: Rectangle) Iterator {
         assert(tile.x0 % block_side == 0 and tile.y0 % block_side == 0);
         return .{ .blocks = blocks, .tile = tile, .x = tile.x0, .y = tile.y0 };
@@ -131,17 +139,23 @@ pub const Blocks = struct {
     /// One of them.
     pub const Block = struct { state: *State, rectangle: Rectangle };
 
+    /// How many of some blocks had a pass, and how many of those get no more.
+    pub const Judged = struct { active_before: usize = 0, finished: usize = 0 };
+
     /// After a pass over the active blocks of a tile: which of them get more.
-    pub fn judge(blocks: *Blocks, tile: Rectangle, film: *const Film, sample_count: u32) void {
+    pub fn judge(blocks: *Blocks, tile: Rectangle, film: *const Film, sample_count: u32) Judged {
+        var judged: Judged = .{};
         var all = blocks.of(tile);
         while (all.next()) |block| {
             if (!block.state.is_active) continue;
+            judged.active_before += 1;
             block.state.sample_count = sample_count;
             if (!std.math.isPowerOfTwo(sample_count)) continue;
             if (sample_count >= sample_count_min) {
                 const found = blocks.errorOf(block.rectangle, film, sample_count);
                 if (found < blocks.noise.error_max) {
                     block.state.is_active = false;
+                    judged.finished += 1;
                     _ = blocks.active_count.fetchSub(1, .monotonic);
                     continue;
                 }
@@ -154,6 +168,7 @@ pub const Blocks = struct {
                 }
             }
         }
+        return judged;
     }
 
     /// Not a number where a pixel is not.
@@ -189,7 +204,8 @@ pub const Blocks = struct {
 
 test "blocks of a picture, those of tiles, and those side by side that are active" {
     const gpa = std.testing.allocator;
-    var blocks: Blocks = try .init(gpa, 70, 40, .{ .error_max = 0.1, .exposure_scale = 1 });
+    const noise: Noise = .{ .error_max = 0.1, .exposure_scale = 1 };
+    var blocks: Blocks = try .init(gpa, &.whole(70, 40), noise);
     defer blocks.deinit(gpa);
     try std.testing.expectEqual(5 * 3, blocks.states.len);
     var all = blocks.of(.{ .x0 = 32, .y0 = 16, .x1 = 70, .y1 = 40 });
@@ -216,10 +232,13 @@ test "the error of a block is that of its mean, as it is shown" {
     defer film.deinit(gpa);
     var random: std.Random.DefaultPrng = .init(7);
     // The first block is quiet, and what the second has is no number.
-    var blocks: Blocks = try .init(gpa, 32, 16, .{ .error_max = 0.014, .exposure_scale = 4 });
+    var blocks: Blocks =
+        try .init(gpa, &.whole(32, 16), .{ .error_max = 0.014, .exposure_scale = 4 });
     defer blocks.deinit(gpa);
     const left: Rectangle = .{ .x0 = 0, .y0 = 0, .x1 = 16, .y1 = 16 };
     const tile: Rectangle = .{ .x0 = 0, .y0 = 0, .x1 = 32, .y1 = 16 };
+    // Passes of blocks, and those that they are spared.
+    var pieces: usize = 0;
     for (0..64) |number| {
         for (0..16) |y| for (0..32) |x| {
             const value = 0.09 + 0.03 * random.random().floatNorm(f32);
@@ -233,8 +252,10 @@ test "the error of a block is that of its mean, as it is shown" {
             const found = blocks.errorOf(left, &film, 64);
             try std.testing.expectApproxEqRel(wanted, found, 0.1);
         }
-        blocks.judge(tile, &film, count);
+        const judged = blocks.judge(tile, &film, count);
+        pieces += judged.active_before + judged.finished * (64 - count);
     }
+    try std.testing.expectEqual(2 * 64, pieces);
     for (blocks.states, [_]bool{ false, true }) |state, is_active| {
         const wanted: Blocks.State = .{ .sample_count = 64, .is_active = is_active };
         try std.testing.expectEqual(wanted, state);

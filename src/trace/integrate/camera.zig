@@ -9,6 +9,7 @@ const vec3 = @import("../../math.zig").vec3;
 const bundle_file = @import("../traverse/bundle.zig");
 const ray_file = @import("../traverse/ray.zig");
 const film_file = @import("../../film.zig");
+const statistics = @import("../../statistics.zig");
 const Grid = @import("../traverse/beam/grid.zig").Grid;
 const Offset = @import("sampler.zig").Offset;
 const Rectangle = film_file.Rectangle;
@@ -75,12 +76,30 @@ pub fn expose(
             const y = rectangle.y0 + rectangle.step * Kernel.pixelY(group, lane);
             if (x >= rectangle.x1 or y >= rectangle.y1) continue;
             const value = .{ red[lane], green[lane], blue[lane], fourth[lane] };
+            const column, const row = rectangle.placeOf(x, y);
             if (layer == .color)
-                film.add(x, y, place.sample, value)
+                film.add(column, row, place.sample, value)
             else
-                film.addApart(layer, x, y, place.sample, value);
+                film.addApart(layer, column, row, place.sample, value);
         }
     }
+}
+
+/// Adds the tests that a sample of a bundle's pixels took, as many to each, to the film.
+pub fn exposeCost(
+    comptime Kernel: type,
+    film: *film_file.Film,
+    place: Place,
+    before: statistics.TestCounts,
+    after: statistics.TestCounts,
+) void {
+    const pixel_count: f32 = @floatFromInt(place.rectangle.pixelCount());
+    const boxes: f32 = @floatFromInt(after.box_useful - before.box_useful);
+    const triangles: f32 = @floatFromInt(after.triangle_useful - before.triangle_useful);
+    const cost = .{ boxes / pixel_count, triangles / pixel_count, 0 };
+    const costs: [Kernel.group_count]Kernel.Rays.Vec3 = @splat(.splat(cost));
+    const zeros: [Kernel.group_count]Kernel.Rays.F32 = @splat(.zero());
+    expose(Kernel, film, .cost, place, &costs, &zeros);
 }
 
 /// The rays through points (x, y) of the picture in pixels from its upper left corner.

@@ -24,6 +24,7 @@ const EnvironmentLights = environment_lights.EnvironmentLights;
 const Film = @import("../../film.zig").Film;
 const Frame = world_file.Frame;
 const Layers = interleave.Layers;
+const Layout = @import("../../film.zig").Layout;
 const RayTree = @import("ray_tree.zig").RayTree;
 const Rectangle = @import("../../film.zig").Rectangle;
 
@@ -164,7 +165,7 @@ fn Lighting(comptime Kernel: type) type {
                     const column = rectangle.x0 + rectangle.step * Kernel.pixelX(group, lane);
                     const row = rectangle.y0 + rectangle.step * Kernel.pixelY(group, lane);
                     if (column >= rectangle.x1 or row >= rectangle.y1) continue;
-                    const at = @as(usize, row) * layers.width + column;
+                    const at = layers.indexOf(&rectangle, column, row);
                     Layers.add(layer, at, sample, .{ x[lane], y[lane], z[lane], w[lane] });
                 }
             }
@@ -225,9 +226,8 @@ fn SharedOf(comptime Kernel: type) type {
             if (has_map_shadows or has_even_sky)
                 shared.sky = try gpa.alloc(EnvironmentLight, shared.sky_sets.count());
             try shared.placeStarts();
-            const view = frame.view;
             const has_sky = shared.sky.len > 0;
-            shared.layers = try .init(gpa, view, has_sky, lights.is_interleaved);
+            shared.layers = try .init(gpa, settings.layout.?, has_sky, lights.is_interleaved);
             return shared;
         }
 
@@ -299,7 +299,7 @@ fn SharedOf(comptime Kernel: type) type {
 
         pub fn pieces(shared: *const Self, number: u32) u32 {
             if (number < steps_before) return shared.selection.pieces(number);
-            return @divCeil(shared.layers.height, band_rows);
+            return bandCount(shared.settings.layout.?);
         }
 
         pub fn work(shared: *Self, tree: *Tree, number: u32, piece: u32, film: *Film) u64 {
@@ -315,21 +315,37 @@ fn SharedOf(comptime Kernel: type) type {
         }
 
         fn place(shared: *Self, band: u32) void {
-            const first = band * band_rows;
-            for (first..@min(first + band_rows, shared.layers.height)) |y| {
-                shared.layers.placeRow(shared.frame.view, @intCast(y));
-            }
+            const part = bandOf(shared.settings.layout.?, band);
+            shared.layers.placeAll(shared.frame.view, part.pixels);
         }
 
         fn filter(shared: *Self, band: u32, film: *Film) u64 {
-            const first = band * band_rows;
-            var non_finite_count: u64 = 0;
+            const part = bandOf(shared.settings.layout.?, band);
+            const view = shared.frame.view;
             const correction = &shared.selection.matrix.correction;
-            for (first..@min(first + band_rows, shared.layers.height)) |y| {
-                non_finite_count += shared.layers
-                    .finishRow(film, shared.frame.view, @intCast(y), correction);
-            }
-            return non_finite_count;
+            return shared.layers.finish(film, view, &part.window, part.pixels, correction);
         }
     };
+}
+
+/// How many pieces what is filtered is cut into: windows, or bands of rows where there is but one.
+fn bandCount(layout: *const Layout) u32 {
+    return switch (layout.form) {
+        .window => @divCeil(layout.film_height, band_rows),
+        .share => layout.count(),
+    };
+}
+
+/// A piece, and the window that it is of.
+const Band = struct { window: Rectangle, pixels: Rectangle };
+
+fn bandOf(layout: *const Layout, number: u32) Band {
+    const is_window = layout.form == .window;
+    const window = layout.windowAt(if (is_window) 0 else number).traced;
+    var band: Band = .{ .window = window, .pixels = window };
+    if (is_window) {
+        band.pixels.y0 += number * band_rows;
+        band.pixels.y1 = @min(band.pixels.y0 + band_rows, band.pixels.y1);
+    }
+    return band;
 }

@@ -17,10 +17,14 @@ const world_file = @import("../../world.zig");
 const Allocator = std.mem.Allocator;
 const Correction = @import("light_correction.zig").Correction;
 const Film = film_file.Film;
+const Layout = film_file.Layout;
+const Rectangle = film_file.Rectangle;
 const Vec3 = [3]f32;
 
 /// Pixels that share a sample's lights, along each side.
 pub const side = 3;
+/// How far away neighbours are that a pixel gets light of, along each side.
+pub const reach = 2;
 /// In all.
 pub const part_count = side * side;
 /// Parts that like neighbours have, at least, the pixel's own among them.
@@ -89,10 +93,9 @@ pub const Sets = struct {
     }
 };
 
-/// By pixel the sums over its samples.
+/// By pixel of the film the sums over its samples.
 pub const Layers = struct {
     width: u32,
-    height: u32,
     is_interleaved: bool,
     /// Geometric normal of what is seen first, and how far away it is.
     guide: []Pixel,
@@ -117,13 +120,12 @@ pub const Layers = struct {
     /// To be freed by `deinit`.
     pub fn init(
         gpa: Allocator,
-        view: *const world_file.View,
+        layout: *const Layout,
         has_sky: bool,
         is_interleaved: bool,
     ) error{OutOfMemory}!Layers {
         var layers: Layers = .{
-            .width = view.width,
-            .height = view.height,
+            .width = layout.film_width,
             .is_interleaved = is_interleaved,
             .guide = &.{},
             .bounced = &.{},
@@ -134,7 +136,7 @@ pub const Layers = struct {
             .place = &.{},
         };
         errdefer layers.deinit(gpa);
-        const count = @as(usize, view.width) * view.height;
+        const count = @as(usize, layout.film_width) * layout.film_height;
         inline for (@typeInfo(Name).@"enum".field_names) |name| {
             const is_sky = std.mem.eql(u8, name, "arriving") or
                 std.mem.eql(u8, name, "shining") or std.mem.eql(u8, name, "open");
@@ -153,17 +155,24 @@ pub const Layers = struct {
         layer[at] = if (number == 0) value else layer[at] + value;
     }
 
-    /// Finds how what the pixels of a row see lies. Before `finishRow` of it and two rows around.
-    pub fn placeRow(layers: *const Layers, view: *const world_file.View, y: u32) void {
-        for (0..layers.width) |x| {
-            const at = @as(usize, y) * layers.width + x;
+    /// Where a pixel of a rectangle is in the layers.
+    pub inline fn indexOf(layers: *const Layers, part: *const Rectangle, x: u32, y: u32) usize {
+        const column, const row = part.placeOf(x, y);
+        return @as(usize, row) * layers.width + column;
+    }
+
+    /// Finds how what pixels see lies. Before `finish` of them and those within `reach`.
+    pub fn placeAll(layers: *const Layers, view: *const world_file.View, part: Rectangle) void {
+        for (part.y0..part.y1) |row| for (part.x0..part.x1) |column| {
+            const x: u32, const y: u32 = .{ @intCast(column), @intCast(row) };
+            const at = layers.indexOf(&part, x, y);
             const sums = layers.guide[at];
             const count = layers.albedo[at][3];
             const size = vec3.length(.{ sums[0], sums[1], sums[2] });
             const length = if (view.camera.orthographic)
                 vec3.length(view.camera.forward)
             else
-                vec3.length(wayOf(view, @intCast(x), y));
+                vec3.length(wayOf(view, x, y));
             const scale = if (size > plain_min * count) 1 / size else 0;
             layers.place[at] = .{
                 sums[0] * scale,
@@ -171,23 +180,26 @@ pub const Layers = struct {
                 sums[2] * scale,
                 sums[3] / count / length,
             };
-        }
+        };
     }
 
-    /// Adds what the layers have to finished pixels of a row. Returns how many came out as not a
-    /// number; these are black.
-    pub fn finishRow(
+    /// Adds what the layers have to finished pixels of a part of a window. Returns how many came
+    /// out as not a number; these are black.
+    pub fn finish(
         layers: *const Layers,
         film: *Film,
         view: *const world_file.View,
-        y: u32,
+        window: *const Rectangle,
+        part: Rectangle,
         correction: *const Correction,
     ) u64 {
         var non_finite_count: u64 = 0;
-        for (0..layers.width) |x| {
-            const light = layers.lightOf(view, @intCast(x), y, correction);
-            const pixel = film.image.at(@intCast(x), y);
-            const count = layers.albedo[@as(usize, y) * layers.width + x][3];
+        for (part.y0..part.y1) |row| for (part.x0..part.x1) |column| {
+            const x: u32, const y: u32 = .{ @intCast(column), @intCast(row) };
+            const light = layers.lightOf(view, window, x, y, correction);
+            const at = layers.indexOf(window, x, y);
+            const pixel = &film.image.pixels[at];
+            const count = layers.albedo[at][3];
             const added = light / @as(Pixel, @splat(count));
             const sum = added[0] + added[1] + added[2];
             if (!std.math.isFinite(sum)) {
@@ -196,7 +208,7 @@ pub const Layers = struct {
                 continue;
             }
             inline for (0..3) |channel| pixel[channel] += added[channel];
-        }
+        };
         return non_finite_count;
     }
 
@@ -204,14 +216,18 @@ pub const Layers = struct {
     fn lightOf(
         layers: *const Layers,
         view: *const world_file.View,
+        window: *const Rectangle,
         x: u32,
         y: u32,
         correction: *const Correction,
     ) Pixel {
-        const at = @as(usize, y) * layers.width + x;
-        const sums = if (layers.is_interleaved) layers.gather(view, x, y) else Sums.of(layers, at);
+        const at = layers.indexOf(window, x, y);
+        const sums = if (layers.is_interleaved)
+            layers.gather(view, window, x, y)
+        else
+            Sums.of(layers, at);
         var light = layers.albedo[at] * quotient(sums.bounced, sums.albedo, 0);
-        light *= correction.of(layers, view, x, y);
+        light *= correction.of(&.of(layers, view, window, x, y), x, y);
         if (layers.open.len > 0)
             light += layers.open[at] * quotient(sums.arriving, sums.shining, 1);
         light[3] = 0;
@@ -259,14 +275,20 @@ pub const Layers = struct {
     };
 
     /// What a pixel and its neighbours have of all parts.
-    fn gather(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Sums {
-        const own = layers.place[@as(usize, y) * layers.width + x];
+    fn gather(
+        layers: *const Layers,
+        view: *const world_file.View,
+        window: *const Rectangle,
+        x: u32,
+        y: u32,
+    ) Sums {
+        const own = layers.place[layers.indexOf(window, x, y)];
         const is_plain = own[0] != 0 or own[1] != 0 or own[2] != 0;
         var sums: Sums = .none;
         // Too few are like it: better light of what is around than noise.
-        if (!is_plain or layers.gatherLike(view, x, y, true, &sums) < like_least) {
+        if (!is_plain or layers.gatherLike(view, window, x, y, true, &sums) < like_least) {
             sums = .none;
-            _ = layers.gatherLike(view, x, y, false, &sums);
+            _ = layers.gatherLike(view, window, x, y, false, &sums);
         }
         return sums;
     }
@@ -276,29 +298,30 @@ pub const Layers = struct {
     fn gatherLike(
         layers: *const Layers,
         view: *const world_file.View,
+        window: *const Rectangle,
         x: u32,
         y: u32,
         by_place: bool,
         sums: *Sums,
     ) u32 {
-        const tent = [_]f32{ 1.0 / 3.0, 2.0 / 3.0, 1, 2.0 / 3.0, 1.0 / 3.0 };
-        const place: Place = .of(layers, view, x, y);
+        const tent = [2 * reach + 1]f32{ 1.0 / 3.0, 2.0 / 3.0, 1, 2.0 / 3.0, 1.0 / 3.0 };
+        const place: Place = .of(layers, view, window, x, y);
         var parts: [part_count]Sums = @splat(.none);
         var weights: [part_count]f32 = @splat(0);
         for (tent, 0..) |by_row, row_step| for (tent, 0..) |by_column, column_step| {
             const row = @as(usize, y) + row_step;
             const column = @as(usize, x) + column_step;
-            if (row < 2 or column < 2) continue;
-            const other_x: u32 = @intCast(column - 2);
-            const other_y: u32 = @intCast(row - 2);
-            if (other_x >= layers.width or other_y >= layers.height) continue;
+            if (row < window.y0 + reach or column < window.x0 + reach) continue;
+            const other_x: u32 = @intCast(column - reach);
+            const other_y: u32 = @intCast(row - reach);
+            if (other_x >= window.x1 or other_y >= window.y1) continue;
             const is_own = other_x == x and other_y == y;
             if (by_place and !is_own) {
-                if (!place.isLike(&.of(layers, view, other_x, other_y))) continue;
+                if (!place.isLike(&.of(layers, view, window, other_x, other_y))) continue;
             }
             const part = partOf(other_x, other_y);
             const weight = by_row * by_column;
-            parts[part].add(&.of(layers, @as(usize, other_y) * layers.width + other_x), weight);
+            parts[part].add(&.of(layers, layers.indexOf(window, other_x, other_y)), weight);
             weights[part] += weight;
         };
         var found: u32 = 0;
@@ -345,8 +368,14 @@ pub const Place = struct {
     /// How far off a neighbour may be.
     off: f32,
 
-    pub inline fn of(layers: *const Layers, view: *const world_file.View, x: u32, y: u32) Place {
-        const place = layers.place[@as(usize, y) * layers.width + x];
+    inline fn of(
+        layers: *const Layers,
+        view: *const world_file.View,
+        window: *const Rectangle,
+        x: u32,
+        y: u32,
+    ) Place {
+        const place = layers.place[layers.indexOf(window, x, y)];
         const camera = &view.camera;
         const distance = place[3];
         const width = 2 * off_max / @as(f32, @floatFromInt(view.width));
@@ -395,7 +424,9 @@ test "like neighbours share light, so that each pixel of a plane has that of all
     var view: world_file.View = .nowhere;
     view.width = 12;
     view.height = 9;
-    var layers: Layers = try .init(gpa, &view, true, true);
+    const layout: Layout = .whole(view.width, view.height);
+    const window = layout.windowAt(0).traced;
+    var layers: Layers = try .init(gpa, &layout, true, true);
     defer layers.deinit(gpa);
     var film: Film = try .init(gpa, view.width, view.height, .init(.{ .color = true }));
     defer film.deinit(gpa);
@@ -416,9 +447,8 @@ test "like neighbours share light, so that each pixel of a plane has that of all
         Layers.add(layers.open, at, 0, @splat(open));
         film.add(@intCast(x), @intCast(y), 0, .{ 1, 1, 1, 0 });
     };
-    for (0..view.height) |y| layers.placeRow(&view, @intCast(y));
-    for (0..view.height) |y|
-        try std.testing.expectEqual(0, layers.finishRow(&film, &view, @intCast(y), &.none));
+    layers.placeAll(&view, window);
+    try std.testing.expectEqual(0, layers.finish(&film, &view, &window, window, &.none));
     for (0..view.height) |y| for (0..view.width) |x| {
         const found = film.image.at(@intCast(x), @intCast(y)).*[0];
         const albedo: f32 = @floatFromInt(1 + (x + y) % 4);

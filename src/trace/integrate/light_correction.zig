@@ -8,10 +8,8 @@
 
 const std = @import("std");
 const vec3 = @import("../../math.zig").vec3;
-const world_file = @import("../../world.zig");
 const interleave = @import("interleave.zig");
-const Layers = interleave.Layers;
-const Pixel = Layers.Pixel;
+const Pixel = interleave.Layers.Pixel;
 
 /// Points of a picture.
 pub const Grid = struct {
@@ -36,29 +34,30 @@ const plain_weight = 0.05;
 const factor_least: Pixel = @splat(0.25);
 const factor_most: Pixel = @splat(4);
 
-/// Light of points; `few` and `many` are row by row, 0 where nothing is known.
+/// Light of points, row by row; 0 where nothing is known.
 pub const Correction = struct {
     grid: Grid,
+    /// Where points are: of the whole picture, whatever part of it there are pixels of.
+    places: []interleave.Place,
     few: []Pixel,
     many: []Pixel,
 
     pub const none: Correction = .{
         .grid = .{ .side = 0, .step = 1 },
+        .places = &.{},
         .few = &.{},
         .many = &.{},
     };
 
-    /// The factors of a pixel.
+    /// The factors of a pixel that sees this.
     pub fn of(
         correction: *const Correction,
-        layers: *const Layers,
-        view: *const world_file.View,
+        own: *const interleave.Place,
         x: u32,
         y: u32,
     ) Pixel {
         const grid = correction.grid;
         if (correction.few.len == 0) return @splat(1);
-        const own: interleave.Place = .of(layers, view, x, y);
         const step: f32 = @floatFromInt(grid.step);
         const column = firstOf(grid, x);
         const row = firstOf(grid, y);
@@ -76,8 +75,7 @@ pub const Correction = struct {
             const other_x = grid.pixelOf(at_column);
             const other_y = grid.pixelOf(at_row);
             const tent = tentOf(x, other_x, step) * tentOf(y, other_y, step);
-            const other: interleave.Place = .of(layers, view, other_x, other_y);
-            const weight: Pixel = @splat(tent * likeness(&own, &other, off_max));
+            const weight: Pixel = @splat(tent * likeness(own, &correction.places[at], off_max));
             around += @as(Pixel, @splat(tent)) * light;
             few += weight * light;
             many += weight * correction.many[at];

@@ -13,7 +13,9 @@ const Candidate = @import("virtual_lights.zig").Candidate;
 const Correction = @import("light_correction.zig").Correction;
 const Grid = @import("light_correction.zig").Grid;
 const Pixel = @import("interleave.zig").Layers.Pixel;
+const Place = @import("interleave.zig").Place;
 const Point = light_importance.Point;
+const View = @import("../../world.zig").View;
 
 /// Points of a piece of work.
 pub const piece_points = 64;
@@ -33,17 +35,23 @@ pub const LightMatrix = struct {
         const place_count = @as(usize, grid.side) * grid.side;
         const gains = try gpa.alloc(f32, row_count * place_count);
         errdefer gpa.free(gains);
+        const places = try gpa.alloc(Place, place_count);
+        errdefer gpa.free(places);
         const few = try gpa.alloc(Pixel, place_count);
         errdefer gpa.free(few);
         const many = try gpa.alloc(Pixel, place_count);
         @memset(few, @splat(0));
         @memset(many, @splat(0));
-        return .{ .gains = gains, .correction = .{ .grid = grid, .few = few, .many = many } };
+        return .{
+            .gains = gains,
+            .correction = .{ .grid = grid, .places = places, .few = few, .many = many },
+        };
     }
 
     /// Frees everything.
     pub fn deinit(matrix: *LightMatrix, gpa: Allocator) void {
         gpa.free(matrix.gains);
+        gpa.free(matrix.correction.places);
         gpa.free(matrix.correction.few);
         gpa.free(matrix.correction.many);
     }
@@ -73,9 +81,10 @@ pub const LightMatrix = struct {
         return points[first..@min(first + piece_points, points.len)];
     }
 
-    /// Adds up what all candidates give some points.
+    /// Adds up what all candidates give some points, as seen from the camera.
     pub fn addUp(
         matrix: *LightMatrix,
+        view: *const View,
         candidates: []const Candidate,
         points: []const Point,
         piece: usize,
@@ -87,8 +96,15 @@ pub const LightMatrix = struct {
             const gains = matrix.gainsOf(row, points.len)[piece * piece_points ..][0..some.len];
             for (sums[0..some.len], gains) |*sum, gain| sum.* += color * @as(Pixel, @splat(gain));
         }
-        for (sums[0..some.len], some) |sum, *point|
-            matrix.correction.many[matrix.placeOf(point)] = sum;
+        for (sums[0..some.len], some) |sum, *point| {
+            const at = matrix.placeOf(point);
+            matrix.correction.many[at] = sum;
+            matrix.correction.places[at] = .{
+                .position = math.vec3.sub(point.position, view.camera.origin),
+                .normal = point.normal,
+                .off = 0,
+            };
+        }
     }
 
     /// Makes the shares of what points get that are some candidates', from this row on, their

@@ -199,7 +199,7 @@ pub fn LightSelection(comptime Kernel: type, comptime Tree: type) type {
                 .finish => light_importance.finishWeights(few, &selection.sums, part, radius),
                 .keep => selection.keep(),
                 .measure => selection.measure(tree, piece),
-                .add => selection.matrix.addUp(selection.found, seen, piece),
+                .add => selection.matrix.addUp(selection.frame.view, selection.found, seen, piece),
                 .rate => {
                     const part_measured = selection.ofPiece(piece, piece_measured);
                     selection.matrix.rate(part_measured, piece * piece_measured, seen);

@@ -135,10 +135,9 @@ pub fn expose(step: anytype, sample: u32, film: *Film) void {
     const all = step.rectangle;
     const number = step.first_sample + sample;
     for (all.y0..all.y1) |y| for (all.x0..all.x1) |x| {
-        const column: u32 = @intCast(x);
-        const row: u32 = @intCast(y);
-        const place = Record.numberOf(sample, column - all.x0, row - all.y0);
+        const place = Record.numberOf(sample, @intCast(x - all.x0), @intCast(y - all.y0));
         const record = &step.records[place];
+        const column, const row = all.placeOf(@intCast(x), @intCast(y));
         var light = record.radiance;
         if (!std.math.isFinite(light[0] + light[1] + light[2])) light = .{ 0, 0, 0 };
         film.add(column, row, number, light ++ .{record.escaped});

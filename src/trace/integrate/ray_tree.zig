@@ -38,6 +38,7 @@ const Grid = @import("../traverse/beam/grid.zig").Grid;
 const Rectangle = @import("../../film.zig").Rectangle;
 const assert = std.debug.assert;
 const Frame = world_file.Frame;
+const Light = world_file.Light;
 
 /// One thread's trees.
 pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
@@ -138,6 +139,7 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
 
         /// A sample of each pixel of a bundle.
         fn trace(tree: *Self, rectangle: Rectangle, sample: u32, film: *Film) void {
+            const before = if (Kernel.counts_tests) tree.visibility.tests else {};
             tree.sample.start(sample, film.layers);
             tree.bounces.start(rectangle, sample);
             tree.lighting.start(rectangle);
@@ -149,6 +151,9 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
             }
             tree.sample.expose(film, rectangle);
             tree.lighting.expose(rectangle, sample);
+            const place: camera.Place = .{ .rectangle = rectangle, .sample = sample };
+            if (Kernel.counts_tests and film.layers.contains(.cost))
+                camera.exposeCost(Kernel, film, place, before, tree.visibility.tests);
         }
 
         fn pushPrimary(tree: *Self, rectangle: Rectangle) void {
@@ -253,11 +258,7 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
         }
 
         /// Adds what the points that rays see scatter of these of the scene's lights.
-        pub fn addDirect(
-            tree: *Self,
-            lights: []const world_file.Light,
-            coherence: dispatch.Coherence,
-        ) void {
+        pub fn addDirect(tree: *Self, lights: []const Light, coherence: dispatch.Coherence) void {
             for (lights) |*light| tree.countShadow(direct.addLight(
                 Kernel,
                 &tree.visibility,

@@ -13,7 +13,8 @@
 //!
 //!     width, height, counts_tests               pixels of a bundle; whether tests are counted
 //!     init(gpa, frame, settings), deinit(gpa)   *I, one a thread
-//!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it
+//!     pass(rectangle, first_sample, sample_count, film)   of a bundle or a part of it, whose
+//!                                               places on the film `Rectangle.placeOf` says
 //!     counts()                                  of all its passes, `Counts`
 //!     tile_step                                 tiles' sides are multiples of it; none: of 1
 //!     Shared                                    what all threads' share; none, void: nothing
@@ -26,12 +27,17 @@ const world_file = @import("../../world.zig");
 const statistics = @import("../../statistics.zig");
 const parallel = @import("../../parallel.zig");
 const adaptive = @import("adaptive.zig");
+const Diagnostic = @import("../../diagnostic.zig").Diagnostic;
 const film_file = @import("../../film.zig");
 const sampler = @import("sampler.zig");
 const assert = std.debug.assert;
 const Allocator = std.mem.Allocator;
 const Film = film_file.Film;
+const Layout = film_file.Layout;
 const Frame = world_file.Frame;
+const Look = @import("survey.zig").Look;
+const progress_file = @import("../../progress.zig");
+const Progress = progress_file.Progress;
 const Rectangle = film_file.Rectangle;
 
 /// How a frame is traced, and who does the work.
@@ -48,8 +54,8 @@ pub const Settings = struct {
     depth_max: u32 = choices.depth.default,
     /// Side of a tile in pixels, at least 1.
     tile_size: u32 = choices.tile_size.default,
-    /// Told of every finished tile of a pass.
-    progress: std.Progress.Node = .none,
+    /// Told of the rays and of every finished tile of a pass; null: nobody is.
+    progress: ?*Progress = null,
     /// Looked at between tiles: set, it ends the work.
     cancel: ?*const std.atomic.Value(bool) = null,
     /// Looked at between tiles: set, it ends the work as soon as every pixel has a sample, and the
@@ -59,6 +65,10 @@ pub const Settings = struct {
     noise: ?adaptive.Noise = null,
     /// Null: all samples in one round.
     course: ?Course = null,
+    /// Of a survey.
+    look: Look = .hits,
+    /// Which pixels; null: all of the picture, as `render` fills in.
+    layout: ?*const Layout = null,
     /// The integrator's `Shared`: `render` fills it in.
     shared: ?*anyopaque = null,
 
@@ -80,6 +90,8 @@ pub const Course = struct {
     /// Called while nobody traces. Returns how many samples pixels are to have after the next
     /// round; the work ends where they have as many.
     next: *const fn (context: *anyopaque, standing: *const Standing) u32,
+    /// What it goes by, if it is a time.
+    budget_ns: ?u64 = null,
 };
 
 /// Where the work stands between rounds.
@@ -94,7 +106,7 @@ pub const Standing = struct {
         const copy: Copy = .{ .job = job, .film = film };
         try job.settings.pool.forEach(job.tiles.count, &copy, Copy.tile);
         const shared = job.integrator.shared orelse return;
-        _ = job.doSteps(shared.steps_before, shared.step_count, film);
+        _ = job.doSteps(shared.steps_before, shared.step_count, film, null);
     }
 
     const Copy = struct {
@@ -125,8 +137,9 @@ pub const Statistics = struct {
     non_finite_count: u64 = 0,
     /// Of the pixels that have the most.
     sample_count: u32 = 0,
-    /// Of all pixels.
+    /// Of all pixels that were traced, and how many these are.
     sample_sum: u64 = 0,
+    pixel_count: u64 = 0,
     /// The work was stopped before its end.
     is_partial: bool = false,
 };
@@ -176,6 +189,7 @@ pub const Integrator = extern struct {
                         .y0 = y,
                         .x1 = @min(x + I.width, tile.x1),
                         .y1 = @min(y + I.height, tile.y1),
+                        .shift = tile.shift,
                     }, first_sample, sample_count, film);
                 }
             }
@@ -275,24 +289,22 @@ pub fn render(
     defer gpa.free(offsets);
     var with_tiles = chosen.*;
     with_tiles.tile_size = @divCeil(chosen.tile_size, integrator.tile_step) * integrator.tile_step;
+    const whole: Layout = .whole(film.image.width, film.image.height);
+    if (with_tiles.layout == null) with_tiles.layout = &whole;
     const settings = &with_tiles;
-    var shown = settings.*;
-    shown.offsets = offsets;
-    if (settings.integrator.isOpen()) {
-        sampler.placeInSequence(offsets);
-        shown.sample_count = open_sample_count;
-    } else sampler.place(offsets);
+    const layout = settings.layout.?;
+    var shown = withSamples(settings, offsets);
     if (integrator.shared) |shared|
         shown.shared = shared.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
     defer if (integrator.shared) |shared| shared.deinit(shown.shared.?, &gpa);
-    const image = &film.image;
+    assert(film.image.width == layout.film_width and film.image.height == layout.film_height);
     var blocks: ?adaptive.Blocks = null;
     defer if (blocks) |*all| all.deinit(gpa);
     if (settings.noise) |noise| {
         assert(settings.integrator.isOpen());
-        blocks = try .init(gpa, image.width, image.height, noise);
+        blocks = try .init(gpa, layout, noise);
     }
-    var tiles: Tiles = .init(image.width, image.height, settings);
+    var tiles: Tiles = .init(layout, settings);
     tiles.states = try gpa.alloc(Tiles.State, tiles.count);
     defer gpa.free(tiles.states);
     @memset(tiles.states, .{});
@@ -314,12 +326,13 @@ pub fn render(
         };
         job.by_thread = by_thread[0 .. job.by_thread.len + 1];
     }
-    if (integrator.shared) |shared| _ = job.doSteps(0, shared.steps_before, film);
+    const progress = settings.progress;
+    if (integrator.shared) |shared| _ = job.doSteps(0, shared.steps_before, film, progress);
     const is_whole = job.run();
     if (settings.isCancelled()) return error.Canceled;
     var total = try job.finish(is_whole);
-    if (integrator.shared) |shared|
-        total.non_finite_count += job.doSteps(shared.steps_before, shared.step_count, film);
+    if (integrator.shared) |shared| total.non_finite_count +=
+        job.doSteps(shared.steps_before, shared.step_count, film, progress);
     var tests: statistics.TestCounts = .{};
     for (job.by_thread) |one| {
         var counts: Counts = undefined;
@@ -329,6 +342,60 @@ pub fn render(
     }
     if (integrator.counts_tests) total.tests = tests;
     return total;
+}
+
+/// Settings as integrators find them, with places for all samples.
+fn withSamples(chosen: *const Settings, offsets: []sampler.Offset) Settings {
+    var shown = chosen.*;
+    shown.offsets = offsets;
+    if (chosen.integrator.isOpen()) {
+        sampler.placeInSequence(offsets);
+        shown.sample_count = open_sample_count;
+    } else sampler.place(offsets);
+    return shown;
+}
+
+/// Has a survey leave hits on the film's layer of origins, of the first sample of those that the
+/// picture has by these settings; all else of the film stays.
+pub fn fillHits(
+    survey: *const Integrator,
+    gpa: Allocator,
+    frame: *const Frame,
+    film: *Film,
+    chosen: *const Settings,
+) Error!void {
+    assert(survey.shared == null and chosen.look == .hits);
+    const offsets = try gpa.alloc(sampler.Offset, chosen.sample_count);
+    defer gpa.free(offsets);
+    const shown = withSamples(chosen, offsets);
+    const whole: Layout = .whole(film.image.width, film.image.height);
+    const tiles: Tiles = .init(chosen.layout orelse &whole, &shown);
+    const nothing: f32 = @bitCast(film_file.no_triangle);
+    @memset(film.imageOf(.origin).?.pixels, .{ nothing, 0, 0, 0 });
+    var by_thread: [parallel.thread_count_max]*anyopaque = undefined;
+    var count: usize = 0;
+    defer for (by_thread[0..count]) |one| survey.deinit(one, &gpa);
+    while (count < chosen.pool.threadsFor(tiles.count)) : (count += 1) {
+        by_thread[count] = survey.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
+    }
+    const Hits = struct {
+        survey: *const Integrator,
+        tiles: *const Tiles,
+        film: *Film,
+        by_thread: []const *anyopaque,
+
+        fn tile(hits: *const @This(), number: usize, thread_index: usize) void {
+            const rectangle = hits.tiles.rectangleOf(@intCast(number));
+            hits.survey.pass(hits.by_thread[thread_index], &rectangle, 0, 1, hits.film);
+        }
+    };
+    const work: Hits = .{
+        .survey = survey,
+        .tiles = &tiles,
+        .film = film,
+        .by_thread = by_thread[0..count],
+    };
+    try chosen.pool.forEach(tiles.count, &work, Hits.tile);
 }
 
 /// One frame by one integrator.
@@ -344,12 +411,19 @@ const Job = struct {
 
     /// Work that is shared, from one step to before another. Returns how many pixels were made
     /// black.
-    fn doSteps(job: *const Job, first: u32, end: u32, film: *Film) u64 {
-        var steps: Steps = .{ .job = job, .film = film };
+    fn doSteps(
+        job: *const Job,
+        first: u32,
+        end: u32,
+        film: *Film,
+        progress: ?*Progress,
+    ) u64 {
+        var steps: Steps = .{ .job = job, .film = film, .progress = progress };
         for (first..end) |step| {
             steps.step = @intCast(step);
             steps.piece_count = job.integrator.shared.?.pieces(job.shared.?, steps.step);
             steps.next.store(0, .monotonic);
+            Progress.begin(progress, .{ .stage = .lights, .total = steps.piece_count });
             const thread_count = @min(job.by_thread.len, steps.piece_count);
             if (thread_count > 0) job.settings.pool.share(thread_count, &steps, Steps.work);
         }
@@ -359,6 +433,7 @@ const Job = struct {
     const Steps = struct {
         job: *const Job,
         film: *Film,
+        progress: ?*Progress,
         /// Under way.
         step: u32 = 0,
         piece_count: u32 = 0,
@@ -374,6 +449,7 @@ const Job = struct {
                 const one = job.by_thread[thread_index];
                 const count = shared.work(job.shared.?, one, steps.step, piece, steps.film);
                 if (count > 0) _ = steps.non_finite_count.fetchAdd(@intCast(count), .monotonic);
+                Progress.add(steps.progress, 1);
             }
         }
     };
@@ -383,6 +459,7 @@ const Job = struct {
         const settings = job.settings;
         const tiles = job.tiles;
         var done: u32 = 0;
+        job.tellBegin();
         while (done < settings.sample_count) : (done = tiles.samples_due) {
             if (done > 0 and job.isEnded()) return false;
             const until = if (settings.course) |course|
@@ -405,39 +482,74 @@ const Job = struct {
         return job.settings.isStopped() and job.tiles.isEachTaken();
     }
 
+    /// Tells the progress of the tiles, each as often as there are samples; of blocks, each of
+    /// which may have enough sooner, where they are judged.
+    fn tellBegin(job: *const Job) void {
+        const settings = job.settings;
+        const count: u64 = if (job.blocks) |blocks|
+            blocks.active_count.load(.monotonic)
+        else
+            job.tiles.count;
+        Progress.begin(settings.progress, .{
+            .stage = .tracing,
+            .total = count * settings.sample_count,
+            .pieces_per_unit = count,
+            .budget_ns = if (settings.course) |course| course.budget_ns else null,
+        });
+    }
+
+    /// Rays of a thread so far, where somebody is told of them.
+    fn raysOf(job: *const Job, thread_index: usize) u64 {
+        if (job.settings.progress == null) return 0;
+        var counts: Counts = undefined;
+        job.integrator.counts(job.by_thread[thread_index], &counts);
+        return counts.rays.primary + counts.rays.shadow + counts.rays.secondary;
+    }
+
     fn work(job: *Job, thread_index: usize) void {
+        const progress = job.settings.progress;
+        var told = job.raysOf(thread_index);
         while (!job.isEnded()) {
             const number = job.tiles.take() orelse return;
             const state = &job.tiles.states[number];
             if (state.due.fetchAdd(1, .acquire) > 0) continue;
             while (true) {
-                job.passTile(job.by_thread[thread_index], number);
-                job.settings.progress.completeOne();
+                Progress.add(progress, job.passTile(job.by_thread[thread_index], number));
+                const rays = job.raysOf(thread_index);
+                Progress.addRays(progress, rays - told);
+                told = rays;
                 if (job.isEnded()) return;
                 if (state.due.fetchSub(1, .acq_rel) == 1) break;
             }
         }
     }
 
-    /// The next samples of a tile.
-    fn passTile(job: *Job, integrator: *anyopaque, number: u32) void {
+    /// The next samples of a tile. Returns how many pieces that are, see `tellBegin`.
+    fn passTile(job: *Job, integrator: *anyopaque, number: u32) usize {
         const state = &job.tiles.states[number];
         const tile = job.tiles.rectangleOf(number);
         const done = state.samples_done;
         const sample_count = passSamples(done, job.tiles.samples_due);
-        if (job.blocks) |blocks| {
-            var all = blocks.of(tile);
-            while (all.nextActive()) |active| {
-                job.integrator.pass(integrator, &active, done, sample_count, job.film);
-            }
-            blocks.judge(tile, job.film, done + sample_count);
-        } else job.integrator.pass(integrator, &tile, done, sample_count, job.film);
         state.samples_done = done + sample_count;
+        if (job.blocks) |blocks| {
+            const on_film = tile.onFilm();
+            var all = blocks.of(on_film);
+            while (all.nextActive()) |active| {
+                const rectangle = tile.ofFilm(active);
+                job.integrator.pass(integrator, &rectangle, done, sample_count, job.film);
+            }
+            const judged = blocks.judge(on_film, job.film, done + sample_count);
+            // Those that have enough count as if they had all.
+            const saved = job.settings.sample_count - (done + sample_count);
+            return judged.active_before * sample_count + judged.finished * saved;
+        }
+        job.integrator.pass(integrator, &tile, done, sample_count, job.film);
+        return sample_count;
     }
 
-    /// A tile in parts whose pixels have the same number of samples.
+    /// A tile of the film in parts whose pixels have the same number of samples.
     fn partsOf(job: *const Job, number: u32) Parts {
-        const tile = job.tiles.rectangleOf(number);
+        const tile = job.tiles.rectangleOf(number).onFilm();
         const sample_count = job.tiles.states[number].samples_done;
         const blocks = job.blocks orelse
             return .{ .whole = .{ .rectangle = tile, .sample_count = sample_count } };
@@ -475,6 +587,7 @@ const Job = struct {
             .non_finite_count = finished.non_finite_count,
             .sample_count = finished.sample_count,
             .sample_sum = finished.sample_sum,
+            .pixel_count = job.tiles.layout.tracedCount(),
             .is_partial = !is_whole,
         };
     }
@@ -485,8 +598,7 @@ const Job = struct {
             const rectangle = part.rectangle;
             sum.non_finite_count += job.film.finish(rectangle, part.sample_count);
             sum.sample_count = @max(sum.sample_count, part.sample_count);
-            const pixel_count = (rectangle.x1 - rectangle.x0) * (rectangle.y1 - rectangle.y0);
-            sum.sample_sum += @as(u64, pixel_count) * part.sample_count;
+            sum.sample_sum += rectangle.pixelCount() * part.sample_count;
         }
     }
 };
@@ -514,11 +626,12 @@ fn passSamples(samples_done: u32, samples_due: u32) u32 {
     return @min(samples_due - samples_done, @min(@as(u32, @intCast(rest)), 64));
 }
 
-/// The picture in tiles, each as often as there are passes.
+/// What is traced in tiles, each as often as there are passes.
 const Tiles = struct {
     next: std.atomic.Value(u32) align(std.atomic.cache_line) = .init(0),
-    width: u32,
-    height: u32,
+    layout: *const Layout,
+    /// Side of a tile where there is one window, and how many there are in a row of it; windows of
+    /// several are tiles themselves.
     size: u32,
     columns: u32,
     count: u32,
@@ -543,7 +656,8 @@ const Tiles = struct {
     const passes_max = 128;
 
     /// Asserts that no size is 0. A side of a tile is raised where there would be too many.
-    fn init(width: u32, height: u32, settings: *const Settings) Tiles {
+    fn init(layout: *const Layout, settings: *const Settings) Tiles {
+        const width, const height = .{ layout.film_width, layout.film_height };
         var size = settings.tile_size;
         assert(width > 0 and height > 0 and size > 0 and settings.sample_count > 0);
         if (settings.noise != null) size = std.mem.alignForward(u32, size, adaptive.block_side);
@@ -551,11 +665,13 @@ const Tiles = struct {
             size *= 2;
         const columns = @divCeil(width, size);
         return .{
-            .width = width,
-            .height = height,
+            .layout = layout,
             .size = size,
             .columns = columns,
-            .count = columns * @divCeil(height, size),
+            .count = switch (layout.form) {
+                .window => columns * @divCeil(height, size),
+                .share => layout.count(),
+            },
         };
     }
 
@@ -581,13 +697,16 @@ const Tiles = struct {
     }
 
     fn rectangleOf(tiles: *const Tiles, number: u32) Rectangle {
-        const x0 = (number % tiles.columns) * tiles.size;
-        const y0 = (number / tiles.columns) * tiles.size;
+        if (tiles.layout.form == .share) return tiles.layout.windowAt(number).traced;
+        const all = tiles.layout.windowAt(0).traced;
+        const x0 = all.x0 + (number % tiles.columns) * tiles.size;
+        const y0 = all.y0 + (number / tiles.columns) * tiles.size;
         return .{
             .x0 = x0,
             .y0 = y0,
-            .x1 = x0 + @min(tiles.size, tiles.width - x0),
-            .y1 = y0 + @min(tiles.size, tiles.height - y0),
+            .x1 = x0 + @min(tiles.size, all.x1 - x0),
+            .y1 = y0 + @min(tiles.size, all.y1 - y0),
+            .shift = all.shift,
         };
     }
 };
@@ -597,7 +716,7 @@ test "every pixel is in exactly one tile, and every tile is due once a pass" {
     defer pool.deinit();
     for ([_][3]u32{ .{ 1, 1, 1 }, .{ 7, 5, 3 }, .{ 64, 64, 16 }, .{ 3, 100, 256 } }) |case| {
         var covered: [100 * 100]u8 = @splat(0);
-        var tiles: Tiles = .init(case[0], case[1], &.{
+        var tiles: Tiles = .init(&.whole(case[0], case[1]), &.{
             .pool = &pool,
             .tile_size = case[2],
         });
@@ -617,7 +736,7 @@ test "every pixel is in exactly one tile, and every tile is due once a pass" {
 test "huge pictures have a countable number of tiles" {
     var pool: parallel.Pool = .init(1);
     defer pool.deinit();
-    var tiles: Tiles = .init(65536, 65536, &.{ .pool = &pool, .tile_size = 1 });
+    var tiles: Tiles = .init(&.whole(65536, 65536), &.{ .pool = &pool, .tile_size = 1 });
     tiles.begin(0, 4096);
     try std.testing.expect(@as(u64, tiles.count) * tiles.pass_count <= Tiles.count_max);
     try std.testing.expect(tiles.pass_count <= Tiles.passes_max);
@@ -769,13 +888,34 @@ const NoisyIntegrator = struct {
                 var random: std.Random.SplitMix64 = .init((y * 64 + x) * 4096 + sample);
                 const value: f32 = @floatFromInt(random.next() >> 40);
                 const shown = if (x < quiet_width) 0.25 else value * 0x1p-25;
-                film.add(@intCast(x), @intCast(y), @intCast(sample), @splat(shown));
+                const column, const row = rectangle.placeOf(@intCast(x), @intCast(y));
+                film.add(column, row, @intCast(sample), @splat(shown));
             }
         };
     }
 
     fn one(_: *anyopaque, standing: *const Standing) u32 {
         return standing.samples_done + 13;
+    }
+};
+
+/// Holds that all pieces that are told when the work begins are done at its end.
+const TestProgress = struct {
+    progress: Progress,
+
+    fn init(told: *TestProgress) void {
+        told.progress = .{ .context = told, .begun = begun };
+    }
+
+    fn begun(context: *anyopaque, work: *const progress_file.Work) void {
+        const told: *TestProgress = @ptrCast(@alignCast(context));
+        told.progress.restart(work);
+    }
+
+    fn expectDone(told: *const TestProgress) !void {
+        const total = told.progress.total.load(.monotonic);
+        try std.testing.expect(total > 0);
+        try std.testing.expectEqual(total, told.progress.done.load(.monotonic));
     }
 };
 
@@ -789,8 +929,11 @@ test "quiet blocks get no more samples than they need, whatever tiles, threads a
             defer pool.deinit();
             var film: Film = try .init(gpa, 40, 20, .init(.{ .color = true }));
             defer film.deinit(gpa);
+            var told: TestProgress = undefined;
+            told.init();
             const total = try render(&.of(NoisyIntegrator), gpa, &frame, &film, &.{
                 .pool = &pool,
+                .progress = &told.progress,
                 .integrator = .path,
                 .sample_count = 100,
                 .tile_size = tile_size,
@@ -800,6 +943,7 @@ test "quiet blocks get no more samples than they need, whatever tiles, threads a
                     .next = NoisyIntegrator.one,
                 },
             });
+            try told.expectDone();
             // In three columns of blocks: some stay until the end.
             try std.testing.expectEqual(100, total.sample_count);
             try std.testing.expectEqual(16 * 20 * 16 + 24 * 20 * 100, total.sample_sum);
@@ -808,4 +952,58 @@ test "quiet blocks get no more samples than they need, whatever tiles, threads a
             hash = film.hash();
         }
     };
+}
+
+test "parts of a picture are what it has there, with blocks of its own grid" {
+    const gpa = std.testing.allocator;
+    const frame: Frame = undefined;
+    var pool: parallel.Pool = .init(2);
+    defer pool.deinit();
+    var diagnostic: Diagnostic = .{};
+    const width = 45;
+    const height = 37;
+    var whole: Film = try .init(gpa, width, height, .init(.{ .color = true }));
+    defer whole.deinit(gpa);
+    var told: TestProgress = undefined;
+    told.init();
+    var shown: Settings = .{
+        .pool = &pool,
+        .progress = &told.progress,
+        .integrator = .path,
+        .sample_count = 50,
+        .tile_size = 24,
+        .noise = .{ .error_max = 0.015, .exposure_scale = 1 },
+    };
+    const total = try render(&.of(NoisyIntegrator), gpa, &frame, &whole, &shown);
+    var sample_sum: u64 = 0;
+    for ([_]choices.Part{
+        .{ .crop = .{ .pixels = .{ 17, 3, 44, 34 } } },
+        .{ .tile = .{ .number = 1, .count = 2 } },
+        .{ .tile = .{ .number = 2, .count = 2 } },
+    }) |part| {
+        var layout: Layout = try .init(gpa, width, height, part, .{
+            .step = adaptive.block_side,
+            .margin = if (part == .crop) 2 else 0,
+        }, &diagnostic);
+        defer layout.deinit(gpa);
+        shown.layout = &layout;
+        var film: Film =
+            try .init(gpa, layout.film_width, layout.film_height, whole.layers);
+        defer film.deinit(gpa);
+        const found = try render(&.of(NoisyIntegrator), gpa, &frame, &film, &shown);
+        try told.expectDone();
+        if (part == .tile) sample_sum += found.sample_sum;
+        var cut = try film.cut(gpa, &layout);
+        defer cut.deinit(gpa);
+        const bare = layout.bare();
+        for (0..bare.count()) |number| {
+            const own = bare.windowAt(@intCast(number)).own;
+            for (own.y0..own.y1) |y| for (own.x0..own.x1) |x| {
+                const place = own.placeOf(@intCast(x), @intCast(y));
+                const expected = whole.image.at(@intCast(x), @intCast(y)).*;
+                try std.testing.expectEqual(expected, cut.image.at(place[0], place[1]).*);
+            };
+        }
+    }
+    try std.testing.expectEqual(total.sample_sum, sample_sum);
 }

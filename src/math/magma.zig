@@ -1,4 +1,4 @@
-//! A map of differences as colours: matplotlib's magma, black through violet and orange to white.
+//! Values as colours: matplotlib's map magma, black through violet and orange to white.
 //!
 //! In: values in 0..1. Out: sRGB bytes, by a polynomial a channel that is 6 codes off at most.
 
@@ -18,10 +18,11 @@ const coefficients = [_][3]f32{
 /// Asserts that there are three bytes for each value.
 pub fn fill(map: []const f32, bytes: []u8) void {
     std.debug.assert(bytes.len == 3 * map.len);
-    for (map, 0..) |value, index| bytes[3 * index ..][0..3].* = colourOf(value);
+    for (map, 0..) |value, index| bytes[3 * index ..][0..3].* = colorOf(value);
 }
 
-fn colourOf(value: f32) [3]u8 {
+/// Of a value in 0..1, beyond which it stays the same.
+pub fn colorOf(value: f32) [3]u8 {
     const x = std.math.clamp(value, 0, 1);
     var colour: [3]u8 = undefined;
     for (&colour, 0..) |*code, channel| {
@@ -37,9 +38,9 @@ fn colourOf(value: f32) [3]u8 {
 }
 
 test "from black to nearly white, and red in between" {
-    try std.testing.expectEqual([3]u8{ 0, 0, 0 }, colourOf(0));
-    const white = colourOf(1);
+    try std.testing.expectEqual([3]u8{ 0, 0, 0 }, colorOf(0));
+    const white = colorOf(1);
     try std.testing.expect(white[0] > 240 and white[1] > 240 and white[2] > 180);
-    const middle = colourOf(0.5);
+    const middle = colorOf(0.5);
     try std.testing.expect(middle[0] > 170 and middle[1] < 70 and middle[2] > 110);
 }
