@@ -97,7 +97,7 @@ test "points have the flux of all pieces, more of them where there is more" {
         }
         try std.testing.expectApproxEqRel(200, flux, 1e-5);
         try std.testing.expectEqual(most, lights.len);
-        try std.testing.expectEqual(if (most == 100) 50 else 15, before);
+        try std.testing.expectEqual(@as(usize, if (most == 100) 50 else 15), before);
     }
     for (&pieces) |*piece| piece.flux = @splat(0);
     try std.testing.expectEqual(0, (try choose(gpa, &pieces, &geometry, 9)).len);
