@@ -25,6 +25,7 @@ const Drawn = @import("prepare/drawn.zig");
 const flatten = @import("prepare/flatten.zig");
 const emitter_lights = @import("prepare/emitter_lights.zig");
 const extent_file = @import("prepare/extent.zig");
+const emission_points = @import("prepare/emission_points.zig");
 const emitters = @import("prepare/emitters.zig");
 const environment = @import("prepare/environment.zig");
 const sharing_file = @import("prepare/instances.zig");
@@ -251,6 +252,8 @@ pub const EnvironmentSource = environment.Source;
 pub const OwnedEnvironmentMap = environment.OwnedMap;
 /// Makes light lists.
 pub const makeLightSampler = light_sampler.make;
+/// See `emission_points.zig`.
+pub const findEmission = emission_points.find;
 /// See `makeLightSampler`.
 pub const OwnedLightSampler = light_sampler.OwnedLightSampler;
 /// How a map is placed around the scene.
@@ -1682,6 +1685,7 @@ test {
     _ = flatten;
     _ = strokes;
     _ = light;
+    _ = emission_points;
     _ = light_sampler;
     _ = material;
     _ = place_file;

@@ -527,6 +527,8 @@ pub const Session = struct {
         var lights = try session.makeLightSampler(choices.integrator, &frame);
         defer if (lights) |*made| made.deinit();
         if (lights) |*made| frame.light_sampler = &made.sampler;
+        frame.emission = try session.findEmission(choices.integrator, &frame);
+        defer session.gpa.free(frame.emission);
         try session.traceInRounds(&frame, film, choices);
         session.times.trace_ns = session.since(start);
         if (session.traced.non_finite_count > 0) session.diagnostic.warn(
@@ -689,6 +691,20 @@ pub const Session = struct {
         if (integrator != .path) return null;
         const has_emitters = session.seen.emitters or session.facts.has_area_lights;
         return try prepare.makeLightSampler(session.gpa, frame, has_emitters, &session.pool);
+    }
+
+    /// Points on surfaces that emit, for an integrator of virtual lights; none for others, or where
+    /// these surfaces do not light the scene.
+    fn findEmission(
+        session: *Session,
+        integrator: settings.Integrator,
+        frame: *const Frame,
+    ) Error![]const Light {
+        if (integrator != .lights) return &.{};
+        for (frame.lights) |*light| {
+            if (light.kind == .emitter) return prepare.findEmission(session.gpa, frame);
+        }
+        return &.{};
     }
 
     /// Traces the same picture again to count intersection tests, without timing.

@@ -72,6 +72,9 @@ pub const Frame = struct {
     view: *const View,
     /// For integrators that choose lights at random; null: nobody asked for it.
     light_sampler: ?*const LightSampler = null,
+    /// Points on surfaces that emit, with the flux of all of these, in the place of `lights` of the
+    /// kind `emitter`: for integrators that have virtual lights. None: nobody asked for them.
+    emission: []const Light = &.{},
 
     /// Whether what is seen depends on how wide rays are: they have cones then.
     pub inline fn needsFootprints(frame: *const Frame) bool {

@@ -111,7 +111,8 @@ pub fn Bounces(comptime Kernel: type) type {
         pub fn init(bounces: *Self, frame: *const Frame) void {
             bounces.frame = frame;
             bounces.spreads = frame.environment.map != null;
-            bounces.splits_emitters = bounces.spreads and for (frame.lights) |*light| {
+            const has_highlights = bounces.spreads and frame.emission.len == 0;
+            bounces.splits_emitters = has_highlights and for (frame.lights) |*light| {
                 if (light.kind == .emitter) break true;
             } else false;
         }

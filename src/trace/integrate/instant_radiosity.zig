@@ -2,12 +2,12 @@
 //! using Fast Ray Tracing"): light that has bounced diffusely comes from virtual point lights.
 //!
 //! In: the frame, a bundle's place in the picture. Out: samples on the film, see `ray_tree.zig`.
-//! Before the picture light paths are traced and virtual lights chosen (`light_paths.zig`,
-//! `virtual_lights.zig`); the sky is as many directional lights as all samples have. Each pixel of
-//! any 3x3 has a ninth of a sample's, and after the picture gets what its neighbours found
-//! (`interleave.zig`). So that shadow rays still are beams, a bundle's pixels are every third. The
-//! lights are the same for all pixels, so there is no noise, and nothing depends on threads. The
-//! scene's own lights, mirrors and glass are as Whitted has them.
+//! Before the picture light paths are traced and virtual lights chosen (`light_selection.zig`); the
+//! sky is as many directional lights as all samples have. Each pixel of any 3x3 has a ninth of a
+//! sample's, and after the picture gets what its neighbours found (`interleave.zig`). So that
+//! shadow rays still are beams, a bundle's pixels are every third. The lights are the same for all
+//! pixels, so there is no noise, and nothing depends on threads. The scene's punctual lights,
+//! mirrors and glass are as Whitted has them; surfaces that emit have virtual lights on them.
 
 const std = @import("std");
 const world_file = @import("../../world.zig");
@@ -17,11 +17,8 @@ const environment_lights = @import("environment_lights.zig");
 const emission = @import("light_emission.zig");
 const interleave = @import("interleave.zig");
 const interleaved_light = @import("interleaved_light.zig");
-const light_importance = @import("light_importance.zig");
-const light_paths = @import("light_paths.zig");
+const light_selection = @import("light_selection.zig");
 const tiles = @import("tiles.zig");
-const virtual_lights = @import("virtual_lights.zig");
-const Candidate = virtual_lights.Candidate;
 const EnvironmentLight = environment_lights.EnvironmentLight;
 const EnvironmentLights = environment_lights.EnvironmentLights;
 const Film = @import("../../film.zig").Film;
@@ -31,12 +28,9 @@ const Layout = @import("../../film.zig").Layout;
 const RayTree = @import("ray_tree.zig").RayTree;
 const Rectangle = @import("../../film.zig").Rectangle;
 
-/// Paths that lights are looked for by: one for so many pixels, within bounds.
-const path_pixels = 8;
-const path_count_min = 1 << 9;
-const path_count_max = 1 << 15;
-/// Candidates that are weighed.
-const weighed_max = 1 << 14;
+/// Directions of the sky that light paths come from, however many lights the sky has: what few of
+/// them let into a room is noise that no number of lights takes away.
+const path_sky_count = 1 << 10;
 /// Rows that are filtered at once.
 const band_rows = 8;
 
@@ -120,8 +114,8 @@ fn Lighting(comptime Kernel: type) type {
                 coherence,
                 &tree.sample.radiance,
             ));
-            tree.addDirect(coherence);
-            for (shared.sets.of(world_file.Light, shared.lights, sample, lighting.part)) |*one| {
+            tree.addDirect(shared.direct, coherence);
+            for (shared.selection.of(sample, lighting.part)) |*one| {
                 tree.countShadow(lighting.light
                     .addVirtual(&tree.visibility, one, &vertices, coherence));
             }
@@ -191,29 +185,16 @@ fn SharedOf(comptime Kernel: type) type {
         sky: []EnvironmentLight,
         /// Small strong sources of the environment.
         sources: []EnvironmentLight,
-        sets: interleave.Sets,
-        /// In the order of `sets`: room, and what of it is used, which is all or nothing.
-        room: []world_file.Light,
-        lights: []const world_file.Light,
-        /// Where light paths start.
-        starts: []emission.Source,
-        path_count: u32,
-        candidates: [][light_paths.bounce_max]Candidate,
-        found: []Candidate,
-        points: [light_importance.point_max]light_importance.Point,
-        point_count: usize,
-        /// What each gets of all candidates, and of those of a piece of work.
-        gains: Gains,
-        piece_gains: [weighed_max / light_importance.piece_candidates]Gains,
+        /// The scene's lights but those that stand for surfaces, which virtual ones do.
+        direct: []const world_file.Light,
+        selection: Selection,
 
         const Self = @This();
-        const Gains = [light_importance.point_max]f64;
         const Tree = InstantRadiosity(Kernel);
-        const Paths = light_paths.LightPaths(Kernel, Tree);
-        const Importance = light_importance.LightImportance(Kernel, Tree);
-        const Step = enum { see, trace, gather, weigh, sum, finish, choose, place, filter };
+        const Selection = light_selection.LightSelection(Kernel, Tree);
+        const Step = enum { place, filter };
 
-        pub const steps_before: u32 = @backingInt(Step.place);
+        pub const steps_before: u32 = Selection.step_count;
         pub const step_count: u32 = steps_before + 2;
 
         pub fn init(
@@ -234,17 +215,8 @@ fn SharedOf(comptime Kernel: type) type {
                 .sky_sets = .init(lights.sky_count, samples, lights.is_interleaved),
                 .sky = &.{},
                 .sources = &.{},
-                .sets = .init(lights.virtual_count, samples, lights.is_interleaved),
-                .room = &.{},
-                .lights = &.{},
-                .starts = &.{},
-                .path_count = 0,
-                .candidates = &.{},
-                .found = &.{},
-                .points = undefined,
-                .point_count = 0,
-                .gains = undefined,
-                .piece_gains = undefined,
+                .direct = directOf(frame),
+                .selection = .init(gpa, frame, settings),
             };
             errdefer shared.freeLights();
             const has_map_shadows = environment.map != null and environment.shadow_count > 0;
@@ -269,49 +241,53 @@ fn SharedOf(comptime Kernel: type) type {
             const gpa = shared.gpa;
             gpa.free(shared.sky);
             gpa.free(shared.sources);
-            gpa.free(shared.room);
-            gpa.free(shared.starts);
-            gpa.free(shared.candidates);
+            shared.selection.deinit();
         }
 
-        /// Makes the sky's lights, and takes room for light paths if there are to be any.
+        /// Makes the sky's lights, and says where light paths start.
         fn placeStarts(shared: *Self) error{OutOfMemory}!void {
             const gpa = shared.gpa;
-            const frame = shared.frame;
-            const far_count = shared.sources.len + shared.sky.len;
-            shared.starts = try gpa.alloc(emission.Source, far_count + frame.lights.len);
-            var count: usize = 0;
-            for (shared.sources, 0..) |*source, index| {
-                source.* = environment_lights
-                    .ofSource(frame.environment, &frame.environment.map.?.sources[index]);
-                shared.starts[count] = .{ .light = parallel(source) };
-                count += 1;
-            }
-            for (0..shared.sky.len) |number| {
-                const weight: f32 = @floatCast(shared.sky_sets.weightOf(number));
-                const environment = frame.environment;
-                const one = if (environment.map == null)
-                    environment_lights.evenPieceOf(environment, number, shared.sky.len, weight)
-                else
-                    environment_lights.pieceOf(environment, number, shared.sky.len, weight);
-                shared.sky[shared.sky_sets.indexOf(number)] = one;
-                shared.starts[count] = .{ .light = parallel(&one) };
-                count += 1;
-            }
-            const rest = shared.starts[count..];
-            for (rest, frame.lights) |*start, light| start.* = .{ .light = light };
-            const box = frame.geometry.bounds;
-            if (shared.settings.depth_max == 0 or shared.sets.part_size == 0) return;
-            if (box.isEmpty()) return;
-            const view = frame.view;
-            const pixel_count = @as(u64, view.width) * view.height;
-            const path_count = std.math
-                .clamp(pixel_count / path_pixels, path_count_min, path_count_max);
-            shared.path_count = emission.shareOut(shared.starts, box, @intCast(path_count));
-            if (shared.path_count == 0) return;
-            shared.candidates =
-                try gpa.alloc([light_paths.bounce_max]Candidate, shared.path_count);
-            shared.room = try gpa.alloc(world_file.Light, shared.sets.count());
+            const environment = shared.frame.environment;
+            for (shared.sources, 0..) |*source, index| source.* = environment_lights
+                .ofSource(environment, &environment.map.?.sources[index]);
+            for (0..shared.sky.len) |number| shared.sky[shared.sky_sets.indexOf(number)] =
+                shared.skyPiece(number, shared.sky.len, shared.sky_sets.weightOf(number));
+            const sky_count: usize = if (shared.sky.len > 0) path_sky_count else 0;
+            const near = [_][]const world_file.Light{ shared.direct, shared.frame.emission };
+            const near_count = near[0].len + near[1].len;
+            const count = near_count + shared.sources.len + sky_count;
+            const starts = try gpa.alloc(emission.Source, count);
+            shared.selection.starts = starts;
+            for (starts[0..near[0].len], near[0]) |*start, light| start.* = .{ .light = light };
+            const rest = starts[near[0].len..];
+            for (rest[0..near[1].len], near[1]) |*start, light| start.* = .{ .light = light };
+            const far = starts[near_count..];
+            for (far[0..shared.sources.len], shared.sources) |*start, *source|
+                start.* = .{ .light = parallel(source) };
+            for (far[shared.sources.len..], 0..) |*start, number|
+                start.* = .{ .light = parallel(&shared.skyPiece(number, sky_count, 1)) };
+            try shared.selection.prepare();
+        }
+
+        fn skyPiece(
+            shared: *const Self,
+            number: usize,
+            count: usize,
+            weight: f64,
+        ) EnvironmentLight {
+            const environment = shared.frame.environment;
+            const share: f32 = @floatCast(weight);
+            return if (environment.map == null)
+                environment_lights.evenPieceOf(environment, number, count, share)
+            else
+                environment_lights.pieceOf(environment, number, count, share);
+        }
+
+        fn directOf(frame: *const Frame) []const world_file.Light {
+            if (frame.emission.len == 0) return frame.lights;
+            var count = frame.lights.len;
+            while (count > 0 and frame.lights[count - 1].kind == .emitter) count -= 1;
+            return frame.lights[0..count];
         }
 
         /// A light of the environment by itself.
@@ -322,86 +298,20 @@ fn SharedOf(comptime Kernel: type) type {
         }
 
         pub fn pieces(shared: *const Self, number: u32) u32 {
-            const step: Step = @fromBackingInt(@intCast(number));
-            if (number < steps_before and shared.path_count == 0) return 0;
-            return switch (step) {
-                .see, .gather, .sum, .choose => 1,
-                .trace => @divCeil(shared.path_count, light_paths.piece_paths),
-                .weigh, .finish => shared.weighedPieces(),
-                .place, .filter => bandCount(shared.settings.layout.?),
-            };
+            if (number < steps_before) return shared.selection.pieces(number);
+            return bandCount(shared.settings.layout.?);
         }
 
         pub fn work(shared: *Self, tree: *Tree, number: u32, piece: u32, film: *Film) u64 {
-            switch (@as(Step, @fromBackingInt(@intCast(number)))) {
-                .see => shared.point_count = Importance.see(tree, &shared.points),
-                .trace => Paths
-                    .trace(tree, shared.starts, piece, shared.path_count, shared.candidates),
-                .gather => shared.gather(),
-                .weigh => {
-                    const sums = &shared.piece_gains[piece];
-                    sums.* = @splat(0);
-                    const found = shared.ofPiece(piece);
-                    Importance.weigh(tree, shared.seen(), found, shared.nearness(), sums);
-                },
-                .sum => shared.sumGains(),
-                .finish => {
-                    const found = shared.ofPiece(piece);
-                    const radius = shared.nearness();
-                    light_importance.finishWeights(shared.seen(), &shared.gains, found, radius);
-                },
-                .choose => {
-                    const geometry = shared.frame.geometry;
-                    if (virtual_lights.choose(shared.found, &shared.sets, geometry, shared.room))
-                        shared.lights = shared.room;
-                },
+            if (number < steps_before) {
+                shared.selection.work(tree, number, piece);
+                return 0;
+            }
+            switch (@as(Step, @fromBackingInt(@intCast(number - steps_before)))) {
                 .place => shared.place(piece),
                 .filter => return shared.filter(piece, film),
             }
             return 0;
-        }
-
-        /// Puts the candidates of all paths together, and keeps those that are weighed.
-        fn gather(shared: *Self) void {
-            const first: [*]Candidate = @ptrCast(shared.candidates.ptr);
-            const all = first[0 .. shared.candidates.len * light_paths.bounce_max];
-            var count: usize = 0;
-            for (shared.candidates) |of_path| for (of_path) |one| {
-                if (!(one.luminance() > 0)) break;
-                all[count] = one;
-                all[count].weight = one.luminance();
-                count += 1;
-            };
-            virtual_lights.sortAlongCurve(all[0..count], shared.frame.geometry.bounds);
-            shared.found = all[0..virtual_lights.thin(all[0..count], weighed_max)];
-        }
-
-        fn weighedPieces(shared: *const Self) u32 {
-            return @intCast(@divCeil(shared.found.len, light_importance.piece_candidates));
-        }
-
-        fn ofPiece(shared: *Self, piece: u32) []Candidate {
-            const first = piece * light_importance.piece_candidates;
-            const end = @min(first + light_importance.piece_candidates, shared.found.len);
-            return shared.found[first..end];
-        }
-
-        fn seen(shared: *const Self) []const light_importance.Point {
-            return shared.points[0..shared.point_count];
-        }
-
-        /// Radius of the disk that bounds what candidates give what is near.
-        fn nearness(shared: *const Self) f32 {
-            return shared.frame.geometry.size / 64;
-        }
-
-        fn sumGains(shared: *Self) void {
-            const all = shared.gains[0..shared.point_count];
-            for (all, 0..) |*sum, index| {
-                sum.* = 0;
-                for (shared.piece_gains[0..shared.weighedPieces()]) |*gains| sum.* += gains[index];
-            }
-            light_importance.invertGains(all);
         }
 
         fn place(shared: *Self, band: u32) void {
@@ -412,7 +322,8 @@ fn SharedOf(comptime Kernel: type) type {
         fn filter(shared: *Self, band: u32, film: *Film) u64 {
             const part = bandOf(shared.settings.layout.?, band);
             const view = shared.frame.view;
-            return shared.layers.finish(film, view, &part.window, part.pixels);
+            const correction = &shared.selection.matrix.correction;
+            return shared.layers.finish(film, view, &part.window, part.pixels, correction);
         }
     };
 }

@@ -15,6 +15,7 @@ const vec3 = @import("../../math.zig").vec3;
 const film_file = @import("../../film.zig");
 const world_file = @import("../../world.zig");
 const Allocator = std.mem.Allocator;
+const Correction = @import("light_correction.zig").Correction;
 const Film = film_file.Film;
 const Layout = film_file.Layout;
 const Rectangle = film_file.Rectangle;
@@ -56,17 +57,20 @@ pub const Sets = struct {
     }
 
     /// Where a light is in the order of sets and their parts: of lights in a row each is another
-    /// set's, and of those of a set each another part's.
+    /// part's, and of those of a part each another set's, so that those of a pixel are far apart.
     pub fn indexOf(sets: *const Sets, number: usize) usize {
-        const set = number % sets.set_count;
-        const within = number / sets.set_count;
-        const part = within % part_count;
-        return (set * part_count + part) * sets.part_size + within / part_count;
+        const part = number % part_count;
+        const within = number / part_count / sets.set_count;
+        return (sets.setOf(number) * part_count + part) * sets.part_size + within;
+    }
+
+    fn setOf(sets: *const Sets, number: usize) usize {
+        return number / part_count % sets.set_count;
     }
 
     /// How much more a light counts where it is one of a pixel's, than one of all.
     pub fn weightOf(sets: *const Sets, number: usize) f64 {
-        const set = number % sets.set_count;
+        const set = sets.setOf(number);
         const uses = (sets.sample_count - set - 1) / sets.set_count + 1;
         const total: f64 = @floatFromInt(sets.sample_count);
         const among: f64 = if (sets.is_interleaved) part_count else 1;
@@ -187,11 +191,12 @@ pub const Layers = struct {
         view: *const world_file.View,
         window: *const Rectangle,
         part: Rectangle,
+        correction: *const Correction,
     ) u64 {
         var non_finite_count: u64 = 0;
         for (part.y0..part.y1) |row| for (part.x0..part.x1) |column| {
             const x: u32, const y: u32 = .{ @intCast(column), @intCast(row) };
-            const light = layers.lightOf(view, window, x, y);
+            const light = layers.lightOf(view, window, x, y, correction);
             const at = layers.indexOf(window, x, y);
             const pixel = &film.image.pixels[at];
             const count = layers.albedo[at][3];
@@ -214,6 +219,7 @@ pub const Layers = struct {
         window: *const Rectangle,
         x: u32,
         y: u32,
+        correction: *const Correction,
     ) Pixel {
         const at = layers.indexOf(window, x, y);
         const sums = if (layers.is_interleaved)
@@ -221,6 +227,7 @@ pub const Layers = struct {
         else
             Sums.of(layers, at);
         var light = layers.albedo[at] * quotient(sums.bounced, sums.albedo, 0);
+        light *= correction.of(&.of(layers, view, window, x, y), x, y);
         if (layers.open.len > 0)
             light += layers.open[at] * quotient(sums.arriving, sums.shining, 1);
         light[3] = 0;
@@ -337,7 +344,7 @@ const plain_min = 0.97;
 /// Cosine between normals that are like.
 const cosine_min = 0.9;
 /// How far off the plane a neighbour may be, in distances between pixels.
-const off_max = 2.5;
+pub const off_max = 2.5;
 
 /// From the middle of the picture to a pixel, where the camera's forward ends.
 inline fn sidewaysOf(view: *const world_file.View, x: u32, y: u32) Vec3 {
@@ -353,7 +360,7 @@ inline fn wayOf(view: *const world_file.View, x: u32, y: u32) Vec3 {
 }
 
 /// Where a pixel's samples see something.
-const Place = struct {
+pub const Place = struct {
     /// From the camera's origin.
     position: Vec3,
     /// See `Layers.place`.
@@ -441,7 +448,7 @@ test "like neighbours share light, so that each pixel of a plane has that of all
         film.add(@intCast(x), @intCast(y), 0, .{ 1, 1, 1, 0 });
     };
     layers.placeAll(&view, window);
-    try std.testing.expectEqual(0, layers.finish(&film, &view, &window, window));
+    try std.testing.expectEqual(0, layers.finish(&film, &view, &window, window, &.none));
     for (0..view.height) |y| for (0..view.width) |x| {
         const found = film.image.at(@intCast(x), @intCast(y)).*[0];
         const albedo: f32 = @floatFromInt(1 + (x + y) % 4);

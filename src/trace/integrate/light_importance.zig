@@ -11,17 +11,23 @@ const world_file = @import("../../world.zig");
 const math = @import("../../math.zig");
 const bundle_file = @import("../traverse/bundle.zig");
 const ray_file = @import("../traverse/ray.zig");
+const dispatch = @import("../traverse/dispatch.zig");
 const camera = @import("camera.zig");
 const ByLane = @import("by_lane.zig").ByLane;
 const Candidate = @import("virtual_lights.zig").Candidate;
+const Grid = @import("light_correction.zig").Grid;
 const LightPaths = @import("light_paths.zig").LightPaths;
 const vec3 = math.vec3;
 const Vec3 = math.Vec3;
 
-/// Points that the camera sees along each side of the picture.
+/// Points that candidates are weighed by, along the long side of a picture, and their factor in a
+/// picture of so many pixels there.
 const points_side = 16;
-/// In all.
-pub const point_max = points_side * points_side;
+const dense_max = 2;
+const dense_pixels = 512;
+/// Points that the camera sees, at most, and those that candidates are weighed by.
+pub const point_max = few_max * dense_max * dense_max;
+pub const few_max = points_side * points_side;
 /// Shadow rays of a candidate.
 const shadow_count = 4;
 /// Candidates of a piece of work.
@@ -30,6 +36,18 @@ pub const piece_candidates = 256 / shadow_count;
 /// chosen all the same gets by so much more flux, and is a bright spot on what it does light.
 const hidden_share = 0.2;
 
+/// Where points are in a picture: next to no pixel is one in small ones.
+pub fn gridOf(view: *const world_file.View) Grid {
+    const side = points_side * denseOf(view);
+    const long: u32 = @max(view.width, view.height);
+    return .{ .side = side, .step = @max(1, @min(long / 4, @max(2, long / side))) };
+}
+
+fn denseOf(view: *const world_file.View) u32 {
+    const long: u32 = @max(view.width, view.height);
+    return if (long < dense_pixels) 1 else dense_max;
+}
+
 /// A point that the camera sees.
 pub const Point = struct {
     position: Vec3,
@@ -37,11 +55,23 @@ pub const Point = struct {
     primitive: i32,
     /// Luminance of what is seen of white light that falls on it.
     albedo: f32,
-    /// Where it is seen, row by row: points are in that order, however rays are bundled.
-    pixel: usize,
+    /// Where in the grid it is seen.
+    row: usize,
+    column: usize,
+    /// Points are in the order of rows, however rays are bundled; the few come first.
+    order: usize = 0,
 
     fn isBefore(_: void, point: Point, other: Point) bool {
-        return point.pixel < other.pixel;
+        return point.order < other.order;
+    }
+
+    fn sortBy(point: *Point, dense: usize) void {
+        point.order = point.row * points_side * dense_max + point.column;
+        if (!point.isOfFew(dense)) point.order += point_max;
+    }
+
+    fn isOfFew(point: *const Point, dense: usize) bool {
+        return point.row % dense == 0 and point.column % dense == 0;
     }
 };
 
@@ -57,10 +87,11 @@ pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
         /// Finds points that the camera sees, evenly over the picture. Returns how many.
         pub fn see(tree: *Tree, points: *[point_max]Point) usize {
             const view = tree.frame.view;
-            const step = @max(1, @max(view.width, view.height) / points_side);
+            const grid = gridOf(view);
+            const step = grid.step;
             var count: usize = 0;
-            for (0..points_side / Kernel.bundle_height) |row| {
-                for (0..points_side / Kernel.bundle_width) |column| {
+            for (0..grid.side / Kernel.bundle_height) |row| {
+                for (0..grid.side / Kernel.bundle_width) |column| {
                     const x: u32 = @intCast(column * Kernel.bundle_width * step + step / 2);
                     const y: u32 = @intCast(row * Kernel.bundle_height * step + step / 2);
                     if (x >= view.width or y >= view.height) continue;
@@ -84,8 +115,19 @@ pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
                     }
                 }
             }
+            const dense = denseOf(view);
+            for (points[0..count]) |*point| point.sortBy(dense);
             std.mem.sort(Point, points[0..count], {}, Point.isBefore);
             return count;
+        }
+
+        /// Those that candidates are weighed by.
+        pub fn fewOf(tree: *const Tree, points: []const Point) []const Point {
+            const dense = denseOf(tree.frame.view);
+            const count = for (points, 0..) |*point, index| {
+                if (!point.isOfFew(dense)) break index;
+            } else points.len;
+            return points[0..count];
         }
 
         fn takePoints(
@@ -111,8 +153,8 @@ pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
                     .normal = normal.at(lane),
                     .primitive = primitive[lane],
                     .albedo = albedo[lane],
-                    .pixel = (corner[1] + Kernel.pixelY(group, lane)) * points_side +
-                        corner[0] + Kernel.pixelX(group, lane),
+                    .row = corner[1] + Kernel.pixelY(group, lane),
+                    .column = corner[0] + Kernel.pixelX(group, lane),
                 };
                 count += 1;
             }
@@ -126,7 +168,7 @@ pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
             points: []const Point,
             candidates: []Candidate,
             radius: f32,
-            sums: *[point_max]f64,
+            sums: *[few_max]f64,
         ) void {
             var first: usize = 0;
             const step = @max(1, batch / shadow_count);
@@ -144,7 +186,7 @@ pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
             points: []const Point,
             candidates: []Candidate,
             radius: f32,
-            sums: *[point_max]f64,
+            sums: *[few_max]f64,
         ) void {
             var rays: Shadows = .none;
             for (candidates, 0..) |*candidate, index| {
@@ -152,26 +194,57 @@ pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
                     if (chosen) |point| rays.put(index * shadow_count + part, candidate, point);
                 }
             }
-            const shares = rays.trace(tree);
+            const shares = rays.trace(tree, &any_point, .none);
             for (candidates, 0..) |*candidate, index| {
                 const of_it = shares[index * shadow_count ..][0..shadow_count];
                 addGains(points, candidate, radius, of_it, sums);
             }
         }
 
-        /// The same of one by one, in bundles that are too small.
+        /// What points get of a candidate, as luminance.
+        pub fn measure(
+            tree: *Tree,
+            points: []const Point,
+            candidate: *const Candidate,
+            gains: []f32,
+        ) void {
+            const luminance: f32 = @floatCast(candidate.luminance());
+            const radius = @sqrt(candidate.disk);
+            @memset(gains, 0);
+            var first: usize = 0;
+            while (first < points.len) : (first += batch) {
+                const some = points[first..@min(first + batch, points.len)];
+                const own = gains[first..][0..some.len];
+                var rays: Shadows = .none;
+                var is_dark = true;
+                for (some, own, 0..) |*point, *gain, at| {
+                    gain.* = luminance * gainOf(point, candidate, radius);
+                    if (!(gain.* > 0)) continue;
+                    rays.put(at, candidate, point);
+                    is_dark = false;
+                }
+                if (is_dark) continue;
+                var from = any_point;
+                from.position = candidate.position;
+                from.from_receiver = tree.frame.geometry.isCoarseAt(candidate.position);
+                const shares = rays.trace(tree, &from, .all);
+                for (own, shares[0..own.len]) |*gain, share| gain.* *= share;
+            }
+        }
+
+        /// `weighBatch` of one by one, in bundles that are too small.
         fn weighOne(
             tree: *Tree,
             points: []const Point,
             candidate: *Candidate,
             radius: f32,
-            sums: *[point_max]f64,
+            sums: *[few_max]f64,
         ) void {
             var shares: [shadow_count]f32 = @splat(0);
             for (targetsOf(points, candidate, radius), &shares) |chosen, *share| {
                 var rays: Shadows = .none;
                 if (chosen) |point| rays.put(0, candidate, point);
-                share.* = rays.trace(tree)[0];
+                share.* = rays.trace(tree, &any_point, .none)[0];
             }
             addGains(points, candidate, radius, &shares, sums);
         }
@@ -204,8 +277,13 @@ pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
                 rays.active[group] |= @as(u32, 1) << @intCast(lane);
             }
 
-            /// Luminance of what arrives, as a share.
-            fn trace(rays: *const Shadows, tree: *Tree) [batch]f32 {
+            /// Luminance of what arrives, as a share. Coherent ones come from the light's place.
+            fn trace(
+                rays: *const Shadows,
+                tree: *Tree,
+                light: *const world_file.Light,
+                coherence: dispatch.Coherence,
+            ) [batch]f32 {
                 var shares: [batch]f32 = @splat(0);
                 var bundle: bundle_file.Bundle(Kernel) = undefined;
                 for (&bundle.groups, 0..) |*ray, group| {
@@ -218,7 +296,7 @@ pub fn LightImportance(comptime Kernel: type, comptime Tree: type) type {
                 }
                 var arriving: [Kernel.group_count]V = undefined;
                 tree.visibility
-                    .transmittance(&bundle, &any_point, &tree.vertices, .none, &arriving);
+                    .transmittance(&bundle, light, &tree.vertices, coherence, &arriving);
                 for (arriving, rays.active, 0..) |share, active, group| {
                     if (active == 0) continue;
                     const seen = share.dot(.splat(.{ 0.2126, 0.7152, 0.0722 })).toArray();
@@ -250,7 +328,7 @@ fn targetsOf(
     candidate: *const Candidate,
     radius: f32,
 ) [shadow_count]?*const Point {
-    var gains: [point_max]f32 = undefined;
+    var gains: [few_max]f32 = undefined;
     var total: f64 = 0;
     for (points, gains[0..points.len]) |*point, *gain| {
         gain.* = gainOf(point, candidate, radius);
@@ -277,7 +355,7 @@ fn addGains(
     candidate: *Candidate,
     radius: f32,
     shares: *const [shadow_count]f32,
-    sums: *[point_max]f64,
+    sums: *[few_max]f64,
 ) void {
     var arriving: f64 = 0;
     for (shares) |share| arriving += share;

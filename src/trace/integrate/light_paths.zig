@@ -1,11 +1,11 @@
 //! Light paths of instant radiosity (Keller 1997), traced in bundles: what they leave on diffuse
 //! surfaces.
 //!
-//! In: where paths start (`light_emission.zig`). Out: candidates for virtual lights
-//! (`virtual_lights.zig`), with the flux that leaves them. At a surface a path goes straight on
-//! through what is clear, as shadow rays do, or leaves it by the cosine or as a mirror would have
-//! it, or ends: by Russian roulette over what the surface does with light, so that its flux keeps
-//! its colour.
+//! In: where paths start (`light_emission.zig`), what the camera sees. Out: candidates for virtual
+//! lights (`virtual_lights.zig`), with the flux that leaves them. At a surface a path goes straight
+//! on through what is clear, as shadow rays do, or leaves it by the cosine or as a mirror would
+//! have it, or ends: by Russian roulette over what the surface does with light, so that its flux
+//! keeps its colour.
 
 const std = @import("std");
 const math = @import("../../math.zig");
@@ -65,6 +65,7 @@ pub fn LightPaths(comptime Kernel: type, comptime Tree: type) type {
             sources: []const emission.Source,
             piece: u32,
             path_count: u32,
+            focus: math.Box3,
             candidates: [][bounce_max]Candidate,
         ) void {
             for (0..piece_paths / batch) |index| {
@@ -74,7 +75,7 @@ pub fn LightPaths(comptime Kernel: type, comptime Tree: type) type {
                 for (candidates[first..end]) |*of_path| for (of_path) |*one| {
                     one.flux = @splat(0);
                 };
-                traceBatch(tree, sources, first, end, candidates);
+                traceBatch(tree, sources, first, end, focus, candidates);
             }
         }
 
@@ -83,10 +84,14 @@ pub fn LightPaths(comptime Kernel: type, comptime Tree: type) type {
             sources: []const emission.Source,
             first: u32,
             end: u32,
+            focus: math.Box3,
             candidates: [][bounce_max]Candidate,
         ) void {
             var state: State = undefined;
-            const box = tree.frame.geometry.bounds;
+            const boxes: emission.Boxes = .{
+                .scene = tree.frame.geometry.bounds,
+                .focus = focus,
+            };
             for (&tree.path.bundle.groups, 0..) |*ray, group| {
                 var origin: Lane3 = undefined;
                 var direction: Lane3 = undefined;
@@ -100,7 +105,7 @@ pub fn LightPaths(comptime Kernel: type, comptime Tree: type) type {
                     var numbers: [4]f64 = undefined;
                     for (&numbers, 0..) |*number, dimension|
                         number.* = emission.numberOf(path, @intCast(dimension));
-                    const one = emission.start(emission.sourceOf(sources, path), box, numbers);
+                    const one = emission.start(emission.sourceOf(sources, path), &boxes, numbers);
                     origin.put(lane, one.origin);
                     direction.put(lane, one.direction);
                     state.flux[at] = one.flux;

@@ -38,6 +38,7 @@ const Grid = @import("../traverse/beam/grid.zig").Grid;
 const Rectangle = @import("../../film.zig").Rectangle;
 const assert = std.debug.assert;
 const Frame = world_file.Frame;
+const Light = world_file.Light;
 
 /// One thread's trees.
 pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
@@ -256,9 +257,9 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
             ));
         }
 
-        /// Adds what the points that rays see scatter of the scene's lights.
-        pub fn addDirect(tree: *Self, coherence: dispatch.Coherence) void {
-            for (tree.frame.lights) |*light| tree.countShadow(direct.addLight(
+        /// Adds what the points that rays see scatter of these of the scene's lights.
+        pub fn addDirect(tree: *Self, lights: []const Light, coherence: dispatch.Coherence) void {
+            for (lights) |*light| tree.countShadow(direct.addLight(
                 Kernel,
                 &tree.visibility,
                 light,

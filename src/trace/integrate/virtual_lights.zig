@@ -30,7 +30,9 @@ pub const Candidate = struct {
     /// What it adds to the picture, in any unit; at least 0.
     weight: f64 = 0,
     /// Place on the curve.
-    place: u32 = 0,
+    place: u64 = 0,
+    /// Square of the radius of the disk that bounds what it gives what is near.
+    disk: f32 = 0,
 
     pub fn luminance(candidate: *const Candidate) f64 {
         const flux = candidate.flux;
@@ -42,23 +44,33 @@ pub const Candidate = struct {
     }
 };
 
-/// Puts them in the order of a curve through space (Morton 1966), equal places in their own.
+/// Puts them in the order of a curve through space (Morton 1966), those that face one way by
+/// themselves, equal places in their own.
 pub fn sortAlongCurve(candidates: []Candidate, box: Box3) void {
     const extent = vec3.maxComponent(box.extent());
     const scale: f32 = if (extent > 0) 1023 / extent else 0;
     for (candidates) |*candidate| {
-        var place: u32 = 0;
+        var place: u64 = 0;
         const off = vec3.scale(vec3.sub(candidate.position, box.lower), scale);
         for (off, 0..) |component, axis| {
             const cell: u32 = @intFromFloat(std.math.clamp(component, 0, 1023));
             for (0..10) |bit| {
-                const one = cell >> @intCast(bit) & 1;
+                const one: u64 = cell >> @intCast(bit) & 1;
                 place |= one << @intCast(3 * bit + axis);
             }
         }
-        candidate.place = place;
+        candidate.place = faceOf(candidate.normal) << 30 | place;
     }
     std.sort.block(Candidate, candidates, {}, Candidate.isBefore);
+}
+
+/// The side of a cube that a direction goes through.
+fn faceOf(direction: Vec3) u64 {
+    var widest: usize = 0;
+    for (1..3) |axis| {
+        if (@abs(direction[axis]) > @abs(direction[widest])) widest = axis;
+    }
+    return 2 * widest + @intFromBool(direction[widest] < 0);
 }
 
 /// Steps of equal weight along a list.
@@ -107,38 +119,47 @@ pub fn thin(candidates: []Candidate, count: usize) usize {
     return kept;
 }
 
-/// Fills in lights, in the order of `interleave.Sets`. Returns false, having filled in none, where
-/// nothing adds anything. `candidates` is in the order of the curve.
-pub fn choose(
-    candidates: []const Candidate,
+/// Chooses as many of `candidates`, which are in the order of the curve, as `chosen` has room for,
+/// with the flux of all; `rows` says which. Returns false where nothing adds anything.
+pub fn choose(candidates: []const Candidate, chosen: []Candidate, rows: []u32) bool {
+    assert(chosen.len == rows.len);
+    var steps: Steps = .of(candidates, chosen.len);
+    if (!(steps.total > 0) or !std.math.isFinite(steps.total)) return false;
+    const each = steps.total / @as(f64, @floatFromInt(chosen.len));
+    for (candidates, 0..) |*candidate, row| {
+        const first = steps.next;
+        for (0..steps.take(candidate.weight)) |index| {
+            const one = &chosen[first + index];
+            one.* = candidate.*;
+            one.flux = vec3.scale(candidate.flux, @floatCast(each / candidate.weight));
+            rows[first + index] = @intCast(row);
+        }
+    }
+    return steps.next == chosen.len;
+}
+
+/// Fills in lights, in the order of `interleave.Sets`.
+pub fn toLights(
+    chosen: []const Candidate,
     sets: *const interleave.Sets,
     geometry: *const world_file.Geometry,
     lights: []Light,
-) bool {
-    assert(lights.len == sets.count());
-    var steps: Steps = .of(candidates, lights.len);
-    if (!(steps.total > 0) or !std.math.isFinite(steps.total)) return false;
-    for (candidates) |*candidate| {
-        const first = steps.next;
-        for (0..steps.take(candidate.weight)) |index| {
-            const number = first + index;
-            const each = steps.total / @as(f64, @floatFromInt(lights.len)) / candidate.weight;
-            const share: f32 = @floatCast(each * sets.weightOf(number) / std.math.pi);
-            lights[sets.indexOf(number)] = .{
-                .kind = .emitter,
-                .from_receiver = geometry.isCoarseAt(candidate.position),
-                .position = candidate.position,
-                .direction = vec3.neg(vec3.neg(candidate.normal)),
-                .intensity = vec3.scale(candidate.flux, share),
-                .range_inv_squared = 0,
-                .cone_scale = 1,
-                .cone_offset = 0,
-            };
-        }
+) void {
+    assert(lights.len == sets.count() and chosen.len == lights.len);
+    for (chosen, 0..) |*one, number| {
+        const share: f32 = @floatCast(sets.weightOf(number) / std.math.pi);
+        lights[sets.indexOf(number)] = .{
+            .kind = .emitter,
+            .from_receiver = geometry.isCoarseAt(one.position),
+            .position = one.position,
+            .direction = one.normal,
+            .intensity = vec3.scale(one.flux, share),
+            .range_inv_squared = 0,
+            .cone_scale = 1,
+            .cone_offset = 0,
+            .disk = one.disk,
+        };
     }
-    if (steps.next < lights.len) return false;
-    for (lights) |*light| light.disk = diskOf(light, lights, geometry.size);
-    return true;
 }
 
 /// Lights that face much the same way and lie nearest to one tell the area that it stands for;
@@ -147,11 +168,11 @@ const neighbour_count = 5;
 /// Radius of the smallest disk, as a part of the scene's size.
 const disk_radius_least = 1.0 / 512.0;
 
-/// Square of the radius of a light's disk.
-fn diskOf(light: *const Light, all: []const Light, size: f32) f32 {
+/// Square of the radius of the disk of one of some lights.
+pub fn diskOf(light: *const Candidate, all: []const Candidate, size: f32) f32 {
     var nearest: [neighbour_count]f32 = @splat(std.math.inf(f32));
     for (all) |*other| {
-        if (vec3.dot(other.direction, light.direction) < 0.5) continue;
+        if (vec3.dot(other.normal, light.normal) < 0.5) continue;
         const way = vec3.sub(other.position, light.position);
         var distance = vec3.dot(way, way);
         if (distance == 0) continue;
@@ -184,8 +205,15 @@ test "lights have the flux of all candidates, and are as near to each other as t
     const box: Box3 = .{ .lower = @splat(0), .upper = .{ 15, 0, 15 } };
     sortAlongCurve(&candidates, box);
     const sets: interleave.Sets = .init(9, 4, true);
+    var chosen: [36]Candidate = undefined;
+    var rows: [36]u32 = undefined;
+    try std.testing.expect(choose(&candidates, &chosen, &rows));
+    for (&chosen, rows) |*one, row| {
+        try std.testing.expectEqual(candidates[row].position, one.position);
+        one.disk = diskOf(one, &chosen, geometry.size);
+    }
     var lights: [36]Light = undefined;
-    try std.testing.expect(choose(&candidates, &sets, &geometry, &lights));
+    toLights(&chosen, &sets, &geometry, &lights);
     var flux: f64 = 0;
     for (&lights) |*light| {
         flux += light.intensity[0] * std.math.pi / @as(f64, interleave.part_count * 4);
@@ -201,5 +229,5 @@ test "lights have the flux of all candidates, and are as near to each other as t
     try std.testing.expect(kept <= 50);
     try std.testing.expectApproxEqRel(total, sum, 1e-5);
     for (&candidates) |*candidate| candidate.weight = 0;
-    try std.testing.expect(!choose(&candidates, &sets, &geometry, &lights));
+    try std.testing.expect(!choose(&candidates, &chosen, &rows));
 }

@@ -42,7 +42,7 @@ fn Lighting(comptime Kernel: type) type {
                 coherence,
                 &tree.sample.radiance,
             ));
-            tree.addDirect(coherence);
+            tree.addDirect(tree.frame.lights, coherence);
         }
 
         pub inline fn expose(_: *Self, _: Rectangle, _: u32) void {}
