@@ -32,6 +32,8 @@ pub const Picture = encode_file.Picture;
 pub const Further = layers_file.Further;
 /// Writes channels of any kind with texts beside them.
 pub const openexr = @import("output/openexr.zig");
+/// Exports what libwebp calls.
+pub const exportWebpFunctions = webp.exportFunctions;
 /// Makes colours of a layer.
 pub const paintLayer = layer_picture.paint;
 /// Rows of a picture that has more.

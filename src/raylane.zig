@@ -47,6 +47,8 @@ pub const world = @import("world.zig");
 
 comptime {
     @export(&trace.link.panicOfKernel, .{ .name = trace.link.panic_symbol });
+    // One for all levels of a program, which share libwebp.
+    if (variant.level.len == 0) output.exportWebpFunctions();
 }
 
 test {

@@ -101,7 +101,9 @@ fn expectTexture(scene: *const Scene, byte: u8, view: ?TextureView) !void {
 }
 
 fn expectMaterial(expected: Material, found: *const Material) !void {
+    try testing.expectEqual(0, found.origin);
     var without = found.*;
+    without.origin = expected.origin;
     inline for (raylane.scene.texture_fields) |field| @field(without, field) = null;
     try testing.expectEqual(expected, without);
 }

@@ -218,7 +218,3 @@ const Server = struct {
         server.kept = null;
     }
 };
-
-test {
-    _ = @import("serve/kept.zig");
-}

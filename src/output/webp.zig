@@ -80,7 +80,8 @@ extern fn rl_webp_encode(
     picture: *const LibraryPicture,
 ) enum(c_int) { done, exhausted, broken };
 
-comptime {
+/// Exports what the library calls: to be called at comptime, once a program.
+pub fn exportFunctions() void {
     @export(&log, .{ .name = "rl_webp_log" });
     @export(&pow, .{ .name = "rl_webp_pow" });
 }
