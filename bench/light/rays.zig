@@ -315,7 +315,7 @@ fn pointLights(
     for (0..1000) |attempt| {
         if (lights.items.len == point_light_count) break;
         var numbers: Numbers = .of(attempt, 1000);
-        const index = numbers.next() % (seen.len * batch_file.ray_count);
+        const index: usize = @intCast(numbers.next() % (seen.len * batch_file.ray_count));
         const vertex = seen[index / batch_file.ray_count][index % batch_file.ray_count] orelse
             continue;
         try lights.append(arena, lightOf(.point, vertex.point, vertex.normal));
