@@ -42,7 +42,7 @@ const architectures = [_]Architecture{
             .{
                 .name = "x86-64-v4",
                 .cpu = &std.Target.x86.cpu.x86_64_v4,
-                // Its model is the first such processor; those of today are quickest with all lanes.
+                // Its model is the first of them; those of today are quickest with all lanes.
                 .without = std.Target.x86.featureSet(&.{.prefer_256_bit}),
             },
         },
