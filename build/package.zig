@@ -307,6 +307,7 @@ pub fn dispatcher(
     told.addOption([]const []const u8, "levels", level_names);
     start.config = told.createModule();
     start.raylane = start.withLibrary("src/raylane.zig");
+    start.raylane.no_builtin = true; // See src/memory_functions.zig.
     const exe = start.addProgram("raylane", "src/release.zig");
     const root = exe.root_module;
     root.addImport("config", start.config);
@@ -315,8 +316,18 @@ pub fn dispatcher(
     for (levels) |level| {
         for (level.kernels) |object| root.addObjectFile(object.getEmittedBin());
         root.addObjectFile(level.whole().getEmittedBin());
+        root.addObjectFile(level.memoryFunctions().getEmittedBin());
     }
     return exe;
+}
+
+/// How a level copies memory: fast, however small the rest of it is.
+fn memoryFunctions(package: Package) *Compile {
+    const root = package.moduleOf("src/memory_functions.zig");
+    root.addImport("config", package.config);
+    root.optimize = .fast;
+    root.no_builtin = true;
+    return package.archive(package.owner.fmt("memory-{s}", .{package.part.level}), root);
 }
 
 /// All but the kernels of a level.

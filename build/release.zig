@@ -16,6 +16,8 @@ const Compile = std.Build.Step.Compile;
 const Level = struct {
     name: []const u8,
     cpu: *const Model,
+    /// What LLVM believes of it and is not so.
+    without: std.Target.Cpu.Feature.Set = .empty,
     /// Small for those that hardly anybody has any more.
     optimize: std.lang.Optimize = .fast,
 };
@@ -30,12 +32,21 @@ const Architecture = struct {
 };
 
 const architectures = [_]Architecture{
-    .{ .arch = .x86_64, .lowest = &std.Target.x86.cpu.x86_64, .levels = &.{
-        .{ .name = "x86-64", .cpu = &std.Target.x86.cpu.x86_64, .optimize = .small },
-        .{ .name = "x86-64-v2", .cpu = &std.Target.x86.cpu.x86_64_v2 },
-        .{ .name = "x86-64-v3", .cpu = &std.Target.x86.cpu.x86_64_v3 },
-        .{ .name = "x86-64-v4", .cpu = &std.Target.x86.cpu.x86_64_v4 },
-    } },
+    .{
+        .arch = .x86_64,
+        .lowest = &std.Target.x86.cpu.x86_64,
+        .levels = &.{
+            .{ .name = "x86-64", .cpu = &std.Target.x86.cpu.x86_64, .optimize = .small },
+            .{ .name = "x86-64-v2", .cpu = &std.Target.x86.cpu.x86_64_v2 },
+            .{ .name = "x86-64-v3", .cpu = &std.Target.x86.cpu.x86_64_v3 },
+            .{
+                .name = "x86-64-v4",
+                .cpu = &std.Target.x86.cpu.x86_64_v4,
+                // Its model is the first of them; those of today are quickest with all lanes.
+                .without = std.Target.x86.featureSet(&.{.prefer_256_bit}),
+            },
+        },
+    },
     .{ .arch = .aarch64, .lowest = &std.Target.aarch64.cpu.generic },
     // The first with the calling convention of hard floats; it is told what is missing.
     .{ .arch = .arm, .lowest = &std.Target.arm.cpu.arm1176jzf_s, .levels = &.{
@@ -103,14 +114,14 @@ fn programOf(
     headers: LazyPath,
     options: Package.Options,
 ) *Compile {
-    const lowest = targetOf(b, architecture.arch, architecture.lowest);
+    const lowest = targetOf(b, architecture.arch, architecture.lowest, .empty);
     if (architecture.levels.len == 0)
         return Package.init(b, lowest, .fast, headers, options).program();
     const levels = b.allocator.alloc(Package, architecture.levels.len) catch @panic("OOM");
     for (levels, architecture.levels) |*package, level| {
         var own = options;
         own.part = .{ .level = level.name };
-        const target = targetOf(b, architecture.arch, level.cpu);
+        const target = targetOf(b, architecture.arch, level.cpu, level.without);
         package.* = .init(b, target, level.optimize, headers, own);
     }
     var own = options;
@@ -126,10 +137,12 @@ fn targetOf(
     b: *std.Build,
     arch: std.Target.Cpu.Arch,
     cpu: *const Model,
+    without: std.Target.Cpu.Feature.Set,
 ) std.Build.ResolvedTarget {
     return b.resolveTargetQuery(.{
         .cpu_arch = arch,
         .cpu_model = .{ .explicit = cpu },
+        .cpu_features_sub = without,
         .os_tag = .linux,
         .abi = if (arch == .arm) .musleabihf else .musl,
     });

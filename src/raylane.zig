@@ -27,6 +27,7 @@ pub const json_text = @import("json_text.zig");
 pub const manifest = @import("manifest.zig");
 pub const math = @import("math.zig");
 pub const memory_account = @import("memory_account.zig");
+pub const memory_functions = @import("memory_functions.zig");
 pub const output = @import("output.zig");
 pub const merge = @import("merge.zig");
 pub const parallel = @import("parallel.zig");

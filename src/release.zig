@@ -3,16 +3,35 @@
 //!
 //! In: arguments, environment. Out: what `level.zig` makes of them; or, where nothing here runs on
 //! this processor, one line. RAYLANE_CPU=LEVEL chooses a lower level, to compare and
-//! to test. The libraries in C, the scalar reference and this file are there once, for the lowest.
+//! to test. The libraries in C, the scalar reference and this file are there once, for the lowest;
+//! copying memory is what they, too, have of the level.
 
 const std = @import("std");
 const config = @import("config");
 const raylane = @import("raylane");
 const link = raylane.trace.link;
 const Program = link.Program;
+const memory = raylane.memory_functions;
 const Level = raylane.processor.Level;
 /// One that this program holds.
-const Entry = struct { level: Level, program: *const Program };
+const Entry = struct { level: Level, program: *const Program, memory: *const memory.Functions };
+
+/// Those of the chosen level, once it is chosen.
+var memory_functions: *const memory.Functions = &memory.functions;
+
+comptime {
+    @export(&move, .{ .name = "memcpy" });
+    @export(&move, .{ .name = "memmove" });
+    @export(&set, .{ .name = "memset" });
+}
+
+fn move(to: [*]u8, from: [*]const u8, count: usize) callconv(.c) [*]u8 {
+    return @call(.always_tail, memory_functions.move, .{ to, from, count });
+}
+
+fn set(to: [*]u8, byte: c_int, count: usize) callconv(.c) [*]u8 {
+    return @call(.always_tail, memory_functions.set, .{ to, byte, count });
+}
 
 /// The lowest first.
 const entries: [config.levels.len]Entry = list: {
@@ -20,22 +39,24 @@ const entries: [config.levels.len]Entry = list: {
     for (&list, config.levels) |*entry, name| entry.* = .{
         .level = std.meta.stringToEnum(Level, name).?,
         .program = @extern(*const Program, .{ .name = link.programOf(name) }),
+        .memory = @extern(*const memory.Functions, .{ .name = memory.nameOf(name) }),
     };
     break :list list;
 };
 
 pub fn main(init: std.process.Init.Minimal) u8 {
-    const program = chosen(init.environ.getPosix("RAYLANE_CPU")) catch |err| return switch (err) {
+    const entry = chosen(init.environ.getPosix("RAYLANE_CPU")) catch |err| return switch (err) {
         error.NoLevel => 1,
         error.WrongLevel => 2,
     };
+    memory_functions = entry.memory;
     const arguments = init.args.vector;
     const variables = init.environ.block.slice;
-    return program(arguments.len, arguments.ptr, variables.len, variables.ptr);
+    return entry.program(arguments.len, arguments.ptr, variables.len, variables.ptr);
 }
 
 /// The one for the highest level, or for the level of this name; says why there is none.
-fn chosen(wanted: ?[]const u8) error{ NoLevel, WrongLevel }!*const Program {
+fn chosen(wanted: ?[]const u8) error{ NoLevel, WrongLevel }!*const Entry {
     const highest = raylane.processor.highestLevel() orelse {
         say("this processor lacks NEON, and Raylane needs it", .{});
         return error.NoLevel;
@@ -45,7 +66,7 @@ fn chosen(wanted: ?[]const u8) error{ NoLevel, WrongLevel }!*const Program {
             say("RAYLANE_CPU is none of {s}", .{comptime names()});
             return error.WrongLevel;
         };
-        if (entry.level.isWithin(highest)) return entry.program;
+        if (entry.level.isWithin(highest)) return entry;
         say("RAYLANE_CPU is {t}, but this processor is {t}", .{ entry.level, highest });
         return error.WrongLevel;
     }
@@ -53,7 +74,7 @@ fn chosen(wanted: ?[]const u8) error{ NoLevel, WrongLevel }!*const Program {
     for (&entries) |*entry| if (entry.level.isWithin(highest)) {
         best = entry;
     };
-    return best.program;
+    return best;
 }
 
 fn entryOf(name: []const u8) ?*const Entry {

@@ -281,10 +281,10 @@ fn deal(
     var tiles: std.ArrayList(u32) = .empty;
     errdefer tiles.deinit(gpa);
     try tiles.ensureTotalCapacityPrecise(gpa, @divCeil(total, tile.count));
-    const side = std.math.ceilPowerOfTwoAssert(u32, @max(columns, rows));
+    const side: u64 = std.math.ceilPowerOfTwoAssert(u32, @max(columns, rows));
     var rank: u32 = 0;
     var code: u64 = 0;
-    while (code < @as(u64, side) * side) : (code += 1) {
+    while (code < side * side) : (code += 1) {
         const x, const y = .{ evenBits(code), evenBits(code >> 1) };
         if (x >= columns or y >= rows) continue;
         const round, const place = .{ rank / tile.count, rank % tile.count };
