@@ -133,9 +133,10 @@ pub const Batch = struct {
             .folder => |folder| if (folder.file_count == 0) {
                 var reason: raylane.diagnostic.Message = .{};
                 const count = folder.folder_count;
-                reason.set("no scenes in it, and {d} folder{s} that are not looked into", .{
-                    count, plural(count),
-                });
+                if (count == 0) reason.set("no scenes in it", .{}) else reason.set(
+                    "no scenes in it, and {d} folder{s} that are not looked into",
+                    .{ count, plural(count) },
+                );
                 batch.refuse(input, reason.text());
             } else if (folder.folder_count > 0 and !batch.options.quiet) {
                 const count = folder.folder_count;
