@@ -487,13 +487,9 @@ test "what is wrong with a scenario is named" {
     try expectError("'scenario' is not an object", "{\"scenario\": \"a.json\"}");
     try expectError("'x' of 'target' is not a number", "{\"model\": \"a\", \"target\":{\"x\":{}}}");
     try expectError("no file name", "{\"model\": \"a\", \"name\": \"../a\"}");
-    try testing.expectError(error.UsageInvalid, readOne(
-        testing.failing_allocator,
-        testing.io,
-        flags_for_test,
-        "",
-        @constCast(&Diagnostic{}),
-    ));
+    var diagnostic: Diagnostic = .{};
+    const nothing = readOne(testing.failing_allocator, testing.io, flags_for_test, "", &diagnostic);
+    try testing.expectError(error.UsageInvalid, nothing);
 }
 
 test "Khronos's scenarios, with what is left out of them" {
