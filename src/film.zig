@@ -41,7 +41,7 @@ pub const Layer = enum {
     /// Half of what the mean of the samples `isInFirstHalf` has more than that of the others; 0
     /// where there is but one sample.
     halves,
-    /// What the first sample shows. A survey (`integrate/survey.zig`) leaves bits of a triangle's
+    /// What the first sample shows. `integrate/aov.zig` leaves bits of a triangle's
     /// number, `no_triangle` where there is none, weights of its corners 1 and 2, and 0; these
     /// become bits of the file's numbers of node, material and primitive, all ones where there is
     /// none, and 0. As the next two it is no mean, and left alone by `finish`.
@@ -55,7 +55,7 @@ pub const Layer = enum {
     cost,
 
     /// Whether it is of the first sample alone.
-    fn isSurveyed(layer: Layer) bool {
+    fn isOfHits(layer: Layer) bool {
         return layer == .origin or layer == .position or layer == .texcoord;
     }
 
@@ -252,7 +252,7 @@ pub const Film = struct {
         number: u32,
         sample: [4]f32,
     ) void {
-        assert(layer != .variance and layer != .halves and !layer.isSurveyed());
+        assert(layer != .variance and layer != .halves and !layer.isOfHits());
         addTo(film.apart.getPtr(layer).*.?.at(x, y), number, sample);
     }
 
@@ -328,7 +328,7 @@ pub const Film = struct {
         const count: V4 = @splat(@floatFromInt(sample_count));
         for (&film.apart.values, std.enums.values(Layer)) |*apart, layer| {
             const image = if (apart.*) |*image| image else continue;
-            if (layer.isSurveyed()) continue;
+            if (layer.isOfHits()) continue;
             const sums: V4 = image.pixels[at];
             const means: [4]f32 = switch (layer) {
                 .color, .alpha => unreachable, // They are not apart.

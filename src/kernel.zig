@@ -1,6 +1,6 @@
 //! A kernel: the tracer of one variant, compiled into an object of its own.
 //!
-//! In: the build options, which name the variant, and whether it counts tests and surveys pictures
+//! In: the build options, which name the variant, and whether it counts tests and makes AOVs of pictures
 //! or holds the integrators besides Whitted's. Out: a symbol for each integrator, behind pointers.
 //! Nothing in it is mutable but what it is handed, and no thread is started: the program that it is
 //! linked to does that, and panics for it.
@@ -19,7 +19,7 @@ comptime {
         show(trace.PathTracer(Kernel), "path");
     } else {
         show(trace.Whitted(Kernel), if (is_counting) "counting" else "whitted");
-        if (is_counting) show(trace.Survey(Kernel), "survey");
+        if (is_counting) show(trace.AovIntegrator(Kernel), "aov");
         if (config.shows_searches and !is_counting) {
             const Searches = trace.searches.Searches(Kernel);
             const name = trace.link.symbolOf(Searches, variant.default, "searches");

@@ -523,7 +523,7 @@ pub const Session = struct {
         var clay: ?Clay =
             if (shade == .ao) try .init(session.gpa, &session.world.?) else null;
         defer if (clay) |*made| made.deinit();
-        if (clay) |*made| made.dress(&frame);
+        if (clay) |*made| made.applyTo(&frame);
         var lights = try session.makeLightSampler(choices.integrator, &frame);
         defer if (lights) |*made| made.deinit();
         if (lights) |*made| frame.light_sampler = &made.sampler;
@@ -537,7 +537,7 @@ pub const Session = struct {
         );
         if (choices.denoise and !choices.is_merged) try session.denoiseFilm();
         try session.cutFilm();
-        try session.survey(&frame);
+        try session.fillHits(&frame);
         if (shade == .cost) try session.paintCost();
     }
 
@@ -552,7 +552,7 @@ pub const Session = struct {
     }
 
     /// Makes layers of what the picture's first samples see, if the film has any.
-    fn survey(session: *Session, frame: *const Frame) trace.Error!void {
+    fn fillHits(session: *Session, frame: *const Frame) trace.Error!void {
         const film = &session.film.?;
         if (!film.layers.contains(.origin)) return;
         const start = Io.Clock.awake.now(session.io);
@@ -635,18 +635,18 @@ pub const Session = struct {
     ) trace.Error!void {
         const gpa = session.gpa;
         const index = session.rendered.variant;
-        var settled = chosen;
+        var adjusted = chosen;
         if (session.seen.shade) |shade| switch (shade) {
-            .normal => settled.look = .normals,
-            .uv => settled.look = .texcoords,
+            .normal => adjusted.aov = .normals,
+            .uv => adjusted.aov = .texcoords,
             .ao, .cost => {},
         };
-        session.traced = if (settled.look != .hits)
-            try trace.look(gpa, index, frame, film, settled)
+        session.traced = if (adjusted.aov != .hits)
+            try trace.traceAov(gpa, index, frame, film, adjusted)
         else if (film.layers.contains(.cost))
-            try trace.traceCounting(gpa, index, frame, film, settled)
+            try trace.traceCounting(gpa, index, frame, film, adjusted)
         else
-            try trace.trace(gpa, index, frame, film, settled);
+            try trace.trace(gpa, index, frame, film, adjusted);
     }
 
     /// Traces a picture of one sample, to find how many fit into the time, and chooses so many;

@@ -27,9 +27,9 @@ pub const Lights = @import("trace/integrate/instant_radiosity.zig").InstantRadio
 /// Path tracing, by one kernel.
 pub const PathTracer = @import("trace/integrate/path_tracer.zig").PathTracer;
 /// What primary rays see, by one kernel that counts tests.
-pub const Survey = @import("trace/integrate/survey.zig").Survey;
-/// What a survey makes.
-pub const Look = @import("trace/integrate/survey.zig").Look;
+pub const AovIntegrator = @import("trace/integrate/aov.zig").AovIntegrator;
+/// What it makes.
+pub const Aov = @import("trace/integrate/aov.zig").Aov;
 /// The comptime shape of a tracer; with the files below for tests and benchmarks of traversal.
 pub const kernel = @import("trace/traverse/kernel.zig");
 /// Rays in lanes.
@@ -130,24 +130,24 @@ pub fn fillHits(
     film: *Film,
     settings: Settings,
 ) Error!void {
-    return tiles.fillHits(surveyOf(variant_index), gpa, frame, film, &settings);
+    return tiles.fillHits(aovIntegratorOf(variant_index), gpa, frame, film, &settings);
 }
 
-/// Makes a picture of what `settings.look` names, of colours of the display: not one of hits, and
+/// Makes a picture of what `settings.aov` names, of colours of the display: not one of hits, and
 /// the film has a layer for those colours.
-pub fn look(
+pub fn traceAov(
     gpa: Allocator,
     variant_index: usize,
     frame: *const Frame,
     film: *Film,
     settings: Settings,
 ) Error!Statistics {
-    assert(settings.look != .hits and film.layers.contains(.display));
-    return tiles.render(surveyOf(variant_index), gpa, frame, film, &settings);
+    assert(settings.aov != .hits and film.layers.contains(.display));
+    return tiles.render(aovIntegratorOf(variant_index), gpa, frame, film, &settings);
 }
 
-fn surveyOf(variant_index: usize) *const Integrator {
-    return (comptime integratorsOf("survey", counting_variants))[variant_index];
+fn aovIntegratorOf(variant_index: usize) *const Integrator {
+    return (comptime integratorsOf("aov", counting_variants))[variant_index];
 }
 
 /// By variant, those that count its tests.

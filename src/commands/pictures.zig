@@ -11,6 +11,7 @@ const console = @import("console.zig");
 const facts = @import("facts.zig");
 const raylane = @import("raylane");
 const signals = @import("../signals.zig");
+const stages = @import("stages.zig");
 const Allocator = std.mem.Allocator;
 const Batch = batch_file.Batch;
 const Io = std.Io;
@@ -50,7 +51,7 @@ pub const Pictures = struct {
 
     const Film = struct { target: Target, name: []const u8, size: [2]u32 = .{ 0, 0 } };
     const Posed = struct { frame: i32, camera: settings.Camera };
-    pub const Error = Session.Error || error{OutputFailed};
+    pub const Error = stages.Error;
 
     pub fn init(batch: *Batch, session: *Session, index: u32) Pictures {
         const gpa = session.gpa;
@@ -267,14 +268,7 @@ pub const Pictures = struct {
             if (posed.frame == frame and (is_same or !has_points)) return;
         }
         session.pool.thread_count = pictures.batch.threadCount();
-        try session.pose(.{
-            .lanes = raylane.variant.compiled[options.render.variant].lanes,
-            .tree_quality = options.tree_quality,
-            .sharing = .of(options.instances),
-            .animation = options.animation,
-            .view = options.view,
-            .layers = options.render.layers,
-        });
+        try stages.pose(session, options);
         pictures.posed = .{ .frame = frame, .camera = options.view.camera };
     }
 
@@ -297,26 +291,15 @@ pub const Pictures = struct {
         try session.view(pictures.viewOf(view));
         pictures.sayWarnings();
         if (pictures.begun_count == 1) facts.say(pictures.batch.io, options, session);
-        if (options.render.part != .whole) session.identify(raylane.cli.version);
+        try stages.check(session, options);
         if (pictures.isAlone()) session.dropScene();
-        session.checkWrite(options.write, options.render.part) catch |err| return switch (err) {
-            error.InputOutput => error.OutputFailed,
-            else => |other| other,
-        };
         session.pool.thread_count = pictures.batch.threadCount();
         try session.render(options.render);
         try pictures.sizeFilm();
         // First, so that where there is the picture there are its layers.
         try pictures.writeLayers();
-        session.write(&target, options.write) catch |err| return switch (err) {
-            error.OutOfMemory, error.Canceled => |other| other,
-            error.InputOutput => error.OutputFailed,
-        };
-        var report = session.report(options.render);
-        report.version = raylane.cli.version;
-        report.scene = options.scene;
-        report.output = pictures.place();
-        if (options.count_tests) report.tests = try session.countTests(options.render);
+        try stages.write(session, &target, options, null);
+        const report = try stages.report(session, options, pictures.place());
         pictures.batch.add(.written, 1);
         try pictures.say(&report);
     }
@@ -334,10 +317,7 @@ pub const Pictures = struct {
             if (pictures.isSkipped()) continue;
             try pictures.claim();
             var target = try pictures.openFile();
-            pictures.session.writeLayer(layer, &target, write.*) catch |err| return switch (err) {
-                error.OutOfMemory, error.Canceled => |other| other,
-                error.InputOutput => error.OutputFailed,
-            };
+            try stages.write(pictures.session, &target, &pictures.options, layer);
         }
         values.layer = color;
         try pictures.setName(values.frame, values.view);

@@ -7,6 +7,7 @@ const console = @import("console.zig");
 const facts = @import("facts.zig");
 const raylane = @import("raylane");
 const signals = @import("../signals.zig");
+const stages = @import("stages.zig");
 const Account = raylane.memory_account.Account;
 const Allocator = std.mem.Allocator;
 const Diagnostic = raylane.diagnostic.Diagnostic;
@@ -141,7 +142,7 @@ const Job = struct {
     /// Warnings that the user has seen.
     warning_count: usize = 0,
 
-    const Error = Session.Error || error{OutputFailed};
+    const Error = stages.Error;
 
     fn run(job: *Job) Error!Report {
         const session = &job.session;
@@ -158,36 +159,18 @@ const Job = struct {
         var load = options.load;
         load.output = target.replaces;
         try session.load(options.scene, load);
-        try session.pose(.{
-            .lanes = raylane.variant.compiled[options.render.variant].lanes,
-            .tree_quality = options.tree_quality,
-            .sharing = .of(options.instances),
-            .animation = options.animation,
-            .view = options.view,
-            .layers = options.render.layers,
-        });
+        try stages.pose(session, options);
         try session.view(options.view);
         job.sayWarnings();
         facts.say(job.io, options, session);
-        if (options.render.part != .whole) session.identify(cli.version);
+        try stages.check(session, options);
         session.dropScene();
         signals.stop.is_awaited.store(options.partial, .release);
-        session.checkWrite(options.write, options.render.part) catch |err| return switch (err) {
-            error.InputOutput => error.OutputFailed,
-            else => |other| other,
-        };
         try session.render(options.render);
         signals.stop.is_awaited.store(false, .release);
-        session.write(&target, options.write) catch |err| return switch (err) {
-            error.OutOfMemory, error.Canceled => |other| other,
-            error.InputOutput => error.OutputFailed,
-        };
+        try stages.write(session, &target, options, null);
         signals.outcome.clear();
-        var report = session.report(options.render);
-        report.version = cli.version;
-        report.scene = options.scene;
-        report.output = job.outputTitle();
-        if (options.count_tests) report.tests = try session.countTests(options.render);
+        const report = try stages.report(session, options, job.outputTitle());
         return report;
     }
 

@@ -8,6 +8,7 @@ const std = @import("std");
 const console = @import("console.zig");
 const raylane = @import("raylane");
 const signals = @import("../signals.zig");
+const stages = @import("stages.zig");
 const Allocator = std.mem.Allocator;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const ExitCode = @import("exit_code.zig").ExitCode;
@@ -59,7 +60,7 @@ const Server = struct {
     /// Of the job before.
     kept: ?*Kept = null,
 
-    const Error = Session.Error || error{OutputFailed};
+    const Error = stages.Error;
 
     /// Does what a line asks for and says how it went. Other codes than 0 are for the end of all.
     fn answer(server: *Server, line: []const u8) ExitCode {
@@ -82,7 +83,6 @@ const Server = struct {
         if (server.picture(&options, output, &diagnostic)) |measured| {
             var report = measured;
             report.id = job.id;
-            report.output = output;
             report.warnings = diagnostic.warningTexts(&warnings);
             raylane.report.writeJson(&report, &text.writer) catch
                 return console.outOfMemory(server.io);
@@ -160,32 +160,14 @@ const Server = struct {
         const session = &kept.session;
         var options = asked.*;
         try kept.recall(server.io, &options.view.environment.source);
-        try session.pose(.{
-            .lanes = raylane.variant.compiled[options.render.variant].lanes,
-            .tree_quality = options.tree_quality,
-            .sharing = .of(options.instances),
-            .animation = options.animation,
-            .view = options.view,
-            .layers = options.render.layers,
-        });
+        try stages.pose(session, &options);
         try session.view(options.view);
         // They would not be said again, and what was missing may be there next time.
         if (diagnostic.warning_count > 0) kept.is_good = false;
-        if (options.render.part != .whole) session.identify(cli.version);
-        session.checkWrite(options.write, options.render.part) catch |err| return switch (err) {
-            error.InputOutput => error.OutputFailed,
-            else => |other| other,
-        };
+        try stages.check(session, &options);
         try session.render(options.render);
-        session.write(&target, options.write) catch |err| return switch (err) {
-            error.OutOfMemory, error.Canceled => |other| other,
-            error.InputOutput => error.OutputFailed,
-        };
-        var report = session.report(options.render);
-        report.version = cli.version;
-        report.scene = options.scene;
-        if (options.count_tests) report.tests = try session.countTests(options.render);
-        return report;
+        try stages.write(session, &target, &options, null);
+        return stages.report(session, &options, output);
     }
 
     /// The session of the job before where the same scene is as it was, else a new one.

@@ -93,7 +93,7 @@ pub fn deinit(clay: *Clay) void {
 
 /// Makes a frame of the world show it, in no other light than the environment's. It has to stay
 /// where it is.
-pub fn dress(clay: *const Clay, frame: *world.Frame) void {
+pub fn applyTo(clay: *const Clay, frame: *world.Frame) void {
     frame.geometry = &clay.geometry;
     frame.materials = &clay.materials;
     frame.lights = &.{};

@@ -1,7 +1,7 @@
 //! Layers made of hits: positions, texture coordinates, and what of the file each pixel shows, with
 //! the names of that.
 //!
-//! In: a film whose layer of origins has hits (`integrate/survey.zig`), the geometry, the origins
+//! In: a film whose layer of origins has hits (`integrate/aov.zig`), the geometry, the origins
 //! of triangles. Out: the layers that the film has of these. By all threads.
 
 const std = @import("std");

@@ -35,7 +35,7 @@ const Allocator = std.mem.Allocator;
 const Film = film_file.Film;
 const Layout = film_file.Layout;
 const Frame = world_file.Frame;
-const Look = @import("survey.zig").Look;
+const Aov = @import("aov.zig").Aov;
 const progress_file = @import("../../progress.zig");
 const Progress = progress_file.Progress;
 const Rectangle = film_file.Rectangle;
@@ -65,8 +65,8 @@ pub const Settings = struct {
     noise: ?adaptive.Noise = null,
     /// Null: all samples in one round.
     course: ?Course = null,
-    /// Of a survey.
-    look: Look = .hits,
+    /// Of the integrator of these.
+    aov: Aov = .hits,
     /// Which pixels; null: all of the picture, as `render` fills in.
     layout: ?*const Layout = null,
     /// The integrator's `Shared`: `render` fills it in.
@@ -355,16 +355,16 @@ fn withSamples(chosen: *const Settings, offsets: []sampler.Offset) Settings {
     return shown;
 }
 
-/// Has a survey leave hits on the film's layer of origins, of the first sample of those that the
+/// Has the integrator of AOVs leave hits on the film's layer of origins, of the first sample of those that the
 /// picture has by these settings; all else of the film stays.
 pub fn fillHits(
-    survey: *const Integrator,
+    integrator: *const Integrator,
     gpa: Allocator,
     frame: *const Frame,
     film: *Film,
     chosen: *const Settings,
 ) Error!void {
-    assert(survey.shared == null and chosen.look == .hits);
+    assert(integrator.shared == null and chosen.aov == .hits);
     const offsets = try gpa.alloc(sampler.Offset, chosen.sample_count);
     defer gpa.free(offsets);
     const shown = withSamples(chosen, offsets);
@@ -374,23 +374,23 @@ pub fn fillHits(
     @memset(film.imageOf(.origin).?.pixels, .{ nothing, 0, 0, 0 });
     var by_thread: [parallel.thread_count_max]*anyopaque = undefined;
     var count: usize = 0;
-    defer for (by_thread[0..count]) |one| survey.deinit(one, &gpa);
+    defer for (by_thread[0..count]) |one| integrator.deinit(one, &gpa);
     while (count < chosen.pool.threadsFor(tiles.count)) : (count += 1) {
-        by_thread[count] = survey.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
+        by_thread[count] = integrator.init(&gpa, frame, &shown) orelse return error.OutOfMemory;
     }
     const Hits = struct {
-        survey: *const Integrator,
+        integrator: *const Integrator,
         tiles: *const Tiles,
         film: *Film,
         by_thread: []const *anyopaque,
 
         fn tile(hits: *const @This(), number: usize, thread_index: usize) void {
             const rectangle = hits.tiles.rectangleOf(@intCast(number));
-            hits.survey.pass(hits.by_thread[thread_index], &rectangle, 0, 1, hits.film);
+            hits.integrator.pass(hits.by_thread[thread_index], &rectangle, 0, 1, hits.film);
         }
     };
     const work: Hits = .{
-        .survey = survey,
+        .integrator = integrator,
         .tiles = &tiles,
         .film = film,
         .by_thread = by_thread[0..count],

@@ -1,5 +1,5 @@
-//! What primary rays see, without any light: which triangle, and where on it; or a quick look at
-//! normals or texture coordinates.
+//! What primary rays see, without any light: arbitrary output variables (AOVs) of
+//! hits, normals or texture coordinates.
 //!
 //! In: the frame, a bundle's place in the picture. Out: on the film's layer of origins, of all
 //! surfaces that the first sample's ray goes through, the one that it sees the largest share of,
@@ -22,8 +22,8 @@ const Grid = @import("../traverse/beam/grid.zig").Grid;
 const OwnFrame = @import("../traverse/own_frame.zig").OwnFrame;
 const Rectangle = film_file.Rectangle;
 
-/// What a survey makes.
-pub const Look = enum {
+/// What is left on the film in place of light.
+pub const Aov = enum {
     /// Hits, by the first sample alone.
     hits,
     /// A picture of unit normals in the world's axes: code 128 is 0, 255 is 1.
@@ -32,8 +32,8 @@ pub const Look = enum {
     texcoords,
 };
 
-/// One thread's survey.
-pub fn Survey(comptime Kernel: type) type {
+/// One thread's integrator.
+pub fn AovIntegrator(comptime Kernel: type) type {
     const Rays = Kernel.Rays;
     const F32 = Rays.F32;
     const I32 = Rays.I32;
@@ -76,35 +76,35 @@ pub fn Survey(comptime Kernel: type) type {
             shared_frame: *const Frame,
             settings: *const tiles.Settings,
         ) error{OutOfMemory}!*Self {
-            const survey = try gpa.create(Self);
-            errdefer gpa.destroy(survey);
-            const frame = try survey.own_frame
+            const integrator = try gpa.create(Self);
+            errdefer gpa.destroy(integrator);
+            const frame = try integrator.own_frame
                 .init(gpa, shared_frame, settings.pool.thread_count);
-            errdefer survey.own_frame.deinit(gpa);
-            survey.stack = try .init(gpa, 0, frame.hasLayers());
-            survey.frame = frame;
-            survey.settings = settings;
-            survey.rays = .{};
-            survey.visibility.init(frame);
-            for (&survey.vertices) |*vertex| vertex.init();
-            return survey;
+            errdefer integrator.own_frame.deinit(gpa);
+            integrator.stack = try .init(gpa, 0, frame.hasLayers());
+            integrator.frame = frame;
+            integrator.settings = settings;
+            integrator.rays = .{};
+            integrator.visibility.init(frame);
+            for (&integrator.vertices) |*vertex| vertex.init();
+            return integrator;
         }
 
         /// Frees everything.
-        pub fn deinit(survey: *Self, gpa: std.mem.Allocator) void {
-            survey.stack.deinit(gpa);
-            survey.own_frame.deinit(gpa);
-            gpa.destroy(survey);
+        pub fn deinit(integrator: *Self, gpa: std.mem.Allocator) void {
+            integrator.stack.deinit(gpa);
+            integrator.own_frame.deinit(gpa);
+            gpa.destroy(integrator);
         }
 
         /// What all passes so far took.
-        pub fn counts(survey: *const Self) tiles.Counts {
-            return .{ .rays = survey.rays, .tests = survey.visibility.tests };
+        pub fn counts(integrator: *const Self) tiles.Counts {
+            return .{ .rays = integrator.rays, .tests = integrator.visibility.tests };
         }
 
         /// Adds some samples of each pixel of a bundle to the film.
         pub fn pass(
-            survey: *Self,
+            integrator: *Self,
             rectangle: Rectangle,
             first_sample: u32,
             sample_count: u32,
@@ -113,75 +113,75 @@ pub fn Survey(comptime Kernel: type) type {
             for (first_sample..first_sample + sample_count) |sample| {
                 const place: camera.Place =
                     .{ .rectangle = rectangle, .sample = @intCast(sample) };
-                survey.trace(place);
-                survey.expose(film, place);
+                integrator.trace(place);
+                integrator.expose(film, place);
             }
         }
 
-        fn trace(survey: *Self, place: camera.Place) void {
-            survey.largest = @splat(.zero());
-            survey.primitive = @splat(.splat(ray_file.no_primitive));
-            survey.weights = @splat(@splat(.zero()));
-            survey.color = @splat(.splat(.{ 0, 0, 0 }));
-            survey.share = @splat(.zero());
-            survey.pushPrimary(place);
-            while (survey.stack.pop()) |path| {
-                survey.path = path.*;
+        fn trace(integrator: *Self, place: camera.Place) void {
+            integrator.largest = @splat(.zero());
+            integrator.primitive = @splat(.splat(ray_file.no_primitive));
+            integrator.weights = @splat(@splat(.zero()));
+            integrator.color = @splat(.splat(.{ 0, 0, 0 }));
+            integrator.share = @splat(.zero());
+            integrator.pushPrimary(place);
+            while (integrator.stack.pop()) |path| {
+                integrator.path = path.*;
                 const is_first = path.transparency_depth == 0;
-                const grid = if (survey.grid) |*grid| grid else null;
-                _ = survey.visibility.closest(&survey.path, if (is_first) grid else null);
-                for (&survey.vertices, 0..) |*vertex, group| {
-                    vertex.find(&survey.visibility, &survey.path, group);
-                    if (vertex.seen.any()) survey.put(group, vertex);
+                const grid = if (integrator.grid) |*grid| grid else null;
+                _ = integrator.visibility.closest(&integrator.path, if (is_first) grid else null);
+                for (&integrator.vertices, 0..) |*vertex, group| {
+                    vertex.find(&integrator.visibility, &integrator.path, group);
+                    if (vertex.seen.any()) integrator.put(group, vertex);
                 }
-                survey.stack.pushRest(&survey.path, &survey.vertices);
+                integrator.stack.pushRest(&integrator.path, &integrator.vertices);
             }
         }
 
-        fn pushPrimary(survey: *Self, place: camera.Place) void {
-            const view = survey.frame.view;
-            const offset = survey.settings.offsets[place.sample];
-            survey.grid = camera.grid(view, place.rectangle, offset);
-            const path = survey.stack.push(0, 0);
+        fn pushPrimary(integrator: *Self, place: camera.Place) void {
+            const view = integrator.frame.view;
+            const offset = integrator.settings.offsets[place.sample];
+            integrator.grid = camera.grid(view, place.rectangle, offset);
+            const path = integrator.stack.push(0, 0);
             camera.primaryRays(Kernel, view, place.rectangle, offset, &path.bundle);
             path.start();
-            if (survey.frame.needsFootprints())
-                path.startCones(camera.footprint(view, survey.settings.sample_count));
-            survey.rays.count(0, .{ .closest = place.rectangle.pixelCount() });
+            if (integrator.frame.needsFootprints())
+                path.startCones(camera.footprint(view, integrator.settings.sample_count));
+            integrator.rays.count(0, .{ .closest = place.rectangle.pixelCount() });
         }
 
         /// Takes what rays of a group see.
-        fn put(survey: *Self, group: usize, vertex: *const Vertex) void {
-            const ray = &survey.path.bundle.groups[group];
+        fn put(integrator: *Self, group: usize, vertex: *const Vertex) void {
+            const ray = &integrator.path.bundle.groups[group];
             const share: F32 = .select(vertex.seen, vertex.throughput.x, .zero());
-            survey.share[group] = survey.share[group].add(share);
+            integrator.share[group] = integrator.share[group].add(share);
             const corners: interaction_file.Corners(Rays) =
-                .of(survey.frame.geometry, ray.closest.primitive, vertex.seen);
+                .of(integrator.frame.geometry, ray.closest.primitive, vertex.seen);
             const hit = visibility_file.hitOf(Rays, ray, &corners, vertex.seen);
             const weights = hit.barycentrics[1..3].*;
-            switch (survey.settings.look) {
+            switch (integrator.settings.aov) {
                 .hits => {
-                    const is_larger = share.gt(survey.largest[group]);
-                    const primitive = &survey.primitive[group];
+                    const is_larger = share.gt(integrator.largest[group]);
+                    const primitive = &integrator.primitive[group];
                     primitive.* = .select(is_larger, ray.closest.primitive, primitive.*);
-                    for (&survey.weights[group], weights) |*to, weight| {
+                    for (&integrator.weights[group], weights) |*to, weight| {
                         to.* = .select(is_larger, weight, to.*);
                     }
-                    survey.largest[group] = survey.largest[group].max(share);
+                    integrator.largest[group] = integrator.largest[group].max(share);
                 },
                 .normals => {
                     const half: Vec3 = .splat(.{ 0.5, 0.5, 0.5 });
-                    survey.paint(group, share, vertex.point.normal.mul(half).add(half));
+                    integrator.paint(group, share, vertex.point.normal.mul(half).add(half));
                 },
                 .texcoords => {
-                    const places = survey.texcoords(ray.closest.primitive, weights, vertex.seen);
-                    survey.paint(group, share, places);
+                    const places = integrator.texcoords(ray.closest.primitive, weights, vertex.seen);
+                    integrator.paint(group, share, places);
                 },
             }
         }
 
         /// Adds colours, whose codes are 0..1 in lanes of a share above 0.
-        fn paint(survey: *Self, group: usize, share: F32, codes: Vec3) void {
+        fn paint(integrator: *Self, group: usize, share: F32, codes: Vec3) void {
             var channels = [3][Kernel.ray_count]f32{
                 codes.x.toArray(), codes.y.toArray(), codes.z.toArray(),
             };
@@ -194,7 +194,7 @@ pub fn Survey(comptime Kernel: type) type {
                 .y = .fromArray(channels[1]),
                 .z = .fromArray(channels[2]),
             };
-            survey.color[group] = survey.color[group].add(color.scale(share));
+            integrator.color[group] = integrator.color[group].add(color.scale(share));
         }
 
         fn codeOf(value: f32) u8 {
@@ -202,8 +202,8 @@ pub fn Survey(comptime Kernel: type) type {
             return if (value > 0) @intFromFloat(@min(value, 1) * 255 + 0.5) else 0;
         }
 
-        fn texcoords(survey: *const Self, primitive: I32, weights: [2]F32, seen: Rays.Mask) Vec3 {
-            const geometry = survey.frame.geometry;
+        fn texcoords(integrator: *const Self, primitive: I32, weights: [2]F32, seen: Rays.Mask) Vec3 {
+            const geometry = integrator.frame.geometry;
             const numbers = primitive.toArray();
             const second = weights[0].toArray();
             const third = weights[1].toArray();
@@ -218,18 +218,18 @@ pub fn Survey(comptime Kernel: type) type {
             return .{ .x = .fromArray(places[0]), .y = .fromArray(places[1]), .z = .zero() };
         }
 
-        fn expose(survey: *const Self, film: *Film, place: camera.Place) void {
-            if (survey.settings.look == .hits) return survey.exposeHits(film, place.rectangle);
+        fn expose(integrator: *const Self, film: *Film, place: camera.Place) void {
+            if (integrator.settings.aov == .hits) return integrator.exposeHits(film, place.rectangle);
             const none: [group_count]Vec3 = @splat(.splat(.{ 0, 0, 0 }));
             var escaped: [group_count]F32 = undefined;
-            for (&escaped, survey.share) |*to, share| to.* = F32.splat(1).sub(share);
+            for (&escaped, integrator.share) |*to, share| to.* = F32.splat(1).sub(share);
             camera.expose(Kernel, film, .color, place, &none, &escaped);
-            camera.expose(Kernel, film, .display, place, &survey.color, &survey.share);
+            camera.expose(Kernel, film, .display, place, &integrator.color, &integrator.share);
         }
 
-        fn exposeHits(survey: *const Self, film: *Film, rectangle: Rectangle) void {
+        fn exposeHits(integrator: *const Self, film: *Film, rectangle: Rectangle) void {
             const image = film.imageOf(.origin).?;
-            for (&survey.primitive, &survey.weights, 0..) |*primitive, *weights, group| {
+            for (&integrator.primitive, &integrator.weights, 0..) |*primitive, *weights, group| {
                 const numbers = primitive.toArray();
                 const second = weights[0].toArray();
                 const third = weights[1].toArray();
