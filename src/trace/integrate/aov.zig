@@ -76,35 +76,35 @@ pub fn AovIntegrator(comptime Kernel: type) type {
             shared_frame: *const Frame,
             settings: *const tiles.Settings,
         ) error{OutOfMemory}!*Self {
-            const integrator = try gpa.create(Self);
-            errdefer gpa.destroy(integrator);
-            const frame = try integrator.own_frame
+            const aovs = try gpa.create(Self);
+            errdefer gpa.destroy(aovs);
+            const frame = try aovs.own_frame
                 .init(gpa, shared_frame, settings.pool.thread_count);
-            errdefer integrator.own_frame.deinit(gpa);
-            integrator.stack = try .init(gpa, 0, frame.hasLayers());
-            integrator.frame = frame;
-            integrator.settings = settings;
-            integrator.rays = .{};
-            integrator.visibility.init(frame);
-            for (&integrator.vertices) |*vertex| vertex.init();
-            return integrator;
+            errdefer aovs.own_frame.deinit(gpa);
+            aovs.stack = try .init(gpa, 0, frame.hasLayers());
+            aovs.frame = frame;
+            aovs.settings = settings;
+            aovs.rays = .{};
+            aovs.visibility.init(frame);
+            for (&aovs.vertices) |*vertex| vertex.init();
+            return aovs;
         }
 
         /// Frees everything.
-        pub fn deinit(integrator: *Self, gpa: std.mem.Allocator) void {
-            integrator.stack.deinit(gpa);
-            integrator.own_frame.deinit(gpa);
-            gpa.destroy(integrator);
+        pub fn deinit(aovs: *Self, gpa: std.mem.Allocator) void {
+            aovs.stack.deinit(gpa);
+            aovs.own_frame.deinit(gpa);
+            gpa.destroy(aovs);
         }
 
         /// What all passes so far took.
-        pub fn counts(integrator: *const Self) tiles.Counts {
-            return .{ .rays = integrator.rays, .tests = integrator.visibility.tests };
+        pub fn counts(aovs: *const Self) tiles.Counts {
+            return .{ .rays = aovs.rays, .tests = aovs.visibility.tests };
         }
 
         /// Adds some samples of each pixel of a bundle to the film.
         pub fn pass(
-            integrator: *Self,
+            aovs: *Self,
             rectangle: Rectangle,
             first_sample: u32,
             sample_count: u32,
@@ -113,75 +113,75 @@ pub fn AovIntegrator(comptime Kernel: type) type {
             for (first_sample..first_sample + sample_count) |sample| {
                 const place: camera.Place =
                     .{ .rectangle = rectangle, .sample = @intCast(sample) };
-                integrator.trace(place);
-                integrator.expose(film, place);
+                aovs.trace(place);
+                aovs.expose(film, place);
             }
         }
 
-        fn trace(integrator: *Self, place: camera.Place) void {
-            integrator.largest = @splat(.zero());
-            integrator.primitive = @splat(.splat(ray_file.no_primitive));
-            integrator.weights = @splat(@splat(.zero()));
-            integrator.color = @splat(.splat(.{ 0, 0, 0 }));
-            integrator.share = @splat(.zero());
-            integrator.pushPrimary(place);
-            while (integrator.stack.pop()) |path| {
-                integrator.path = path.*;
+        fn trace(aovs: *Self, place: camera.Place) void {
+            aovs.largest = @splat(.zero());
+            aovs.primitive = @splat(.splat(ray_file.no_primitive));
+            aovs.weights = @splat(@splat(.zero()));
+            aovs.color = @splat(.splat(.{ 0, 0, 0 }));
+            aovs.share = @splat(.zero());
+            aovs.pushPrimary(place);
+            while (aovs.stack.pop()) |path| {
+                aovs.path = path.*;
                 const is_first = path.transparency_depth == 0;
-                const grid = if (integrator.grid) |*grid| grid else null;
-                _ = integrator.visibility.closest(&integrator.path, if (is_first) grid else null);
-                for (&integrator.vertices, 0..) |*vertex, group| {
-                    vertex.find(&integrator.visibility, &integrator.path, group);
-                    if (vertex.seen.any()) integrator.put(group, vertex);
+                const grid = if (aovs.grid) |*grid| grid else null;
+                _ = aovs.visibility.closest(&aovs.path, if (is_first) grid else null);
+                for (&aovs.vertices, 0..) |*vertex, group| {
+                    vertex.find(&aovs.visibility, &aovs.path, group);
+                    if (vertex.seen.any()) aovs.put(group, vertex);
                 }
-                integrator.stack.pushRest(&integrator.path, &integrator.vertices);
+                aovs.stack.pushRest(&aovs.path, &aovs.vertices);
             }
         }
 
-        fn pushPrimary(integrator: *Self, place: camera.Place) void {
-            const view = integrator.frame.view;
-            const offset = integrator.settings.offsets[place.sample];
-            integrator.grid = camera.grid(view, place.rectangle, offset);
-            const path = integrator.stack.push(0, 0);
+        fn pushPrimary(aovs: *Self, place: camera.Place) void {
+            const view = aovs.frame.view;
+            const offset = aovs.settings.offsets[place.sample];
+            aovs.grid = camera.grid(view, place.rectangle, offset);
+            const path = aovs.stack.push(0, 0);
             camera.primaryRays(Kernel, view, place.rectangle, offset, &path.bundle);
             path.start();
-            if (integrator.frame.needsFootprints())
-                path.startCones(camera.footprint(view, integrator.settings.sample_count));
-            integrator.rays.count(0, .{ .closest = place.rectangle.pixelCount() });
+            if (aovs.frame.needsFootprints())
+                path.startCones(camera.footprint(view, aovs.settings.sample_count));
+            aovs.rays.count(0, .{ .closest = place.rectangle.pixelCount() });
         }
 
         /// Takes what rays of a group see.
-        fn put(integrator: *Self, group: usize, vertex: *const Vertex) void {
-            const ray = &integrator.path.bundle.groups[group];
+        fn put(aovs: *Self, group: usize, vertex: *const Vertex) void {
+            const ray = &aovs.path.bundle.groups[group];
             const share: F32 = .select(vertex.seen, vertex.throughput.x, .zero());
-            integrator.share[group] = integrator.share[group].add(share);
+            aovs.share[group] = aovs.share[group].add(share);
             const corners: interaction_file.Corners(Rays) =
-                .of(integrator.frame.geometry, ray.closest.primitive, vertex.seen);
+                .of(aovs.frame.geometry, ray.closest.primitive, vertex.seen);
             const hit = visibility_file.hitOf(Rays, ray, &corners, vertex.seen);
             const weights = hit.barycentrics[1..3].*;
-            switch (integrator.settings.aov) {
+            switch (aovs.settings.aov) {
                 .hits => {
-                    const is_larger = share.gt(integrator.largest[group]);
-                    const primitive = &integrator.primitive[group];
+                    const is_larger = share.gt(aovs.largest[group]);
+                    const primitive = &aovs.primitive[group];
                     primitive.* = .select(is_larger, ray.closest.primitive, primitive.*);
-                    for (&integrator.weights[group], weights) |*to, weight| {
+                    for (&aovs.weights[group], weights) |*to, weight| {
                         to.* = .select(is_larger, weight, to.*);
                     }
-                    integrator.largest[group] = integrator.largest[group].max(share);
+                    aovs.largest[group] = aovs.largest[group].max(share);
                 },
                 .normals => {
                     const half: Vec3 = .splat(.{ 0.5, 0.5, 0.5 });
-                    integrator.paint(group, share, vertex.point.normal.mul(half).add(half));
+                    aovs.paint(group, share, vertex.point.normal.mul(half).add(half));
                 },
                 .texcoords => {
-                    const places = integrator.texcoords(ray.closest.primitive, weights, vertex.seen);
-                    integrator.paint(group, share, places);
+                    const places = aovs.texcoords(ray.closest.primitive, weights, vertex.seen);
+                    aovs.paint(group, share, places);
                 },
             }
         }
 
         /// Adds colours, whose codes are 0..1 in lanes of a share above 0.
-        fn paint(integrator: *Self, group: usize, share: F32, codes: Vec3) void {
+        fn paint(aovs: *Self, group: usize, share: F32, codes: Vec3) void {
             var channels = [3][Kernel.ray_count]f32{
                 codes.x.toArray(), codes.y.toArray(), codes.z.toArray(),
             };
@@ -194,7 +194,7 @@ pub fn AovIntegrator(comptime Kernel: type) type {
                 .y = .fromArray(channels[1]),
                 .z = .fromArray(channels[2]),
             };
-            integrator.color[group] = integrator.color[group].add(color.scale(share));
+            aovs.color[group] = aovs.color[group].add(color.scale(share));
         }
 
         fn codeOf(value: f32) u8 {
@@ -202,8 +202,8 @@ pub fn AovIntegrator(comptime Kernel: type) type {
             return if (value > 0) @intFromFloat(@min(value, 1) * 255 + 0.5) else 0;
         }
 
-        fn texcoords(integrator: *const Self, primitive: I32, weights: [2]F32, seen: Rays.Mask) Vec3 {
-            const geometry = integrator.frame.geometry;
+        fn texcoords(aovs: *const Self, primitive: I32, weights: [2]F32, seen: Rays.Mask) Vec3 {
+            const geometry = aovs.frame.geometry;
             const numbers = primitive.toArray();
             const second = weights[0].toArray();
             const third = weights[1].toArray();
@@ -218,18 +218,18 @@ pub fn AovIntegrator(comptime Kernel: type) type {
             return .{ .x = .fromArray(places[0]), .y = .fromArray(places[1]), .z = .zero() };
         }
 
-        fn expose(integrator: *const Self, film: *Film, place: camera.Place) void {
-            if (integrator.settings.aov == .hits) return integrator.exposeHits(film, place.rectangle);
+        fn expose(aovs: *const Self, film: *Film, place: camera.Place) void {
+            if (aovs.settings.aov == .hits) return aovs.exposeHits(film, place.rectangle);
             const none: [group_count]Vec3 = @splat(.splat(.{ 0, 0, 0 }));
             var escaped: [group_count]F32 = undefined;
-            for (&escaped, integrator.share) |*to, share| to.* = F32.splat(1).sub(share);
+            for (&escaped, aovs.share) |*to, share| to.* = F32.splat(1).sub(share);
             camera.expose(Kernel, film, .color, place, &none, &escaped);
-            camera.expose(Kernel, film, .display, place, &integrator.color, &integrator.share);
+            camera.expose(Kernel, film, .display, place, &aovs.color, &aovs.share);
         }
 
-        fn exposeHits(integrator: *const Self, film: *Film, rectangle: Rectangle) void {
+        fn exposeHits(aovs: *const Self, film: *Film, rectangle: Rectangle) void {
             const image = film.imageOf(.origin).?;
-            for (&integrator.primitive, &integrator.weights, 0..) |*primitive, *weights, group| {
+            for (&aovs.primitive, &aovs.weights, 0..) |*primitive, *weights, group| {
                 const numbers = primitive.toArray();
                 const second = weights[0].toArray();
                 const third = weights[1].toArray();

@@ -355,8 +355,8 @@ fn withSamples(chosen: *const Settings, offsets: []sampler.Offset) Settings {
     return shown;
 }
 
-/// Has the integrator of AOVs leave hits on the film's layer of origins, of the first sample of those that the
-/// picture has by these settings; all else of the film stays.
+/// Has the integrator of AOVs leave hits on the film's layer of origins, of the first sample of
+/// those that the picture has by these settings; all else of the film stays.
 pub fn fillHits(
     integrator: *const Integrator,
     gpa: Allocator,
