@@ -1,7 +1,7 @@
 //! A kernel: the tracer of one variant, compiled into an object of its own.
 //!
-//! In: the build options, which name the variant, and whether it counts tests and makes
-//! AOVs or holds the integrators besides Whitted's. Out: a symbol for each integrator, behind pointers.
+//! In: the build options, which name the variant, and whether it counts tests and makes AOVs or
+//! holds the integrators besides Whitted's. Out: a symbol for each integrator, behind pointers.
 //! Nothing in it is mutable but what it is handed, and no thread is started: the program that it is
 //! linked to does that, and panics for it.
 
