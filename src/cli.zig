@@ -1,8 +1,8 @@
 //! The command line: flags -> `Command`, or one line that says what is wrong with them.
 //!
 //! In: the arguments as the system hands them over. Out: settings, each within its range, for
-//! `main` to pass on; slices point into the arguments. The table `sections` is the whole syntax and
-//! its description; limits and defaults come from `settings`.
+//! `main` to pass on; slices point into the arguments. Tables are the whole syntax and its
+//! description (that of rendering: `cli/options.zig`); limits and defaults come from `settings`.
 
 const std = @import("std");
 const batch_plan = @import("batch.zig");
@@ -12,6 +12,8 @@ const compare = @import("cli/compare.zig");
 const info = @import("cli/info.zig");
 const merge = @import("cli/merge.zig");
 const colors = @import("cli/colors.zig");
+const options_file = @import("cli/options.zig");
+const values = @import("cli/values.zig");
 const config = @import("config");
 const arguments_file = @import("cli/arguments.zig");
 const completion = @import("cli/completion.zig");
@@ -21,7 +23,6 @@ const settings = @import("settings.zig");
 const diagnostic_file = @import("diagnostic.zig");
 const Diagnostic = diagnostic_file.Diagnostic;
 const Page = @import("cli/page.zig").Page;
-const Section = arguments_file.Section;
 const comptimePrint = std.fmt.comptimePrint;
 const integer = arguments_file.integer;
 const namesOf = arguments_file.namesOf;
@@ -120,18 +121,12 @@ pub const ScenarioCall = struct {
 const Word = enum { bench, compare, info, merge, serve, completion, man, help };
 
 /// Form of the report.
-pub const Stats = enum { text, json, none };
+pub const Stats = options_file.Stats;
 
 /// What a resolution is, for messages.
-pub const expected_resolution = std.fmt.comptimePrint("WxH, each {s}, 2^{d} pixels at most", .{
-    settings.side.text(), std.math.log2_int(u32, settings.pixel_count_max),
-});
+pub const expected_resolution = options_file.expected_resolution;
+const expected_size = options_file.expected_size;
 
-const expected_size = std.fmt.comptimePrint("{s}, or {s} for the long side", .{
-    expected_resolution, settings.long_side.text(),
-});
-
-/// How to render scenes.
 pub const Options = struct {
     /// The first that is named; of several, all are `inputs`.
     scene: []const u8,
@@ -226,393 +221,7 @@ pub fn outputName(gpa: std.mem.Allocator, options: *const Options) error{OutOfMe
     return gpa.print("{s}.{t}", .{ std.fs.path.stem(path), options.write.format });
 }
 
-const sections: []const Section = &.{
-    .{ .title = "Image", .options = &.{
-        .{
-            .usage = "-o, --output FILE",
-            .help = "name ending in a format, or a template of names; - is\nstandard output",
-            .also = &.{ "--outfile", "--output-file" },
-        },
-        .{
-            .usage = "--format FORMAT",
-            .words = wordsOf(settings.Format),
-            .help = "png, jpg, webp, tga, bmp or ppm, linear: hdr, pfm or\n" ++
-                "exr, or a film: y4m",
-        },
-        .{ .usage = "--jpeg-quality N", .help = settings.jpeg_quality.textWithDefault() },
-        .{
-            .usage = "--webp-quality N",
-            .help = settings.webp_quality.text() ++ ", with loss (default: without)",
-        },
-        .{
-            .usage = "--exr KIND",
-            .words = wordsOf(settings.ExrKind),
-            .help = "half or float: colours of an EXR file (default: half)",
-        },
-        .{
-            .usage = "-r, --resolution WxH|N",
-            .help = comptimePrint("size in pixels, or of the long side in the camera's\n" ++
-                "aspect (default: the scene's own, or {d})", .{settings.long_side.default}),
-            .also = &.{"--size"},
-            .meant = &.{ "--geometry", "--res" },
-        },
-        .{ .usage = "--width N", .help = "with --height N: -r in two numbers" },
-        .{ .usage = "--height N", .help = "with --width N" },
-        .{
-            .usage = "--pixel-ratio N",
-            .help = "multiply both sides of that size, " ++ settings.pixel_ratio.textWithDefault(),
-            .also = &.{"--device-pixel-ratio"},
-        },
-        .{
-            .usage = "--crop X0,Y0,X1,Y1",
-            .help = "a part alone: pixels, or fractions where a dot is in\n" ++
-                "them; exr files of parts can be merged",
-        },
-        .{
-            .usage = "--tile I/N",
-            .help = "1/N of the picture in tiles all over it, an exr file;\n" ++
-                "'raylane merge' makes the picture of all I",
-        },
-        .{
-            .usage = "--exposure EV|auto",
-            .words = &.{"auto"},
-            .help = "brighten by EV stops, or by what is seen (default:\n" ++
-                "auto for scenes with lights of their own, else 0)",
-        },
-        .{
-            .usage = "--tonemap CURVE",
-            .words = wordsOf(settings.ToneMapping),
-            .help = namesOf(settings.ToneMapping) ++ " (default: neutral)",
-            .also = &.{ "--tone-mapping", "--tonemapping" },
-        },
-        .{
-            .usage = "--background WHAT",
-            .words = &.{ "env", "studio", "transparent" },
-            .help = "env, studio, transparent, a CSS colour (red, #rrggbb)\n" ++
-                "or radiance R,G,B (default: a grey gradient)",
-            .meant = &.{ "--bg", "--background-color" },
-        },
-        .{
-            .usage = "--layers LIST",
-            .words = wordsOf(settings.Layer),
-            .help = "depth,normal,albedo,uv,node,material,primitive,alpha,\n" ++
-                "position,cost,variance: channels of an EXR file, or\n" ++
-                "files of their own by {layer} in the output's name",
-        },
-        .{
-            .usage = "--shade LOOK",
-            .words = wordsOf(settings.Shade),
-            .help = "a quick look, not lit: ao, normal, uv or cost",
-        },
-    } },
-    .{ .title = "Several pictures (see docs/batch.md)", .options = &.{
-        .{
-            .usage = "--frames RANGE",
-            .help = "of the animation, 1-10,12,20-40:2, at frame / fps\nseconds",
-        },
-        .{ .usage = "--fps F", .help = "24 (default), 23.976 or 30000/1001, say" },
-        .{
-            .usage = "--reference-frame F",
-            .help = "whose exposure, framing and studio all frames have,\n" ++
-                "a range's first (default: the first of --frames)",
-        },
-        .{
-            .usage = "--turntable N",
-            .help = "views all around, from --orbit on (default: " ++
-                comptimePrint("{d},{d})", .{
-                    settings.orbit_turntable.theta_degrees, settings.orbit_turntable.phi_degrees,
-                }),
-        },
-        .{ .usage = "--views RANGE", .help = "only these of them, from 0 on" },
-        .{ .usage = "--skip-existing", .help = "leave pictures as they are that are there" },
-        .{
-            .usage = "--jobs N",
-            .help = "scenes side by side, " ++ settings.job_count.text() ++
-                "\n(default: by their number and the pictures' size)",
-        },
-    } },
-    .{ .title = "Camera", .options = &.{
-        .{
-            .usage = "--camera WHICH",
-            .words = &.{"auto"},
-            .help = "name or index of a camera, or auto: all in view",
-            .also = &.{"--camera-index"},
-        },
-        .{
-            .usage = "--eye X,Y,Z",
-            .help = "where the camera stands, in place of the file's",
-            .also = &.{"--camera-position"},
-        },
-        .{
-            .usage = "--target X,Y,Z",
-            .help = "what it looks at (default: the middle of the scene)",
-            .also = &.{"--camera-focal-point"},
-            .meant = &.{ "--look-at", "--camera-target" },
-        },
-        .{
-            .usage = "--up X,Y,Z",
-            .help = "what is upwards in the picture (default: 0,1,0)",
-            .also = &.{"--camera-view-up"},
-        },
-        .{
-            .usage = "--orbit THETA,PHI,R",
-            .help = "stand about the target, degrees from +z and from\n" ++
-                "above, R metres or percent (default: 100%, all seen)",
-            .meant = &.{"--camera-orbit"},
-        },
-        .{
-            .usage = "--fov DEG",
-            .help = "vertical angle of view, in place of the camera's",
-            .also = &.{"--camera-view-angle"},
-            .meant = &.{"--field-of-view"},
-        },
-        .{
-            .usage = "--ortho",
-            .help = "no perspective",
-            .also = &.{ "--orthographic", "--camera-orthographic" },
-        },
-        .{
-            .usage = "--frame-all",
-            .help = "frame all that the animation shows at any time",
-        },
-    } },
-    .{ .title = "Scene", .options = &.{
-        .{ .usage = "--scene WHICH", .help = "name or index of a scene of a glTF file" },
-        .{
-            .usage = "--material-variant N",
-            .help = "name or index of one of its variants of materials",
-            .also = &.{"--variant-name"},
-        },
-        .{
-            .usage = "--animation WHICH",
-            .words = &.{"all"},
-            .help = "name or index of an animation, or all (default: none)",
-            .also = &.{ "--animation-index", "--animation-name" },
-        },
-        .{
-            .usage = "--animation-time S",
-            .help = "seconds since its start (default: 0)",
-        },
-        .{
-            .usage = "--up-axis AXIS",
-            .words = wordsOf(settings.UpAxis),
-            .help = "y or z: which axis of the file points up (STL: z)",
-        },
-        .{
-            .usage = "--format-in FORMAT",
-            .words = wordsOf(settings.SceneFormat),
-            .help = namesOf(settings.SceneFormat) ++ ", whatever it holds",
-        },
-        .{
-            .usage = "--env FILE",
-            .words = &.{ "studio", "none" },
-            .help = "light from all around: an equirectangular image of\n" ++
-                "radiance (exr, hdr, png), studio or none (default:\n" ++
-                "the scene's, or studio, dim around its own lights)",
-            .also = &.{ "--hdri", "--hdri-file", "--environment" },
-            .meant = &.{ "--ibl", "--environment-image" },
-        },
-        .{ .usage = "--env-intensity X", .help = "multiplies its radiance (default: 1)" },
-        .{
-            .usage = "--env-rotation DEG",
-            .help = "turn it about y, counter-clockwise from above (the\n" ++
-                "studio otherwise turns with the camera)",
-        },
-        .{
-            .usage = "--env-shadows N",
-            .help = "directional lights a sample that stand for it, to\n" ++
-                "find how much of it arrives, " ++ settings.environment_shadow_count.text() ++
-                comptimePrint("\n(default: {d}, with a floor {d}; 0: all of it)", .{
-                    settings.environment_shadow_count.default, settings.floor_shadow_count,
-                }),
-        },
-        .{
-            .usage = "--floor WHAT",
-            .words = wordsOf(settings.Floor),
-            .help = "shadow: a floor that shows it, or none (default)",
-        },
-        .{
-            .usage = "--ambient L",
-            .help = comptimePrint("radiance from all sides (default: {d} for scenes\n" ++
-                "without lights, otherwise 0)", .{settings.ambient_default}),
-        },
-        .{
-            .usage = "--point-size PIXELS",
-            .help = comptimePrint("width of points and lines in the automatic view,\n" ++
-                "{d} to {d} (default: {d})", .{
-                settings.point_size.min,     settings.point_size.max,
-                settings.point_size.default,
-            }),
-        },
-        .{
-            .usage = "--tessellation N",
-            .help = "straight pieces of a circle in curved PBRT shapes,\n" ++
-                settings.tessellation.textWithDefault(),
-        },
-        .{
-            .usage = "--max-texture-size N",
-            .help = comptimePrint("halve larger images on loading until no side is\n" ++
-                "longer, {s}", .{settings.texture_side.text()}),
-        },
-        .{
-            .usage = "--allow-outside",
-            .help = "let the scene name files outside of its own folder",
-        },
-        .{
-            .usage = "--strict",
-            .help = "refuse files that break the rules of their format in\n" ++
-                "ways that are otherwise forgiven with a warning",
-        },
-        .{
-            .usage = "--force",
-            .help = "render what requires extensions that are not known,\nas far as it goes",
-        },
-    } },
-    .{ .title = "Rendering (PBRT scenes bring their own spp and depth)", .options = &.{
-        .{
-            .usage = "--spp N",
-            .help = comptimePrint("samples a pixel, {s} (default: {d}, or {d} where\n" ++
-                "the long side is below {d}; path: {d})", .{
-                settings.sample_count.text(), settings.sample_count.default,
-                settings.sample_count_small,  settings.side_small,
-                settings.sample_count_path,
-            }),
-            .also = &.{ "--samples", "--samples-per-pixel" },
-        },
-        .{
-            .usage = "--noise E",
-            .help = comptimePrint("path: no more samples where pixels have a standard\n" ++
-                "error below E, white being 1; --spp is then the\n" ++
-                "most (default: {d})", .{settings.noise_sample_count}),
-        },
-        .{
-            .usage = "--time-budget S",
-            .help = "as many samples, --spp at most, as fit into S seconds\n" ++
-                "of tracing; says the --spp with the same picture",
-        },
-        .{
-            .usage = "--progress-image OUT",
-            .help = "the picture so far, every two seconds, as a whole,\nencoded as the output is",
-        },
-        .{
-            .usage = "--partial",
-            .help = "INT (Ctrl-C) or TERM during tracing ends it, and the\n" ++
-                "picture so far is written; once more ends all",
-        },
-        .{
-            .usage = "--depth N",
-            .help = comptimePrint("reflections and refractions in a row, {s}\n" ++
-                "(default: {d}; path, all bounces of light: {d})", .{
-                settings.depth.text(), settings.depth.default, settings.depth_path,
-            }),
-            .also = &.{ "--max-depth", "--maxdepth", "--bounces", "--max-bounces" },
-        },
-        .{
-            .usage = "--thesis",
-            .help = comptimePrint("{d}x{d}, {d} sample, depth {d}, linear, all CPUs; what\n" ++
-                "follows it still counts", .{
-                settings.thesis.resolution[0], settings.thesis.resolution[1],
-                settings.thesis.sample_count,  settings.thesis.depth,
-            }),
-        },
-        .{
-            .usage = "-t, --threads N",
-            .help = settings.thread_count.text() ++ " (default: as many as CPUs)",
-            .also = &.{ "--nthreads", "--num-threads" },
-        },
-        .{
-            .usage = "--tile-size N",
-            .help = comptimePrint("pixels on the side of a piece of work, {s} in\n" ++
-                "steps of {d} (default: {d})", .{
-                settings.tile_size.text(),  settings.tile_size_step,
-                settings.tile_size.default,
-            }),
-        },
-        .{
-            .usage = "--bvh QUALITY",
-            .words = wordsOf(settings.TreeQuality),
-            .help = namesOf(settings.TreeQuality) ++ ": time to build the scene's tree\n" ++
-                "against time to trace; the image is always the same",
-        },
-        .{
-            .usage = "--instances HOW",
-            .words = wordsOf(settings.Instances),
-            .help = namesOf(settings.Instances) ++ ": whether a mesh is\n" ++
-                "held once for all its instances: less memory, more\n" ++
-                "time; the image is always the same",
-        },
-        .{
-            .usage = "--integrator NAME",
-            .words = wordsOf(settings.Integrator),
-            .help = namesOf(settings.Integrator) ++ " (default: whitted)",
-        },
-        .{
-            .usage = "--virtual-lights N",
-            .help = "of '--integrator lights' a sample, " ++
-                settings.virtual_light_count.text() ++ "\n" ++
-                comptimePrint("(default: {d})", .{settings.virtual_light_count.default}),
-        },
-        .{
-            .usage = "--sky-lights N",
-            .help = "the same that stand for the environment, " ++
-                settings.sky_light_count.text() ++ "\n" ++
-                comptimePrint("(default: {d})", .{settings.sky_light_count.default}),
-        },
-        .{
-            .usage = "--all-lights",
-            .help = "every pixel has all of a sample's lights, not a\n" ++
-                "ninth of them and its neighbours' by a filter",
-        },
-        .{ .usage = "--denoise", .help = "filter the noise out" },
-        .{
-            .usage = "--variant NAME",
-            .words = variant_file.names,
-            .help = "how rays are traced; the image is always the same",
-        },
-        .{
-            .usage = "--list-variants",
-            .help = "print the names of the variants, the default first",
-        },
-        .{ .usage = "--max-memory SIZE", .help = "512M or 2G, say; an error where more is needed" },
-    } },
-    .{ .title = "Messages", .options = &.{
-        .{
-            .usage = "--stats FORM",
-            .words = wordsOf(Stats),
-            .help = "report as " ++ namesOf(Stats) ++ " (default: text, or none\n" ++
-                "when the image goes to standard output); when it is\n" ++
-                "given, a report that cannot be printed is an error",
-            .meant = &.{"--json"},
-        },
-        .{
-            .usage = "--scenario FILE|JSON",
-            .help = "options as JSON (docs/json.md), or scenarios of\n" ++
-                "Khronos's render fidelity comparison; what else the\n" ++
-                "command line says counts more",
-        },
-        .{
-            .usage = "--progress HOW",
-            .words = wordsOf(settings.ProgressForm),
-            .help = "auto: a line on a terminal; json: lines for programs,\n" ++
-                "see docs/progress.md; or none",
-        },
-        .{ .usage = "--progress-fd N", .help = "json to that descriptor, not to stderr" },
-        .{
-            .usage = "--count-tests",
-            .help = "count intersection tests, in a second, untimed pass",
-        },
-        .{ .usage = "-q, --quiet", .help = "no warnings, no progress, no report but by --stats" },
-        .{ .usage = "-v, --verbose", .help = "say what was chosen by default" },
-        .{ .usage = "-h, --help", .help = "print this" },
-        .{ .usage = "-V, --version", .help = "print the version" },
-        .{
-            .usage = "--licenses",
-            .help = "print the licence, and those of the libraries used",
-            .also = &.{ "--license", "--licence" },
-        },
-    } },
-};
-
+const sections = options_file.sections;
 const Reader = arguments_file.Arguments(sections);
 
 /// One of `--scenario`'s, or a job.
@@ -922,13 +531,13 @@ const Parser = struct {
             .output => options.output = try reader.text(given, "a file name or -"),
             .frames, .fps, .reference_frame, .turntable => try parser.setBatch(given),
             .views, .skip_existing, .jobs => try parser.setBatch(given),
-            .format => parser.format = formatOf(given.value) orelse
+            .format => parser.format = values.formatOf(given.value) orelse
                 return reader.bad(given, comptime namesOf(settings.Format)),
             .denoise => options.render.denoise = true,
             .shade => options.view.shade = try reader.choice(given, settings.Shade),
             .layers, .jpeg_quality, .webp_quality, .exr => try parser.setWriting(given),
             .exposure, .tonemap => try parser.setWriting(given),
-            .max_memory => options.memory_max = bytesOf(given.value) orelse
+            .max_memory => options.memory_max = values.bytesOf(given.value) orelse
                 return reader.bad(given, "a size such as 512M or 2G"),
             .crop, .tile => try parser.setPart(given),
             .resolution, .width, .height, .pixel_ratio => try parser.setSize(given),
@@ -936,7 +545,7 @@ const Parser = struct {
             .spp => options.render.sample_count = try reader.number(given, settings.sample_count),
             .noise, .time_budget, .progress_image, .partial => try parser.setSampling(given),
             .depth => options.render.depth = try reader.number(given, settings.depth),
-            .tile_size => options.render.tile_size = tileSizeOf(given.value) orelse
+            .tile_size => options.render.tile_size = values.tileSizeOf(given.value) orelse
                 return reader.bad(given, comptimePrint("{s}, a multiple of {d}", .{
                     settings.tile_size.text(), settings.tile_size_step,
                 })),
@@ -946,11 +555,11 @@ const Parser = struct {
             .tessellation, .max_texture_size => try parser.setLoad(given),
             .allow_outside, .strict, .force => try parser.setLoad(given),
             .animation, .animation_time => try parser.setAnimation(given),
-            .background => options.view.background = backgroundOf(given.value) orelse
+            .background => options.view.background = values.backgroundOf(given.value) orelse
                 return parser.noBackground(given),
             .env, .env_intensity, .env_rotation, .env_shadows => try parser.setEnvironment(given),
             .floor => options.view.floor = try reader.choice(given, settings.Floor),
-            .ambient => options.view.ambient = radiance(given.value) orelse
+            .ambient => options.view.ambient = values.radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
             .stats, .count_tests, .quiet, .verbose => try parser.setMessages(given),
             .progress, .progress_fd => try parser.setMessages(given),
@@ -966,7 +575,7 @@ const Parser = struct {
                 try reader.choice(given, settings.Integrator),
             .virtual_lights, .sky_lights, .all_lights => try parser.setLights(given),
             .point_size => options.view.point_size =
-                numberWithin(given.value, settings.point_size) orelse
+                values.numberWithin(given.value, settings.point_size) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} pixels", .{
                     settings.point_size.min, settings.point_size.max,
                 })),
@@ -986,10 +595,10 @@ const Parser = struct {
     fn setPart(parser: *Parser, given: Reader.Given) Error!void {
         const part = &parser.options.render.part;
         switch (given.id) {
-            .crop => part.* = .{ .crop = cropOf(given.value) orelse
+            .crop => part.* = .{ .crop = values.cropOf(given.value) orelse
                 return parser.reader.bad(given, "four pixels, or fractions from 0.0 to 1.0, of " ++
                     "a rectangle's left, upper, right and lower edge") },
-            .tile => part.* = .{ .tile = tileOf(given.value) orelse
+            .tile => part.* = .{ .tile = values.tileOf(given.value) orelse
                 return parser.reader.bad(given, comptimePrint("I/N, N {s}, I 1 to N", .{
                     settings.part_count.text(),
                 })) },
@@ -1004,7 +613,7 @@ const Parser = struct {
             .resolution => {
                 parser.sides = .{ null, null };
                 view.long_side = integer(given.value, settings.long_side);
-                view.resolution = resolutionOf(given.value);
+                view.resolution = values.resolutionOf(given.value);
                 if (view.long_side == null and view.resolution == null)
                     return reader.bad(given, expected_size);
             },
@@ -1101,14 +710,14 @@ const Parser = struct {
         const write = &parser.options.write;
         const reader = &parser.reader;
         switch (given.id) {
-            .layers => parser.options.render.layers = layersOf(given.value) orelse
+            .layers => parser.options.render.layers = values.layersOf(given.value) orelse
                 return reader.bad(given, comptime namesOf(settings.Layer)),
             .jpeg_quality => write.jpeg_quality =
                 try reader.number(given, settings.jpeg_quality),
             .webp_quality => write.webp_quality =
                 try reader.number(given, settings.webp_quality),
             .exr => write.exr_kind = try reader.choice(given, settings.ExrKind),
-            .exposure => write.exposure = exposureOf(given.value) orelse
+            .exposure => write.exposure = values.exposureOf(given.value) orelse
                 return reader.bad(given, comptimePrint("-{d} to {d}, or auto", .{
                     settings.exposure_ev_max, settings.exposure_ev_max,
                 })),
@@ -1149,14 +758,14 @@ const Parser = struct {
         const reader = &parser.reader;
         switch (given.id) {
             .noise => {
-                const error_max = numberWithin(given.value, settings.noise_error) orelse
+                const error_max = values.numberWithin(given.value, settings.noise_error) orelse
                     return reader.bad(given, comptimePrint("{d} to {d}", .{
                         settings.noise_error.min, settings.noise_error.max,
                     }));
                 options.render.noise = .{ .error_max = error_max };
             },
             .time_budget => options.render.time_budget_s =
-                numberWithin(given.value, settings.time_budget_s) orelse
+                values.numberWithin(given.value, settings.time_budget_s) orelse
                 return reader.bad(given, comptimePrint("{d} to {d} seconds", .{
                     settings.time_budget_s.min, settings.time_budget_s.max,
                 })),
@@ -1210,9 +819,9 @@ const Parser = struct {
         const load = &parser.options.load;
         const reader = &parser.reader;
         switch (given.id) {
-            .scene => load.scene = choiceOf(given.value) orelse
+            .scene => load.scene = values.choiceOf(given.value) orelse
                 return reader.bad(given, "a scene's name or its index"),
-            .material_variant => load.material_variant = choiceOf(given.value) orelse
+            .material_variant => load.material_variant = values.choiceOf(given.value) orelse
                 return reader.bad(given, "a material variant's name or its index"),
             .up_axis => load.up_axis = try reader.choice(given, settings.UpAxis),
             .format_in => load.format = try reader.choice(given, settings.SceneFormat),
@@ -1231,10 +840,10 @@ const Parser = struct {
         const animation = &parser.options.animation;
         const reader = &parser.reader;
         switch (given.id) {
-            .animation => animation.which = animationOf(given.value) orelse
+            .animation => animation.which = values.animationOf(given.value) orelse
                 return reader.bad(given, "an animation's name, its index, or all"),
             .animation_time => {
-                animation.time_s = numberOf(given.value) orelse
+                animation.time_s = values.numberOf(given.value) orelse
                     return reader.bad(given, "a number of seconds");
                 parser.has_time = true;
             },
@@ -1247,21 +856,24 @@ const Parser = struct {
         const viewpoint = &view.viewpoint;
         const reader = &parser.reader;
         switch (given.id) {
-            .camera => view.camera = cameraOf(given.value) orelse
+            .camera => view.camera = values.cameraOf(given.value) orelse
                 return reader.bad(given, "a camera's name, its index, or auto"),
             .frame_all => view.frames_all = true,
-            .eye => viewpoint.eye = vectorOf(given.value) orelse
+            .eye => viewpoint.eye = values.vectorOf(given.value) orelse
                 return reader.bad(given, "X,Y,Z in metres"),
-            .target => viewpoint.target = vectorOf(given.value) orelse
+            .target => viewpoint.target = values.vectorOf(given.value) orelse
                 return reader.bad(given, "X,Y,Z in metres"),
-            .up => viewpoint.up = directionOf(given.value) orelse
+            .up => viewpoint.up = values.directionOf(given.value) orelse
                 return reader.bad(given, "X,Y,Z other than 0,0,0"),
-            .orbit => viewpoint.orbit = orbitOf(given.value) orelse
+            .orbit => viewpoint.orbit = values.orbitOf(given.value) orelse
                 return reader.bad(given, "THETA,PHI[,RADIUS], PHI 0 to 180, RADIUS above 0"),
-            .fov => viewpoint.fov_degrees = numberWithin(given.value, settings.fov_degrees) orelse
-                return reader.bad(given, comptimePrint("{d} to {d} degrees", .{
-                    settings.fov_degrees.min, settings.fov_degrees.max,
-                })),
+            .fov => {
+                const range = settings.fov_degrees;
+                viewpoint.fov_degrees = values.numberWithin(given.value, range) orelse
+                    return reader.bad(given, comptimePrint("{d} to {d} degrees", .{
+                        range.min, range.max,
+                    }));
+            },
             .ortho => viewpoint.orthographic = true,
             else => unreachable, // `set` hands over the above.
         }
@@ -1271,11 +883,11 @@ const Parser = struct {
         const reader = &parser.reader;
         const environment = &parser.options.view.environment;
         switch (given.id) {
-            .env => environment.source = environmentOf(given.value) orelse
+            .env => environment.source = values.environmentOf(given.value) orelse
                 return reader.bad(given, "a file name, studio or none"),
-            .env_intensity => environment.intensity = radiance(given.value) orelse
+            .env_intensity => environment.intensity = values.radiance(given.value) orelse
                 return reader.bad(given, "a number of 0 or more"),
-            .env_rotation => environment.rotation_deg = rotationOf(given.value) orelse
+            .env_rotation => environment.rotation_deg = values.rotationOf(given.value) orelse
                 return reader.bad(given, "degrees, -3600 to 3600"),
             .env_shadows => environment.shadow_count =
                 try reader.number(given, settings.environment_shadow_count),
@@ -1413,7 +1025,7 @@ pub fn formatFor(
 ) Error!settings.Format {
     if (isStdout(name)) return chosen orelse .png;
     const extension = std.fs.path.extension(name);
-    const implied = if (extension.len == 0) null else formatOf(extension[1..]);
+    const implied = if (extension.len == 0) null else values.formatOf(extension[1..]);
     if (chosen) |format| {
         if (implied == null or implied == format) return format;
         return reader.fail("'--format {t}' contradicts the name {f}", .{ format, quote(name) });
@@ -1423,195 +1035,6 @@ pub fn formatFor(
             "folder's ends in /",
         .{quote(name)},
     );
-}
-
-/// A rectangle of at least one pixel; with a dot anywhere, all are fractions.
-fn cropOf(text: []const u8) ?settings.Part.Crop {
-    const has_dot = std.mem.findScalar(u8, text, '.') != null;
-    var pixels: [4]u32 = undefined;
-    var shares: [4]f32 = undefined;
-    var numbers = std.mem.splitScalar(u8, text, ',');
-    for (&pixels, &shares) |*pixel, *share| {
-        const number = numbers.next() orelse return null;
-        if (has_dot)
-            share.* = numberWithin(number, crop_shares) orelse return null
-        else
-            pixel.* = integer(number, .{ .min = 0, .max = settings.side.max }) orelse return null;
-    }
-    if (numbers.next() != null) return null;
-    if (has_dot) {
-        const is_some = shares[0] < shares[2] and shares[1] < shares[3];
-        return if (is_some) .{ .shares = shares } else null;
-    }
-    const is_some = pixels[0] < pixels[2] and pixels[1] < pixels[3];
-    return if (is_some) .{ .pixels = pixels } else null;
-}
-
-const crop_shares: struct { min: f32, max: f32 } = .{ .min = 0, .max = 1 };
-
-/// I/N.
-fn tileOf(text: []const u8) ?settings.Part.Tile {
-    const slash = std.mem.findScalar(u8, text, '/') orelse return null;
-    const number = integer(text[0..slash], settings.part_count) orelse return null;
-    const count = integer(text[slash + 1 ..], settings.part_count) orelse return null;
-    return if (number <= count) .{ .number = number, .count = count } else null;
-}
-
-/// A format by its extension, in either case; JPEG has two.
-pub fn formatOf(extension: []const u8) ?settings.Format {
-    if (std.ascii.eqlIgnoreCase(extension, "jpeg")) return .jpg;
-    for (std.enums.values(settings.Format)) |format| {
-        if (std.ascii.eqlIgnoreCase(extension, @tagName(format))) return format;
-    }
-    return null;
-}
-
-/// A number of bytes above 0, or of K, M, G or T, each 1024 times the one before.
-pub fn bytesOf(text: []const u8) ?u64 {
-    if (text.len == 0) return null;
-    const units = "KMGT";
-    const unit = std.mem.findScalar(u8, units, std.ascii.toUpper(text[text.len - 1]));
-    const digits = if (unit == null) text else text[0 .. text.len - 1];
-    for (digits) |digit| if (!std.ascii.isDigit(digit)) return null;
-    const count = std.fmt.parseInt(u64, digits, 10) catch return null;
-    if (count == 0) return null;
-    const shift: u6 = if (unit) |index| @intCast(10 * (index + 1)) else 0;
-    return std.math.shlExact(u64, count, shift) catch null;
-}
-
-/// Names with commas between them.
-fn layersOf(text: []const u8) ?std.EnumSet(settings.Layer) {
-    var layers: std.EnumSet(settings.Layer) = .empty;
-    var names = std.mem.splitScalar(u8, text, ',');
-    while (names.next()) |name|
-        layers.insert(std.meta.stringToEnum(settings.Layer, name) orelse return null);
-    return layers;
-}
-
-/// A number from `range.min` to `range.max`.
-fn numberWithin(text: []const u8, range: anytype) ?f32 {
-    const number = numberOf(text) orelse return null;
-    return if (number >= range.min and number <= range.max) number else null;
-}
-
-/// A finite decimal number; a denormal one is zero, as everywhere in the renderer.
-pub fn numberOf(text: []const u8) ?f32 {
-    for (text) |byte| switch (byte) {
-        '0'...'9', '+', '-', '.', 'e', 'E' => {},
-        else => return null, // The parser knows "nan", "inf", "0x" and "_" besides.
-    };
-    const value = std.fmt.parseFloat(f32, text) catch return null;
-    if (!std.math.isFinite(value)) return null;
-    return if (@abs(value) < std.math.floatMin(f32)) 0 else value;
-}
-
-fn radiance(text: []const u8) ?f32 {
-    const value = numberOf(text) orelse return null;
-    return if (value >= 0) value else null;
-}
-
-/// Width and height, within the limits.
-pub fn resolutionOf(text: []const u8) ?[2]u32 {
-    const at = std.mem.findAny(u8, text, "xX") orelse return null;
-    const width = integer(text[0..at], settings.side) orelse return null;
-    const height = integer(text[at + 1 ..], settings.side) orelse return null;
-    if (@as(u64, width) * height > settings.pixel_count_max) return null;
-    return .{ width, height };
-}
-
-/// `X,Y,Z`.
-fn vectorOf(text: []const u8) ?[3]f32 {
-    var vector: [3]f32 = undefined;
-    var parts = std.mem.splitScalar(u8, text, ',');
-    for (&vector) |*component| component.* = numberOf(parts.next() orelse return null) orelse
-        return null;
-    return if (parts.next() == null) vector else null;
-}
-
-/// `X,Y,Z`, not zero.
-fn directionOf(text: []const u8) ?[3]f32 {
-    const vector = vectorOf(text) orelse return null;
-    return if (std.mem.eql(f32, &vector, &.{ 0, 0, 0 })) null else vector;
-}
-
-/// `THETA,PHI[,RADIUS]`.
-fn orbitOf(text: []const u8) ?settings.Orbit {
-    var parts = std.mem.splitScalar(u8, text, ',');
-    var orbit: settings.Orbit = .{
-        .theta_degrees = numberOf(parts.next().?) orelse return null,
-        .phi_degrees = numberOf(parts.next() orelse return null) orelse return null,
-    };
-    if (!(orbit.phi_degrees >= 0 and orbit.phi_degrees <= 180)) return null;
-    const radius = parts.next() orelse return orbit;
-    if (parts.next() != null) return null;
-    if (std.mem.cutSuffix(u8, radius, "%")) |percent| {
-        orbit.radius = .{ .share = (numberOf(percent) orelse return null) / 100 };
-    } else orbit.radius = .{ .metres = numberOf(radius) orelse return null };
-    return switch (orbit.radius) {
-        inline else => |value| if (value > 0) orbit else null,
-    };
-}
-
-fn tileSizeOf(text: []const u8) ?u32 {
-    const size = integer(text, settings.tile_size) orelse return null;
-    return if (size % settings.tile_size_step == 0) size else null;
-}
-
-fn cameraOf(text: []const u8) ?settings.Camera {
-    if (text.len == 0) return null;
-    if (std.mem.eql(u8, text, "auto")) return .auto;
-    const index = integer(text, any_index) orelse return .{ .name = text };
-    return .{ .index = index };
-}
-
-/// By its index or its name; null: it is empty.
-pub fn choiceOf(text: []const u8) ?settings.Choice {
-    if (text.len == 0) return null;
-    const index = integer(text, any_index) orelse return .{ .name = text };
-    return .{ .index = index };
-}
-
-fn animationOf(text: []const u8) ?settings.Animation.Which {
-    if (std.mem.eql(u8, text, "all")) return .all;
-    return switch (choiceOf(text) orelse return null) {
-        .default => unreachable, // Nothing spells it.
-        .index => |index| .{ .index = index },
-        .name => |name| .{ .name = name },
-    };
-}
-
-const any_index: settings.Range = .{ .min = 0, .max = std.math.maxInt(u32) };
-
-fn backgroundOf(text: []const u8) ?settings.Background {
-    if (std.mem.eql(u8, text, "transparent")) return .transparent;
-    if (std.mem.eql(u8, text, "env")) return .env;
-    if (std.mem.eql(u8, text, "studio")) return .studio;
-    if (std.mem.cutPrefix(u8, text, "#")) |digits|
-        return .{ .srgb = colors.hexadecimal(digits) orelse return null };
-    if (colors.named(text)) |codes| return .{ .srgb = codes };
-    var color: [3]f32 = undefined;
-    var parts = std.mem.splitScalar(u8, text, ',');
-    for (&color) |*component| {
-        component.* = radiance(parts.next() orelse return null) orelse return null;
-    }
-    return if (parts.next() == null) .{ .linear = color } else null;
-}
-
-fn environmentOf(text: []const u8) ?settings.Environment.Source {
-    if (text.len == 0) return null;
-    if (std.mem.eql(u8, text, "none")) return .none;
-    return if (std.mem.eql(u8, text, "studio")) .studio else .{ .file = text };
-}
-
-fn rotationOf(text: []const u8) ?f32 {
-    const value = numberOf(text) orelse return null;
-    return if (@abs(value) <= 3600) value else null;
-}
-
-fn exposureOf(text: []const u8) ?settings.Exposure {
-    if (std.mem.eql(u8, text, "auto")) return .auto;
-    const ev = numberOf(text) orelse return null;
-    return if (@abs(ev) <= settings.exposure_ev_max) .{ .ev = ev } else null;
 }
 
 const test_names: []const []const u8 = &.{ "vector-beam-8", "scalar-single-4" };
@@ -2156,7 +1579,7 @@ test "noise is told of path tracing alone, as the picture is exposed" {
     try std.testing.expect(options.partial and options.progress_image == null);
     try expectUsage("'--integrator path'", &.{ "--noise=0.01", "s" });
     for ([_][:0]const u8{ "0", "-1", "2", "nan", "" }) |text| {
-        try std.testing.expectEqual(null, numberWithin(text, settings.noise_error));
+        try std.testing.expectEqual(null, values.numberWithin(text, settings.noise_error));
     }
 }
 
@@ -2186,7 +1609,7 @@ test "points and lines are as wide as they may be" {
     const wide = try optionsForTest(&.{"--point-size=4.25"});
     try std.testing.expectEqual(4.25, wide.view.point_size);
     for ([_][:0]const u8{ "0", "-1", "101", "nan", "" }) |text| {
-        try std.testing.expectEqual(null, numberWithin(text, settings.point_size));
+        try std.testing.expectEqual(null, values.numberWithin(text, settings.point_size));
     }
 }
 

@@ -3,6 +3,7 @@
 const std = @import("std");
 const arguments_file = @import("arguments.zig");
 const cli = @import("../cli.zig");
+const values = @import("values.zig");
 const settings = @import("../settings.zig");
 const variant = @import("../variant.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
@@ -167,7 +168,7 @@ pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error
 
 fn set(reader: *const Reader, bench: *Bench, given: Reader.Given) cli.Error!void {
     switch (given.id) {
-        .resolution => bench.resolution = cli.resolutionOf(given.value) orelse
+        .resolution => bench.resolution = values.resolutionOf(given.value) orelse
             return reader.bad(given, cli.expected_resolution),
         .threads => bench.thread_count = try reader.number(given, settings.thread_count),
         .spp => bench.sample_count = try reader.number(given, settings.sample_count),

@@ -4,6 +4,7 @@
 const std = @import("std");
 const arguments_file = @import("arguments.zig");
 const cli = @import("../cli.zig");
+const values = @import("values.zig");
 const settings = @import("../settings.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Metric = settings.Metric;
@@ -107,7 +108,7 @@ fn set(reader: *const Reader, compare: *Compare, given: Reader.Given) cli.Error!
                 return reader.bad(given, expected);
             const metric = std.meta.stringToEnum(Metric, given.value[0..equals]) orelse
                 return reader.bad(given, expected);
-            compare.thresholds.set(metric, cli.numberOf(given.value[equals + 1 ..]) orelse
+            compare.thresholds.set(metric, values.numberOf(given.value[equals + 1 ..]) orelse
                 return reader.bad(given, expected));
         },
         .output => {
@@ -118,7 +119,7 @@ fn set(reader: *const Reader, compare: *Compare, given: Reader.Given) cli.Error!
             compare.output = name;
         },
         .exposure => {
-            const ev = cli.numberOf(given.value) orelse settings.exposure_ev_max + 1;
+            const ev = values.numberOf(given.value) orelse settings.exposure_ev_max + 1;
             if (@abs(ev) > settings.exposure_ev_max) return reader.bad(given, comptimePrint(
                 "-{d} to {d}",
                 .{ settings.exposure_ev_max, settings.exposure_ev_max },

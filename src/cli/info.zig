@@ -3,6 +3,7 @@
 const std = @import("std");
 const arguments_file = @import("arguments.zig");
 const cli = @import("../cli.zig");
+const values = @import("values.zig");
 const settings = @import("../settings.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Section = arguments_file.Section;
@@ -87,9 +88,9 @@ pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error
 fn set(reader: *const Reader, info: *Info, given: Reader.Given) cli.Error!void {
     switch (given.id) {
         .json => info.json = true,
-        .scene => info.load.scene = cli.choiceOf(given.value) orelse
+        .scene => info.load.scene = values.choiceOf(given.value) orelse
             return reader.bad(given, "a scene's name or its index"),
-        .material_variant => info.load.material_variant = cli.choiceOf(given.value) orelse
+        .material_variant => info.load.material_variant = values.choiceOf(given.value) orelse
             return reader.bad(given, "a material variant's name or its index"),
         .up_axis => info.load.up_axis = try reader.choice(given, settings.UpAxis),
         .format_in => info.load.format = try reader.choice(given, settings.SceneFormat),

@@ -3,6 +3,7 @@
 const std = @import("std");
 const arguments_file = @import("arguments.zig");
 const cli = @import("../cli.zig");
+const values = @import("values.zig");
 const settings = @import("../settings.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const Section = arguments_file.Section;
@@ -92,10 +93,10 @@ pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error
         },
         .flag => |flag| switch (flag.id) {
             .output => output = try reader.text(flag, "a file name or -"),
-            .format => format = cli.formatOf(flag.value) orelse
+            .format => format = values.formatOf(flag.value) orelse
                 return reader.bad(flag, comptime arguments_file.namesOf(settings.Format)),
             .threads => merge.thread_count = try reader.number(flag, settings.thread_count),
-            .max_memory => merge.memory_max = cli.bytesOf(flag.value) orelse
+            .max_memory => merge.memory_max = values.bytesOf(flag.value) orelse
                 return reader.bad(flag, "a size such as 512M or 2G"),
             .help => unreachable, // Asked for before the rest is read.
         },
