@@ -70,23 +70,23 @@ def _run_on_cluster(
 ) -> None:
     # Here, for Dask takes a second to import, which errors above need not wait for.
     try:
-        from . import bundle, cluster, crew, farm
+        from . import bundle, cluster, worker_pool, farm
     except ImportError as error:
         raise FarmError(f"needs Dask, by pip install distributed: {error}") from None
     name = secrets.token_hex(6)
     with contextlib.ExitStack() as stack:
         client = stack.enter_context(cluster.connect(line.scheduler, line.workers))
-        station = stack.enter_context(bundle.on_workers(client, folder, name))
-        job = station.Job(
+        task_runner = stack.enter_context(bundle.on_workers(client, folder, name))
+        job = task_runner.Job(
             name=name,
-            identity=station.Identity(identity.version, identity.picture),
-            files=tuple(station.File(file.path, file.digest) for file in found.files),
+            identity=task_runner.Identity(identity.version, identity.picture),
+            files=tuple(task_runner.File(file.path, file.digest) for file in found.files),
             folders=found.folders,
             cache_bytes=line.cache_bytes,
         )
         progress.begin()
-        members = crew.Crew(client, station, job, found.sources, progress.say)
-        leader = farm.Farm(client, station, name, members, job_work, found, progress, is_quiet)
+        members = worker_pool.WorkerPool(client, task_runner, job, found.sources, progress.say)
+        leader = farm.Farm(client, task_runner, name, members, job_work, found, progress, is_quiet)
         stack.callback(leader.stop)
         try:
             leader.run(line.patience_s)

@@ -45,8 +45,8 @@ def write(folder: str) -> Tuple[str, str]:
 
 @contextlib.contextmanager
 def on_workers(client: Client, folder: str, name: str) -> Iterator[ModuleType]:
-    """The package's `station`, on the scheduler, which looks into tasks, and on all workers that
-    are there or come; `name` is the job's."""
+    """The package's `task_runner`, on the scheduler, which looks into tasks, and on all workers
+    that are there or come; `name` is the job's."""
     path, package = write(folder)
     plugin = f"raylane-farm-{name}"
     try:
@@ -57,7 +57,7 @@ def on_workers(client: Client, folder: str, name: str) -> Iterator[ModuleType]:
     sys.path.insert(0, path)
     importlib.invalidate_caches()
     try:
-        yield importlib.import_module(package + ".station")
+        yield importlib.import_module(package + ".task_runner")
     finally:
         sys.path.remove(path)
         # Where the cluster is lost there is nothing to tidy up.

@@ -16,7 +16,7 @@ from typing import Any, Dict, Set, Tuple
 from distributed import Client, Future
 from distributed.scheduler import KilledWorker
 
-from .crew import Crew
+from .worker_pool import WorkerPool
 from .errors import FarmError
 from .progress import Progress
 from .remote.program import Run, reason
@@ -44,18 +44,18 @@ class Farm:
     def __init__(
         self,
         client: Client,
-        station: Any,
+        task_runner: Any,
         job_name: str,
-        crew: Crew,
+        worker_pool: WorkerPool,
         work: Work,
         scene: Scene,
         progress: Progress,
         is_quiet: bool,
     ) -> None:
         self._client = client
-        self._station = station
+        self._task_runner = task_runner
         self._job_name = job_name
-        self._crew = crew
+        self._worker_pool = worker_pool
         self._work = work
         self._scene = scene
         self._progress = progress
@@ -74,7 +74,7 @@ class Farm:
     def run(self, patience_s: float) -> None:
         """Does all of the work, or gives up when no worker is there for so long."""
         idle_since = time.monotonic()
-        self._crew.update(wait=True)
+        self._worker_pool.update(wait=True)
         next_look = time.monotonic() + TICK_S
         while not self._work.is_done():
             self._submit()
@@ -86,17 +86,17 @@ class Farm:
             if now < next_look:
                 continue
             next_look = now + TICK_S
-            self._crew.update()
-            members = self._crew.members()
+            self._worker_pool.update()
+            members = self._worker_pool.members()
             if members:
                 idle_since = now
                 self._progress.step(0, len(members))
             elif now - idle_since > patience_s:
-                raise FarmError("; ".join(self._crew.refusals()) or "no worker is there")
+                raise FarmError("; ".join(self._worker_pool.refusals()) or "no worker is there")
             self._rescue({member.address for member in members})
 
     def _submit(self) -> None:
-        members = self._crew.members()
+        members = self._worker_pool.members()
         slots = sum(member.slots for member in members)
         while len(self._pending) < AHEAD * slots:
             task = self._work.next(slots)
@@ -106,7 +106,7 @@ class Farm:
             key = f"raylane-{self._job_name}-{self._number}"
             addresses = [member.address for member in members]
             future = self._client.submit(
-                self._station.render,
+                self._task_runner.render,
                 self._job_name,
                 task.arguments,
                 key=key,
@@ -149,7 +149,7 @@ class Farm:
         self._work.take(task, result)
         self.run_count += 1
         self.workers.add(result.worker)
-        self._progress.step(len(task.units), len(self._crew.members()))
+        self._progress.step(len(task.units), len(self._worker_pool.members()))
 
     def _fail(self, task: Task, why: str, code: int) -> None:
         count = self._failures[task.units] = self._failures.get(task.units, 0) + 1
@@ -192,4 +192,4 @@ class Farm:
         with contextlib.suppress(Exception):
             if futures:
                 self._client.cancel(futures, force=True)
-            self._client.run(self._station.leave, self._job_name, on_error="ignore")
+            self._client.run(self._task_runner.leave, self._job_name, on_error="ignore")

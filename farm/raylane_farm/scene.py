@@ -18,7 +18,7 @@ from .errors import FAILED, FarmError
 from .options import Options
 from .remote import program
 from .remote.cache import digest_of
-from .remote.station import ROOT, File
+from .remote.task_runner import ROOT, File
 
 BUILTIN = "builtin:"
 

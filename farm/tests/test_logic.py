@@ -16,7 +16,7 @@ from unittest import mock
 from raylane_farm import command_line, options, output, plan, ranges, scene, template, work
 from raylane_farm.errors import FarmError
 from raylane_farm.progress import Progress, duration
-from raylane_farm.remote import cache, program, station
+from raylane_farm.remote import cache, program, task_runner
 
 try:
     from openjd.model import IntRangeExpr
@@ -290,16 +290,17 @@ class CacheTest(FolderTest):
         large = self.blob(held, b"x" * 100)
         self.assertEqual([large], os.listdir(self.folder))
 
-    def test_a_station_takes_pieces_in_order(self):
+    def test_a_task_runner_takes_pieces_in_order(self):
         contents = b"abcdefgh"
         path = self.put("source", contents)
         digest = cache.digest_of(path)
         with mock.patch.dict(os.environ, RAYLANE_FARM_CACHE=os.path.join(self.folder, "cache")):
-            with mock.patch.object(station, "identity", lambda: program.Identity("v", "p")):
-                job = station.Job("j", program.Identity("v", "p"), (
-                    station.File("scene/x/a.bin", digest), station.File("scene/b.bin", digest),
+            with mock.patch.object(task_runner, "identity", lambda: program.Identity("v", "p")):
+                job = task_runner.Job("j", program.Identity("v", "p"), (
+                    task_runner.File("scene/x/a.bin", digest),
+                    task_runner.File("scene/b.bin", digest),
                 ), ("scene/d",), 1 << 20)
-                one = station.Station(job, "w", os.path.join(self.folder, "scratch"))
+                one = task_runner.TaskRunner(job, "w", os.path.join(self.folder, "scratch"))
                 self.assertEqual((digest,), one.greet().missing)
                 self.assertFalse(one.receive(digest, 4, False, contents[4:]))
                 self.assertTrue(one.receive(digest, 0, False, contents[:4]))
@@ -312,8 +313,8 @@ class CacheTest(FolderTest):
                     self.assertEqual(contents, read(os.path.join(one.copies, name)))
                 self.assertTrue(os.path.isdir(os.path.join(one.copies, "scene/d")))
                 one.close()
-                other = station.Job("k", program.Identity("w", "p"), (), (), 1)
-                refusal = station.Station(other, "w", self.folder).greet().refusal
+                other = task_runner.Job("k", program.Identity("w", "p"), (), (), 1)
+                refusal = task_runner.TaskRunner(other, "w", self.folder).greet().refusal
                 self.assertEqual("has v, not w", refusal)
 
 
@@ -330,7 +331,7 @@ class WorkTest(FolderTest):
         })
 
     def result(self, files, seconds=0.5):
-        return station.Result("w", 0, seconds, tuple(files), "")
+        return task_runner.Result("w", 0, seconds, tuple(files), "")
 
     def test_frames_in_batches_and_what_is_left_of_them(self):
         self.put("s_03.png")

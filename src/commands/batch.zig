@@ -209,7 +209,7 @@ pub const Batch = struct {
         batch.display.start();
         defer batch.display.stop();
         defer signals.outcome.clear();
-        batch.foretell();
+        batch.setOutcome();
         signals.stop.is_awaited.store(options.partial, .release);
         defer signals.stop.is_awaited.store(false, .release);
         var threads: [settings.job_count.max]std.Thread = undefined;
@@ -273,11 +273,11 @@ pub const Batch = struct {
         batch.mutex.lockUncancelable(batch.io);
         defer batch.mutex.unlock(batch.io);
         @field(batch, @tagName(what) ++ "_count") += number;
-        batch.foretell();
+        batch.setOutcome();
     }
 
     /// What a signal says that ends the program.
-    fn foretell(batch: *const Batch) void {
+    fn setOutcome(batch: *const Batch) void {
         if (batch.options.quiet) return;
         const count = batch.written_count;
         const format = "{d} picture{s} written, those under way are not";

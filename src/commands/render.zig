@@ -150,7 +150,7 @@ const Job = struct {
         // Before the work, so that a place that cannot be written is an error in the first second.
         var target = try job.openTarget();
         defer target.abandon();
-        job.foretell(&target);
+        job.setOutcome(&target);
         defer signals.outcome.clear();
         var progress_image = try job.openProgressImage();
         defer if (progress_image) |*image| image.close();
@@ -175,7 +175,7 @@ const Job = struct {
     }
 
     /// What a signal says that ends the program.
-    fn foretell(job: *const Job, target: *const Target) void {
+    fn setOutcome(job: *const Job, target: *const Target) void {
         if (job.options.quiet) return;
         const title = printable(job.outputTitle());
         if (target.replaces != null)

@@ -73,7 +73,7 @@ class Result:
     stderr: str
 
 
-class Station:
+class TaskRunner:
     """What one worker process holds of one job."""
 
     def __init__(self, job: Job, worker: str, scratch: str) -> None:
@@ -183,20 +183,20 @@ def cpu_count() -> int:
     return CPU_COUNT
 
 
-_stations: Dict[str, Station] = {}
-_stations_lock = threading.Lock()
+_task_runners: Dict[str, TaskRunner] = {}
+_task_runners_lock = threading.Lock()
 
 
 def _greet(job: Job, worker: str, scratch: str) -> Greeting:
-    with _stations_lock:
-        station = _stations.get(job.name)
-        if station is None:
-            station = _stations[job.name] = Station(job, worker, scratch)
-    return station.greet()
+    with _task_runners_lock:
+        task_runner = _task_runners.get(job.name)
+        if task_runner is None:
+            task_runner = _task_runners[job.name] = TaskRunner(job, worker, scratch)
+    return task_runner.greet()
 
 
 async def greet(job: Job, dask_worker=None) -> Greeting:
-    """Makes this worker's station, unless it has one, and says how it stands."""
+    """Makes this worker's task_runner, unless it has one, and says how it stands."""
     scratch = os.path.join(dask_worker.local_directory, "raylane-farm")
     return await asyncio.get_running_loop().run_in_executor(
         None, _greet, job, str(dask_worker.name), scratch
@@ -205,21 +205,21 @@ async def greet(job: Job, dask_worker=None) -> Greeting:
 
 def use_threads(name: str, count: int) -> None:
     """Sets the threads of each program that this worker runs."""
-    _stations[name].thread_count = count
+    _task_runners[name].thread_count = count
 
 
 def receive(name: str, digest: str, offset: int, is_last: bool, piece: bytes) -> bool:
-    """Task: adds a piece to a blob of this worker's cache; see `Station.receive`."""
-    return _stations[name].receive(digest, offset, is_last, piece)
+    """Task: adds a piece to a blob of this worker's cache; see `TaskRunner.receive`."""
+    return _task_runners[name].receive(digest, offset, is_last, piece)
 
 
 def render(name: str, arguments: Sequence[str]) -> Result:
-    """Task: runs the program; see `Station.render`."""
-    return _stations[name].render(arguments)
+    """Task: runs the program; see `TaskRunner.render`."""
+    return _task_runners[name].render(arguments)
 
 
 def leave(name: str) -> None:
     """Ends this worker's part in a job, whatever of it runs."""
-    station = _stations.pop(name, None)
-    if station is not None:
-        station.close()
+    task_runner = _task_runners.pop(name, None)
+    if task_runner is not None:
+        task_runner.close()

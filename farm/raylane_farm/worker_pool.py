@@ -1,9 +1,9 @@
 """Who takes part in a job: workers that have the same program, and all files of the scene.
 
-Workers come and go. A new one is asked how it stands (`station.greet`, by `Client.run`), is refused
-by name where its program is another, and gets the files that its cache lacks: pieces are scattered
-once and taken, piece by piece, by a task on each worker that needs them. Workers with the same
-cache get a file once.
+Workers come and go. A new one is asked how it stands (`task_runner.greet`, by `Client.run`), is
+refused by name where its program is another, and gets the files that its cache lacks: pieces are
+scattered once and taken, piece by piece, by a task on each worker that needs them. Workers with
+the same cache get a file once.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ class Member:
     slots: int
 
 
-class Crew:
+class WorkerPool:
     """The workers of a job."""
 
     def __init__(
         self,
         client: Client,
-        station: Any,
+        task_runner: Any,
         job: Any,
         sources: Dict[str, str],
         say: Callable[[str], None],
     ) -> None:
         self._client = client
-        self._station = station
+        self._task_runner = task_runner
         self._job = job
         self._sources = sources
         self._say = say
@@ -122,7 +122,7 @@ class Crew:
 
     def _ask(self, addresses: List[str]) -> Dict[str, Any]:
         answers = self._client.run(
-            self._station.greet, self._job, workers=addresses, on_error="return"
+            self._task_runner.greet, self._job, workers=addresses, on_error="return"
         )
         good = {}
         for address, answer in answers.items():
@@ -171,7 +171,7 @@ class Crew:
         held = self._client.scatter({key: piece}, workers=receivers[:1], timeout=ASK_TIMEOUT_S)
         tasks = {
             address: self._client.submit(
-                self._station.receive,
+                self._task_runner.receive,
                 self._job.name,
                 digest,
                 offset,
@@ -207,7 +207,7 @@ class Crew:
             shares.setdefault(share, []).append(member.address)
         for share, addresses in shares.items():
             self._client.run(
-                self._station.use_threads,
+                self._task_runner.use_threads,
                 self._job.name,
                 share,
                 workers=addresses,
