@@ -174,7 +174,8 @@ fn moduleOf(package: Package, root: []const u8) *Module {
         .link_libc = true,
         .strip = if (package.is_stripped) true else null,
         .unwind_tables = if (package.is_stripped) .none else null,
-        // A failed test tells where its error came from, in safe mode too.
+        // A failed test tells where its error came from, in safe mode too. Modules of one program
+        // must agree: where the root has no trace, std takes an error for unreachable.
         .error_tracing = if (package.optimize == .safe) true else null,
         .omit_frame_pointer = if (package.optimize == .fast) true else null,
     });
@@ -356,16 +357,10 @@ pub fn benchmark(package: Package, name: []const u8, root: []const u8) *Compile 
 
 /// A program of its own that imports `raylane`: the renderer, or a tool beside it.
 pub fn addProgram(package: Package, name: []const u8, root: []const u8) *Compile {
-    const b = package.owner;
-    return b.addExecutable(.{ .name = name, .root_module = b.createModule(.{
-        .root_source_file = b.path(root),
-        .target = package.target,
-        .optimize = package.optimize,
-        .strip = package.is_stripped or package.optimize == .fast,
-        .unwind_tables = if (package.is_stripped) .none else null,
-        .omit_frame_pointer = if (package.optimize == .fast) true else null,
-        .imports = &.{.{ .name = "raylane", .module = package.raylane }},
-    }) });
+    const module = package.moduleOf(root);
+    module.strip = package.is_stripped or package.optimize == .fast;
+    module.addImport("raylane", package.raylane);
+    return package.owner.addExecutable(.{ .name = name, .root_module = module });
 }
 
 /// As many lanes as the registers hold; the C intrinsics and 2x2 packets have 4 only.

@@ -21,9 +21,6 @@ const assert = std.debug.assert;
 /// The line on the terminal.
 pub const Line = line_file.Line;
 
-/// Files that are shown at a time; others are under way unseen.
-pub const slot_count_max = 64;
-
 const draw_ms = 100;
 const tell_ms = 200;
 const quiet_ms = 500;
@@ -43,7 +40,7 @@ pub const Display = struct {
     ended: Io.Event = .unset,
     /// Guards all below, but for the counters.
     mutex: Io.Mutex = .init,
-    slots: [slot_count_max]Slot = @splat(.{}),
+    slots: []Slot,
     /// Of the slot that is told of next.
     turn: usize = 0,
     /// Nobody reads what is told.
@@ -51,8 +48,8 @@ pub const Display = struct {
 
     const Form = enum { none, line, json };
 
-    /// A file that is under way.
-    const Slot = struct {
+    /// Room for a file that is under way.
+    pub const Slot = struct {
         display: *Display = undefined,
         /// Null: nobody has the slot.
         place: ?Place = null,
@@ -114,8 +111,10 @@ pub const Display = struct {
         }
     };
 
-    /// `line` is where others learn whether there is one on the terminal. Says nothing yet.
-    pub fn init(io: Io, chosen: settings.Progress, line: *Line) Display {
+    /// `line` is where others learn whether there is one on the terminal. `slots` is room for the
+    /// files that are shown at a time; others are under way unseen. Says nothing yet.
+    pub fn init(io: Io, chosen: settings.Progress, line: *Line, slots: []Slot) Display {
+        @memset(slots, .{});
         return .{
             .io = io,
             .form = switch (chosen.form) {
@@ -126,6 +125,7 @@ pub const Display = struct {
             .file = fileOf(chosen.file),
             .line = line,
             .begin = Io.Clock.awake.now(io),
+            .slots = slots,
         };
     }
 
@@ -161,7 +161,7 @@ pub const Display = struct {
         if (display.form == .none) return null;
         display.mutex.lockUncancelable(display.io);
         defer display.mutex.unlock(display.io);
-        const slot = for (&display.slots) |*slot| {
+        const slot = for (display.slots) |*slot| {
             if (slot.place == null) break slot;
         } else return null;
         slot.* = .{
@@ -217,8 +217,8 @@ pub const Display = struct {
         defer display.mutex.unlock(display.io);
         if (display.form == .line) return display.draw();
         // One at a time, so that many files are not told of more often than one.
-        for (0..slot_count_max) |step| {
-            const index = (display.turn + step) % slot_count_max;
+        for (0..display.slots.len) |step| {
+            const index = (display.turn + step) % display.slots.len;
             const slot = &display.slots[index];
             if (slot.place == null) continue;
             const work = slot.work orelse continue;
@@ -233,7 +233,7 @@ pub const Display = struct {
         if (now_s * std.time.ms_per_s < quiet_ms) return;
         var first: ?*Slot = null;
         var count: usize = 0;
-        for (&display.slots) |*slot| {
+        for (display.slots) |*slot| {
             const place = slot.place orelse continue;
             count += 1;
             if (first == null or place.index < first.?.place.?.index) first = slot;
@@ -309,8 +309,9 @@ fn tellForTest(buffer: []u8) ![]const u8 {
     {
         defer _ = std.c.close(ends[1]);
         var line: Line = .{};
+        var slots: [1]Display.Slot = undefined;
         var display: Display =
-            .init(testing.io, .{ .form = .json, .file = @intCast(ends[1]) }, &line);
+            .init(testing.io, .{ .form = .json, .file = @intCast(ends[1]) }, &line, &slots);
         display.start();
         defer display.stop();
         for ([_]Outcome{ .done, .failed }, 1..) |outcome, index| {
@@ -346,16 +347,17 @@ test "every stage that begins is told in a line, and how a file ends" {
 
 test "nobody is told of files without a display for them, or beyond its slots" {
     var line: Line = .{};
-    var none: Display = .init(testing.io, .{ .form = .none }, &line);
+    var slots: [3]Display.Slot = undefined;
+    var none: Display = .init(testing.io, .{ .form = .none }, &line, &slots);
     none.start();
     defer none.stop();
     try testing.expectEqual(null, none.beginFile(.{ .index = 1, .count = 1, .name = "a" }));
     none.endFile(null, .done);
 
-    var display: Display = .init(testing.io, .{ .form = .json, .file = null }, &line);
+    var display: Display = .init(testing.io, .{ .form = .json, .file = null }, &line, &slots);
     display.has_failed = true;
     var first: ?*Progress = null;
-    for (0..slot_count_max) |index| {
+    for (0..slots.len) |index| {
         const progress = display.beginFile(.{ .index = index, .count = 99, .name = "a" });
         try testing.expect(progress != null);
         if (index == 0) first = progress;

@@ -13,6 +13,7 @@ const signals = @import("../signals.zig");
 const Account = raylane.memory_account.Account;
 const Allocator = std.mem.Allocator;
 const Diagnostic = raylane.diagnostic.Diagnostic;
+const Display = raylane.display.Display;
 const ExitCode = @import("exit_code.zig").ExitCode;
 const Io = std.Io;
 const Options = raylane.cli.Options;
@@ -61,7 +62,9 @@ pub const Batch = struct {
     thread_count: usize,
     plan: Plan = .{ .files = &.{}, .frames = &.{}, .views = &.{}, .template = null },
     start: Io.Timestamp = .{ .nanoseconds = 0 },
-    display: raylane.display.Display = undefined,
+    display: Display = undefined,
+    /// What the display shows: the files under way.
+    slots: []Display.Slot = &.{},
     /// Indices of the files, as they are begun.
     order: []const u32 = &.{},
     next: std.atomic.Value(usize) = .init(0),
@@ -114,6 +117,7 @@ pub const Batch = struct {
         }, &diagnostic.message);
         try batch.checkStdout(diagnostic);
         batch.job_count = batch.jobCount();
+        batch.slots = try arena.alloc(Display.Slot, batch.job_count);
         const order = try arena.alloc(u32, files.items.len);
         for (order, 0..) |*index, place| index.* = @intCast(place);
         if (batch.job_count > 1) std.mem.sort(u32, order, files.items, isLarger);
@@ -205,7 +209,7 @@ pub const Batch = struct {
     /// Takes the files one after the other, by several threads.
     fn runAll(batch: *Batch) void {
         const options = batch.options;
-        batch.display = .init(batch.io, options.progress, &signals.progress_line);
+        batch.display = .init(batch.io, options.progress, &signals.progress_line, batch.slots);
         batch.display.start();
         defer batch.display.stop();
         defer signals.outcome.clear();

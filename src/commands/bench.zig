@@ -40,7 +40,8 @@ pub fn run(init: std.process.Init, options: *const cli.Bench, diagnostic: *Diagn
     defer target.abandon();
     settings.output = target.replaces;
     const shown: raylane.settings.Progress = .{ .form = if (options.quiet) .none else .auto };
-    var display: Display = .init(io, shown, &signals.progress_line);
+    var slot: [1]Display.Slot = undefined;
+    var display: Display = .init(io, shown, &signals.progress_line, &slot);
     display.start();
     var run_of: raylane.bench.Bench = .{
         .arena = init.arena.allocator(),

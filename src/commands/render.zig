@@ -103,7 +103,8 @@ fn renderAndReport(
         ),
     };
     defer job.session.deinit();
-    var display: Display = .init(io, options.progress, &signals.progress_line);
+    var slot: [1]Display.Slot = undefined;
+    var display: Display = .init(io, options.progress, &signals.progress_line, &slot);
     display.start();
     const progress = display.beginFile(.{ .index = 1, .count = 1, .name = options.scene });
     job.session.pool.progress = progress;
