@@ -13,6 +13,7 @@ test {
     _ = @import("strokes.zig");
     _ = @import("decode.zig");
     _ = @import("environment.zig");
+    _ = @import("exhaustion.zig");
     _ = @import("forgiven.zig");
     _ = @import("formats.zig");
     _ = @import("glass.zig");
