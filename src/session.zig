@@ -535,10 +535,30 @@ pub const Session = struct {
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
+        session.warnOfCuts();
         if (choices.denoise and !choices.is_merged) try session.denoiseFilm();
         try session.cutFilm();
         try session.fillHits(&frame);
         if (shade == .cost) try session.paintCost();
+    }
+
+    /// Says what was left out of the picture lest it take too long.
+    fn warnOfCuts(session: *Session) void {
+        const cuts = &session.traced.cuts;
+        const diagnostic = session.diagnostic;
+        if (cuts.passing > 0) diagnostic.warn(
+            "{d} rays met more than {d} blended or open surfaces in a row; " ++
+                "in place of what is behind these they see the background",
+            .{ cuts.passing, trace.transparency_depth_max },
+        );
+        if (cuts.shadow > 0) diagnostic.warn(
+            "some light goes through more than {d} surfaces on its way and was left out",
+            .{trace.attenuation_count_max},
+        );
+        if (cuts.nested > 0) diagnostic.warn(
+            "some rays are in more than {d} volumes at a time; others were taken for not there",
+            .{trace.nested_max},
+        );
     }
 
     /// Leaves of the film what was asked for.

@@ -87,6 +87,8 @@ pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4
 pub const occlusion_shadow_count = 16;
 /// And where a floor catches their shadows, unless the user says.
 pub const floor_shadow_count = 16;
+/// Punctual lights that a point is lit by one after the other; of more, so many stand for all.
+pub const punctual_light_count_max = 1024;
 /// See `Lights`.
 pub const virtual_light_count: Range = .{ .min = 0, .max = 1024, .default = 96 };
 /// See `Lights`.

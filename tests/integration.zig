@@ -16,6 +16,7 @@ test {
     _ = @import("exhaustion.zig");
     _ = @import("forgiven.zig");
     _ = @import("formats.zig");
+    _ = @import("garbage.zig");
     _ = @import("glass.zig");
     _ = @import("gltf_animations.zig");
     _ = @import("gltf_materials.zig");
