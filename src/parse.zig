@@ -100,6 +100,12 @@ fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Err
     };
     errdefer scene.deinit();
     try diagnostic.failIfRefused();
+    const triangle_count = scene.triangleCount();
+    const triangle_count_max = resources.triangleCountMax();
+    if (triangle_count > triangle_count_max) return diagnostic.invalid(
+        "it places {d} triangles, more than {d} (see --max-triangles)",
+        .{ triangle_count, triangle_count_max },
+    );
     scene.file.byte_count = resources.bytes_read;
     scene.file.files = try filesOf(scene.arena.allocator(), &listing);
     return scene;

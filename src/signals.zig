@@ -59,6 +59,17 @@ pub const Outcome = struct {
     }
 };
 
+/// Ends the program with one line, as a signal does. Any thread may call it.
+pub fn endWith(text: []const u8, code: u8) noreturn {
+    temporary_files.discardAll();
+    progress_line.close(std.posix.STDERR_FILENO);
+    var line: [raylane.diagnostic.message_bytes_max + 1]u8 = undefined;
+    @memcpy(line[0..text.len], text);
+    line[text.len] = '\n';
+    _ = std.c.write(std.posix.STDERR_FILENO, &line, text.len + 1);
+    std.c._exit(code);
+}
+
 /// What a signal does.
 pub fn verbOf(signal: SIG) []const u8 {
     return switch (signal) {
