@@ -1371,6 +1371,18 @@ test "numbers keep to their ranges" {
             .good = &.{ "1", "64K", "512M", "512m", "2G", "16777215T" },
             .bad = &.{ "", "0", "M", "0M", "-1G", "1.5G", "1P", "2GB", "16777216T" },
         },
+        .{
+            .flag = "--max-time",
+            .good = &.{ "0.01", "2", "1e6" },
+            .bad = &.{ "", "0", "-1", "nan", "2s", "1e7" },
+        },
+        .{
+            .flag = "--max-triangles",
+            .good = &.{ "1", "5M", "2g", "18446744073G" },
+            .bad = &.{ "", "0", "K", "0K", "-1", "1.5M", "1T", "18446744074G" },
+        },
+        .{ .flag = "--max-pixels", .good = &.{ "1", "4K" }, .bad = &.{ "0", "64x64" } },
+        .{ .flag = "--max-texture-pixels", .good = &.{ "1", "1G" }, .bad = &.{ "0", "all" } },
         .{ .flag = "--variant", .good = test_names, .bad = &.{ "vector", "", "vector-beam-16" } },
         .{ .flag = "--camera", .good = &.{ "auto", "0", "4294967296", "b c" }, .bad = &.{""} },
         .{

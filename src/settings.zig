@@ -613,6 +613,14 @@ test FrameRate {
     try std.testing.expectEqual(-0.5, (FrameRate{}).timeOf(-12));
 }
 
+test "files may have as many triangles as bytes, and small ones many" {
+    const load: Load = .{};
+    try std.testing.expectEqual(triangle_count_max, load.triangleCountMax(100));
+    try std.testing.expectEqual(1 << 30, load.triangleCountMax(1 << 30));
+    const asked: Load = .{ .triangle_count_max = 7 };
+    try std.testing.expectEqual(7, asked.triangleCountMax(1 << 30));
+}
+
 test Range {
     try std.testing.expect(depth.holds(0) and depth.holds(32) and !depth.holds(33));
     try std.testing.expectEqualStrings("1 to 256", comptime thread_count.text());

@@ -1150,6 +1150,30 @@ test "alpha of factor, texture and vertices together" {
     }
 }
 
+test "images of more pixels than are allowed are refused by their headers" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const file = try TestImage.png(files.allocator(), 2, 3, 1, &@as([6]u8, @splat(9)));
+    var from = try testScene(testing.allocator, &.{ file, file }, &.{
+        .{ .base_color_texture = .{ .texture = 0 } },
+        .{ .base_color_texture = .{ .texture = 1 } },
+    });
+    defer from.deinit();
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    var diagnostic: Diagnostic = .{};
+    var settings: Settings = .{ .pool = &pool, .side_max = 1, .pixel_count_max = 11 };
+    const refused = load(testing.allocator, &from, settings, &diagnostic);
+    try testing.expectError(error.SceneTooLarge, refused);
+    try testing.expectEqualStrings(
+        "its images have 12 pixels, more than 11 (see --max-texture-pixels)",
+        diagnostic.message.text(),
+    );
+    settings.pixel_count_max = 12;
+    var set = try load(testing.allocator, &from, settings, &diagnostic);
+    set.deinit();
+}
+
 test "threads change nothing, batches neither" {
     var files: std.heap.ArenaAllocator = .init(testing.allocator);
     defer files.deinit();
