@@ -114,7 +114,9 @@ fn renderAndReport(
     display.start();
     const progress = display.beginFile(.{ .index = 1, .count = 1, .name = options.scene });
     job.session.pool.progress = progress;
-    const outcome = limit.settle(job.runWithin(&limit, account), diagnostic);
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    defer arena.deinit();
+    const outcome = limit.settle(job.runWithin(&limit, account, arena.allocator()), diagnostic);
     display.endFile(progress, if (outcome) |_| .done else |_| .failed);
     display.stop();
     job.sayWarnings();
@@ -151,7 +153,18 @@ const Job = struct {
 
     const Error = stages.Error;
 
-    fn runWithin(job: *Job, limit: *TimeLimit, account: *Account) Error!Report {
+    fn runWithin(
+        job: *Job,
+        limit: *TimeLimit,
+        account: *Account,
+        arena: Allocator,
+    ) Error!Report {
+        if (job.options.stats == .json) try limit.prepareAnswer(arena, .{
+            .version = cli.version,
+            .scene = job.options.scene,
+            .output = job.outputTitle(),
+            .problem = undefined,
+        }, job.options.toStdout());
         try limit.start(account, &job.session.pool, job.diagnostic);
         return job.run();
     }

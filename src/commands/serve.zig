@@ -86,6 +86,13 @@ const Server = struct {
             .seconds = options.time_max_s,
             .title = options.scene,
         };
+        limit.prepareAnswer(arena, .{
+            .id = job.id,
+            .version = cli.version,
+            .scene = options.scene,
+            .output = output,
+            .problem = undefined,
+        }, false) catch return console.outOfMemory(server.io);
         const outcome = server.picture(&options, output, &limit, &diagnostic);
         if (limit.settle(outcome, &diagnostic)) |measured| {
             var report = measured;

@@ -24,6 +24,8 @@ pub const TimeLimit = struct {
     seconds: ?f32,
     /// What messages call the scene.
     title: []const u8,
+    /// For programs, where this one is ended.
+    answer: signals.Answer = .{},
     account: *Account = undefined,
     pool: *Pool = undefined,
     thread: ?std.Thread = null,
@@ -35,6 +37,28 @@ pub const TimeLimit = struct {
 
     const stack_bytes = 1 << 20;
     const title_bytes_max = 200;
+
+    /// Makes the answer, in memory from `arena`; the problem is filled in.
+    pub fn prepareAnswer(
+        limit: *TimeLimit,
+        arena: std.mem.Allocator,
+        failure: raylane.report.Failure,
+        to_stderr: bool,
+    ) error{OutOfMemory}!void {
+        if (limit.seconds == null) return;
+        var message: Message = .{};
+        limit.explain(&message);
+        var told = failure;
+        told.problem = .{
+            .message = message.text(),
+            .file = limit.title,
+            .exit_code = @backingInt(ExitCode.timed_out),
+        };
+        var text: Io.Writer.Allocating = .init(arena);
+        raylane.report.writeFailure(&told, &text.writer) catch return error.OutOfMemory;
+        limit.answer.text = text.written();
+        if (to_stderr) limit.answer.file = std.posix.STDERR_FILENO;
+    }
 
     /// Begins to watch the work by a pool in the memory of an account.
     pub fn start(
@@ -96,7 +120,7 @@ pub const TimeLimit = struct {
         const title = limit.title[0..@min(limit.title.len, title_bytes_max)];
         line.set("raylane: {f}: ", .{printable(title)});
         limit.explain(&line);
-        signals.endWith(line.text(), @backingInt(ExitCode.timed_out));
+        signals.endWith(limit.answer, line.text(), @backingInt(ExitCode.timed_out));
     }
 
     /// Whether the work comes to its end within the time.
