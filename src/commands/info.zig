@@ -13,7 +13,7 @@ const cli = raylane.cli;
 
 /// Says what is in a scene file, or why it cannot be read.
 pub fn run(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagnostic) ExitCode {
-    var account: Account = .init(gpa, null);
+    var account: Account = .initFor(gpa, io, null);
     var text: Io.Writer.Allocating = .init(account.allocator());
     defer text.deinit();
     const outcome = describe(&account, io, options, diagnostic, &text.writer);
