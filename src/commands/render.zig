@@ -3,6 +3,7 @@
 
 const std = @import("std");
 const batch = @import("batch.zig");
+const confine = @import("confine.zig");
 const console = @import("console.zig");
 const facts = @import("facts.zig");
 const raylane = @import("raylane");
@@ -30,6 +31,8 @@ pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnos
     if (options.toStdout() and console.isTerminal(io)) return .usage;
     if (options.isBatch() or isFolder(io, options.scene))
         return batch.run(gpa, io, options, diagnostic);
+    if (confine.aroundPictures(gpa, io, options[0..1], diagnostic)) |code|
+        return failed(gpa, io, options, null, "", code, diagnostic);
     var account: Account = .init(gpa, options.memory_max);
     return renderAndReport(&account, io, options, diagnostic);
 }
