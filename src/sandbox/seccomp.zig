@@ -130,42 +130,52 @@ const missing = [_][]const u8{
 const Condition = struct {
     calls: []const []const u8,
     argument: u8,
-    test_of: enum {
-        /// Denied is one of the values.
-        none_of,
-        /// Denied is everything but the value.
-        only,
-        /// Denied is what has none of the bits.
-        with_bits,
-        /// Denied is what has one of them.
-        without_bits,
-    },
-    values: []const u32,
+    denied_if: enum { equal, other, with_bits, without_bits },
+    value: Value,
+
+    const Value = union(enum) { number: u32, process_id };
 };
 
-fn conditions(process: u32) [5]Condition {
-    const clone_thread = linux.CLONE.THREAD;
-    const protection_exec = 4;
-    return .{
-        .{ .calls = &.{"clone"}, .argument = 0, .test_of = .with_bits, .values = &.{clone_thread} },
-        // No machine code but the program's.
-        .{
-            .calls = &.{ "mmap", "mmap2", "mprotect", "pkey_mprotect" },
-            .argument = 2,
-            .test_of = .without_bits,
-            .values = &.{protection_exec},
-        },
-        // Typing for whoever sits at the terminal (TIOCSTI, TIOCLINUX).
-        .{
-            .calls = &.{"ioctl"},
-            .argument = 1,
-            .test_of = .none_of,
-            .values = &.{ 0x5412, 0x541c },
-        },
-        .{ .calls = &.{"tgkill"}, .argument = 0, .test_of = .only, .values = &.{process} },
-        .{ .calls = &.{"prlimit64"}, .argument = 0, .test_of = .only, .values = &.{0} },
-    };
-}
+const protection_exec = 4;
+const tiocsti = 0x5412;
+const tioclinux = 0x541c;
+
+const conditions = [_]Condition{
+    .{
+        .calls = &.{"clone"},
+        .argument = 0,
+        .denied_if = .without_bits,
+        .value = .{ .number = linux.CLONE.THREAD },
+    },
+    // No machine code but the program's.
+    .{
+        .calls = &.{ "mmap", "mmap2", "mprotect", "pkey_mprotect" },
+        .argument = 2,
+        .denied_if = .with_bits,
+        .value = .{ .number = protection_exec },
+    },
+    // Typing in the name of whoever sits at the terminal.
+    .{
+        .calls = &.{"ioctl"},
+        .argument = 1,
+        .denied_if = .equal,
+        .value = .{ .number = tiocsti },
+    },
+    .{
+        .calls = &.{"ioctl"},
+        .argument = 1,
+        .denied_if = .equal,
+        .value = .{ .number = tioclinux },
+    },
+    // Threads of others, and limits of others.
+    .{ .calls = &.{"tgkill"}, .argument = 0, .denied_if = .other, .value = .process_id },
+    .{
+        .calls = &.{"prlimit64"},
+        .argument = 0,
+        .denied_if = .other,
+        .value = .{ .number = 0 },
+    },
+};
 
 /// The number of a call; null: the architecture has none of this name.
 fn numberOf(comptime name: []const u8) ?u32 {
@@ -268,32 +278,37 @@ const Builder = struct {
                 builder.answer(deny(list[1]));
             }
         }
-        const all = conditions(process);
-        const names = comptime conditions(0);
-        inline for (names, 0..) |condition, index| {
+        inline for (conditions) |condition| {
+            const value = switch (condition.value) {
+                .number => |number| number,
+                .process_id => process,
+            };
+            const index = condition.argument;
             for (comptime numbersOf(condition.calls)) |number|
-                builder.addCondition(number, &all[index]);
+                builder.addCondition(number, index, condition.denied_if, value);
         }
         builder.answer(allow);
     }
 
-    fn addCondition(builder: *Builder, number: u32, condition: *const Condition) void {
-        const start = builder.count;
-        builder.when(.jump_equal, number);
+    /// What is not denied goes on with the number.
+    fn addCondition(
+        builder: *Builder,
+        number: u32,
+        argument: u32,
+        denied_if: @FieldType(Condition, "denied_if"),
+        value: u32,
+    ) void {
         comptime std.debug.assert(builtin.cpu.arch.endian() == .little);
-        const arguments = @offsetOf(linux.SECCOMP.data, "arg0");
-        builder.load(arguments + @sizeOf(u64) * @as(u32, condition.argument));
-        for (condition.values) |value| {
-            switch (condition.test_of) {
-                .none_of => builder.when(.jump_equal, value),
-                .only => builder.unless(.jump_equal, value),
-                .with_bits => builder.unless(.jump_bits, value),
-                .without_bits => builder.when(.jump_bits, value),
-            }
-            builder.answer(deny(.PERM));
+        builder.add(.{ .code = .jump_equal, .skipped_if_false = 4, .operand = number });
+        builder.load(@offsetOf(linux.SECCOMP.data, "arg0") + @sizeOf(u64) * argument);
+        switch (denied_if) {
+            .equal => builder.when(.jump_equal, value),
+            .other => builder.unless(.jump_equal, value),
+            .with_bits => builder.when(.jump_bits, value),
+            .without_bits => builder.unless(.jump_bits, value),
         }
-        builder.answer(allow);
-        builder.instructions[start].skipped_if_false = @intCast(builder.count - start - 1);
+        builder.answer(deny(.PERM));
+        builder.load(@offsetOf(linux.SECCOMP.data, "nr"));
     }
 
     /// What the kernel would answer, by the program.
