@@ -45,7 +45,7 @@ pub const Command = union(enum) {
     list_variants,
     render: Options,
     scenario: ScenarioCall,
-    serve: []const [:0]const u8,
+    serve: ServeCall,
     serve_help,
     bench: Bench,
     bench_help,
@@ -117,6 +117,14 @@ pub const ScenarioCall = struct {
     arguments: []const [:0]const u8,
 };
 
+/// What `raylane serve` is to do.
+pub const ServeCall = struct {
+    /// Arguments of jobs that say nothing else.
+    defaults: []const [:0]const u8,
+    sandbox: settings.Sandbox,
+    verbose: bool,
+};
+
 /// Words that stand before all others, but for `render`, which may stand among flags.
 const Word = enum { bench, compare, info, merge, serve, completion, man, help };
 
@@ -144,6 +152,7 @@ pub const Options = struct {
     tree_quality: settings.TreeQuality = .default,
     instances: settings.Instances = .auto,
     load: settings.Load = .{},
+    sandbox: settings.Sandbox = .auto,
     animation: settings.Animation = .{},
     view: settings.View = .{},
     render: settings.Render = .{},
@@ -400,7 +409,7 @@ fn checkedDefaults(
     arguments: []const [:0]const u8,
     variant_names: []const []const u8,
     diagnostic: *Diagnostic,
-) Error![]const [:0]const u8 {
+) Error!ServeCall {
     var parser: Parser = .init(arguments, variant_names, diagnostic);
     parser.reader.help = "raylane serve --help";
     try parser.read();
@@ -409,7 +418,11 @@ fn checkedDefaults(
     });
     if (parser.other != null or parser.scenario != null)
         return parser.reader.fail("one of the options is no default of pictures", .{});
-    return arguments;
+    return .{
+        .defaults = arguments,
+        .sandbox = parser.options.sandbox,
+        .verbose = parser.options.verbose,
+    };
 }
 
 /// `help`, `help WORD`.
@@ -556,6 +569,7 @@ const Parser = struct {
             .scene, .material_variant, .up_axis, .format_in => try parser.setLoad(given),
             .tessellation, .max_texture_size => try parser.setLoad(given),
             .allow_outside, .strict, .force => try parser.setLoad(given),
+            .sandbox => options.sandbox = try reader.choice(given, settings.Sandbox),
             .animation, .animation_time => try parser.setAnimation(given),
             .background => options.view.background = values.backgroundOf(given.value) orelse
                 return parser.noBackground(given),
@@ -1278,7 +1292,7 @@ test "scenarios are kept for whoever reads them, and what comes after counts" {
     try std.testing.expectEqual(1, other.batch.input_count);
     inputs = other.inputs(&diagnostic);
     try std.testing.expectEqualStrings("c", inputs.next().?);
-    try std.testing.expectEqual(2, (try parseForTest(&.{ "serve", "-q", "-t2" })).serve.len);
+    try std.testing.expectEqual(2, (try parseForTest(&.{ "serve", "-q", "-t2" })).serve.defaults.len);
     const bad = parse(&.{ "serve", "--spp=0" }, test_names, &diagnostic);
     try std.testing.expectError(error.UsageInvalid, bad);
     const named = parse(&.{ "serve", "a.glb" }, test_names, &diagnostic);

@@ -30,6 +30,10 @@ pub const Range = struct {
     }
 };
 
+/// Whether the process keeps itself from what it does not need: where the system can, or it is an
+/// error where the system cannot, or not at all.
+pub const Sandbox = enum { auto, on, off };
+
 /// Longest line of a job, in bytes.
 pub const job_bytes_max = 1 << 20;
 /// Pixels on the side of one that a size is given in.

@@ -25,6 +25,7 @@ const Ending = struct {
 
 test {
     _ = @import("json.zig");
+    _ = @import("sandbox.zig");
 }
 
 /// A fresh folder in which the program runs; everything is freed by `deinit`.

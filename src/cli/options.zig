@@ -257,6 +257,13 @@ pub const sections: []const arguments_file.Section = &.{
             .help = "let the scene name files outside of its own folder",
         },
         .{
+            .usage = "--sandbox WHEN",
+            .words = wordsOf(settings.Sandbox),
+            .help = "keep the program from files elsewhere, the network and\n" ++
+                "other programs: auto (default), where Linux can; on,\n" ++
+                "or it is an error; off",
+        },
+        .{
             .usage = "--strict",
             .help = "refuse files that break the rules of their format in\n" ++
                 "ways that are otherwise forgiven with a warning",

@@ -6,6 +6,7 @@
 //! which there was none beside others is tried once more by itself.
 
 const std = @import("std");
+const confine = @import("confine.zig");
 const console = @import("console.zig");
 const pictures_file = @import("pictures.zig");
 const raylane = @import("raylane");
@@ -49,6 +50,7 @@ pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnos
             return .usage;
         },
     };
+    if (confine.aroundPictures(gpa, io, options[0..1], diagnostic)) |code| return code;
     batch.runAll();
     return batch.finish();
 }

@@ -3,6 +3,7 @@
 
 const std = @import("std");
 const batch = @import("batch.zig");
+const confine = @import("confine.zig");
 const console = @import("console.zig");
 const facts = @import("facts.zig");
 const raylane = @import("raylane");
@@ -32,6 +33,8 @@ pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnos
     if (options.isBatch() or isFolder(io, options.scene))
         return batch.run(gpa, io, options, diagnostic);
     var account: Account = .initFor(gpa, io, options.memory_max);
+    if (confine.aroundPictures(gpa, io, options[0..1], diagnostic)) |code|
+        return failed(gpa, io, options, null, "", code, diagnostic);
     return renderAndReport(&account, io, options, diagnostic);
 }
 

@@ -10,6 +10,7 @@ const raylane = @import("raylane");
 const signals = @import("../signals.zig");
 const stages = @import("stages.zig");
 const Allocator = std.mem.Allocator;
+const Confinement = @import("confine.zig").Confinement;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const ExitCode = @import("exit_code.zig").ExitCode;
 const Io = std.Io;
@@ -23,12 +24,17 @@ const cli = raylane.cli;
 
 const line_bytes_max = raylane.settings.job_bytes_max;
 
-/// Answers all jobs, then ends with 0. `defaults` are arguments for those that say nothing else.
-pub fn run(gpa: Allocator, io: Io, defaults: []const [:0]const u8) ExitCode {
+/// Answers all jobs, then ends with 0.
+pub fn run(gpa: Allocator, io: Io, call: *const cli.ServeCall) ExitCode {
+    var confinement: Confinement = .init(io, call.sandbox);
+    confinement.is_verbose = call.verbose;
+    confinement.addAll();
+    var unused: Diagnostic = .{};
+    if (confinement.enter(&unused)) |code| return code;
     const buffer = gpa.alloc(u8, line_bytes_max + 1) catch return console.outOfMemory(io);
     defer gpa.free(buffer);
     var input = Io.File.stdin().readerStreaming(io, buffer);
-    var server: Server = .{ .gpa = gpa, .io = io, .defaults = defaults };
+    var server: Server = .{ .gpa = gpa, .io = io, .call = call };
     defer server.forget();
     while (true) {
         const line = input.interface.takeDelimiter('\n') catch |err| switch (err) {
@@ -57,7 +63,7 @@ fn unreadable(io: Io) ExitCode {
 const Server = struct {
     gpa: Allocator,
     io: Io,
-    defaults: []const [:0]const u8,
+    call: *const cli.ServeCall,
     /// Of the job before.
     kept: ?*Kept = null,
 
@@ -73,10 +79,10 @@ const Server = struct {
             if (err == error.OutOfMemory) diagnostic.message.set("out of memory", .{});
             return server.refuse(arena, cli.idOf(arena, line), null, &diagnostic);
         };
-        const parts = .{ server.defaults, job.arguments };
+        const parts = .{ server.call.defaults, job.arguments };
         const options = cli.parseParts(parts, raylane.variant.names, &diagnostic) catch
             return server.refuse(arena, job.id, null, &diagnostic);
-        check(&options, &diagnostic) catch
+        server.check(&options, &diagnostic) catch
             return server.refuse(arena, job.id, &options, &diagnostic);
         const output = cli.outputName(arena, &options) catch return console.outOfMemory(server.io);
         var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
@@ -146,7 +152,11 @@ const Server = struct {
     }
 
     /// Refuses what has no place among jobs.
-    fn check(options: *const Options, diagnostic: *Diagnostic) error{UsageInvalid}!void {
+    fn check(
+        server: *const Server,
+        options: *const Options,
+        diagnostic: *Diagnostic,
+    ) error{UsageInvalid}!void {
         const fail = Diagnostic.fail;
         if (options.toStdout())
             return fail(diagnostic, error.UsageInvalid, "standard output has the answers", .{});
@@ -158,6 +168,8 @@ const Server = struct {
             return fail(diagnostic, error.UsageInvalid, "a job tells no progress", .{});
         if (options.isBatch() or options.write.format == .y4m)
             return fail(diagnostic, error.UsageInvalid, "a job is one picture of a name", .{});
+        if (options.sandbox != server.call.sandbox)
+            return fail(diagnostic, error.UsageInvalid, "a job has no sandbox of its own", .{});
         return @import("render.zig").checkVariant(&options.render, diagnostic);
     }
 
