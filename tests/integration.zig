@@ -15,6 +15,7 @@ test {
     _ = @import("environment.zig");
     _ = @import("forgiven.zig");
     _ = @import("formats.zig");
+    _ = @import("fuzz.zig");
     _ = @import("glass.zig");
     _ = @import("gltf_animations.zig");
     _ = @import("gltf_materials.zig");
