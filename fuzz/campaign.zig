@@ -146,8 +146,10 @@ pub const Campaign = struct {
         };
         campaign.coverage.clear();
         watch.begin(own);
+        defer watch.end();
+        // While the input is there.
+        errdefer watch.save("wrong");
         const outcome = try campaign.target.execute(&run, own);
-        watch.end();
         campaign.execution_count += 1;
         campaign.outcomes.getPtr(outcome).* += 1;
         const left = account.used.load(.monotonic);

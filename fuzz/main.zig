@@ -64,7 +64,6 @@ pub fn main(init: std.process.Init) !u8 {
     if (choices.files.len > 0) return runFiles(arena, &campaign, choices.files);
     fuzz(arena, &campaign, &choices) catch |err| switch (err) {
         error.Contradiction, error.Leaked => {
-            watch.save("wrong");
             tell(&campaign, &choices);
             return 1;
         },

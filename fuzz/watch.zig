@@ -36,9 +36,10 @@ pub fn begin(input: []const u8) void {
     setTimer(current.time_s_max);
 }
 
-/// After it.
+/// After it, while it is still there.
 pub fn end() void {
     setTimer(0);
+    current.input = "";
 }
 
 fn setTimer(seconds: u32) void {
@@ -66,8 +67,9 @@ fn keep(signal: posix.SIG) callconv(.c) void {
     if (signal == .PROF) std.c._exit(1);
 }
 
-/// Writes the input that runs, by nothing but system calls.
+/// Writes the input that runs, by nothing but system calls, once there is a folder for it.
 pub fn save(kind: []const u8) void {
+    if (current.folder.len == 0) return;
     var path_buffer: [512]u8 = undefined;
     var name_buffer: [name_bytes_max]u8 = undefined;
     const name = nameOf(&name_buffer, kind, current.input);

@@ -93,24 +93,35 @@ fn elementsOf(arena: Allocator, input: []const u8) Allocator.Error![]const Eleme
             '"' => at = stringEnd(input, at),
             '[', '{' => {
                 if (depth == depth_max) break;
-                open[depth] = .{ .start = at + 1, .value = at + 1, .end = undefined };
+                open[depth] = begun(input, at + 1);
                 depth += 1;
             },
             ':' => if (depth > 0) {
-                open[depth - 1].value = at + 1;
+                open[depth - 1].value = spaceEnd(input, at + 1);
             },
             ',', ']', '}' => |byte| if (depth > 0) {
                 var element = open[depth - 1];
                 element.end = at;
+                element.value = @min(element.value, at);
                 if (element.end > element.start) try elements.append(arena, element);
-                if (byte == ',') {
-                    open[depth - 1] = .{ .start = at + 1, .value = at + 1, .end = undefined };
-                } else depth -= 1;
+                if (byte == ',') open[depth - 1] = begun(input, at + 1) else depth -= 1;
             },
             else => {},
         }
     }
     return elements.items;
+}
+
+/// An element whose end and value are not known yet.
+fn begun(input: []const u8, at: usize) Element {
+    const start = spaceEnd(input, at);
+    return .{ .start = start, .value = start, .end = start };
+}
+
+fn spaceEnd(input: []const u8, start: usize) usize {
+    var at = start;
+    while (at < input.len and std.ascii.isWhitespace(input[at])) at += 1;
+    return at;
 }
 
 /// Where the quote is that ends a string, or the text.
