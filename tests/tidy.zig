@@ -108,6 +108,7 @@ const roots = [_][]const u8{
     "bench/poses.zig",
     "bench/rays.zig",
     "bench/structures.zig",
+    "fuzz/main.zig",
     "src/kernel.zig",
     "src/level.zig",
     "src/main.zig",
