@@ -9,5 +9,6 @@ pub const raylane = @import("src/raylane.zig");
 
 test {
     _ = raylane;
+    _ = @import("src/sandbox.zig"); // The program's own.
     _ = @import("tests/integration.zig");
 }

@@ -53,7 +53,7 @@ THUMBNAILER = """\
 [Thumbnailer Entry]
 TryExec=raylane
 Exec=raylane render --quiet --max-memory 2G --max-texture-size 1024 --background transparent \
---format png --resolution %s --output %o -- %i
+--sandbox auto --format png --resolution %s --output %o -- %i
 MimeType=model/gltf-binary;model/gltf+json;model/obj;model/stl;model/x.stl-ascii;\
 model/x.stl-binary;model/x-ply;
 """

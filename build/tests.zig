@@ -112,6 +112,7 @@ pub fn addReport(tests: Tests, step: *std.Build.Step, target: Target) void {
 pub fn addCheck(tests: Tests, step: *std.Build.Step, target: Target) void {
     step.dependOn(&tests.ofLibrary(target.package, null).step);
     step.dependOn(&tests.hostProgram("cli").step);
+    step.dependOn(&target.package.renderer("fuzz", "fuzz/main.zig").step);
 }
 
 fn format(tests: Tests) LazyPath {
@@ -219,7 +220,7 @@ const Part = enum {
 /// The program of one part; null: of all, for all are compiled in little more time than one.
 fn ofLibrary(tests: Tests, package: Package, part: ?Part) *Compile {
     const root = package.tests();
-    libraries.stb_image_of_tests.addTo(root, package.headers);
+    libraries.stb_image_of_tests.addTo(root, package.headers, .{});
     package.addKernels(root);
     var own = tests;
     if (part) |one| {

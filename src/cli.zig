@@ -45,7 +45,7 @@ pub const Command = union(enum) {
     list_variants,
     render: Options,
     scenario: ScenarioCall,
-    serve: []const [:0]const u8,
+    serve: ServeCall,
     serve_help,
     bench: Bench,
     bench_help,
@@ -117,6 +117,14 @@ pub const ScenarioCall = struct {
     arguments: []const [:0]const u8,
 };
 
+/// What `raylane serve` is to do.
+pub const ServeCall = struct {
+    /// Arguments of jobs that say nothing else.
+    defaults: []const [:0]const u8,
+    sandbox: settings.Sandbox,
+    verbose: bool,
+};
+
 /// Words that stand before all others, but for `render`, which may stand among flags.
 const Word = enum { bench, compare, info, merge, serve, completion, man, help };
 
@@ -135,13 +143,16 @@ pub const Options = struct {
     /// What the command line was, for `inputs`.
     arguments: []const [:0]const u8 = &.{},
     batch: Batch = .{},
-    /// Bytes of memory that may be allocated at a time; null: as much as there is.
+    /// Bytes of memory that may be allocated at a time; null: by what is left.
     memory_max: ?u64 = null,
+    /// Seconds that a scene may take, within `settings.time_max_s`.
+    time_max_s: ?f32 = null,
     /// Null: as many as the system has CPUs.
     thread_count: ?u32 = null,
     tree_quality: settings.TreeQuality = .default,
     instances: settings.Instances = .auto,
     load: settings.Load = .{},
+    sandbox: settings.Sandbox = .auto,
     animation: settings.Animation = .{},
     view: settings.View = .{},
     render: settings.Render = .{},
@@ -287,8 +298,8 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\      with all the light that bounces, as radiance
     \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
-    \\supported, 4 images differ (bench, compare), 128 + N ended by signal N (with
-    \\--partial, the picture may be there).
+    \\supported, 4 images differ (bench, compare), 124 over --max-time, 128 + N ended
+    \\by signal N (with --partial, the picture may be there).
     \\
 ;
 
@@ -398,7 +409,7 @@ fn checkedDefaults(
     arguments: []const [:0]const u8,
     variant_names: []const []const u8,
     diagnostic: *Diagnostic,
-) Error![]const [:0]const u8 {
+) Error!ServeCall {
     var parser: Parser = .init(arguments, variant_names, diagnostic);
     parser.reader.help = "raylane serve --help";
     try parser.read();
@@ -407,7 +418,11 @@ fn checkedDefaults(
     });
     if (parser.other != null or parser.scenario != null)
         return parser.reader.fail("one of the options is no default of pictures", .{});
-    return arguments;
+    return .{
+        .defaults = arguments,
+        .sandbox = parser.options.sandbox,
+        .verbose = parser.options.verbose,
+    };
 }
 
 /// `help`, `help WORD`.
@@ -537,8 +552,8 @@ const Parser = struct {
             .shade => options.view.shade = try reader.choice(given, settings.Shade),
             .layers, .jpeg_quality, .webp_quality, .exr => try parser.setWriting(given),
             .exposure, .tonemap => try parser.setWriting(given),
-            .max_memory => options.memory_max = values.bytesOf(given.value) orelse
-                return reader.bad(given, "a size such as 512M or 2G"),
+            .max_memory, .max_time, .max_triangles => try parser.setLimit(given),
+            .max_pixels, .max_texture_pixels => try parser.setLimit(given),
             .crop, .tile => try parser.setPart(given),
             .resolution, .width, .height, .pixel_ratio => try parser.setSize(given),
             .threads => options.thread_count = try reader.number(given, settings.thread_count),
@@ -554,6 +569,7 @@ const Parser = struct {
             .scene, .material_variant, .up_axis, .format_in => try parser.setLoad(given),
             .tessellation, .max_texture_size => try parser.setLoad(given),
             .allow_outside, .strict, .force => try parser.setLoad(given),
+            .sandbox => options.sandbox = try reader.choice(given, settings.Sandbox),
             .animation, .animation_time => try parser.setAnimation(given),
             .background => options.view.background = values.backgroundOf(given.value) orelse
                 return parser.noBackground(given),
@@ -583,6 +599,30 @@ const Parser = struct {
             .version => parser.other = parser.other orelse .version,
             .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
+        }
+    }
+
+    fn setLimit(parser: *Parser, given: Reader.Given) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .max_memory => options.memory_max = values.bytesOf(given.value) orelse
+                return reader.bad(given, "a size such as 512M or 2G"),
+            .max_time => options.time_max_s =
+                values.numberWithin(given.value, settings.time_max_s) orelse
+                return reader.bad(given, comptimePrint("{d} to {d} seconds", .{
+                    settings.time_max_s.min, settings.time_max_s.max,
+                })),
+            else => {
+                const count = values.countOf(given.value) orelse
+                    return reader.bad(given, "a number above 0 such as 500000 or 5M");
+                switch (given.id) {
+                    .max_triangles => options.load.triangle_count_max = count,
+                    .max_pixels => options.view.pixel_count_max = count,
+                    .max_texture_pixels => options.load.texture_pixel_count_max = count,
+                    else => unreachable, // `set` hands over the above.
+                }
+            },
         }
     }
 
@@ -1252,7 +1292,7 @@ test "scenarios are kept for whoever reads them, and what comes after counts" {
     try std.testing.expectEqual(1, other.batch.input_count);
     inputs = other.inputs(&diagnostic);
     try std.testing.expectEqualStrings("c", inputs.next().?);
-    try std.testing.expectEqual(2, (try parseForTest(&.{ "serve", "-q", "-t2" })).serve.len);
+    try std.testing.expectEqual(2, (try parseForTest(&.{ "serve", "-q", "-t2" })).serve.defaults.len);
     const bad = parse(&.{ "serve", "--spp=0" }, test_names, &diagnostic);
     try std.testing.expectError(error.UsageInvalid, bad);
     const named = parse(&.{ "serve", "a.glb" }, test_names, &diagnostic);
@@ -1345,6 +1385,18 @@ test "numbers keep to their ranges" {
             .good = &.{ "1", "64K", "512M", "512m", "2G", "16777215T" },
             .bad = &.{ "", "0", "M", "0M", "-1G", "1.5G", "1P", "2GB", "16777216T" },
         },
+        .{
+            .flag = "--max-time",
+            .good = &.{ "0.01", "2", "1e6" },
+            .bad = &.{ "", "0", "-1", "nan", "2s", "1e7" },
+        },
+        .{
+            .flag = "--max-triangles",
+            .good = &.{ "1", "5M", "2g", "18446744073G" },
+            .bad = &.{ "", "0", "K", "0K", "-1", "1.5M", "1T", "18446744074G" },
+        },
+        .{ .flag = "--max-pixels", .good = &.{ "1", "4K" }, .bad = &.{ "0", "64x64" } },
+        .{ .flag = "--max-texture-pixels", .good = &.{ "1", "1G" }, .bad = &.{ "0", "all" } },
         .{ .flag = "--variant", .good = test_names, .bad = &.{ "vector", "", "vector-beam-16" } },
         .{ .flag = "--camera", .good = &.{ "auto", "0", "4294967296", "b c" }, .bad = &.{""} },
         .{

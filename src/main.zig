@@ -50,7 +50,7 @@ fn runCommand(init: std.process.Init) ExitCode {
             return .usage;
         },
         .scenario => |*call| return commands.scenario.run(init, call, &diagnostic),
-        .serve => |defaults| return commands.serve.run(init.gpa, io, defaults),
+        .serve => |*call| return commands.serve.run(init.gpa, io, call),
         .serve_help => return console.print(io, cli.serve_help),
         .bench_help => return console.print(io, cli.bench_help),
         .compare_help => return console.print(io, cli.compare_help),

@@ -22,6 +22,8 @@ const exposure_file = @import("output/exposure.zig");
 const assert = std.debug.assert;
 
 pub const Target = target_file.Target;
+/// Which open descriptor a path stands for.
+pub const descriptorOf = target_file.descriptorOf;
 /// What a target fails with.
 pub const TargetError = target_file.Error;
 /// What is behind a picture.

@@ -25,6 +25,7 @@ const Ending = struct {
 
 test {
     _ = @import("json.zig");
+    _ = @import("sandbox.zig");
 }
 
 /// A fresh folder in which the program runs; everything is freed by `deinit`.
@@ -1141,6 +1142,74 @@ test "--max-memory is kept to in every stage, or is an error in one line" {
     try testing.expect(std.mem.find(u8, before.stderr, ", 16 MiB more asked for)") != null);
     const after = try sandbox.run(&(arguments ++ .{"--max-memory=18900K"}));
     try testing.expect(std.mem.find(u8, after.stderr, ", 3 MiB more asked for)") != null);
+}
+
+test "what a file asks for is refused before the work, in a line that names the option" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const film = "Film \"image\" \"integer xresolution\" 16384 \"integer yresolution\" ";
+    const world = " WorldBegin Shape \"sphere\" Shape \"sphere\" WorldEnd";
+    try sandbox.write("pixels.pbrt", film ++ "16384" ++ world);
+    const samples = "Sampler \"halton\" \"integer pixelsamples\" 4096 ";
+    try sandbox.write("samples.pbrt", samples ++ film ++ "4096" ++ world);
+    try sandbox.write("levels.pbrt", "WorldBegin Shape \"loopsubdiv\" \"integer levels\" 8 " ++
+        "\"point P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] WorldEnd");
+    for ([_]struct { []const []const u8, []const u8 }{
+        .{ &.{"pixels.pbrt"}, "raylane: pixels.pbrt: a picture of 16384x16384 is asked for, of " ++
+            "more than 67108864 pixels (see --max-pixels and -r)\n" },
+        .{ &.{"samples.pbrt"}, "raylane: samples.pbrt: it wants 4096 samples of each of " ++
+            "16384x4096 pixels, over 8589934592 in all (see --spp and -r)\n" },
+        .{
+            &.{ "pixels.pbrt", "-r16x8", "--max-pixels=100" },
+            "raylane: pixels.pbrt: a picture of 16x8 is asked for, of more than 100 pixels (see " ++
+                "--max-pixels and -r)\n",
+        },
+        .{
+            &.{ "samples.pbrt", "-r16", "--spp=1", "--max-pixels=60" },
+            "raylane: samples.pbrt: a picture of 16x4 is asked for, of more than 60 pixels (see " ++
+                "--max-pixels and -r)\n",
+        },
+        .{
+            &.{ "pixels.pbrt", "--max-triangles=3K" },
+            "raylane: pixels.pbrt:1:96: shapes so far have over 3000 triangles (see " ++
+                "--max-triangles)\n",
+        },
+        .{
+            &.{ "levels.pbrt", "--max-triangles=65535" },
+            "raylane: levels.pbrt:1:12: loopsubdiv: it becomes 65536 triangles, over 65535 with " ++
+                "those before it (see --max-triangles)\n",
+        },
+    }) |case| {
+        const arguments = try std.mem.concat(
+            sandbox.arena_state.allocator(),
+            []const u8,
+            &.{ case[0], &.{ "-o", "a.ppm" } },
+        );
+        const ending = try sandbox.expectExit(3, arguments);
+        try testing.expectEqualStrings(case[1], ending.stderr);
+        try sandbox.expectFiles(&.{ "levels.pbrt", "pixels.pbrt", "samples.pbrt" });
+    }
+    _ = try sandbox.expectExit(0, &.{
+        "samples.pbrt",    "-r8x4", "--spp=1", "--max-triangles=4K",
+        "--max-pixels=32", "-o",    "a.ppm",
+    });
+}
+
+test "--max-time ends what takes longer, whole or not at all" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("a.ppm", "before");
+    const arguments = [_][]const u8{
+        "builtin:cornell", "-r4096x4096", "--spp=4096", "-t1", "-q", "-oa.ppm", "--max-time",
+    };
+    const ending = try sandbox.expectExit(124, &(arguments ++ .{"0.2"}));
+    try testing.expectEqualStrings(
+        "raylane: builtin:cornell: takes longer than the 0.2 s of --max-time\n",
+        ending.stderr,
+    );
+    try testing.expectEqualStrings("before", try sandbox.read("a.ppm"));
+    try sandbox.expectFiles(&.{"a.ppm"});
+    _ = try sandbox.expectExit(2, &(arguments ++ .{"0"}));
 }
 
 test "exhausted memory is an error in one line" {

@@ -16,6 +16,8 @@ test {
     _ = @import("exhaustion.zig");
     _ = @import("forgiven.zig");
     _ = @import("formats.zig");
+    _ = @import("garbage.zig");
+    _ = @import("fuzz.zig");
     _ = @import("glass.zig");
     _ = @import("gltf_animations.zig");
     _ = @import("gltf_materials.zig");

@@ -18,7 +18,8 @@ const Row = struct { part: []const u8, may_import: []const []const u8 };
 /// build other than the language's own.
 const directions = [_]Row{
     .{ .part = "main", .may_import = &.{ "module:raylane", "signals", "commands" } },
-    .{ .part = "commands", .may_import = &.{ "module:raylane", "signals" } },
+    .{ .part = "commands", .may_import = &.{ "module:raylane", "sandbox", "signals" } },
+    .{ .part = "sandbox", .may_import = &.{} },
     .{ .part = "signals", .may_import = &.{"module:raylane"} },
     .{ .part = "cli", .may_import = &.{ "module:config", "batch", "variant" } },
     .{ .part = "batch", .may_import = &.{} },
@@ -107,6 +108,7 @@ const roots = [_][]const u8{
     "bench/poses.zig",
     "bench/rays.zig",
     "bench/structures.zig",
+    "fuzz/main.zig",
     "src/kernel.zig",
     "src/level.zig",
     "src/main.zig",

@@ -23,6 +23,7 @@ pub const Compare = struct {
     stats: ?cli.Stats = null,
     /// Worst values that count as the same.
     thresholds: std.EnumArray(Metric, ?f32) = .initFill(null),
+    sandbox: settings.Sandbox = .auto,
 };
 
 /// What it understands.
@@ -46,6 +47,11 @@ pub const sections: []const Section = &.{
             .usage = "--stats FORM",
             .words = arguments_file.wordsOf(cli.Stats),
             .help = "text (default), json or none",
+        },
+        .{
+            .usage = "--sandbox WHEN",
+            .words = arguments_file.wordsOf(settings.Sandbox),
+            .help = "auto (default), on or off, as for rendering",
         },
         .{ .usage = "-h, --help", .help = "print this" },
     } },
@@ -127,6 +133,7 @@ fn set(reader: *const Reader, compare: *Compare, given: Reader.Given) cli.Error!
             compare.exposure_ev = ev;
         },
         .stats => compare.stats = try reader.choice(given, cli.Stats),
+        .sandbox => compare.sandbox = try reader.choice(given, settings.Sandbox),
         .help => unreachable, // Asked for before the rest is read.
     }
 }

@@ -13,6 +13,7 @@ pub const Info = struct {
     scene: []const u8 = "",
     /// Such a file is described all the same.
     load: settings.Load = .{ .force = true },
+    sandbox: settings.Sandbox = .auto,
     json: bool = false,
     quiet: bool = false,
 };
@@ -39,6 +40,11 @@ pub const sections: []const Section = &.{
         .{
             .usage = "--allow-outside",
             .help = "let the scene name files outside of its own folder",
+        },
+        .{
+            .usage = "--sandbox WHEN",
+            .words = arguments_file.wordsOf(settings.Sandbox),
+            .help = "auto (default), on or off, as for rendering",
         },
         .{ .usage = "-q, --quiet", .help = "no warnings" },
         .{ .usage = "-h, --help", .help = "print this" },
@@ -94,6 +100,7 @@ fn set(reader: *const Reader, info: *Info, given: Reader.Given) cli.Error!void {
             return reader.bad(given, "a material variant's name or its index"),
         .up_axis => info.load.up_axis = try reader.choice(given, settings.UpAxis),
         .format_in => info.load.format = try reader.choice(given, settings.SceneFormat),
+        .sandbox => info.sandbox = try reader.choice(given, settings.Sandbox),
         .allow_outside => info.load.allow_outside = true,
         .quiet => info.quiet = true,
         .help => unreachable, // Asked for before the rest is read.

@@ -19,6 +19,7 @@ pub const Merge = struct {
     thread_count: ?u32 = null,
     /// Bytes of memory that may be allocated at a time; null: as much as there is.
     memory_max: ?u64 = null,
+    sandbox: settings.Sandbox = .auto,
 
     /// Names of the parts, as given; the caller frees the list.
     pub fn parts(
@@ -55,6 +56,11 @@ pub const sections: []const Section = &.{
             .help = settings.thread_count.text() ++ " (default: as many as CPUs)",
         },
         .{ .usage = "--max-memory SIZE", .help = "512M or 2G, say; an error where more is needed" },
+        .{
+            .usage = "--sandbox WHEN",
+            .words = arguments_file.wordsOf(settings.Sandbox),
+            .help = "auto (default), on or off, as for rendering",
+        },
         .{ .usage = "-h, --help", .help = "print this" },
     } },
 };
@@ -98,6 +104,7 @@ pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error
             .threads => merge.thread_count = try reader.number(flag, settings.thread_count),
             .max_memory => merge.memory_max = values.bytesOf(flag.value) orelse
                 return reader.bad(flag, "a size such as 512M or 2G"),
+            .sandbox => merge.sandbox = try reader.choice(flag, settings.Sandbox),
             .help => unreachable, // Asked for before the rest is read.
         },
     };

@@ -257,6 +257,13 @@ pub const sections: []const arguments_file.Section = &.{
             .help = "let the scene name files outside of its own folder",
         },
         .{
+            .usage = "--sandbox WHEN",
+            .words = wordsOf(settings.Sandbox),
+            .help = "keep the program from files elsewhere, the network and\n" ++
+                "other programs: auto (default), where Linux can; on,\n" ++
+                "or it is an error; off",
+        },
+        .{
             .usage = "--strict",
             .help = "refuse files that break the rules of their format in\n" ++
                 "ways that are otherwise forgiven with a warning",
@@ -371,7 +378,36 @@ pub const sections: []const arguments_file.Section = &.{
             .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
         },
-        .{ .usage = "--max-memory SIZE", .help = "512M or 2G, say; an error where more is needed" },
+    } },
+    .{ .title = "Limits (see docs/limits.md)", .options = &.{
+        .{
+            .usage = "--max-memory SIZE",
+            .help = "512M or 2G, say (default: three quarters of what the\n" ++
+                "machine or the process's cgroup has left)",
+        },
+        .{
+            .usage = "--max-time S",
+            .help = "seconds for a scene, from reading to writing (default:\nno limit)",
+            .meant = &.{ "--timeout", "--time-limit" },
+        },
+        .{
+            .usage = "--max-triangles N",
+            .help = comptimePrint("with all instances, 5M, say (default: {d},\n" ++
+                "or as many as bytes are read)", .{settings.triangle_count_max}),
+        },
+        .{
+            .usage = "--max-pixels N",
+            .help = comptimePrint("of a picture (default: {d}, of what the scene\n" ++
+                "asks for {d})", .{
+                settings.pixel_count_max, settings.scene_pixel_count_max,
+            }),
+        },
+        .{
+            .usage = "--max-texture-pixels N",
+            .help = comptimePrint("of all images of a scene (default: {d})", .{
+                settings.texture_pixel_count_max,
+            }),
+        },
     } },
     .{ .title = "Messages", .options = &.{
         .{

@@ -6,6 +6,7 @@ const raylane = @import("raylane");
 const signals = @import("../signals.zig");
 const Account = raylane.memory_account.Account;
 const Allocator = std.mem.Allocator;
+const Confinement = @import("confine.zig").Confinement;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const ExitCode = @import("exit_code.zig").ExitCode;
 const Io = std.Io;
@@ -16,7 +17,11 @@ const printable = raylane.diagnostic.printable;
 /// Compares two images, prints how far they are apart, and says which thresholds they pass.
 pub fn run(gpa: Allocator, io: Io, options: *const cli.Compare, diagnostic: *Diagnostic) ExitCode {
     if (options.output) |name| if (cli.isStdout(name) and console.isTerminal(io)) return .usage;
-    var account: Account = .init(gpa, null);
+    var account: Account = .initFor(gpa, io, null);
+    var confinement: Confinement = .init(io, options.sandbox);
+    for (options.images) |path| confinement.addFile(path);
+    if (options.output) |path| confinement.addOutput(path);
+    if (confinement.enter(diagnostic)) |code| return code;
     const allocator = account.allocator();
     var target: ?Target = openMap(io, options.output, diagnostic) catch {
         const text = diagnostic.message.text();

@@ -5,6 +5,7 @@ const console = @import("console.zig");
 const raylane = @import("raylane");
 const Account = raylane.memory_account.Account;
 const Allocator = std.mem.Allocator;
+const Confinement = @import("confine.zig").Confinement;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const ExitCode = @import("exit_code.zig").ExitCode;
 const Io = std.Io;
@@ -13,7 +14,10 @@ const cli = raylane.cli;
 
 /// Says what is in a scene file, or why it cannot be read.
 pub fn run(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagnostic) ExitCode {
-    var account: Account = .init(gpa, null);
+    var account: Account = .initFor(gpa, io, null);
+    var confinement: Confinement = .init(io, options.sandbox);
+    confinement.addScene(options.scene, options.load.allow_outside);
+    if (confinement.enter(diagnostic)) |code| return code;
     var text: Io.Writer.Allocating = .init(account.allocator());
     defer text.deinit();
     const outcome = describe(&account, io, options, diagnostic, &text.writer);

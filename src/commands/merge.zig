@@ -6,6 +6,7 @@ const raylane = @import("raylane");
 const signals = @import("../signals.zig");
 const Account = raylane.memory_account.Account;
 const Allocator = std.mem.Allocator;
+const Confinement = @import("confine.zig").Confinement;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const ExitCode = @import("exit_code.zig").ExitCode;
 const Io = std.Io;
@@ -14,7 +15,8 @@ const cli = raylane.cli;
 
 /// Merges the parts and writes the picture.
 pub fn run(gpa: Allocator, io: Io, options: *const cli.Merge, diagnostic: *Diagnostic) ExitCode {
-    var account: Account = .init(gpa, options.memory_max);
+    var account: Account = .initFor(gpa, io, options.memory_max);
+    if (confine(gpa, io, options, diagnostic)) |code| return code;
     var job: Job = .{ .gpa = account.allocator(), .io = io, .options = options };
     job.run(diagnostic) catch |err| {
         const title = if (options.toStdout()) "standard output" else options.output;
@@ -22,6 +24,20 @@ pub fn run(gpa: Allocator, io: Io, options: *const cli.Merge, diagnostic: *Diagn
         return console.fail(&account, io, if (place.len > 0) place else title, err, diagnostic);
     };
     return .ok;
+}
+
+fn confine(
+    gpa: Allocator,
+    io: Io,
+    options: *const cli.Merge,
+    diagnostic: *Diagnostic,
+) ?ExitCode {
+    const parts = options.parts(gpa) catch return console.outOfMemory(io);
+    defer gpa.free(parts);
+    var confinement: Confinement = .init(io, options.sandbox);
+    for (parts) |path| confinement.addFile(path);
+    confinement.addOutput(options.output);
+    return confinement.enter(diagnostic);
 }
 
 const Job = struct {

@@ -410,22 +410,10 @@ pub const Pictures = struct {
     fn openFile(pictures: *Pictures) error{OutputFailed}!Target {
         const io = pictures.batch.io;
         const path = pictures.name.written();
-        makeFolders(io, path);
+        if (std.fs.path.dirname(path)) |folder| makeFolders(io, folder);
         const diagnostic = pictures.session.diagnostic;
         return Target.openFile(io, &signals.temporary_files, path, diagnostic) catch
             error.OutputFailed;
-    }
-
-    /// Makes the folders above a file, as far as that goes: where one is missing, opening the file
-    /// says so.
-    fn makeFolders(io: Io, path: []const u8) void {
-        const cwd: Io.Dir = .cwd();
-        const whole = std.fs.path.dirname(path) orelse return;
-        if (cwd.access(io, whole, .{})) return else |_| {}
-        for (path[0 .. whole.len + 1], 0..) |byte, end| {
-            if (byte != '/' or end == 0) continue;
-            cwd.createDir(io, path[0..end], .default_dir) catch {}; // It may be there.
-        }
     }
 
     /// All frames of a film have one size.
@@ -487,3 +475,14 @@ pub const Pictures = struct {
             batch.print(text.written());
     }
 };
+
+/// Makes a folder and those above it, as far as that goes: where one is missing, opening a file in
+/// it says so.
+pub fn makeFolders(io: Io, folder: []const u8) void {
+    const cwd: Io.Dir = .cwd();
+    if (cwd.access(io, folder, .{})) return else |_| {}
+    for (1..folder.len + 1) |end| {
+        if (end < folder.len and folder[end] != '/') continue;
+        cwd.createDir(io, folder[0..end], .default_dir) catch {}; // It may be there.
+    }
+}

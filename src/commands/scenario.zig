@@ -1,6 +1,7 @@
 //! `raylane --scenario`: the pictures that JSON describes, one after another.
 
 const std = @import("std");
+const confine = @import("confine.zig");
 const console = @import("console.zig");
 const raylane = @import("raylane");
 const render = @import("render.zig");
@@ -38,8 +39,10 @@ pub fn run(
         }, false);
         return code;
     };
+    if (confine.aroundPictures(init.gpa, io, pictures, diagnostic)) |code| return code;
     var worst: ExitCode = .ok;
     for (pictures) |*options| {
+        options.sandbox = .off; // It is around all of them.
         var own: Diagnostic = .{};
         const code = render.run(init.gpa, io, options, &own);
         if (@backingInt(code) > @backingInt(worst)) worst = code;
@@ -57,7 +60,7 @@ fn read(
     call: *const cli.ScenarioCall,
     is_json: bool,
     diagnostic: *Diagnostic,
-) Error![]const cli.Options {
+) Error![]cli.Options {
     const source: cli.ScenarioSource = if (is_json)
         .{ .text = call.scenario }
     else

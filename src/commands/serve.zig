@@ -10,6 +10,7 @@ const raylane = @import("raylane");
 const signals = @import("../signals.zig");
 const stages = @import("stages.zig");
 const Allocator = std.mem.Allocator;
+const Confinement = @import("confine.zig").Confinement;
 const Diagnostic = raylane.diagnostic.Diagnostic;
 const ExitCode = @import("exit_code.zig").ExitCode;
 const Io = std.Io;
@@ -18,16 +19,22 @@ const Options = raylane.cli.Options;
 const Report = raylane.report.Report;
 const Session = raylane.session.Session;
 const Target = raylane.output.Target;
+const TimeLimit = @import("time_limit.zig").TimeLimit;
 const cli = raylane.cli;
 
 const line_bytes_max = raylane.settings.job_bytes_max;
 
-/// Answers all jobs, then ends with 0. `defaults` are arguments for those that say nothing else.
-pub fn run(gpa: Allocator, io: Io, defaults: []const [:0]const u8) ExitCode {
+/// Answers all jobs, then ends with 0.
+pub fn run(gpa: Allocator, io: Io, call: *const cli.ServeCall) ExitCode {
+    var confinement: Confinement = .init(io, call.sandbox);
+    confinement.is_verbose = call.verbose;
+    confinement.addAll();
+    var unused: Diagnostic = .{};
+    if (confinement.enter(&unused)) |code| return code;
     const buffer = gpa.alloc(u8, line_bytes_max + 1) catch return console.outOfMemory(io);
     defer gpa.free(buffer);
     var input = Io.File.stdin().readerStreaming(io, buffer);
-    var server: Server = .{ .gpa = gpa, .io = io, .defaults = defaults };
+    var server: Server = .{ .gpa = gpa, .io = io, .call = call };
     defer server.forget();
     while (true) {
         const line = input.interface.takeDelimiter('\n') catch |err| switch (err) {
@@ -56,7 +63,7 @@ fn unreadable(io: Io) ExitCode {
 const Server = struct {
     gpa: Allocator,
     io: Io,
-    defaults: []const [:0]const u8,
+    call: *const cli.ServeCall,
     /// Of the job before.
     kept: ?*Kept = null,
 
@@ -72,15 +79,28 @@ const Server = struct {
             if (err == error.OutOfMemory) diagnostic.message.set("out of memory", .{});
             return server.refuse(arena, cli.idOf(arena, line), null, &diagnostic);
         };
-        const parts = .{ server.defaults, job.arguments };
+        const parts = .{ server.call.defaults, job.arguments };
         const options = cli.parseParts(parts, raylane.variant.names, &diagnostic) catch
             return server.refuse(arena, job.id, null, &diagnostic);
-        check(&options, &diagnostic) catch
+        server.check(&options, &diagnostic) catch
             return server.refuse(arena, job.id, &options, &diagnostic);
         const output = cli.outputName(arena, &options) catch return console.outOfMemory(server.io);
         var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
         var text: Io.Writer.Allocating = .init(arena);
-        if (server.picture(&options, output, &diagnostic)) |measured| {
+        var limit: TimeLimit = .{
+            .io = server.io,
+            .seconds = options.time_max_s,
+            .title = options.scene,
+        };
+        limit.prepareAnswer(arena, .{
+            .id = job.id,
+            .version = cli.version,
+            .scene = options.scene,
+            .output = output,
+            .problem = undefined,
+        }, false) catch return console.outOfMemory(server.io);
+        const outcome = server.picture(&options, output, &limit, &diagnostic);
+        if (limit.settle(outcome, &diagnostic)) |measured| {
             var report = measured;
             report.id = job.id;
             report.warnings = diagnostic.warningTexts(&warnings);
@@ -132,7 +152,11 @@ const Server = struct {
     }
 
     /// Refuses what has no place among jobs.
-    fn check(options: *const Options, diagnostic: *Diagnostic) error{UsageInvalid}!void {
+    fn check(
+        server: *const Server,
+        options: *const Options,
+        diagnostic: *Diagnostic,
+    ) error{UsageInvalid}!void {
         const fail = Diagnostic.fail;
         if (options.toStdout())
             return fail(diagnostic, error.UsageInvalid, "standard output has the answers", .{});
@@ -144,6 +168,8 @@ const Server = struct {
             return fail(diagnostic, error.UsageInvalid, "a job tells no progress", .{});
         if (options.isBatch() or options.write.format == .y4m)
             return fail(diagnostic, error.UsageInvalid, "a job is one picture of a name", .{});
+        if (options.sandbox != server.call.sandbox)
+            return fail(diagnostic, error.UsageInvalid, "a job has no sandbox of its own", .{});
         return @import("render.zig").checkVariant(&options.render, diagnostic);
     }
 
@@ -151,12 +177,13 @@ const Server = struct {
         server: *Server,
         asked: *const Options,
         output: []const u8,
+        limit: *TimeLimit,
         diagnostic: *Diagnostic,
     ) Error!Report {
         var target = Target.openFile(server.io, &signals.temporary_files, output, diagnostic) catch
             return error.OutputFailed;
         defer target.abandon();
-        const kept = try server.keep(asked, target.replaces, diagnostic);
+        const kept = try server.keep(asked, target.replaces, limit, diagnostic);
         const session = &kept.session;
         var options = asked.*;
         try kept.recall(server.io, &options.view.environment.source);
@@ -175,17 +202,20 @@ const Server = struct {
         server: *Server,
         options: *const Options,
         replaced: ?raylane.identity.Identity,
+        limit: *TimeLimit,
         diagnostic: *Diagnostic,
     ) Session.Error!*Kept {
         if (server.kept) |kept| {
             if (try kept.holds(server.io, options, replaced)) {
                 kept.begin(server.io, replaced, diagnostic);
+                try limit.start(&kept.account, &kept.session.pool, diagnostic);
                 return kept;
             }
             server.forget();
         }
         server.kept = try .create(server.gpa, server.io, options, diagnostic);
         const kept = server.kept.?;
+        try limit.start(&kept.account, &kept.session.pool, diagnostic);
         try kept.load(server.io, options, replaced);
         return kept;
     }

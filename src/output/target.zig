@@ -231,7 +231,7 @@ const Place = struct {
 
 /// The open descriptor that a path stands for. Its name in the file system would open a file anew,
 /// from the start, and would not open a socket.
-fn descriptorOf(path: []const u8) ?std.posix.fd_t {
+pub fn descriptorOf(path: []const u8) ?std.posix.fd_t {
     if (std.mem.eql(u8, path, "/dev/stdout")) return 1;
     if (std.mem.eql(u8, path, "/dev/stderr")) return 2;
     for ([_][]const u8{ "/dev/fd/", "/proc/self/fd/" }) |folder| {

@@ -124,7 +124,7 @@ pub const TemporaryFiles = struct {
             if (!isFrom(entry.name, &host)) continue;
             // For writing, which network file systems want for a lock.
             const file = listing.openFile(io, entry.name, .{
-                .mode = .read_write,
+                .mode = .write_only,
                 .follow_symlinks = false,
             }) catch continue;
             defer file.close(io);

@@ -37,6 +37,9 @@ pub const Error = error{ OutOfMemory, InputOutput, InvalidInput };
 /// What is said of a file that would be replaced.
 pub const overwritten = "would be overwritten by the output";
 
+/// What is said of a link.
+const outside = "is a link that leads outside the scene's folder (see --allow-outside)";
+
 /// Largest file that is read, in bytes.
 pub const file_bytes_max: u64 = 2 << 30;
 
@@ -189,6 +192,11 @@ fn entryInAnyCase(
     return least;
 }
 
+/// Triangles that the scene may place, for what has been read so far.
+pub fn triangleCountMax(resources: *const Resources) u64 {
+    return resources.settings.triangleCountMax(resources.bytes_read);
+}
+
 const LoadError = Error || error{ NotRegular, IsFolder, Overwritten };
 
 fn readNamed(
@@ -266,8 +274,25 @@ fn openFile(resources: *const Resources, path: []const u8, reason: *Reason) Load
         .NONBLOCK = true, // A pipe without a writer would block us.
         .NOCTTY = true,
         .CLOEXEC = true,
-    }, 0) catch |err| return refuseError(reason, err);
+    }, 0) catch |err| {
+        if (err == error.AccessDenied and resources.leadsOutside(path))
+            return refuse(reason, error.InvalidInput, outside);
+        return refuseError(reason, err);
+    };
     return .{ .handle = handle, .flags = .{ .nonblocking = true } };
+}
+
+/// Whether that is what is wrong with a file that must not be opened: then it is said rather than
+/// what permissions it has.
+fn leadsOutside(resources: *const Resources, path: []const u8) bool {
+    if (resources.settings.allow_outside) return false;
+    const handle = std.posix.openat(resources.folder.handle, path, .{
+        .PATH = true,
+        .CLOEXEC = true,
+    }, 0) catch return false;
+    const file: Io.File = .{ .handle = handle, .flags = .{ .nonblocking = false } };
+    defer file.close(resources.io);
+    return !resources.isBelow(file);
 }
 
 /// Which file it is, unless it is the output.
@@ -292,11 +317,8 @@ fn loadFile(
     const stat = file.stat(io) catch |err| return refuseError(reason, err);
     if (stat.kind == .directory) return refuse(reason, error.IsFolder, "is a folder");
     if (stat.kind != .file) return refuse(reason, error.NotRegular, "is not a regular file");
-    if (!resources.settings.allow_outside and !resources.isBelow(file)) return refuse(
-        reason,
-        error.InvalidInput,
-        "is a link that leads outside the scene's folder (see --allow-outside)",
-    );
+    if (!resources.settings.allow_outside and !resources.isBelow(file))
+        return refuse(reason, error.InvalidInput, outside);
     if (stat.size > bytesMax()) return refuseSize(reason);
     const bytes = try allocator.allocSentinel(u8, @intCast(stat.size), 0);
     errdefer allocator.free(bytes);
