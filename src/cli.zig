@@ -1304,6 +1304,7 @@ test "numbers keep to their ranges" {
         },
         .{ .flag = "--spp", .good = &.{ "1", "4096" }, .bad = &.{ "0", "4097", "" } },
         .{ .flag = "--time-budget", .good = &.{ "0.5", "3600" }, .bad = &.{ "0", "-1", "1s", "" } },
+        .{ .flag = "--sandbox", .good = &.{ "auto", "on", "off" }, .bad = &.{ "", "yes" } },
         .{ .flag = "--progress-image", .good = &.{"p.png"}, .bad = &.{ "", "-", "/dev/stdout" } },
         .{ .flag = "--depth", .good = &.{ "0", "32" }, .bad = &.{ "33", "-1" } },
         .{ .flag = "--tile-size", .good = &.{ "4", "36", "512" }, .bad = &.{ "0", "2", "516" } },
