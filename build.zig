@@ -9,6 +9,7 @@ const builtin = @import("builtin");
 const manifest = @import("build.zig.zon");
 const Package = @import("build/package.zig");
 const Tests = @import("build/tests.zig");
+const fuzz = @import("build/fuzz.zig");
 const libraries = @import("build/libraries.zig");
 const release = @import("build/release.zig");
 const variants = @import("build/variants.zig");
@@ -89,6 +90,11 @@ pub fn build(b: *std.Build) void {
     tests.addReport(steps.test_report, targets[0]);
     tests.addCheck(steps.check, targets[0]);
     steps.check.dependOn(&package.program().step);
+
+    var fuzzed = options;
+    fuzzed.extent = .one;
+    fuzzed.is_fuzzed = true;
+    fuzz.add(.init(b, resolve(b, .{}), optimize orelse .safe, vendor.headers, fuzzed));
 
     release.add(steps.release, steps.test_release, addVendor(b, release.optional).headers);
     addScenes(steps.scenes, .init(b, resolve(b, .{}), .safe, vendor.headers, options));

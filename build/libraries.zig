@@ -1,9 +1,10 @@
 //! The third-party libraries: a row each, with what is compiled of them, and how.
 //!
 //! In: the folder that vendor/fetch fills. Out: their C files in a module of ours, and the notices
-//! that have to go with a program that holds them. All are compiled without the sanitizer of
-//! undefined behaviour and without contraction, so that every target computes the same bits, and
-//! get their memory from whoever calls them, by the hooks of src/memory_account.h or by cgltf's.
+//! that have to go with a program that holds them. All are compiled without contraction, so that
+//! every target computes the same bits, and get their memory from whoever calls them, by the hooks
+//! of src/memory_account.h or by cgltf's. Debug and safe builds trap undefined behaviour in them,
+//! and indices past the bounds of arrays, but for what `Library.tolerated` names.
 
 const std = @import("std");
 const LazyPath = std.Build.LazyPath;
@@ -13,7 +14,6 @@ const Module = std.Build.Module;
 const cpp_flags: []const []const u8 = &.{
     "-std=c++17",
     "-ffp-contract=off",
-    "-fno-sanitize=undefined",
     "-fno-exceptions",
     "-fno-rtti",
     "-fno-c++-static-destructors",
@@ -32,8 +32,43 @@ const cpp_flags: []const []const u8 = &.{
     "-D_LIBCPP_HAS_VENDOR_AVAILABILITY_ANNOTATIONS=0",
     "-D_LIBCPP_DISABLE_VISIBILITY_ANNOTATIONS",
     "-D_LIBCPP_PSTL_BACKEND_SERIAL",
-    "-D_LIBCPP_HARDENING_MODE=_LIBCPP_HARDENING_MODE_NONE",
-    "-D_LIBCPP_ASSERTION_SEMANTIC_DEFAULT=_LIBCPP_ASSERTION_SEMANTIC_IGNORE",
+};
+
+const Language = enum { c, cpp };
+
+/// What is compiled into libraries besides their code.
+pub const Instruments = struct {
+    /// Undefined behaviour ends the program.
+    traps: bool = false,
+    /// Which code has run is counted, for fuzzing.
+    counts: bool = false,
+
+    fn flags(instruments: Instruments, language: Language) []const []const u8 {
+        const trapping: []const []const u8 = switch (language) {
+            .c => &.{"-fsanitize=local-bounds"},
+            .cpp => &.{
+                "-fsanitize=local-bounds",
+                "-D_LIBCPP_HARDENING_MODE=_LIBCPP_HARDENING_MODE_EXTENSIVE",
+                "-D_LIBCPP_ASSERTION_SEMANTIC_DEFAULT=_LIBCPP_ASSERTION_SEMANTIC_QUICK_ENFORCE",
+            },
+        };
+        const plain: []const []const u8 = switch (language) {
+            .c => &.{"-fno-sanitize=undefined"},
+            .cpp => &.{
+                "-fno-sanitize=undefined",
+                "-D_LIBCPP_HARDENING_MODE=_LIBCPP_HARDENING_MODE_NONE",
+                "-D_LIBCPP_ASSERTION_SEMANTIC_DEFAULT=_LIBCPP_ASSERTION_SEMANTIC_IGNORE",
+            },
+        };
+        return if (instruments.traps) trapping else plain;
+    }
+
+    fn counting(instruments: Instruments) []const []const u8 {
+        return if (instruments.counts)
+            &.{"-fsanitize-coverage=inline-8bit-counters,pc-table"}
+        else
+            &.{};
+    }
 };
 
 /// One library; vendor/libraries.json says where it comes from, under the same name.
@@ -51,13 +86,19 @@ pub const Library = struct {
     own_headers: ?[]const u8 = null,
     /// Definitions, and what else a library needs the compiler to be told.
     flags: []const []const u8 = &.{},
+    /// Undefined behaviour that does no harm on any of our targets, and why: flags that let it pass
+    /// where all other traps.
+    tolerated: []const []const u8 = &.{},
 
     /// Compiles what is C of the library into `module`.
-    pub fn addTo(library: Library, module: *Module, headers: LazyPath) void {
+    pub fn addTo(
+        library: Library,
+        module: *Module,
+        headers: LazyPath,
+        instruments: Instruments,
+    ) void {
         const b = module.owner;
-        const flags = std.mem.concat(b.allocator, []const u8, &.{
-            &.{ "-std=c11", "-ffp-contract=off", "-fno-sanitize=undefined" }, library.flags,
-        }) catch @panic("OOM");
+        const flags = library.allFlags(b, .c, instruments);
         module.addIncludePath(headers);
         for (library.includes) |folder| module.addIncludePath(headers.path(b, folder));
         if (library.own_headers) |folder| module.addIncludePath(b.path(folder));
@@ -77,6 +118,7 @@ pub const Library = struct {
         shim: []const u8,
         root: *Module,
         headers: LazyPath,
+        instruments: Instruments,
     ) void {
         const b = root.owner;
         for ([_][]const u8{ "libcxx/include", "libcxxabi/include" }) |folder| {
@@ -86,10 +128,23 @@ pub const Library = struct {
         root.addIncludePath(headers);
         for (library.includes) |folder| root.addIncludePath(headers.path(b, folder));
         if (library.own_headers) |folder| root.addIncludePath(b.path(folder));
-        const flags = std.mem.concat(b.allocator, []const u8, &.{
-            cpp_flags, library.flags,
-        }) catch @panic("OOM");
+        const flags = library.allFlags(b, .cpp, instruments);
         root.addCSourceFile(.{ .file = b.path(shim), .flags = flags });
+    }
+
+    fn allFlags(
+        library: Library,
+        b: *std.Build,
+        language: Language,
+        instruments: Instruments,
+    ) []const []const u8 {
+        return std.mem.concat(b.allocator, []const u8, &.{
+            if (language == .c) &.{ "-std=c11", "-ffp-contract=off" } else cpp_flags,
+            instruments.flags(language),
+            instruments.counting(),
+            library.flags,
+            if (instruments.traps) library.tolerated else &.{},
+        }) catch @panic("OOM");
     }
 };
 

@@ -20,6 +20,7 @@ target: std.Build.ResolvedTarget,
 optimize: std.lang.Optimize,
 headers: LazyPath,
 is_stripped: bool,
+is_fuzzed: bool,
 optional: libraries.Optional,
 /// The library, `@import("raylane")`.
 raylane: *Module,
@@ -49,6 +50,8 @@ pub const Options = struct {
     part: Part = .whole,
     /// Whether its programs do without what debuggers and traces of the stack read.
     is_stripped: bool = false,
+    /// Whether the library and the C in it count which of their code has run.
+    is_fuzzed: bool = false,
     optional: libraries.Optional,
 };
 
@@ -86,6 +89,7 @@ pub fn init(
         .optimize = optimize,
         .headers = headers,
         .is_stripped = options.is_stripped,
+        .is_fuzzed = options.is_fuzzed,
         .optional = options.optional,
         .shows_searches = options.shows_searches,
         .part = options.part,
@@ -125,6 +129,7 @@ pub fn tests(package: Package) *Module {
 /// A module that holds the library, with all that this imports.
 fn withLibrary(package: Package, path: []const u8) *Module {
     const root = package.moduleOf(path);
+    if (package.is_fuzzed) root.fuzz = true;
     root.addImport("config", package.config);
     const held = libraries.held(package.optional);
     const is_musl = package.target.result.isMuslLibC();
@@ -142,16 +147,31 @@ fn addThirdParty(package: Package, root: *Module) void {
 fn libraryArchives(package: Package) []const *Compile {
     const arena = package.owner.allocator;
     var list: std.ArrayList(*Compile) = .empty;
-    const c = package.moduleOfC();
+    const c = package.moduleOfLibraries();
     for (libraries.held(package.optional)) |library| {
-        library.addTo(c, package.headers);
+        library.addTo(c, package.headers, package.instruments());
         const shim = library.cpp_shim orelse continue;
-        const cpp = package.moduleOfC();
-        library.addCppTo(shim, cpp, package.headers);
+        const cpp = package.moduleOfLibraries();
+        library.addCppTo(shim, cpp, package.headers, package.instruments());
         list.append(arena, package.archive(library.name, cpp)) catch @panic("OOM");
     }
     list.append(arena, package.archive("libraries", c)) catch @panic("OOM");
     return list.items;
+}
+
+/// What is compiled into the third-party libraries.
+pub fn instruments(package: Package) libraries.Instruments {
+    return .{
+        .traps = package.optimize == .debug or package.optimize == .safe,
+        .counts = package.is_fuzzed,
+    };
+}
+
+/// Of C that is not ours. What it traps needs no library that explains it.
+fn moduleOfLibraries(package: Package) *Module {
+    const module = package.moduleOfC();
+    if (package.instruments().traps) module.sanitize_c = .trap;
+    return module;
 }
 
 fn moduleOfC(package: Package) *Module {

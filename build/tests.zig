@@ -54,9 +54,9 @@ pub fn addAll(tests: Tests, step: *std.Build.Step, targets: []const Target) void
     var logs: std.ArrayList(LazyPath) = .empty;
     const arena = tests.owner.allocator;
     logs.appendSlice(arena, &.{
-        tests.format(),         tests.tidy(),    tests.machinery(),
-        tests.report(),         tests.fetcher(), tests.packages("Layout", null),
-        tests.farm(targets[0]),
+        tests.format(),                 tests.tidy(),           tests.machinery(),
+        tests.report(),                 tests.fetcher(),        tests.robustness(),
+        tests.packages("Layout", null), tests.farm(targets[0]),
     }) catch @panic("OOM");
     if (targets[0].emulator.len == 0) {
         const own = targets[0].package.program();
@@ -103,7 +103,7 @@ pub fn addTidy(tests: Tests, step: *std.Build.Step) void {
 /// with the program of `target`.
 pub fn addReport(tests: Tests, step: *std.Build.Step, target: Target) void {
     tests.close(step, &.{
-        tests.report(),                 tests.fetcher(),
+        tests.report(),                 tests.fetcher(),    tests.robustness(),
         tests.packages("Layout", null), tests.farm(target),
     }, .logs_only);
 }
@@ -112,6 +112,7 @@ pub fn addReport(tests: Tests, step: *std.Build.Step, target: Target) void {
 pub fn addCheck(tests: Tests, step: *std.Build.Step, target: Target) void {
     step.dependOn(&tests.ofLibrary(target.package, null).step);
     step.dependOn(&tests.hostProgram("cli").step);
+    step.dependOn(&target.package.renderer("fuzz", "fuzz/main.zig").step);
 }
 
 fn format(tests: Tests) LazyPath {
@@ -140,6 +141,14 @@ fn fetcher(tests: Tests) LazyPath {
     const run, const log = tests.start("fetch", "sources");
     run.addArgs(&.{ "--one", "--needs=python3", "--", "python3", "-m", "unittest", "discover" });
     run.addArgs(&.{ "-s", "vendor" });
+    return log;
+}
+
+/// What damages files, measures and judges in tests/robustness.
+fn robustness(tests: Tests) LazyPath {
+    const run, const log = tests.start("robustness", "sources");
+    run.addArgs(&.{ "--one", "--needs=python3", "--", "python3", "-m", "unittest", "discover" });
+    run.addArgs(&.{ "-s", "tests/robustness" });
     return log;
 }
 
@@ -211,7 +220,7 @@ const Part = enum {
 /// The program of one part; null: of all, for all are compiled in little more time than one.
 fn ofLibrary(tests: Tests, package: Package, part: ?Part) *Compile {
     const root = package.tests();
-    libraries.stb_image_of_tests.addTo(root, package.headers);
+    libraries.stb_image_of_tests.addTo(root, package.headers, .{});
     package.addKernels(root);
     var own = tests;
     if (part) |one| {

@@ -143,8 +143,10 @@ pub const Options = struct {
     /// What the command line was, for `inputs`.
     arguments: []const [:0]const u8 = &.{},
     batch: Batch = .{},
-    /// Bytes of memory that may be allocated at a time; null: as much as there is.
+    /// Bytes of memory that may be allocated at a time; null: by what is left.
     memory_max: ?u64 = null,
+    /// Seconds that a scene may take, within `settings.time_max_s`.
+    time_max_s: ?f32 = null,
     /// Null: as many as the system has CPUs.
     thread_count: ?u32 = null,
     tree_quality: settings.TreeQuality = .default,
@@ -296,8 +298,8 @@ pub const help: []const u8 = "raylane " ++ version ++
     \\      with all the light that bounces, as radiance
     \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
-    \\supported, 4 images differ (bench, compare), 128 + N ended by signal N (with
-    \\--partial, the picture may be there).
+    \\supported, 4 images differ (bench, compare), 124 over --max-time, 128 + N ended
+    \\by signal N (with --partial, the picture may be there).
     \\
 ;
 
@@ -550,8 +552,8 @@ const Parser = struct {
             .shade => options.view.shade = try reader.choice(given, settings.Shade),
             .layers, .jpeg_quality, .webp_quality, .exr => try parser.setWriting(given),
             .exposure, .tonemap => try parser.setWriting(given),
-            .max_memory => options.memory_max = values.bytesOf(given.value) orelse
-                return reader.bad(given, "a size such as 512M or 2G"),
+            .max_memory, .max_time, .max_triangles => try parser.setLimit(given),
+            .max_pixels, .max_texture_pixels => try parser.setLimit(given),
             .crop, .tile => try parser.setPart(given),
             .resolution, .width, .height, .pixel_ratio => try parser.setSize(given),
             .threads => options.thread_count = try reader.number(given, settings.thread_count),
@@ -597,6 +599,30 @@ const Parser = struct {
             .version => parser.other = parser.other orelse .version,
             .licenses => parser.other = parser.other orelse .licenses,
             .list_variants => parser.other = parser.other orelse .list_variants,
+        }
+    }
+
+    fn setLimit(parser: *Parser, given: Reader.Given) Error!void {
+        const options = &parser.options;
+        const reader = &parser.reader;
+        switch (given.id) {
+            .max_memory => options.memory_max = values.bytesOf(given.value) orelse
+                return reader.bad(given, "a size such as 512M or 2G"),
+            .max_time => options.time_max_s =
+                values.numberWithin(given.value, settings.time_max_s) orelse
+                return reader.bad(given, comptimePrint("{d} to {d} seconds", .{
+                    settings.time_max_s.min, settings.time_max_s.max,
+                })),
+            else => {
+                const count = values.countOf(given.value) orelse
+                    return reader.bad(given, "a number above 0 such as 500000 or 5M");
+                switch (given.id) {
+                    .max_triangles => options.load.triangle_count_max = count,
+                    .max_pixels => options.view.pixel_count_max = count,
+                    .max_texture_pixels => options.load.texture_pixel_count_max = count,
+                    else => unreachable, // `set` hands over the above.
+                }
+            },
         }
     }
 
@@ -1362,6 +1388,18 @@ test "numbers keep to their ranges" {
             .good = &.{ "1", "64K", "512M", "512m", "2G", "16777215T" },
             .bad = &.{ "", "0", "M", "0M", "-1G", "1.5G", "1P", "2GB", "16777216T" },
         },
+        .{
+            .flag = "--max-time",
+            .good = &.{ "0.01", "2", "1e6" },
+            .bad = &.{ "", "0", "-1", "nan", "2s", "1e7" },
+        },
+        .{
+            .flag = "--max-triangles",
+            .good = &.{ "1", "5M", "2g", "18446744073G" },
+            .bad = &.{ "", "0", "K", "0K", "-1", "1.5M", "1T", "18446744074G" },
+        },
+        .{ .flag = "--max-pixels", .good = &.{ "1", "4K" }, .bad = &.{ "0", "64x64" } },
+        .{ .flag = "--max-texture-pixels", .good = &.{ "1", "1G" }, .bad = &.{ "0", "all" } },
         .{ .flag = "--variant", .good = test_names, .bad = &.{ "vector", "", "vector-beam-16" } },
         .{ .flag = "--camera", .good = &.{ "auto", "0", "4294967296", "b c" }, .bad = &.{""} },
         .{

@@ -13,10 +13,22 @@ pub fn main(init: std.process.Init) u8 {
     holdStandardFiles();
     signals.catchAll();
     _ = raylane.simd.setFlushToZero();
-    return @backingInt(run(init));
+    var program: Program = .{ .init = init };
+    raylane.call_stack.call(raylane.parallel.stack_bytes, &program, Program.run);
+    return @backingInt(program.exit_code);
 }
 
-fn run(init: std.process.Init) ExitCode {
+/// What `main` does, on a stack that does not depend on who starts the program.
+const Program = struct {
+    init: std.process.Init,
+    exit_code: ExitCode = .ok,
+
+    fn run(program: *Program) void {
+        program.exit_code = runCommand(program.init);
+    }
+};
+
+fn runCommand(init: std.process.Init) ExitCode {
     const io = init.io;
     var diagnostic: Diagnostic = .{};
     const arguments = init.minimal.args.toSlice(init.arena.allocator()) catch

@@ -8,6 +8,7 @@ const std = @import("std");
 const Alignment = std.mem.Alignment;
 const Allocator = std.mem.Allocator;
 const Message = @import("diagnostic.zig").Message;
+const available = @import("memory_account/available.zig");
 const huge_pages = @import("huge_pages.zig");
 const assert = std.debug.assert;
 
@@ -15,6 +16,10 @@ const assert = std.debug.assert;
 pub const Account = struct {
     child: Allocator,
     limit: usize,
+    /// Nobody has asked for that limit.
+    is_default: bool = false,
+    /// Nothing more is to be had.
+    is_ended: std.atomic.Value(bool) = .init(false),
     used: std.atomic.Value(usize) = .init(0),
     /// Bytes of the last refused request, and how many were out by then.
     refused: std.atomic.Value(usize) = .init(0),
@@ -28,6 +33,27 @@ pub const Account = struct {
         const bytes_max = std.math.maxInt(usize);
         return .{ .child = child, .limit = std.math.cast(usize, limit orelse bytes_max) orelse
             bytes_max };
+    }
+
+    /// As the user asks: null is three quarters of what is left to the process, so that neither
+    /// the kernel nor its neighbours have to end it.
+    pub fn initFor(child: Allocator, io: std.Io, asked: ?u64) Account {
+        if (asked) |bytes| return .init(child, bytes);
+        const left = available.find(io) orelse return .init(child, null);
+        var account: Account = .init(child, left / 4 * 3);
+        account.is_default = true;
+        return account;
+    }
+
+    /// Refuses all that is asked for from now on, so that whoever is at work comes to an end, in a
+    /// C library as well. Any thread may call it.
+    pub fn end(account: *Account) void {
+        account.is_ended.store(true, .monotonic);
+    }
+
+    /// Takes that back.
+    pub fn reopen(account: *Account) void {
+        account.is_ended.store(false, .monotonic);
     }
 
     /// The allocator for everybody.
@@ -45,6 +71,11 @@ pub const Account = struct {
         const refused = account.refused.load(.acquire);
         if (refused == 0) return account.explainMissing(message);
         const used = account.refused_at.load(.monotonic);
+        if (account.is_default) return message.set(
+            "needs more than {f}, three quarters of the memory that is left " ++
+                "({f} in use, {f} more asked for; see --max-memory)",
+            .{ inUnits(account.limit), inUnits(used), inUnits(refused) },
+        );
         message.set(
             "needs more than the {f} of --max-memory ({f} in use, {f} more asked for)",
             .{ inUnits(account.limit), inUnits(used), inUnits(refused) },
@@ -62,6 +93,7 @@ pub const Account = struct {
     }
 
     fn take(account: *Account, bytes: usize) bool {
+        if (account.is_ended.load(.monotonic)) return false;
         var used = account.used.load(.monotonic);
         while (true) {
             if (bytes > account.limit -| used) {
@@ -237,6 +269,11 @@ test "an account counts, refuses and forgets nothing" {
     list.deinit(gpa);
     try std.testing.expectEqual(0, account.used.load(.monotonic));
 
+    account.end();
+    try std.testing.expectError(error.OutOfMemory, gpa.alloc(u8, 1));
+    account.reopen();
+    gpa.free(try gpa.alloc(u8, 1));
+
     // The child's own failure is not a refusal.
     var failing: std.testing.FailingAllocator = .init(std.testing.allocator, .{ .fail_index = 0 });
     var unlimited: Account = .init(failing.allocator(), null);
@@ -247,6 +284,22 @@ test "an account counts, refuses and forgets nothing" {
         message.text(),
     );
     try std.testing.expectEqual(0, unlimited.used.load(.monotonic));
+}
+
+test "the limit that nobody asks for is below what is left, and said to be so" {
+    const io = std.testing.io;
+    const asked: Account = .initFor(std.testing.allocator, io, 7);
+    try std.testing.expect(asked.limit == 7 and !asked.is_default);
+    var account: Account = .initFor(std.testing.allocator, io, null);
+    if (available.find(io) == null) return error.SkipZigTest;
+    try std.testing.expect(account.is_default and account.limit < std.math.maxInt(usize));
+    account.limit = 1000;
+    const gpa = account.allocator();
+    try std.testing.expectError(error.OutOfMemory, gpa.alloc(u8, 1001));
+    var message: Message = .{};
+    account.explain(&message);
+    try std.testing.expectEqualStrings("needs more than 1000 bytes, three quarters of the " ++
+        "memory that is left (0 bytes in use, 1001 bytes more asked for; see --max-memory)", message.text());
 }
 
 test inUnits {
@@ -314,4 +367,8 @@ test LibraryHeap {
 
 fn alignmentOf(memory: [*]const u8) bool {
     return LibraryHeap.alignment.check(@intFromPtr(memory));
+}
+
+test {
+    _ = available;
 }

@@ -100,9 +100,29 @@ fn read(opened: *Resources.Scene, path: []const u8, diagnostic: *Diagnostic) Err
     };
     errdefer scene.deinit();
     try diagnostic.failIfRefused();
+    const triangle_count = placedCount(&scene);
+    const triangle_count_max = resources.triangleCountMax();
+    if (triangle_count > triangle_count_max) return diagnostic.invalid(
+        "it places {d} triangles, more than {d} (see --max-triangles)",
+        .{ triangle_count, triangle_count_max },
+    );
     scene.file.byte_count = resources.bytes_read;
     scene.file.files = try filesOf(scene.arena.allocator(), &listing);
     return scene;
+}
+
+/// Triangles of a point, or of a line's piece, at the least.
+const stroke_triangle_count = 8;
+
+/// Triangles that all instances are, points and lines counted.
+fn placedCount(scene: *const Scene) u64 {
+    var count: u64 = 0;
+    for (scene.instances) |instance| {
+        const mesh = &scene.meshes[instance.mesh];
+        const stroke_count = @as(u64, mesh.points.len) + mesh.segments.len;
+        count +|= mesh.triangles.len + stroke_triangle_count * stroke_count;
+    }
+    return count;
 }
 
 /// What was read, in memory from `arena`.

@@ -36,6 +36,7 @@ const material = @import("prepare/material.zig");
 const motion_file = @import("prepare/motion.zig");
 const place_file = @import("prepare/pose.zig");
 const reference_file = @import("prepare/reference.zig");
+const representative_lights = @import("prepare/representative_lights.zig");
 const tangents = @import("prepare/tangents.zig");
 const texture = @import("prepare/texture.zig");
 const strokes = @import("prepare/strokes.zig");
@@ -589,6 +590,7 @@ noinline fn chooseView(
 ) ViewError!void {
     const gpa = seen.view_arena.child_allocator;
     seen.lights = &.{};
+    seen.all_lights = null;
     _ = seen.view_arena.reset(.retain_capacity);
     const arena = seen.view_arena.allocator();
     const reference = settings.reference;
@@ -596,7 +598,7 @@ noinline fn chooseView(
     const chosen = kept orelse try chooseCamera(seen, from, &settings, diagnostic);
     const facing = if (reference) |first| &first.facing else &chosen.camera;
     seen.view = .{ .camera = chosen.camera, .width = chosen.width, .height = chosen.height };
-    seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
+    try placeLights(seen, from, diagnostic);
     const shining = if (settings.emitters or from.has_area_lights)
         try emittersOf(gpa, seen, from)
     else
@@ -633,6 +635,25 @@ noinline fn chooseView(
     seen.facts.camera_is_default = chosen.camera_is_default;
     seen.facts.lights_are_default = lights_are_default;
     seen.facts.environment_is_default = settings.environment.is_default;
+}
+
+/// Punctual lights, or those that stand for too many of them.
+fn placeLights(
+    seen: *World,
+    from: *const Scene,
+    diagnostic: *Diagnostic,
+) error{OutOfMemory}!void {
+    const arena = seen.view_arena.allocator();
+    const most = choices.punctual_light_count_max;
+    seen.lights = try light.place(arena, from.lights, seen.node_maps, &seen.geometry, diagnostic);
+    if (seen.lights.len <= most) return;
+    const all = seen.lights;
+    const gpa = seen.view_arena.child_allocator;
+    seen.lights = try representative_lights.choose(gpa, arena, all, most);
+    seen.all_lights = all;
+    diagnostic.warn("{d} lights: {d} of them stand for all, but for --integrator path", .{
+        all.len, seen.lights.len,
+    });
 }
 
 fn chooseCamera(
@@ -1672,6 +1693,7 @@ test "memory that runs out when a scene is posed again is an error that leaks no
 
 test {
     _ = animate;
+    _ = representative_lights;
     _ = reference_file;
     _ = Drawn;
     _ = motion_file;

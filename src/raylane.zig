@@ -9,6 +9,7 @@ const std = @import("std");
 pub const batch = @import("batch.zig");
 pub const bench = @import("bench.zig");
 pub const builtin = @import("builtin.zig");
+pub const call_stack = @import("call_stack.zig");
 pub const cli = @import("cli.zig");
 pub const compare = @import("compare.zig");
 pub const decode = @import("decode.zig");

@@ -131,6 +131,7 @@ pub const Session = struct {
     ownership: Ownership = .owned,
     facts: Facts = .{},
     texture_side_max: u32 = settings.texture_side.default,
+    texture_pixel_count_max: u64 = settings.texture_pixel_count_max,
     /// Made by the first `pose` of a scene.
     loaded: ?prepare.Loaded = null,
     /// The scene as it is posed.
@@ -235,6 +236,7 @@ pub const Session = struct {
         session.adopt(scene, .owned);
         session.output = choices.output;
         session.texture_side_max = choices.texture_side_max;
+        session.texture_pixel_count_max = choices.texture_pixel_count_max;
         session.start = start;
         session.times.parse_ns = session.since(start);
     }
@@ -322,6 +324,50 @@ pub const Session = struct {
         session.loaded = null;
     }
 
+    /// Refuses a picture that the scene wants larger than it may be, or with more samples, before
+    /// anything is made of it. Asserts that there is a scene.
+    pub fn checkWishes(
+        session: *const Session,
+        seen: *const settings.View,
+        choices: *const settings.Render,
+    ) error{SceneTooLarge}!void {
+        const scene = &session.scene.?;
+        const is_own = seen.resolution == null and seen.long_side == null;
+        const size = seen.resolution orelse if (is_own) scene.resolution else null;
+        const width, const height = size orelse return;
+        const pixel_count = @as(u64, width) * height;
+        const pixel_count_max: u64 = seen.pixel_count_max orelse if (is_own)
+            settings.scene_pixel_count_max
+        else
+            settings.pixel_count_max;
+        const diagnostic = session.diagnostic;
+        if (pixel_count > pixel_count_max) return diagnostic.fail(
+            error.SceneTooLarge,
+            "a picture of {d}x{d} is asked for, of more than {d} pixels (see --max-pixels and -r)",
+            .{ width, height, pixel_count_max },
+        );
+        const has_own_count = choices.sample_count == null and choices.noise == null and
+            choices.time_budget_s == null and seen.shade != .cost;
+        const sample_count = if (has_own_count) scene.sample_count orelse return else return;
+        if (pixel_count * sample_count > settings.scene_sample_count_max) return diagnostic.fail(
+            error.SceneTooLarge,
+            "it wants {d} samples of each of {d}x{d} pixels, over {d} in all (see --spp and -r)",
+            .{ sample_count, width, height, settings.scene_sample_count_max },
+        );
+    }
+
+    /// Refuses a picture larger than the user allows, whose size a camera decides.
+    fn checkSize(session: *const Session) error{SceneTooLarge}!void {
+        const seen = &session.world.?.view;
+        const pixel_count_max = session.seen.pixel_count_max orelse return;
+        if (@as(u64, seen.width) * seen.height <= pixel_count_max) return;
+        return session.diagnostic.fail(
+            error.SceneTooLarge,
+            "a picture of {d}x{d} is asked for, of more than {d} pixels (see --max-pixels and -r)",
+            .{ seen.width, seen.height, pixel_count_max },
+        );
+    }
+
     /// Places the geometry at a moment of the scene's animations and builds the tree over it; the
     /// first time, decodes the textures. It may be called again, also where nodes, weights and
     /// materials of a borrowed scene have changed since, and nothing else: arrays are written once
@@ -333,6 +379,7 @@ pub const Session = struct {
             session.loaded = try prepare.load(session.gpa, session.io, scene, .{
                 .pool = &session.pool,
                 .side_max = session.texture_side_max,
+                .pixel_count_max = session.texture_pixel_count_max,
             }, session.diagnostic, &session.times);
             try session.diagnostic.failIfRefused();
         }
@@ -453,6 +500,7 @@ pub const Session = struct {
                 null,
             .reference = if (reference) |*first| first else null,
         }, session.diagnostic, &session.times);
+        return session.checkSize();
     }
 
     /// The view as what other pictures of a film go by that are rendered and written like this.
@@ -535,10 +583,30 @@ pub const Session = struct {
             "{d} pixels came out as not a number and were made black",
             .{session.traced.non_finite_count},
         );
+        session.warnOfCuts();
         if (choices.denoise and !choices.is_merged) try session.denoiseFilm();
         try session.cutFilm();
         try session.fillHits(&frame);
         if (shade == .cost) try session.paintCost();
+    }
+
+    /// Says what was left out of the picture lest it take too long.
+    fn warnOfCuts(session: *Session) void {
+        const cuts = &session.traced.cuts;
+        const diagnostic = session.diagnostic;
+        if (cuts.passing > 0) diagnostic.warn(
+            "{d} rays met more than {d} blended or open surfaces in a row; " ++
+                "in place of what is behind these they see the background",
+            .{ cuts.passing, trace.transparency_depth_max },
+        );
+        if (cuts.shadow > 0) diagnostic.warn(
+            "some light goes through more than {d} surfaces on its way and was left out",
+            .{trace.attenuation_count_max},
+        );
+        if (cuts.nested > 0) diagnostic.warn(
+            "some rays are in more than {d} volumes at a time; others were taken for not there",
+            .{trace.nested_max},
+        );
     }
 
     /// Leaves of the film what was asked for.

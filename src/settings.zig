@@ -69,6 +69,19 @@ pub const tile_size_step = 4;
 pub const side: Range = .{ .min = 1, .max = 65_536, .default = 1024 };
 /// Pixels of a picture.
 pub const pixel_count_max = 1 << 28;
+/// The same where a scene asks for them, unless the user allows another number.
+pub const scene_pixel_count_max = 1 << 26;
+/// Samples of all pixels together that a scene may ask for; `--spp` asks for any number.
+pub const scene_sample_count_max = 1 << 33;
+/// Triangles that a scene may place, each instance counted, unless the user allows another number:
+/// so many, or one for each byte that is read, whichever is more.
+pub const triangle_count_max = 1 << 25;
+/// Pixels of all images of a scene before they are halved, unless the user allows another number.
+pub const texture_pixel_count_max = 1 << 30;
+/// Seconds that a scene may take.
+pub const time_max_s: struct { min: f32, max: f32 } = .{ .min = 0.01, .max = 1_000_000 };
+/// Share of these after which what does not look at the time is ended with the program.
+pub const time_grace = 0.05;
 /// The longer side where it alone is given: a square one has as many pixels as there may be.
 pub const long_side: Range = .{ .min = 1, .max = 1 << 14, .default = side.default };
 /// Parts of a picture that are tiles.
@@ -91,6 +104,8 @@ pub const environment_shadow_count: Range = .{ .min = 0, .max = 64, .default = 4
 pub const occlusion_shadow_count = 16;
 /// And where a floor catches their shadows, unless the user says.
 pub const floor_shadow_count = 16;
+/// Punctual lights that a point is lit by one after the other; of more, so many stand for all.
+pub const punctual_light_count_max = 1024;
 /// See `Lights`.
 pub const virtual_light_count: Range = .{ .min = 0, .max = 1024, .default = 96 };
 /// See `Lights`.
@@ -387,6 +402,10 @@ pub const Load = struct {
     tessellation: u32 = tessellation.default,
     /// Within `texture_side`.
     texture_side_max: u32 = texture_side.default,
+    /// Pixels of all images together.
+    texture_pixel_count_max: u64 = texture_pixel_count_max,
+    /// Triangles that are placed, each instance counted; null: see `triangleCountMax`.
+    triangle_count_max: ?u64 = null,
     scene: Choice = .default,
     material_variant: Choice = .default,
     /// Null: what the file's contents and its name tell.
@@ -397,6 +416,11 @@ pub const Load = struct {
     output: ?Identity = null,
     /// Told how far reading has come; null: nobody is.
     progress: ?*progress.Progress = null,
+
+    /// For a scene of so many bytes: large files may have many triangles, small ones not.
+    pub fn triangleCountMax(load: *const Load, byte_count: u64) u64 {
+        return load.triangle_count_max orelse @max(triangle_count_max, byte_count);
+    }
 };
 
 /// How the work under way is shown.
@@ -422,6 +446,9 @@ pub const View = struct {
     resolution: ?[2]u32 = null,
     /// Within `long_side`, where there is no `resolution`; null: the scene's, or the default.
     long_side: ?u32 = null,
+    /// Of the picture; null: `pixel_count_max`, and `scene_pixel_count_max` where the scene says
+    /// its size.
+    pixel_count_max: ?u64 = null,
     /// Radiance from everywhere, finite and >= 0; null: as the lights have it.
     ambient: ?f32 = null,
     environment: Environment = .{},
@@ -590,6 +617,14 @@ test FrameRate {
     const film: FrameRate = .{ .numerator = 24_000, .denominator = 1001 };
     try std.testing.expectEqual(1.001, film.timeOf(24));
     try std.testing.expectEqual(-0.5, (FrameRate{}).timeOf(-12));
+}
+
+test "files may have as many triangles as bytes, and small ones many" {
+    const load: Load = .{};
+    try std.testing.expectEqual(triangle_count_max, load.triangleCountMax(100));
+    try std.testing.expectEqual(1 << 30, load.triangleCountMax(1 << 30));
+    const asked: Load = .{ .triangle_count_max = 7 };
+    try std.testing.expectEqual(7, asked.triangleCountMax(1 << 30));
 }
 
 test Range {

@@ -72,6 +72,24 @@ pub const TestCounts = struct {
     }
 };
 
+/// What was left out, so that there is a bound to what a pixel costs.
+pub const CutCounts = struct {
+    /// Rays that went straight on through as many surfaces as they may.
+    passing: u64 = 0,
+    /// Shadow rays that more surfaces weaken than are counted: how many may depend on the variant
+    /// where something opaque is behind these.
+    shadow: u64 = 0,
+    /// Boundaries that rays hit in more volumes at once than are told apart.
+    nested: u64 = 0,
+
+    /// Adds another thread's counts.
+    pub fn add(counts: *CutCounts, other: CutCounts) void {
+        counts.passing += other.passing;
+        counts.shadow += other.shadow;
+        counts.nested += other.nested;
+    }
+};
+
 test "counts of two threads add up" {
     var rays: RayCounts = .{ .primary = 1, .shadow = 2, .secondary = 3 };
     rays.add(.{ .primary = 10, .shadow = 20, .secondary = 30 });
@@ -79,4 +97,7 @@ test "counts of two threads add up" {
     var tests: TestCounts = .{ .box_useful = 1 };
     tests.add(.{ .box_issued = 4, .box_useful = 1, .triangle_issued = 4, .triangle_useful = 3 });
     try std.testing.expectEqual(2, tests.box_useful);
+    var cuts: CutCounts = .{ .passing = 1, .nested = 5 };
+    cuts.add(.{ .passing = 10, .shadow = 3 });
+    try std.testing.expectEqual(CutCounts{ .passing = 11, .shadow = 3, .nested = 5 }, cuts);
 }

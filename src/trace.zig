@@ -11,6 +11,7 @@ const variant_file = @import("variant.zig");
 const adaptive = @import("trace/integrate/adaptive.zig");
 const interleave = @import("trace/integrate/interleave.zig");
 const tiles = @import("trace/integrate/tiles.zig");
+const visibility = @import("trace/integrate/visibility.zig");
 const Film = @import("film.zig").Film;
 const Surroundings = @import("film.zig").Surroundings;
 const assert = std.debug.assert;
@@ -69,6 +70,11 @@ pub const interaction = @import("trace/shade/interaction.zig");
 /// The light list in lanes, and the tree of it.
 pub const light_sampling = @import("trace/shade/light_sampling.zig");
 pub const light_tree = @import("trace/shade/light_tree.zig");
+/// Surfaces that one ray goes on through without a bounce, and that weaken light on its way.
+pub const transparency_depth_max = visibility.transparency_depth_max;
+pub const attenuation_count_max = visibility.attenuation_count_max;
+/// Volumes that a ray is in at a time.
+pub const nested_max = @import("trace/shade/volumes.zig").nested_max;
 /// What tests of traversal ask of a kernel.
 pub const searches = @import("trace/traverse/searches.zig");
 /// A bundle in the variant's own way.

@@ -68,6 +68,9 @@ pub const Frame = struct {
     materials: *const Materials,
     textures: *const Textures,
     lights: []const Light,
+    /// The punctual ones among them, or all those that they stand for where these are many more
+    /// (`settings.punctual_light_count_max`): for integrators that choose lights at random.
+    all_lights: []const Light = &.{},
     environment: *const Environment,
     view: *const View,
     /// For integrators that choose lights at random; null: nobody asked for it.
@@ -127,6 +130,8 @@ pub const World = struct {
     /// Made once a scene, by `prepare.load`, as are the lookups of the materials; not owned.
     textures: Textures,
     lights: []const Light = &.{},
+    /// See `Frame`; null: `lights` has them all.
+    all_lights: ?[]const Light = null,
     /// In the place of all surfaces that emit; null: not made yet.
     emitters: ?[]const Light = null,
     environment: Environment = .{ .ambient = 0, .background = @splat(0) },
@@ -163,6 +168,7 @@ pub const World = struct {
             .materials = &world.materials,
             .textures = &world.textures,
             .lights = world.lights,
+            .all_lights = world.all_lights orelse world.lights,
             .environment = &world.environment,
             .view = &world.view,
         };

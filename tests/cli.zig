@@ -1144,6 +1144,74 @@ test "--max-memory is kept to in every stage, or is an error in one line" {
     try testing.expect(std.mem.find(u8, after.stderr, ", 3 MiB more asked for)") != null);
 }
 
+test "what a file asks for is refused before the work, in a line that names the option" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const film = "Film \"image\" \"integer xresolution\" 16384 \"integer yresolution\" ";
+    const world = " WorldBegin Shape \"sphere\" Shape \"sphere\" WorldEnd";
+    try sandbox.write("pixels.pbrt", film ++ "16384" ++ world);
+    const samples = "Sampler \"halton\" \"integer pixelsamples\" 4096 ";
+    try sandbox.write("samples.pbrt", samples ++ film ++ "4096" ++ world);
+    try sandbox.write("levels.pbrt", "WorldBegin Shape \"loopsubdiv\" \"integer levels\" 8 " ++
+        "\"point P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] WorldEnd");
+    for ([_]struct { []const []const u8, []const u8 }{
+        .{ &.{"pixels.pbrt"}, "raylane: pixels.pbrt: a picture of 16384x16384 is asked for, of " ++
+            "more than 67108864 pixels (see --max-pixels and -r)\n" },
+        .{ &.{"samples.pbrt"}, "raylane: samples.pbrt: it wants 4096 samples of each of " ++
+            "16384x4096 pixels, over 8589934592 in all (see --spp and -r)\n" },
+        .{
+            &.{ "pixels.pbrt", "-r16x8", "--max-pixels=100" },
+            "raylane: pixels.pbrt: a picture of 16x8 is asked for, of more than 100 pixels (see " ++
+                "--max-pixels and -r)\n",
+        },
+        .{
+            &.{ "samples.pbrt", "-r16", "--spp=1", "--max-pixels=60" },
+            "raylane: samples.pbrt: a picture of 16x4 is asked for, of more than 60 pixels (see " ++
+                "--max-pixels and -r)\n",
+        },
+        .{
+            &.{ "pixels.pbrt", "--max-triangles=3K" },
+            "raylane: pixels.pbrt:1:96: shapes so far have over 3000 triangles (see " ++
+                "--max-triangles)\n",
+        },
+        .{
+            &.{ "levels.pbrt", "--max-triangles=65535" },
+            "raylane: levels.pbrt:1:12: loopsubdiv: it becomes 65536 triangles, over 65535 with " ++
+                "those before it (see --max-triangles)\n",
+        },
+    }) |case| {
+        const arguments = try std.mem.concat(
+            sandbox.arena_state.allocator(),
+            []const u8,
+            &.{ case[0], &.{ "-o", "a.ppm" } },
+        );
+        const ending = try sandbox.expectExit(3, arguments);
+        try testing.expectEqualStrings(case[1], ending.stderr);
+        try sandbox.expectFiles(&.{ "levels.pbrt", "pixels.pbrt", "samples.pbrt" });
+    }
+    _ = try sandbox.expectExit(0, &.{
+        "samples.pbrt",    "-r8x4", "--spp=1", "--max-triangles=4K",
+        "--max-pixels=32", "-o",    "a.ppm",
+    });
+}
+
+test "--max-time ends what takes longer, whole or not at all" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("a.ppm", "before");
+    const arguments = [_][]const u8{
+        "builtin:cornell", "-r4096x4096", "--spp=4096", "-t1", "-q", "-oa.ppm", "--max-time",
+    };
+    const ending = try sandbox.expectExit(124, &(arguments ++ .{"0.2"}));
+    try testing.expectEqualStrings(
+        "raylane: builtin:cornell: takes longer than the 0.2 s of --max-time\n",
+        ending.stderr,
+    );
+    try testing.expectEqualStrings("before", try sandbox.read("a.ppm"));
+    try sandbox.expectFiles(&.{"a.ppm"});
+    _ = try sandbox.expectExit(2, &(arguments ++ .{"0"}));
+}
+
 test "exhausted memory is an error in one line" {
     // An emulator needs the address space itself.
     if (testing.environ.getPosix("RAYLANE_EMULATOR") != null) return error.SkipZigTest;
@@ -1160,19 +1228,20 @@ test "exhausted memory is an error in one line" {
 }
 
 test "a small stack is enough for every command" {
-    // Unoptimised code gives each value a place of its own.
-    const mode = testing.environ.getPosix("RAYLANE_OPTIMIZE") orelse return error.ModeNotNamed;
-    const limit_kib: u32 = if (std.mem.eql(u8, mode, "debug")) 2048 else 256;
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
-    const arena = sandbox.arena_state.allocator();
     // An emulator needs the limit for itself, and has another for the program.
     const script = if (testing.environ.getPosix("RAYLANE_EMULATOR") != null)
-        try arena.print("QEMU_STACK_SIZE={d} exec \"$@\"", .{limit_kib << 10})
+        "QEMU_STACK_SIZE=262144 exec \"$@\" <job"
     else
-        try arena.print("ulimit -s {d}; exec \"$@\"", .{limit_kib});
+        "ulimit -s 256; exec \"$@\" <job";
     try sandbox.write("empty.gltf", empty_scene);
+    try sandbox.write("s.pbrt", pbrt_scene);
+    const job = "{\"input\":\"builtin:cornell\",\"output\":\"b.png\",\"resolution\":[8,8]," ++
+        "\"spp\":1,\"env\":\"none\"}";
+    try sandbox.write("job", job);
     const variant = try firstVariant(&sandbox);
+    const small = [_][]const u8{ "-r8x8", "--spp=1", "-q" };
     for ([_][]const []const u8{
         &.{"--help"},
         &.{"--list-variants"},
@@ -1181,12 +1250,72 @@ test "a small stack is enough for every command" {
         &.{ "builtin:cornell", "-r64x64", "-t1", "--bvh=high", "--count-tests" },
         &.{ "builtin:cornell", "-r64x64", "-t2" },
         &.{ "builtin:atrium", "-r8x8" },
+        &(.{ "builtin:cornell", "--integrator=path", "--denoise", dark } ++ small),
+        &(.{ "builtin:cornell", "--integrator=lights", dark } ++ small),
+        &(.{ "builtin:cornell", "s.pbrt", "empty.gltf", dark, "--turntable=2" } ++ small),
+        &.{ "--scenario", job },
+        &.{"serve"},
+        &.{ "info", "builtin:cornell", "-q" },
+        &(.{ "builtin:cornell", "--tile=1/1", "-ocornell.exr", dark } ++ small),
+        &.{ "merge", "cornell.exr", "-omerged.png" },
+        &.{ "compare", "b.png", "merged.png" },
         &.{ "bench", "builtin:cornell", "-r16x16", "-q", "--no-energy", "--rounds=2", variant },
     }) |arguments| {
         const ending = try sandbox.runShell(script, arguments);
-        errdefer std.debug.print("{s}: {s}\n", .{ arguments[0], ending.stderr });
+        errdefer std.debug.print("{s} {s}: {s}\n", .{
+            arguments[0], if (arguments.len > 1) arguments[1] else "", ending.stderr,
+        });
         try testing.expectEqual(0, ending.exit_code);
     }
+}
+
+test "few descriptors are enough, or an error in one line" {
+    // An emulator needs some itself.
+    if (testing.environ.getPosix("RAYLANE_EMULATOR") != null) return error.SkipZigTest;
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.write("s.glb", try triangleScene(sandbox.arena_state.allocator()));
+    const arguments = [_][]const u8{ "s.glb", dark, "-r4x4", "--spp=1", "-q", "-oa.png" };
+    // Beyond the standard three: none, two, and what is enough.
+    for ([_][]const u8{ "3", "5", "10" }, [_]u8{ 1, 1, 0 }) |limit, exit_code| {
+        errdefer std.debug.print("{s}\n", .{limit});
+        const script = try sandbox.arena_state.allocator().print(
+            "ulimit -n {s}; exec \"$@\"",
+            .{limit},
+        );
+        const ending = try sandbox.runShell(script, &arguments);
+        try testing.expectEqual(exit_code, ending.exit_code);
+        if (exit_code == 0) continue;
+        try expectOneErrorLine(ending);
+        try sandbox.expectFiles(&.{"s.glb"});
+    }
+    try sandbox.expectFiles(&.{ "a.png", "s.glb" });
+}
+
+test "a file that ends before its size does is an error, or a texture less" {
+    // The system says 4096 bytes, and has fewer.
+    const short = "/sys/devices/system/cpu/online";
+    Io.Dir.cwd().access(io, short, .{}) catch return error.SkipZigTest;
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    try sandbox.folder.dir.symLink(io, short, "short", .{});
+    try sandbox.write("s.gltf",
+        \\{"asset":{"version":"2.0"},"buffers":[{"byteLength":12,"uri":"short"}],
+        \\"bufferViews":[{"buffer":0,"byteLength":12}],"accessors":[{"bufferView":0,"count":1,
+        \\"componentType":5126,"type":"VEC3"}],"meshes":[{"primitives":[{"mode":0,
+        \\"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}],"scene":0}
+    );
+    try sandbox.write("t.pbrt", pbrt_scene ++
+        "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"short\"\n" ++
+        "Material \"matte\" \"texture Kd\" \"t\"\nShape \"sphere\"\n");
+    const options = [_][]const u8{ "--allow-outside", dark, "-r4x4", "--spp=1", "-oa.png" };
+    for ([_][]const u8{ short, "s.gltf" }) |scene| {
+        const ending = try sandbox.expectExit(1, &(.{scene} ++ options));
+        try expectOneErrorLine(ending);
+        try testing.expectStringEndsWith(ending.stderr, "changed while it was read\n");
+    }
+    const textured = try sandbox.expectExit(0, &(.{"t.pbrt"} ++ options));
+    try testing.expect(std.mem.find(u8, textured.stderr, "changed while it was read") != null);
 }
 
 /// Starts a render that does not end by itself, by a script as `runShell` takes it, and waits until

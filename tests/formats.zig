@@ -733,50 +733,56 @@ fn damage(name: []const u8, bytes: []const u8, seed: u64, rounds: usize) !void {
     }
 }
 
+const obj_text =
+    \\v 0 0 0 1 0 0
+    \\v 1 0 0
+    \\v 1 1 0
+    \\v 0 1 \
+    \\ 0
+    \\vt 0 0
+    \\vn 0 0 1
+    \\s 1
+    \\f 1/1/1 2/1/1 3//1 -1
+    \\f 1 2 3 4
+    \\usemtl a
+    \\l 1 2
+    \\p 3 4
+;
+
+const stl_text =
+    \\solid x
+    \\facet normal 0 0 1
+    \\outer loop
+    \\vertex 0 0 0
+    \\vertex 1 0 0
+    \\vertex 0 1 0
+    \\endloop
+    \\endfacet
+    \\endsolid
+;
+
+const ply_text = ply_vertices ++
+    \\property uchar red
+    \\element face 1
+    \\property list uchar int vertex_indices
+    \\property list uchar float texcoord
+    \\element tristrips 1
+    \\property list int int vertex_indices
+    \\element edge 1
+    \\property int vertex1
+    \\property int vertex2
+    \\end_header
+    \\0 0 0 255 1 0 0 0 1 1 0 9 0 1 0 8
+    \\4 0 1 2 3 8 0 0 1 0 1 1 0 1
+    \\4 0 1 2 -1
+    \\0 1
+;
+
 test "no damage to an OBJ, STL or PLY file crashes" {
-    try damage("a.obj",
-        \\v 0 0 0 1 0 0
-        \\v 1 0 0
-        \\v 1 1 0
-        \\v 0 1 \
-        \\ 0
-        \\vt 0 0
-        \\vn 0 0 1
-        \\s 1
-        \\f 1/1/1 2/1/1 3//1 -1
-        \\f 1 2 3 4
-        \\usemtl a
-        \\l 1 2
-        \\p 3 4
-    , 1, 300);
+    try damage("a.obj", obj_text, 1, 300);
     try damage("a.stl", &binaryStl("solid COLOR=\xff\x00\x00\xff", .{ 0, 0x8000 }), 2, 100);
-    try damage("a.stl",
-        \\solid x
-        \\facet normal 0 0 1
-        \\outer loop
-        \\vertex 0 0 0
-        \\vertex 1 0 0
-        \\vertex 0 1 0
-        \\endloop
-        \\endfacet
-        \\endsolid
-    , 3, 100);
-    try damage("a.ply", ply_vertices ++
-        \\property uchar red
-        \\element face 1
-        \\property list uchar int vertex_indices
-        \\property list uchar float texcoord
-        \\element tristrips 1
-        \\property list int int vertex_indices
-        \\element edge 1
-        \\property int vertex1
-        \\property int vertex2
-        \\end_header
-        \\0 0 0 255 1 0 0 0 1 1 0 9 0 1 0 8
-        \\4 0 1 2 3 8 0 0 1 0 1 1 0 1
-        \\4 0 1 2 -1
-        \\0 1
-    , 4, 300);
+    try damage("a.stl", stl_text, 3, 100);
+    try damage("a.ply", ply_text, 4, 300);
 }
 
 test "no damage to a material library crashes" {
@@ -815,4 +821,22 @@ test "a lack of memory while an OBJ file is read leaks none" {
     defer folder.cleanup();
     try folder.dir.writeFile(io, .{ .sub_path = "my materials.mtl", .data = library });
     try std.testing.checkAllAllocationFailures(gpa, readWithLibrary, .{folder.dir});
+}
+
+fn readAndFree(allocator: std.mem.Allocator, name: []const u8, bytes: []const u8) !void {
+    var said: Diagnostic = .{};
+    var scene = try raylane.parse.parseNamed(allocator, io, name, bytes, .cwd(), .{}, &said);
+    scene.deinit();
+}
+
+test "a lack of memory while an STL, PLY or gzip file is read leaks none" {
+    var packed_file: Io.Writer.Allocating = .init(gpa);
+    defer packed_file.deinit();
+    try gzipped(&packed_file.writer, obj_text);
+    for ([_][2][]const u8{
+        .{ "a.stl", &binaryStl("solid COLOR=\xff\x00\x00\xff", .{ 0, 0x8000 }) },
+        .{ "a.stl", stl_text },
+        .{ "a.ply", ply_text },
+        .{ "a.obj.gz", packed_file.written() },
+    }) |file| try std.testing.checkAllAllocationFailures(gpa, readAndFree, .{ file[0], file[1] });
 }

@@ -13,8 +13,11 @@ test {
     _ = @import("strokes.zig");
     _ = @import("decode.zig");
     _ = @import("environment.zig");
+    _ = @import("exhaustion.zig");
     _ = @import("forgiven.zig");
     _ = @import("formats.zig");
+    _ = @import("garbage.zig");
+    _ = @import("fuzz.zig");
     _ = @import("glass.zig");
     _ = @import("gltf_animations.zig");
     _ = @import("gltf_materials.zig");

@@ -277,3 +277,15 @@ test "Draco: a scene of two meshes, or a build that says that it cannot" {
         try expectGrid(mesh, 1);
     }
 }
+
+fn parseAndFree(allocator: std.mem.Allocator, path: []const u8) !void {
+    var said: Diagnostic = .{};
+    var scene = try raylane.parse.parse(allocator, io, path, .{}, &said);
+    scene.deinit();
+}
+
+test "every allocation may fail while compressed meshes are read" {
+    const fails = testing.checkAllAllocationFailures;
+    try fails(gpa, parseAndFree, .{"tests/meshes/meshopt.gltf"});
+    if (draco.is_held) try fails(gpa, parseAndFree, .{"tests/meshes/draco.gltf"});
+}

@@ -54,6 +54,7 @@ const directions = [_]Row{
     .{ .part = "simd", .may_import = &.{"variant"} },
     .{ .part = "parallel", .may_import = &.{"simd"} },
     .{ .part = "builtin", .may_import = &.{"scene"} },
+    .{ .part = "call_stack", .may_import = &.{} },
     .{ .part = "parse", .may_import = &.{ "scene", "decode" } },
     .{ .part = "scene", .may_import = &.{} },
     .{
@@ -107,6 +108,7 @@ const roots = [_][]const u8{
     "bench/poses.zig",
     "bench/rays.zig",
     "bench/structures.zig",
+    "fuzz/main.zig",
     "src/kernel.zig",
     "src/level.zig",
     "src/main.zig",
@@ -516,6 +518,27 @@ test "an import against the way of the data is found" {
     try expectFinding(rule, "src/trace.zig", "const a = @import(\"trace/shade/b.zig\");", null);
     try expectFinding(rule, "src/new.zig", "", "src/new.zig:1: 'new' is not in tidy's table");
     try expectFinding(rule, "src/raylane.zig", "const a = @import(\"trace.zig\");", null);
+}
+
+/// Where the time of day is asked for: to be told, and to be compared with times of files. All else
+/// is measured by the clock that nobody sets, so that no length of time depends on who does.
+const wall_clock_files = [_][]const u8{ "src/bench.zig", "src/commands/serve/kept.zig" };
+
+fn checkClocks(findings: *Findings, file: File) Allocator.Error!void {
+    if (!file.isZig() or partOf(file.path) == null) return;
+    if (contains(&wall_clock_files, file.path)) return;
+    for ([_][]const u8{ ".real" ++ ".now", ".clock = .real" }) |text| {
+        const place = std.mem.find(u8, file.source, text) orelse continue;
+        try findings.add(file.path, lineIndex(file.source, place), "asks for the time of day", .{});
+    }
+}
+
+test "no length of time is measured by a clock that can be set" {
+    try expectTidy(checkClocks);
+    const source = "\nconst now = Io.Clock.real" ++ ".now(io);";
+    try expectFinding(checkClocks, "src/a.zig", source, "src/a.zig:2: asks for the time of day");
+    try expectFinding(checkClocks, "src/bench.zig", source, null);
+    try expectFinding(checkClocks, "src/a.zig", "const now = Io.Clock.awake.now(io);", null);
 }
 
 /// Lists the Zig files that no root leads to.

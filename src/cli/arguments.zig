@@ -84,6 +84,10 @@ pub fn helpOf(comptime sections: []const Section) []const u8 {
             for (section.options) |option| {
                 const indent = if (option.usage[1] == '-') "      " else "  ";
                 var left: []const u8 = indent ++ option.usage;
+                if (left.len >= help_column) {
+                    text = text ++ left ++ "\n";
+                    left = "";
+                }
                 var lines = std.mem.splitScalar(u8, option.help, '\n');
                 while (lines.next()) |line| {
                     const gap: [help_column - left.len]u8 = @splat(' ');

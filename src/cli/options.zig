@@ -378,7 +378,36 @@ pub const sections: []const arguments_file.Section = &.{
             .usage = "--list-variants",
             .help = "print the names of the variants, the default first",
         },
-        .{ .usage = "--max-memory SIZE", .help = "512M or 2G, say; an error where more is needed" },
+    } },
+    .{ .title = "Limits (see docs/limits.md)", .options = &.{
+        .{
+            .usage = "--max-memory SIZE",
+            .help = "512M or 2G, say (default: three quarters of what the\n" ++
+                "machine or the process's cgroup has left)",
+        },
+        .{
+            .usage = "--max-time S",
+            .help = "seconds for a scene, from reading to writing (default:\nno limit)",
+            .meant = &.{ "--timeout", "--time-limit" },
+        },
+        .{
+            .usage = "--max-triangles N",
+            .help = comptimePrint("with all instances, 5M, say (default: {d},\n" ++
+                "or as many as bytes are read)", .{settings.triangle_count_max}),
+        },
+        .{
+            .usage = "--max-pixels N",
+            .help = comptimePrint("of a picture (default: {d}, of what the scene\n" ++
+                "asks for {d})", .{
+                settings.pixel_count_max, settings.scene_pixel_count_max,
+            }),
+        },
+        .{
+            .usage = "--max-texture-pixels N",
+            .help = comptimePrint("of all images of a scene (default: {d})", .{
+                settings.texture_pixel_count_max,
+            }),
+        },
     } },
     .{ .title = "Messages", .options = &.{
         .{

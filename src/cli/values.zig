@@ -59,6 +59,17 @@ pub fn bytesOf(text: []const u8) ?u64 {
     return std.math.shlExact(u64, count, shift) catch null;
 }
 
+/// A number above 0, or of K, M or G, each 1000 times the one before.
+pub fn countOf(text: []const u8) ?u64 {
+    if (text.len == 0) return null;
+    const unit = std.mem.findScalar(u8, "KMG", std.ascii.toUpper(text[text.len - 1]));
+    const digits = if (unit == null) text else text[0 .. text.len - 1];
+    for (digits) |digit| if (!std.ascii.isDigit(digit)) return null;
+    const count = std.fmt.parseInt(u64, digits, 10) catch return null;
+    const factor = if (unit) |index| std.math.pow(u64, 1000, index + 1) else 1;
+    return if (count == 0) null else std.math.mul(u64, count, factor) catch null;
+}
+
 /// Names with commas between them.
 pub fn layersOf(text: []const u8) ?std.EnumSet(settings.Layer) {
     var layers: std.EnumSet(settings.Layer) = .empty;

@@ -21,6 +21,7 @@ const Options = raylane.cli.Options;
 const Pictures = pictures_file.Pictures;
 const Plan = raylane.batch.Plan;
 const Session = raylane.session.Session;
+const TimeLimit = @import("time_limit.zig").TimeLimit;
 const cli = raylane.cli;
 const printable = raylane.diagnostic.printable;
 const settings = raylane.settings;
@@ -29,7 +30,7 @@ const settings = raylane.settings;
 pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnostic) ExitCode {
     var arena: std.heap.ArenaAllocator = .init(gpa);
     defer arena.deinit();
-    var account: Account = .init(gpa, options.memory_max);
+    var account: Account = .initFor(gpa, io, options.memory_max);
     var batch: Batch = .{
         .gpa = gpa,
         .account = &account,
@@ -202,8 +203,8 @@ pub const Batch = struct {
         var file_bytes: u64 = 0;
         for (batch.plan.files) |file| file_bytes = @max(file_bytes, file.byte_count orelse 0);
         const job_bytes = job_bytes_least + pixel_count * pixel_bytes + file_bytes * unpacked_ratio;
-        const room = batch.options.memory_max orelse memoryAvailable(batch.io) orelse
-            return 1;
+        const room = batch.account.limit;
+        if (room == std.math.maxInt(usize)) return 1;
         const wanted = @min(file_count / 2, batch.thread_count, settings.job_count.max);
         return @intCast(@max(1, @min(wanted, room / job_bytes)));
     }
@@ -348,11 +349,14 @@ fn plural(count: usize) []const u8 {
 const Worker = struct {
     batch: *Batch,
     diagnostic: Diagnostic = .{},
+    /// Its part of the batch's, which can be ended by itself.
+    account: Account = undefined,
     session: Session = undefined,
 
     fn init(worker: *Worker) void {
         const batch = worker.batch;
-        const gpa = batch.account.allocator();
+        worker.account = .init(batch.account.allocator(), null);
+        const gpa = worker.account.allocator();
         worker.session = .init(gpa, batch.io, batch.threadCount(), &worker.diagnostic);
         if (batch.options.partial) worker.session.stop = &signals.stop.is_asked;
     }
@@ -373,7 +377,12 @@ const Worker = struct {
         defer worker.session.drop();
         var pictures: Pictures = .init(batch, &worker.session, index);
         defer pictures.deinit();
-        const outcome = pictures.run();
+        var limit: TimeLimit = .{
+            .io = batch.io,
+            .seconds = batch.options.time_max_s,
+            .title = path,
+        };
+        const outcome = limit.settle(worker.runWithin(&limit, &pictures), &worker.diagnostic);
         outcome catch |err| if (err == error.OutOfMemory and batch.postpone(index))
             return display.endFile(progress, .postponed);
         const is_skipped = pictures.begun_count == 0;
@@ -401,6 +410,11 @@ const Worker = struct {
             });
         };
     }
+
+    fn runWithin(worker: *Worker, limit: *TimeLimit, pictures: *Pictures) Pictures.Error!void {
+        try limit.start(&worker.account, &worker.session.pool, &worker.diagnostic);
+        return pictures.run();
+    }
 };
 
 /// Pictures of so many pixels are small.
@@ -410,16 +424,3 @@ const pixel_count_small = 1 << 20;
 const job_bytes_least = 128 << 20;
 const pixel_bytes = 64;
 const unpacked_ratio = 12;
-
-/// Bytes of memory that the system could give; null: it does not tell.
-fn memoryAvailable(io: Io) ?u64 {
-    var buffer: [4096]u8 = undefined;
-    const text = Io.Dir.cwd().readFile(io, "/proc/meminfo", &buffer) catch return null;
-    var lines = std.mem.tokenizeScalar(u8, text, '\n');
-    while (lines.next()) |line| {
-        const rest = std.mem.cutPrefix(u8, line, "MemAvailable:") orelse continue;
-        const number = std.mem.trim(u8, std.mem.cutSuffix(u8, rest, "kB") orelse continue, " ");
-        return (std.fmt.parseInt(u64, number, 10) catch return null) << 10;
-    }
-    return null;
-}

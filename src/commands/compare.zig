@@ -17,11 +17,11 @@ const printable = raylane.diagnostic.printable;
 /// Compares two images, prints how far they are apart, and says which thresholds they pass.
 pub fn run(gpa: Allocator, io: Io, options: *const cli.Compare, diagnostic: *Diagnostic) ExitCode {
     if (options.output) |name| if (cli.isStdout(name) and console.isTerminal(io)) return .usage;
+    var account: Account = .initFor(gpa, io, null);
     var confinement: Confinement = .init(io, options.sandbox);
     for (options.images) |path| confinement.addFile(path);
     if (options.output) |path| confinement.addOutput(path);
     if (confinement.enter(diagnostic)) |code| return code;
-    var account: Account = .init(gpa, null);
     const allocator = account.allocator();
     var target: ?Target = openMap(io, options.output, diagnostic) catch {
         const text = diagnostic.message.text();

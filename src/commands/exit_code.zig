@@ -15,6 +15,8 @@ pub const ExitCode = enum(u8) {
     invalid = 3,
     /// Images that must be the same are not.
     differ = 4,
+    /// The scene has taken longer than it may.
+    timed_out = 124,
     /// 128 and the number of the signal that asked for a picture before it was finished.
     _,
 
@@ -26,7 +28,7 @@ pub const ExitCode = enum(u8) {
             error.MaterialVariantUnknown, error.AnimationUnknown, error.PartUnknown => .usage,
             error.InvalidInput, error.SceneTooLarge => .invalid,
             error.ImagesDiffer => .differ,
-            error.Canceled => unreachable, // Nobody asks for it here.
+            error.Canceled => .timed_out, // Nothing else cancels here.
         };
     }
 };

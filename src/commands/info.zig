@@ -14,10 +14,10 @@ const cli = raylane.cli;
 
 /// Says what is in a scene file, or why it cannot be read.
 pub fn run(gpa: Allocator, io: Io, options: *const cli.Info, diagnostic: *Diagnostic) ExitCode {
+    var account: Account = .initFor(gpa, io, null);
     var confinement: Confinement = .init(io, options.sandbox);
     confinement.addScene(options.scene, options.load.allow_outside);
     if (confinement.enter(diagnostic)) |code| return code;
-    var account: Account = .init(gpa, null);
     var text: Io.Writer.Allocating = .init(account.allocator());
     defer text.deinit();
     const outcome = describe(&account, io, options, diagnostic, &text.writer);

@@ -15,8 +15,8 @@ const cli = raylane.cli;
 
 /// Merges the parts and writes the picture.
 pub fn run(gpa: Allocator, io: Io, options: *const cli.Merge, diagnostic: *Diagnostic) ExitCode {
+    var account: Account = .initFor(gpa, io, options.memory_max);
     if (confine(gpa, io, options, diagnostic)) |code| return code;
-    var account: Account = .init(gpa, options.memory_max);
     var job: Job = .{ .gpa = account.allocator(), .io = io, .options = options };
     job.run(diagnostic) catch |err| {
         const title = if (options.toStdout()) "standard output" else options.output;

@@ -18,6 +18,7 @@ const Io = std.Io;
 const Options = raylane.cli.Options;
 const Report = raylane.report.Report;
 const Session = raylane.session.Session;
+const TimeLimit = @import("time_limit.zig").TimeLimit;
 const Target = raylane.output.Target;
 const cli = raylane.cli;
 const printable = raylane.diagnostic.printable;
@@ -31,9 +32,9 @@ pub fn run(gpa: Allocator, io: Io, options: *const Options, diagnostic: *Diagnos
     if (options.toStdout() and console.isTerminal(io)) return .usage;
     if (options.isBatch() or isFolder(io, options.scene))
         return batch.run(gpa, io, options, diagnostic);
+    var account: Account = .initFor(gpa, io, options.memory_max);
     if (confine.aroundPictures(gpa, io, options[0..1], diagnostic)) |code|
         return failed(gpa, io, options, null, "", code, diagnostic);
-    var account: Account = .init(gpa, options.memory_max);
     return renderAndReport(&account, io, options, diagnostic);
 }
 
@@ -106,12 +107,19 @@ fn renderAndReport(
         ),
     };
     defer job.session.deinit();
+    var limit: TimeLimit = .{
+        .io = io,
+        .seconds = options.time_max_s,
+        .title = raylane.parse.title(options.scene),
+    };
     var slot: [1]Display.Slot = undefined;
     var display: Display = .init(io, options.progress, &signals.progress_line, &slot);
     display.start();
     const progress = display.beginFile(.{ .index = 1, .count = 1, .name = options.scene });
     job.session.pool.progress = progress;
-    const outcome = job.run();
+    var arena: std.heap.ArenaAllocator = .init(gpa);
+    defer arena.deinit();
+    const outcome = limit.settle(job.runWithin(&limit, account, arena.allocator()), diagnostic);
     display.endFile(progress, if (outcome) |_| .done else |_| .failed);
     display.stop();
     job.sayWarnings();
@@ -147,6 +155,22 @@ const Job = struct {
     warning_count: usize = 0,
 
     const Error = stages.Error;
+
+    fn runWithin(
+        job: *Job,
+        limit: *TimeLimit,
+        account: *Account,
+        arena: Allocator,
+    ) Error!Report {
+        if (job.options.stats == .json) try limit.prepareAnswer(arena, .{
+            .version = cli.version,
+            .scene = job.options.scene,
+            .output = job.outputTitle(),
+            .problem = undefined,
+        }, job.options.toStdout());
+        try limit.start(account, &job.session.pool, job.diagnostic);
+        return job.run();
+    }
 
     fn run(job: *Job) Error!Report {
         const session = &job.session;

@@ -19,6 +19,7 @@ const Options = raylane.cli.Options;
 const Report = raylane.report.Report;
 const Session = raylane.session.Session;
 const Target = raylane.output.Target;
+const TimeLimit = @import("time_limit.zig").TimeLimit;
 const cli = raylane.cli;
 
 const line_bytes_max = raylane.settings.job_bytes_max;
@@ -86,7 +87,20 @@ const Server = struct {
         const output = cli.outputName(arena, &options) catch return console.outOfMemory(server.io);
         var warnings: [raylane.diagnostic.warning_count_max][]const u8 = undefined;
         var text: Io.Writer.Allocating = .init(arena);
-        if (server.picture(&options, output, &diagnostic)) |measured| {
+        var limit: TimeLimit = .{
+            .io = server.io,
+            .seconds = options.time_max_s,
+            .title = options.scene,
+        };
+        limit.prepareAnswer(arena, .{
+            .id = job.id,
+            .version = cli.version,
+            .scene = options.scene,
+            .output = output,
+            .problem = undefined,
+        }, false) catch return console.outOfMemory(server.io);
+        const outcome = server.picture(&options, output, &limit, &diagnostic);
+        if (limit.settle(outcome, &diagnostic)) |measured| {
             var report = measured;
             report.id = job.id;
             report.warnings = diagnostic.warningTexts(&warnings);
@@ -163,12 +177,13 @@ const Server = struct {
         server: *Server,
         asked: *const Options,
         output: []const u8,
+        limit: *TimeLimit,
         diagnostic: *Diagnostic,
     ) Error!Report {
         var target = Target.openFile(server.io, &signals.temporary_files, output, diagnostic) catch
             return error.OutputFailed;
         defer target.abandon();
-        const kept = try server.keep(asked, target.replaces, diagnostic);
+        const kept = try server.keep(asked, target.replaces, limit, diagnostic);
         const session = &kept.session;
         var options = asked.*;
         try kept.recall(server.io, &options.view.environment.source);
@@ -187,17 +202,20 @@ const Server = struct {
         server: *Server,
         options: *const Options,
         replaced: ?raylane.identity.Identity,
+        limit: *TimeLimit,
         diagnostic: *Diagnostic,
     ) Session.Error!*Kept {
         if (server.kept) |kept| {
             if (try kept.holds(server.io, options, replaced)) {
                 kept.begin(server.io, replaced, diagnostic);
+                try limit.start(&kept.account, &kept.session.pool, diagnostic);
                 return kept;
             }
             server.forget();
         }
         server.kept = try .create(server.gpa, server.io, options, diagnostic);
         const kept = server.kept.?;
+        try limit.start(&kept.account, &kept.session.pool, diagnostic);
         try kept.load(server.io, options, replaced);
         return kept;
     }

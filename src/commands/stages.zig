@@ -12,8 +12,9 @@ const Target = raylane.output.Target;
 /// Why there is no picture.
 pub const Error = Session.Error || error{OutputFailed};
 
-/// Places the scene as the options have it.
+/// Places the scene as the options have it, unless that is too much to ask.
 pub fn pose(session: *Session, options: *const Options) Error!void {
+    try session.checkWishes(&options.view, &options.render);
     return session.pose(.{
         .lanes = raylane.variant.compiled[options.render.variant].lanes,
         .tree_quality = options.tree_quality,

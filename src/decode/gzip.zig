@@ -72,8 +72,11 @@ fn append(
     const claimed = std.mem.readInt(u32, body[body.len - 4 ..][0..4], .little);
     var room = @min(claimed, whole_max - before);
     while (true) {
-        // And one for the zero byte.
-        try result.ensureTotalCapacityPrecise(gpa, before + room + 1);
+        // And one for the zero byte. What has many members grows by more than each.
+        if (before == 0)
+            try result.ensureTotalCapacityPrecise(gpa, room + 1)
+        else
+            try result.ensureTotalCapacity(gpa, before + room + 1);
         var used: usize = 0;
         var written: usize = 0;
         const out = result.allocatedSlice()[before..][0..room];

@@ -192,6 +192,11 @@ fn entryInAnyCase(
     return least;
 }
 
+/// Triangles that the scene may place, for what has been read so far.
+pub fn triangleCountMax(resources: *const Resources) u64 {
+    return resources.settings.triangleCountMax(resources.bytes_read);
+}
+
 const LoadError = Error || error{ NotRegular, IsFolder, Overwritten };
 
 fn readNamed(

@@ -64,7 +64,7 @@ noinline fn makeOf(
     defer collector.deinit();
     if (has_emitters) try collector.addEmitters();
     const emitter_count = collector.leaves.items.len;
-    for (frame.lights, 0..) |*light, number| try collector.addLight(light, @intCast(number));
+    for (frame.all_lights, 0..) |*light, number| try collector.addLight(light, @intCast(number));
     const leaves = try arena.dupe(world.LightLeaf, collector.leaves.items);
     const nodes = try light_tree.build(gpa, arena, collector.bounds.items, leaves);
     var sampler: world.LightSampler = .{
@@ -75,7 +75,7 @@ noinline fn makeOf(
         .directional = &.{},
         .tree = .{ .nodes = nodes, .leaves = leaves, .emitter_count = emitter_count },
     };
-    try addDirectional(arena, frame.lights, &sampler);
+    try addDirectional(arena, frame.all_lights, &sampler);
     try addEnvironment(arena, frame.environment, pool, &sampler);
     return .{ .arena = arena_state, .sampler = sampler };
 }

@@ -15,6 +15,7 @@ const parallel = @import("../parallel.zig");
 const pyramid_file = @import("pyramid.zig");
 const relief = @import("relief.zig");
 const scene = @import("../scene.zig");
+const user_settings = @import("../settings.zig");
 const world = @import("../world.zig");
 const Diagnostic = @import("../diagnostic.zig").Diagnostic;
 const printable = @import("../diagnostic.zig").printable;
@@ -34,6 +35,8 @@ pub const Settings = struct {
     pool: *parallel.Pool,
     /// Larger images are halved until they fit, at least 1.
     side_max: u32 = pyramid_file.side_max,
+    /// Pixels of all images together, before that.
+    pixel_count_max: u64 = user_settings.texture_pixel_count_max,
 };
 
 /// `SceneTooLarge`: the diagnostic says more.
@@ -139,7 +142,12 @@ pub fn load(
     diagnostic: *Diagnostic,
 ) Error!TextureSet {
     assert(settings.side_max >= 1);
-    var work: Work = .{ .gpa = gpa, .from = from, .side_max = settings.side_max };
+    var work: Work = .{
+        .gpa = gpa,
+        .from = from,
+        .side_max = settings.side_max,
+        .pixel_count_max = settings.pixel_count_max,
+    };
     defer work.deinit();
     errdefer work.dropPyramids();
     try work.collect();
@@ -208,6 +216,7 @@ const Work = struct {
     gpa: Allocator,
     from: *const scene.Scene,
     side_max: u32,
+    pixel_count_max: u64 = user_settings.texture_pixel_count_max,
     is_drawn: []bool = &.{},
     vertex_alpha: []AlphaRange = &.{},
     requests: std.ArrayList(Request) = .empty,
@@ -302,6 +311,7 @@ const Work = struct {
     /// that all textures take at most.
     fn plan(work: *Work, diagnostic: *Diagnostic) Error!u64 {
         var total: u64 = 0;
+        var pixel_count = work.environmentPixels();
         for (work.request_of, 0..) |requests, image| {
             if (requests[0] == scene.none and requests[1] == scene.none) continue;
             var reason: decode.Reason = .{};
@@ -311,12 +321,18 @@ const Work = struct {
             };
             if (work.from.images[image].is_relief) info.channel_count = relief.channel_count;
             total += work.pyramidBytes(&info, requests);
+            pixel_count += @as(u64, info.width) * info.height;
             try work.tasks.append(work.gpa, .{
                 .image = @intCast(image),
                 .info = info,
                 .requests = requests,
             });
         }
+        if (pixel_count > work.pixel_count_max) return diagnostic.fail(
+            error.SceneTooLarge,
+            "its images have {d} pixels, more than {d} (see --max-texture-pixels)",
+            .{ pixel_count, work.pixel_count_max },
+        );
         if (total > @min(texture_bytes_max, std.math.maxInt(usize))) return diagnostic.fail(
             error.SceneTooLarge,
             "its textures take {d} MiB, more than {d}; --max-texture-size makes them smaller",
@@ -324,6 +340,19 @@ const Work = struct {
         );
         std.mem.sortUnstable(Task, work.tasks.items, {}, Task.isLarger);
         return total;
+    }
+
+    /// Pixels of the images that surround the scene.
+    fn environmentPixels(work: *const Work) u64 {
+        const map = if (work.from.environment) |*map| map else return 0;
+        const faces: []const u32 = if (map.projection == .cube) &map.faces else &.{map.image};
+        var count: u64 = 0;
+        for (faces) |face| {
+            var reason: decode.Reason = .{};
+            const info = decode.info(work.from.images[face].bytes, &reason) catch continue;
+            count += @as(u64, info.width) * info.height;
+        }
+        return count;
     }
 
     /// Bytes that an image's textures take at most.
@@ -1119,6 +1148,30 @@ test "alpha of factor, texture and vertices together" {
     for ([_]?f32{ null, 0, -1, 1.01, std.math.inf(f32), std.math.nan(f32) }) |none_kept| {
         try testing.expectEqual(null, cutoffCode(none_kept));
     }
+}
+
+test "images of more pixels than are allowed are refused by their headers" {
+    var files: std.heap.ArenaAllocator = .init(testing.allocator);
+    defer files.deinit();
+    const file = try TestImage.png(files.allocator(), 2, 3, 1, &@as([6]u8, @splat(9)));
+    var from = try testScene(testing.allocator, &.{ file, file }, &.{
+        .{ .base_color_texture = .{ .texture = 0 } },
+        .{ .base_color_texture = .{ .texture = 1 } },
+    });
+    defer from.deinit();
+    var pool: parallel.Pool = .init(1);
+    defer pool.deinit();
+    var diagnostic: Diagnostic = .{};
+    var settings: Settings = .{ .pool = &pool, .side_max = 1, .pixel_count_max = 11 };
+    const refused = load(testing.allocator, &from, settings, &diagnostic);
+    try testing.expectError(error.SceneTooLarge, refused);
+    try testing.expectEqualStrings(
+        "its images have 12 pixels, more than 11 (see --max-texture-pixels)",
+        diagnostic.message.text(),
+    );
+    settings.pixel_count_max = 12;
+    var set = try load(testing.allocator, &from, settings, &diagnostic);
+    set.deinit();
 }
 
 test "threads change nothing, batches neither" {

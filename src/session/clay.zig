@@ -97,4 +97,5 @@ pub fn applyTo(clay: *const Clay, frame: *world.Frame) void {
     frame.geometry = &clay.geometry;
     frame.materials = &clay.materials;
     frame.lights = &.{};
+    frame.all_lights = &.{};
 }

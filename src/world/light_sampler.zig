@@ -70,7 +70,7 @@ pub const LightNode = struct {
 pub const LightLeaf = struct {
     /// The children on the way to it from the root, two bits each, the first the lowest.
     path: u64,
-    /// A triangle that emits, else a light of `Frame.lights`.
+    /// A triangle that emits, else a light of `Frame.all_lights`.
     is_emitter: bool,
     /// Of emitters: seen from behind as well.
     is_two_sided: bool = false,
@@ -103,7 +103,7 @@ pub const LightTree = struct {
 
 /// A directional light.
 pub const DirectionalChoice = struct {
-    /// Its number in `Frame.lights`.
+    /// Its number in `Frame.all_lights`.
     light: u32,
     /// Share of the irradiance of all of them, and the sum of shares up to its own.
     share: f32,

@@ -65,7 +65,7 @@ pub const Kept = struct {
         const kept = try gpa.create(Kept);
         kept.* = .{
             .gpa = gpa,
-            .account = .init(gpa, options.memory_max),
+            .account = .initFor(gpa, io, options.memory_max),
             .session = undefined,
             .arena = .init(gpa),
         };

@@ -32,6 +32,8 @@ input: *Input,
 /// What has been added so far.
 scene: *scene_data.Builder,
 parts: std.ArrayList(Part) = .empty,
+/// Of all instances.
+triangle_count: u64 = 0,
 /// Radiance from everywhere, of all infinite lights that shine evenly.
 sky: ?Vec3 = null,
 /// There is an infinite light whose map is not read.
@@ -61,6 +63,7 @@ pub fn clear(builder: *SceneBuilder) void {
     builder.scene.instances.clearRetainingCapacity();
     builder.scene.lights.clearRetainingCapacity();
     builder.parts.clearRetainingCapacity();
+    builder.triangle_count = 0;
     builder.scene.scene.environment = null;
     builder.scene.scene.has_area_lights = false;
     builder.sky = null;
@@ -96,6 +99,13 @@ fn instantiateAt(builder: *SceneBuilder, mesh: u32, node: u32) Error!void {
         builder.input.offset(),
         "over {d} instances of meshes",
         .{limits.instance_count_max},
+    );
+    const triangle_count_max = builder.input.resources.triangleCountMax();
+    builder.triangle_count += builder.scene.meshes.items[mesh].triangles.len;
+    if (builder.triangle_count > triangle_count_max) return builder.input.fail(
+        builder.input.offset(),
+        "shapes so far have over {d} triangles (see --max-triangles)",
+        .{triangle_count_max},
     );
     try builder.scene.addInstance(mesh, node);
 }

@@ -43,6 +43,9 @@ pub fn search(comptime Kernel: type, visibility: anytype, path: anytype) void {
     const found = findAll(Kernel, visibility, path, null);
     if (found.any_hidden or (found.any_met and visibility.frame.materials.volumes.len > 1))
         searchTouching(Kernel, visibility, path);
+    if (found.any_met) for (&visibility.boundaries) |*boundaries| {
+        visibility.cuts.nested += boundaries.forgotten_count;
+    };
 }
 
 const Found = struct { any_met: bool, any_hidden: bool };
@@ -102,6 +105,8 @@ pub fn Boundaries(comptime Kernel: type) type {
         f0: [Kernel.ray_count]f32,
         /// Of what is beyond, by channel.
         sigma_t: [3][Kernel.ray_count]f32,
+        /// Hits where rays enter more volumes than are told apart.
+        forgotten_count: u32,
         /// What rays are in beyond, whatever they hit.
         beyond: [Kernel.ray_count]Nesting,
 
@@ -124,6 +129,7 @@ pub fn Boundaries(comptime Kernel: type) type {
             var primitives = ray.closest.primitive.toArray();
             var masks: [3]u32 = @splat(0);
             boundaries.beyond = nestings.*;
+            boundaries.forgotten_count = 0;
             boundaries.eta = @splat(1);
             boundaries.f0 = @splat(0);
             boundaries.sigma_t = @splat(@splat(0));
@@ -148,6 +154,9 @@ pub fn Boundaries(comptime Kernel: type) type {
                 const boundary: volumes_file.Boundary =
                     .cross(nestings[lane], crossings[0..count]);
                 boundaries.beyond[lane] = boundary.beyond;
+                const is_forgotten = nestings[lane].isFull() and boundary.beyond.isFull() and
+                    !crossings[0].is_leaving;
+                boundaries.forgotten_count += @intFromBool(is_forgotten);
                 boundaries.eta[lane] = boundary.eta(volumes);
                 const sigma = Volume.sigmaOf(volumes, boundary.beyond.top());
                 for (&boundaries.sigma_t, sigma) |*to, channel| to[lane] = channel;

@@ -64,22 +64,26 @@ pub fn addEscaped(
 }
 
 /// Ends paths that have gone straight on through as many surfaces as they may: what is left of them
-/// is better spent on what is around the scene than on a black that nothing there has.
+/// is better spent on what is around the scene than on a black that nothing there has. Returns how
+/// many these are.
 pub fn endRest(
     comptime Kernel: type,
     around: *const world_file.Environment,
     path: *const path_file.PathState(Kernel),
     vertices: *const [Kernel.group_count]path_file.Vertex(Kernel.Rays),
     sample: *sample_file.Sample(Kernel),
-) void {
-    if (path.transparency_depth < visibility_file.transparency_depth_max) return;
-    const masks = path.restLanes(vertices) orelse return;
+) u64 {
+    if (path.transparency_depth < visibility_file.transparency_depth_max) return 0;
+    const masks = path.restLanes(vertices) orelse return 0;
+    var count: u64 = 0;
     for (masks, vertices, 0..) |mask, *vertex, group| {
         if (mask.none()) continue;
         const left = path.restThroughput(vertex, group);
         const throughput: Kernel.Rays.Vec3 = .select(mask, left, .splat(.{ 0, 0, 0 }));
         addSurroundings(Kernel, around, path, group, mask, throughput, sample);
+        count += mask.popCount();
     }
+    return count;
 }
 
 /// Adds what is around the scene as rays see it, worth `throughput`, which is 0 in other lanes.

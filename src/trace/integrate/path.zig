@@ -18,6 +18,9 @@ const visibility = @import("visibility.zig");
 const assert = std.debug.assert;
 const Frame = @import("../../world.zig").Frame;
 
+/// Light that comes from behind blended surfaces and is worth no more is left out.
+const rest_throughput_min = 0x1p-16;
+
 /// Bounces at most.
 pub const depth_limit = @import("../../settings.zig").depth.max;
 
@@ -144,18 +147,23 @@ pub fn PathState(comptime Kernel: type) type {
             path.nestings[group] = point.beyond;
         }
 
-        /// Lanes of paths that go straight on behind their vertices, by group; null: none does.
+        /// Lanes of paths that go straight on behind their vertices and are worth it, by group;
+        /// null: none does.
         pub fn restLanes(
             path: *const @This(),
             vertices: *const [Kernel.group_count]Vertex(Kernel.Rays),
         ) ?[Kernel.group_count]Kernel.Rays.Mask {
             var masks: [Kernel.group_count]Kernel.Rays.Mask = undefined;
             var any_left = false;
-            for (&masks, vertices, &path.bundle.groups) |*mask, *vertex, *ray| {
+            for (&masks, vertices, &path.bundle.groups, 0..) |*mask, *vertex, *ray, group| {
                 const missed = ray.closest.primitive.eq(.splat(ray_file.no_primitive));
                 mask.* = ray.active.andNot(missed);
                 if (mask.none()) continue;
                 mask.* = mask.bitAnd(vertex.point.opacity.lt(.splat(1)));
+                if (mask.none()) continue;
+                const left = path.restThroughput(vertex, group);
+                const largest = left.x.max(left.y).max(left.z);
+                mask.* = mask.bitAnd(largest.gt(.splat(rest_throughput_min)));
                 any_left = any_left or mask.any();
             }
             return if (any_left) masks else null;

@@ -154,6 +154,7 @@ pub fn PathStep(comptime Kernel: type) type {
             if (passing.any()) {
                 const most: I32 = .splat(visibility_file.transparency_depth_max);
                 gone = passing.andNot(step.transparency_depth.lt(most));
+                step.visibility.cuts.passing += gone.popCount();
                 path_bounce.pass(Kernel, step, passing.andNot(gone));
             }
             if (stopped.none()) return gone;

@@ -119,7 +119,8 @@ pub fn PathTracer(comptime Kernel: type) type {
 
         /// What all passes so far took.
         pub fn counts(tracer: *const Self) tiles.Counts {
-            return .{ .rays = tracer.rays, .tests = tracer.visibility.tests };
+            const visibility = &tracer.visibility;
+            return .{ .rays = tracer.rays, .tests = visibility.tests, .cuts = visibility.cuts };
         }
 
         /// Adds some samples of each pixel of an area, or of a part of one, to the film.

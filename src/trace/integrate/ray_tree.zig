@@ -118,7 +118,8 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
 
         /// What all passes so far took.
         pub fn counts(tree: *const Self) tiles.Counts {
-            return .{ .rays = tree.rays, .tests = tree.visibility.tests };
+            const visibility = &tree.visibility;
+            return .{ .rays = tree.rays, .tests = visibility.tests, .cuts = visibility.cuts };
         }
 
         /// Adds some samples of each pixel of `width` x `height`, or of a part, to the film.
@@ -199,7 +200,8 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
             // The last pushed is traced first: reflection, refraction, the ray's own rest.
             tree.stack.pushRest(path, &tree.vertices);
             const around = tree.frame.environment;
-            environment_light.endRest(Kernel, around, path, &tree.vertices, &tree.sample);
+            tree.visibility.cuts.passing +=
+                environment_light.endRest(Kernel, around, path, &tree.vertices, &tree.sample);
             if (!any_seen or tree.isEnd()) return;
             const count = tree.bounces.push(path, &tree.vertices, &tree.stack);
             tree.rays.count(path.depth + 1, .{ .closest = count });

@@ -126,6 +126,7 @@ pub const Standing = struct {
 pub const Counts = struct {
     rays: statistics.RayCounts,
     tests: statistics.TestCounts,
+    cuts: statistics.CutCounts = .{},
 };
 
 /// What the frame took.
@@ -133,6 +134,7 @@ pub const Statistics = struct {
     rays: statistics.RayCounts = .{},
     /// Null where they were not counted.
     tests: ?statistics.TestCounts = null,
+    cuts: statistics.CutCounts = .{},
     /// Pixels that came out as not a number and were made black.
     non_finite_count: u64 = 0,
     /// Of the pixels that have the most.
@@ -339,6 +341,7 @@ pub fn render(
         integrator.counts(one, &counts);
         total.rays.add(counts.rays);
         tests.add(counts.tests);
+        total.cuts.add(counts.cuts);
     }
     if (integrator.counts_tests) total.tests = tests;
     return total;

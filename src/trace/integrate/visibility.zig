@@ -31,11 +31,14 @@ const Light = world_file.Light;
 pub const transparency_depth_max = 255;
 
 /// Surfaces that weaken a shadow ray before the rest counts as opaque.
-const attenuation_count_max = 16;
+pub const attenuation_count_max = 67;
+
+/// Light of which no more is left is all gone: 16 surfaces that let a half pass.
+const transmittance_min = 0x1p-16;
 
 comptime {
-    // Whoever passes all hits of a search has been weakened too often, unless some were holes.
-    std.debug.assert(multi_hit.hits_max == attenuation_count_max + 1);
+    // Whoever passes all hits of four searches has been weakened too often, unless some were holes.
+    std.debug.assert(4 * multi_hit.hits_max == attenuation_count_max + 1);
     std.debug.assert(transparency_depth_max % multi_hit.hits_max == 0);
 }
 
@@ -64,6 +67,7 @@ pub fn Visibility(comptime Kernel: type) type {
     return struct {
         frame: *const Frame,
         tests: statistics.TestCounts,
+        cuts: statistics.CutCounts,
         hits: multi_hit.HitLists(Kernel),
         /// By group, of the path under way; undefined in frames without volumes.
         boundaries: [group_count]boundaries_file.Boundaries(Kernel),
@@ -76,6 +80,7 @@ pub fn Visibility(comptime Kernel: type) type {
         pub fn init(visibility: *Self, frame: *const Frame) void {
             visibility.frame = frame;
             visibility.tests = .{};
+            visibility.cuts = .{};
             visibility.hits.geometry = frame.geometry;
             visibility.hits.materials = frame.materials;
         }
@@ -207,6 +212,7 @@ pub fn Visibility(comptime Kernel: type) type {
             }
             for (&bundle.groups, transmittances) |*ray, *value| {
                 value.* = .select(ray.active, none, value.*);
+                visibility.cuts.shadow += ray.active.popCount();
             }
         }
 
@@ -271,9 +277,11 @@ pub fn Visibility(comptime Kernel: type) type {
                     weakened_count.add(F32.select(through.weakens, one, .zero()));
                 const limit: F32 = .splat(attenuation_count_max);
                 const ended = weakened_count.gt(limit).bitAnd(ray.active);
-                value.* = .select(ended, none, value.*);
-                const dark = value.x.max(value.y).max(value.z).le(.zero());
-                ray.active = ray.active.andNot(ended).andNot(dark);
+                const dark = value.x.max(value.y).max(value.z).le(.splat(transmittance_min));
+                visibility.cuts.shadow += ended.andNot(dark).popCount();
+                const left = ray.active.andNot(ended).andNot(dark);
+                value.* = .select(ray.active.andNot(left), none, value.*);
+                ray.active = left;
             }
         }
     };

@@ -174,7 +174,7 @@ inline fn within(comptime Lanes: type, number: Lanes.F32, share: Lanes.F32) Lane
 /// Lights with a number, in lanes.
 fn Chosen(comptime Lanes: type) type {
     return struct {
-        /// In `Frame.lights`, negative: none. In `LightTree.leaves`, negative: none.
+        /// In `Frame.all_lights`, negative: none. In `LightTree.leaves`, negative: none.
         light: [Lanes.count]i32,
         emitter: [Lanes.count]i32,
         probability: [Lanes.count]f32,
@@ -347,7 +347,7 @@ fn addLights(
     point.position = receiver.position;
     for (lights.numbers[0..lights.count], lights.lanes[0..lights.count]) |number, all| {
         const lanes = all.bitAnd(asked);
-        const light = &frame.lights[number];
+        const light = &frame.all_lights[number];
         const arrival = light_file.arrive(Lanes, light, &point);
         result.to_light = .select(lanes, arrival.to_light, result.to_light);
         result.radiance = .select(lanes, arrival.irradiance, result.radiance);

@@ -11,7 +11,7 @@ const std = @import("std");
 const Volume = @import("../../world.zig").Volume;
 
 /// Volumes that a ray is in at the same time; of more the last in rank are forgotten.
-const nested_max = 4;
+pub const nested_max = 4;
 
 /// The volumes that a ray is in.
 pub const Nesting = struct {
@@ -20,6 +20,11 @@ pub const Nesting = struct {
 
     /// In none.
     pub const air: Nesting = .{ .ranks = @splat(Volume.air) };
+
+    /// Another volume would be one too many.
+    pub inline fn isFull(nesting: *const Nesting) bool {
+        return nesting.ranks[nested_max - 1] != Volume.air;
+    }
 
     /// Rank of the volume that is there.
     pub inline fn top(nesting: *const Nesting) u16 {

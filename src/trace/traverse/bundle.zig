@@ -38,6 +38,21 @@ pub fn Precalculations(comptime Lanes: type) type {
         /// The one axis of all active rays, if there is one.
         uniform: ?u2,
         view: ray_file.ShearedRay(Rays),
+
+        /// Has some rays enter no box: those that are not finite would enter all of them, or those
+        /// that some backend's minima and maxima let through.
+        noinline fn shut(view: *@This(), lanes: Rays.Mask) void {
+            @branchHint(.cold);
+            const inf = std.math.inf(f32);
+            const slabs = &view.slabs;
+            const before: Rays.F32 = .splat(-inf);
+            slabs.origin = .select(lanes, .splat(@splat(0)), slabs.origin);
+            slabs.shift = .select(lanes, before, slabs.shift);
+            slabs.direction_inv = .select(lanes, .splat(@splat(inf)), slabs.direction_inv);
+            for (&slabs.negative) |*negative| negative.* = negative.andNot(lanes);
+            view.view.shift = .select(lanes, before, view.view.shift);
+            view.fusable = view.fusable.andNot(lanes);
+        }
     };
 }
 
@@ -53,7 +68,7 @@ pub fn viewOf(
     const ends = nodeOrigins(Rays, padding, slabs.origin);
     const near = box.select3(Rays, slabs.negative, ends[1], ends[0]);
     const far = box.select3(Rays, slabs.negative, ends[0], ends[1]);
-    return .{
+    var view: Precalculations(Rays) = .{
         .slabs = slabs,
         .near_shift = near.mul(slabs.direction_inv).neg(),
         .far_shift = far.mul(slabs.direction_inv).neg(),
@@ -62,6 +77,9 @@ pub fn viewOf(
         .uniform = axis.uniform(group.active),
         .view = .init(group.line, axis, padding),
     };
+    const not_finite = group.line.isNotFinite().bitAnd(group.active);
+    if (not_finite.any()) view.shut(not_finite);
+    return view;
 }
 
 /// Where lower and upper faces of nodes are met from, their margin included.

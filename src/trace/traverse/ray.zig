@@ -67,6 +67,16 @@ pub fn Line(comptime Lanes: type) type {
         pub inline fn init(origin: Lanes.Vec3, direction: Lanes.Vec3) @This() {
             return .{ .origin = origin, .direction = direction };
         }
+
+        /// Set where a component is infinite or NaN: no triangle is hit there.
+        pub inline fn isNotFinite(line: @This()) Lanes.Mask {
+            const zero: Lanes.F32 = .zero();
+            const origin = line.origin.scale(zero);
+            const direction = line.direction.scale(zero);
+            const sum = origin.x.add(origin.y).add(origin.z)
+                .add(direction.x).add(direction.y).add(direction.z);
+            return sum.eq(zero).bitNot();
+        }
     };
 }
 

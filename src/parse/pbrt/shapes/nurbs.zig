@@ -93,6 +93,8 @@ const Basis = struct {
     }
 };
 
+/// Points of the surface, row by row: what the control points come to along v is summed once a row,
+/// as the control points of a curve, and its derivative.
 const Surface = struct {
     u: Direction,
     v: Direction,
@@ -100,15 +102,19 @@ const Surface = struct {
     points: []const f32,
     weighted: bool,
     steps: u32,
+    /// By column of the grid.
+    bases: []Basis,
+    /// Of the row under way, by column of control points.
+    curve: [][4]f64,
+    curve_slopes: [][4]f64,
+    row: ?u32 = null,
 
-    fn sampleAt(surface: *const Surface, column: u32, row: u32) Sample {
-        const at_u = parameter(&surface.u, column, surface.steps);
-        const at_v = parameter(&surface.v, row, surface.steps);
-        const u = Basis.at(&surface.u, at_u);
-        const v = Basis.at(&surface.v, at_v);
-        const whole = surface.sum(&u, &v, &u.values, &v.values);
-        const by_u = surface.sum(&u, &v, &u.slopes, &v.values);
-        const by_v = surface.sum(&u, &v, &u.values, &v.slopes);
+    fn sampleAt(surface: *Surface, column: u32, row: u32) Sample {
+        if (surface.row != row) surface.setRow(row);
+        const u = &surface.bases[column];
+        const whole = sum(u, &u.values, surface.curve);
+        const by_u = sum(u, &u.slopes, surface.curve);
+        const by_v = sum(u, &u.values, surface.curve_slopes);
         const w = if (whole[3] != 0) whole[3] else 1;
         const point: Vector = .{ whole[0] / w, whole[1] / w, whole[2] / w };
         const normal = vec3d.cross(slope(by_u, point), slope(by_v, point));
@@ -116,9 +122,39 @@ const Surface = struct {
         return .{
             .point = point,
             .normal = vec3d.normalize(normal) orelse .{ 0, 0, 0 },
-            .u = at_u,
-            .v = at_v,
+            .u = parameter(&surface.u, column, surface.steps),
+            .v = parameter(&surface.v, row, surface.steps),
         };
+    }
+
+    fn setColumns(surface: *Surface) void {
+        for (surface.bases, 0..) |*basis, column| basis.* = .at(
+            &surface.u,
+            parameter(&surface.u, @intCast(column), surface.steps),
+        );
+    }
+
+    fn setRow(surface: *Surface, row: u32) void {
+        surface.row = row;
+        const v: Basis = .at(&surface.v, parameter(&surface.v, row, surface.steps));
+        @memset(surface.curve, @splat(0));
+        @memset(surface.curve_slopes, @splat(0));
+        for (0..v.count) |line| {
+            const first = (v.first + line) * @as(usize, surface.u.point_count);
+            for (surface.curve, surface.curve_slopes, first..) |*to, *to_slope, index| {
+                const from = surface.pointAt(index);
+                for (to, to_slope, from) |*component, *slope_component, of_point| {
+                    component.* += v.values[line] * of_point;
+                    slope_component.* += v.slopes[line] * of_point;
+                }
+            }
+        }
+    }
+
+    fn pointAt(surface: *const Surface, index: usize) [4]f64 {
+        const width: usize = if (surface.weighted) 4 else 3;
+        const point = surface.points[width * index ..][0..width];
+        return .{ point[0], point[1], point[2], if (surface.weighted) point[3] else 1 };
     }
 
     /// Derivative of a quotient, but for a factor above 0.
@@ -132,22 +168,11 @@ const Surface = struct {
         return true;
     }
 
-    fn sum(
-        surface: *const Surface,
-        u: *const Basis,
-        v: *const Basis,
-        u_weights: *const [order_max]f64,
-        v_weights: *const [order_max]f64,
-    ) [4]f64 {
-        var result: [4]f64 = .{ 0, 0, 0, 0 };
-        const width: usize = if (surface.weighted) 4 else 3;
-        for (0..v.count) |row| for (0..u.count) |column| {
-            const weight = u_weights[column] * v_weights[row];
-            const index = (v.first + row) * surface.u.point_count + u.first + column;
-            const from = surface.points[width * index ..][0..width];
-            for (from, result[0..width]) |component, *to| to.* += weight * component;
-            if (!surface.weighted) result[3] += weight;
-        };
+    fn sum(u: *const Basis, weights: *const [order_max]f64, points: []const [4]f64) [4]f64 {
+        var result: [4]f64 = @splat(0);
+        for (weights[0..u.count], points[u.first..][0..u.count]) |weight, point| {
+            for (&result, point) |*to, component| to.* += weight * component;
+        }
         return result;
     }
 
@@ -170,14 +195,24 @@ pub fn nurbs(tessellator: *Tessellator) Error!Geometry {
         "has {d} numbers for {d} by {d} points",
         .{ points.len, u.point_count, v.point_count },
     );
-    const surface: Surface = .{
+    const steps = tessellator.input.resources.settings.tessellation;
+    const gpa = tessellator.input.gpa;
+    const bases = try gpa.alloc(Basis, steps + 1);
+    defer gpa.free(bases);
+    const curves = try gpa.alloc([4]f64, 2 * @as(usize, u.point_count));
+    defer gpa.free(curves);
+    var surface: Surface = .{
         .u = u,
         .v = v,
         .points = points,
         .weighted = weighted,
-        .steps = tessellator.input.resources.settings.tessellation,
+        .steps = steps,
+        .bases = bases,
+        .curve = curves[0..u.point_count],
+        .curve_slopes = curves[u.point_count..],
     };
-    const grid: Grid = .{ .columns = surface.steps, .rows = surface.steps };
+    surface.setColumns();
+    const grid: Grid = .{ .columns = steps, .rows = steps };
     return tessellator.tessellate(.{ .grid = grid }, &surface, Surface.sampleAt);
 }
 

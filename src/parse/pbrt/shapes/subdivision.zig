@@ -78,6 +78,7 @@ pub fn loop(tessellator: *Tessellator) Error!Geometry {
     const asked = tessellator.parameters.integer("levels") orelse
         tessellator.parameters.integer("nlevels") orelse 3;
     const levels: u32 = @intCast(std.math.clamp(asked, 0, limits.subdivision_count_max));
+    try tessellator.reserveTriangles(level.triangles.len *| (@as(u64, 1) << @intCast(2 * levels)));
     const gpa = tessellator.input.gpa;
     for (0..levels) |_| {
         const edges = try findEdges(tessellator, level.triangles);

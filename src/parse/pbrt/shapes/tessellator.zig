@@ -42,6 +42,8 @@ wants_texcoords: bool = false,
 name: []const u8 = "",
 /// Bytes of all geometry so far.
 bytes_used: u64 = 0,
+/// Triangles of all curved shapes so far.
+triangle_count: u64 = 0,
 
 /// Fails where the shape stands.
 pub fn fail(
@@ -78,6 +80,17 @@ pub fn reserve(tessellator: *Tessellator, element_count: u64, element_bytes: u64
     // Each array within half of the address space, too.
     if (tessellator.bytes_used <= limit and bytes <= std.math.maxInt(usize) / 2) return;
     return tessellator.fail("the scene's shapes need much more memory than its files explain", .{});
+}
+
+/// Counts triangles before they are made: `count` of a shape.
+pub fn reserveTriangles(tessellator: *Tessellator, count: u64) Error!void {
+    const limit = tessellator.input.resources.triangleCountMax();
+    tessellator.triangle_count +|= count;
+    if (tessellator.triangle_count <= limit) return;
+    return tessellator.fail(
+        "it becomes {d} triangles, over {d} with those before it (see --max-triangles)",
+        .{ count, limit },
+    );
 }
 
 /// A number that has to be above 0.
@@ -133,6 +146,7 @@ pub fn tessellate(
         @intFromBool(surface.last_row_is_point);
     const triangle_count = @as(u64, grid.columns) * (2 * @as(u64, grid.rows) - points);
     if (vertex_count > std.math.maxInt(u32)) return tessellator.fail("has too many vertices", .{});
+    try tessellator.reserveTriangles(triangle_count);
     const result: Geometry = .{
         .positions = try tessellator.alloc(Vec3, vertex_count),
         .normals = try tessellator.alloc(Vec3, vertex_count),
