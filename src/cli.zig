@@ -1292,9 +1292,9 @@ test "scenarios are kept for whoever reads them, and what comes after counts" {
     try std.testing.expectEqual(1, other.batch.input_count);
     inputs = other.inputs(&diagnostic);
     try std.testing.expectEqualStrings("c", inputs.next().?);
-    const call = (try parseForTest(&.{ "serve", "-q", "--sandbox=off" })).serve;
-    try std.testing.expectEqual(2, call.defaults.len);
-    try std.testing.expectEqual(.off, call.sandbox);
+    const served = (try parseForTest(&.{ "serve", "-q", "--sandbox=off" })).serve;
+    try std.testing.expectEqual(2, served.defaults.len);
+    try std.testing.expectEqual(.off, served.sandbox);
     const bad = parse(&.{ "serve", "--spp=0" }, test_names, &diagnostic);
     try std.testing.expectError(error.UsageInvalid, bad);
     const named = parse(&.{ "serve", "a.glb" }, test_names, &diagnostic);
