@@ -1147,7 +1147,8 @@ test "--max-memory is kept to in every stage, or is an error in one line" {
 test "what a file asks for is refused before the work, in a line that names the option" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
-    const film = "Camera \"perspective\" Film \"image\" \"integer xresolution\" 16384 \"integer yresolution\" ";
+    const film = "Camera \"perspective\" Film \"image\" \"integer xresolution\" 16384 " ++
+        "\"integer yresolution\" ";
     const world = " WorldBegin Shape \"sphere\" Shape \"sphere\" WorldEnd";
     try sandbox.write("pixels.pbrt", film ++ "16384" ++ world);
     const samples = "Sampler \"halton\" \"integer pixelsamples\" 4096 ";
