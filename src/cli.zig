@@ -1292,7 +1292,9 @@ test "scenarios are kept for whoever reads them, and what comes after counts" {
     try std.testing.expectEqual(1, other.batch.input_count);
     inputs = other.inputs(&diagnostic);
     try std.testing.expectEqualStrings("c", inputs.next().?);
-    try std.testing.expectEqual(2, (try parseForTest(&.{ "serve", "-q", "-t2" })).serve.defaults.len);
+    const served = (try parseForTest(&.{ "serve", "-q", "--sandbox=off" })).serve;
+    try std.testing.expectEqual(2, served.defaults.len);
+    try std.testing.expectEqual(.off, served.sandbox);
     const bad = parse(&.{ "serve", "--spp=0" }, test_names, &diagnostic);
     try std.testing.expectError(error.UsageInvalid, bad);
     const named = parse(&.{ "serve", "a.glb" }, test_names, &diagnostic);
@@ -1330,6 +1332,7 @@ test "numbers keep to their ranges" {
         },
         .{ .flag = "--spp", .good = &.{ "1", "4096" }, .bad = &.{ "0", "4097", "" } },
         .{ .flag = "--time-budget", .good = &.{ "0.5", "3600" }, .bad = &.{ "0", "-1", "1s", "" } },
+        .{ .flag = "--sandbox", .good = &.{ "auto", "on", "off" }, .bad = &.{ "", "yes" } },
         .{ .flag = "--progress-image", .good = &.{"p.png"}, .bad = &.{ "", "-", "/dev/stdout" } },
         .{ .flag = "--depth", .good = &.{ "0", "32" }, .bad = &.{ "33", "-1" } },
         .{ .flag = "--tile-size", .good = &.{ "4", "36", "512" }, .bad = &.{ "0", "2", "516" } },

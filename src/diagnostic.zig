@@ -169,6 +169,7 @@ const system_reasons: std.StaticStringMap([]const u8) = .initComptime(.{
     .{ "BadPathName", "not a file name" },
     .{ "BrokenPipe", "nobody reads it" },
     .{ "Canceled", "the program is ending" },
+    .{ "ConnectionResetByPeer", "the connection was reset" },
     .{ "DeviceBusy", "device busy" },
     .{ "DiskQuota", "disk quota exceeded" },
     .{ "FileBusy", "it is in use" },

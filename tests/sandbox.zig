@@ -6,7 +6,8 @@ const Sandbox = @import("cli.zig").Sandbox;
 const testing = std.testing;
 
 const small = [_][]const u8{ "-q", "--env=none", "-r8x8", "--spp=1" };
-const sphere = "WorldBegin\nShape \"sphere\"\n";
+const shape = "Shape \"sphere\"\n";
+const sphere = "WorldBegin\n" ++ shape;
 
 /// Skips the test where `--sandbox on` is an error, which has to say why.
 fn expectThere(sandbox: *Sandbox) !void {
@@ -26,7 +27,7 @@ test "the sandbox leaves what the command line names, wherever it is" {
     for ([_][]const u8{ "scenes", "scenes/parts", "real", "env" }) |name|
         try sandbox.folder.dir.createDir(testing.io, name, .default_dir);
     try sandbox.write("scenes/a.pbrt", "WorldBegin\nInclude \"parts/b.pbrt\"\n");
-    try sandbox.write("scenes/parts/b.pbrt", sphere);
+    try sandbox.write("scenes/parts/b.pbrt", shape);
     try sandbox.write("real/c.pbrt", sphere);
     try sandbox.folder.dir.symLink(testing.io, "../real/c.pbrt", "scenes/c.pbrt", .{});
     const picture = [_][]const u8{ "builtin:cornell", "-v", "--env=none", "-r8x8", "--spp=1" };
@@ -95,7 +96,7 @@ test "a link that leads out of the scene's folder is an error, in the same words
     defer sandbox.deinit();
     try expectThere(&sandbox);
     try sandbox.folder.dir.createDir(testing.io, "scene", .default_dir);
-    try sandbox.write("secret.pbrt", sphere);
+    try sandbox.write("secret.pbrt", shape);
     try sandbox.write("scene/s.pbrt", "WorldBegin\nInclude \"link.pbrt\"\n");
     try sandbox.folder.dir.symLink(testing.io, "../secret.pbrt", "scene/link.pbrt", .{});
     const scene = [_][]const u8{"scene/s.pbrt"} ++ small;

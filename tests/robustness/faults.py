@@ -28,6 +28,7 @@ import time
 import runs
 
 SCENE = "builtin:cornell"
+LARGE_SCENE = "builtin:atrium"
 OLD = b"old picture"
 CGROUPS = pathlib.Path("/sys/fs/cgroup")
 
@@ -196,19 +197,33 @@ def descriptors(tool):
 
 def address_space(tool):
     """Address space from what the program itself takes to enough."""
-    expected(tool, SCENE)
+    expected(tool, LARGE_SCENE)
     least = os.path.getsize(tool.program) + (8 << 20)
     return series(tool, "space", lambda target: (
-        tool.run(SCENE, "-o", target, limits={resource.RLIMIT_AS: least + (size << 20)})
-        for size in range(0, 128, 4)))
+        tool.run(LARGE_SCENE, "-o", target, limits={resource.RLIMIT_AS: least + (size << 20)})
+        for size in range(0, 64, 4)))
+
+
+def memory_groups():
+    """(folder of control groups with memory, name of their limit), of either version, or None."""
+    try:
+        if "memory" in (CGROUPS / "cgroup.subtree_control").read_text(encoding="ascii").split():
+            return CGROUPS, "memory.max"
+    except OSError:
+        pass
+    first = CGROUPS / "memory"
+    return (first, "memory.limit_in_bytes") if (first / "cgroup.procs").exists() else None
 
 
 def control_group(tool):
     """A control group whose memory is too little for the picture: no kill, but a line."""
-    group = CGROUPS / f"raylane-faults-{os.getpid()}"
+    groups = memory_groups()
+    if groups is None:
+        return 0, "no control group could be made", None
+    group = groups[0] / f"raylane-faults-{os.getpid()}"
     try:
         group.mkdir()
-        (group / "memory.max").write_text(str(96 << 20), encoding="ascii")
+        (group / groups[1]).write_text(str(64 << 20), encoding="ascii")
     except OSError:
         if group.exists():
             group.rmdir()
@@ -217,7 +232,7 @@ def control_group(tool):
     codes = collections.Counter()
     why = None
     try:
-        for size in ("256x256", "2048x2048", "8192x8192"):
+        for size in ("64x64", "2048x2048", "8192x8192"):
             command = ["sh", "-c", 'echo $$ >"$0/cgroup.procs"; exec "$@"', str(group),
                        tool.program, SCENE, "-o", str(target), "-r", size, "--spp", "1", "-q",
                        "--env", "none"]

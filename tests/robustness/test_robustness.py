@@ -78,6 +78,7 @@ class Verdicts(unittest.TestCase):
         for expected, run, is_bad in [
                 ("ok", good, False), ("ok", warned, True), ("warn", good, True),
                 ("warn", warned, False), ("error", refused, False), ("error", warned, True),
+                ("ok", self.run_of(0, "raylane: a: warning: nothing to render of 2 triangles"), False),
                 ("ok or warn", good, False), ("ok or warn", refused, True),
                 ("error 3", refused, False), ("error 3", self.run_of(1, "raylane: a"), True)]:
             self.assertEqual(hostile.complaint(expected, run) is not None, is_bad, expected)
