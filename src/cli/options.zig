@@ -260,8 +260,8 @@ pub const sections: []const arguments_file.Section = &.{
             .usage = "--sandbox WHEN",
             .words = wordsOf(settings.Sandbox),
             .help = "keep the program from files elsewhere, the network\n" ++
-                "and other programs: auto (default), where Linux can; on,\n" ++
-                "or it is an error; off",
+                "and other programs: auto (default), where Linux can;\n" ++
+                "on, or it is an error; off",
         },
         .{
             .usage = "--strict",
