@@ -90,7 +90,6 @@ pub fn build(b: *std.Build) void {
     tests.addReport(steps.test_report, targets[0]);
     tests.addCheck(steps.check, targets[0]);
     steps.check.dependOn(&package.program().step);
-
     fuzz.add(.init(b, resolve(b, .{}), optimize orelse .safe, vendor.headers, fuzzed(options)));
     release.add(steps.release, steps.test_release, addVendor(b, release.optional).headers);
     addScenes(steps.scenes, .init(b, resolve(b, .{}), .safe, vendor.headers, options));

@@ -117,7 +117,8 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
 
         /// What all passes so far took.
         pub fn counts(tree: *const Self) tiles.Counts {
-            return .{ .rays = tree.rays, .tests = tree.visibility.tests, .cuts = tree.visibility.cuts };
+            const seen = &tree.visibility;
+            return .{ .rays = tree.rays, .tests = seen.tests, .cuts = seen.cuts };
         }
 
         /// Adds some samples of each pixel of `width` x `height`, or of a part, to the film.
@@ -130,9 +131,8 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
         ) void {
             for (0..stride * stride) |index| {
                 const part = tree.lighting.partOf(rectangle, index) orelse continue;
-                for (first_sample..first_sample + sample_count) |sample| {
+                for (first_sample..first_sample + sample_count) |sample|
                     tree.trace(part, @intCast(sample), film);
-                }
             }
         }
 
