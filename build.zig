@@ -90,15 +90,18 @@ pub fn build(b: *std.Build) void {
     tests.addReport(steps.test_report, targets[0]);
     tests.addCheck(steps.check, targets[0]);
     steps.check.dependOn(&package.program().step);
-
-    var fuzzed = options;
-    fuzzed.extent = .one;
-    fuzzed.is_fuzzed = true;
-    fuzz.add(.init(b, resolve(b, .{}), optimize orelse .safe, vendor.headers, fuzzed));
-
+    fuzz.add(.init(b, resolve(b, .{}), optimize orelse .safe, vendor.headers, fuzzed(options)));
     release.add(steps.release, steps.test_release, addVendor(b, release.optional).headers);
     addScenes(steps.scenes, .init(b, resolve(b, .{}), .safe, vendor.headers, options));
     addLowering(steps.lowering);
+}
+
+/// Of fuzzers: one variant, whose libraries count what has run.
+fn fuzzed(options: Package.Options) Package.Options {
+    var result = options;
+    result.extent = .one;
+    result.is_fuzzed = true;
+    return result;
 }
 
 /// The choice of variants, for programs that are used and for those that compare variants.

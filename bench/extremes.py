@@ -4,7 +4,7 @@
     bench/extremes.py layers 1000000 --alpha 1e-6 -o layers.glb    blended layers before a card
     bench/extremes.py lights 1000000 -o lights.glb                 point lights above a floor
     bench/extremes.py shells 10000 -o shells.glb                   glass spheres in one another
-    bench/extremes.py far 10000 -o far.glb                         a ball, and a corner that far away
+    bench/extremes.py far 10000 -o far.glb                         a ball, and a corner so far away
     bench/extremes.py bits 20000 -o bits.glb                       triangles of random bits
     bench/extremes.py table PROGRAM [--scale 1]                    all of them in small pictures
 

@@ -298,8 +298,11 @@ test "the limit that nobody asks for is below what is left, and said to be so" {
     try std.testing.expectError(error.OutOfMemory, gpa.alloc(u8, 1001));
     var message: Message = .{};
     account.explain(&message);
-    try std.testing.expectEqualStrings("needs more than 1000 bytes, three quarters of the " ++
-        "memory that is left (0 bytes in use, 1001 bytes more asked for; see --max-memory)", message.text());
+    try std.testing.expectEqualStrings(
+        "needs more than 1000 bytes, three quarters of the memory that is left " ++
+            "(0 bytes in use, 1001 bytes more asked for; see --max-memory)",
+        message.text(),
+    );
 }
 
 test inUnits {

@@ -1147,7 +1147,8 @@ test "--max-memory is kept to in every stage, or is an error in one line" {
 test "what a file asks for is refused before the work, in a line that names the option" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
-    const film = "Film \"image\" \"integer xresolution\" 16384 \"integer yresolution\" ";
+    const film = "Camera \"perspective\" Film \"image\" \"integer xresolution\" 16384 " ++
+        "\"integer yresolution\" ";
     const world = " WorldBegin Shape \"sphere\" Shape \"sphere\" WorldEnd";
     try sandbox.write("pixels.pbrt", film ++ "16384" ++ world);
     const samples = "Sampler \"halton\" \"integer pixelsamples\" 4096 ";
@@ -1171,7 +1172,7 @@ test "what a file asks for is refused before the work, in a line that names the 
         },
         .{
             &.{ "pixels.pbrt", "--max-triangles=3K" },
-            "raylane: pixels.pbrt:1:96: shapes so far have over 3000 triangles (see " ++
+            "raylane: pixels.pbrt:1:117: shapes so far have over 3000 triangles (see " ++
                 "--max-triangles)\n",
         },
         .{

@@ -187,7 +187,8 @@ fn set(reader: *const Reader, bench: *Bench, given: Reader.Given) cli.Error!void
         .no_energy => bench.energy = false,
         .allow_outside => bench.allow_outside = true,
         .quiet => bench.quiet = true,
-        .help => unreachable, // Asked for before the rest is read.
+        // By itself it is found before the rest is read.
+        .help => return reader.fail("'-h' stands alone", .{}),
     }
 }
 

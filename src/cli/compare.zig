@@ -134,7 +134,8 @@ fn set(reader: *const Reader, compare: *Compare, given: Reader.Given) cli.Error!
         },
         .stats => compare.stats = try reader.choice(given, cli.Stats),
         .sandbox => compare.sandbox = try reader.choice(given, settings.Sandbox),
-        .help => unreachable, // Asked for before the rest is read.
+        // By itself it is found before the rest is read.
+        .help => return reader.fail("'-h' stands alone", .{}),
     }
 }
 

@@ -103,7 +103,8 @@ fn set(reader: *const Reader, info: *Info, given: Reader.Given) cli.Error!void {
         .sandbox => info.sandbox = try reader.choice(given, settings.Sandbox),
         .allow_outside => info.load.allow_outside = true,
         .quiet => info.quiet = true,
-        .help => unreachable, // Asked for before the rest is read.
+        // By itself it is found before the rest is read.
+        .help => return reader.fail("'-h' stands alone", .{}),
     }
 }
 

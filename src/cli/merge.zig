@@ -105,7 +105,8 @@ pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error
             .max_memory => merge.memory_max = values.bytesOf(flag.value) orelse
                 return reader.bad(flag, "a size such as 512M or 2G"),
             .sandbox => merge.sandbox = try reader.choice(flag, settings.Sandbox),
-            .help => unreachable, // Asked for before the rest is read.
+            // By itself it is found before the rest is read.
+            .help => return reader.fail("'-h' stands alone", .{}),
         },
     };
     merge.output = output orelse return reader.fail("'--output' says where the picture goes", .{});

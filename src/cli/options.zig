@@ -259,9 +259,9 @@ pub const sections: []const arguments_file.Section = &.{
         .{
             .usage = "--sandbox WHEN",
             .words = wordsOf(settings.Sandbox),
-            .help = "keep the program from files elsewhere, the network and\n" ++
-                "other programs: auto (default), where Linux can; on,\n" ++
-                "or it is an error; off",
+            .help = "keep the program from files elsewhere, the network\n" ++
+                "and other programs: auto (default), where Linux can;\n" ++
+                "on, or it is an error; off",
         },
         .{
             .usage = "--strict",
@@ -387,7 +387,7 @@ pub const sections: []const arguments_file.Section = &.{
         },
         .{
             .usage = "--max-time S",
-            .help = "seconds for a scene, from reading to writing (default:\nno limit)",
+            .help = "seconds for a scene, from reading to writing\n(default: no limit)",
             .meant = &.{ "--timeout", "--time-limit" },
         },
         .{

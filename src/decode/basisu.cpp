@@ -2,9 +2,10 @@
  * that we do not call, and the two calls that we make.
  *
  * In: what ktx2.zig found in a file, its sizes checked. Out: RGBA. Of the C++ library there are the
- * headers only: what would need its code has its place here. Memory that runs out and what the
- * transcoder ends the program for leave it by longjmp; what it holds then is freed with the heap
- * behind the hooks, and no destructor needs to run.
+ * headers only: what would need its code has its place here. Memory that runs out, assertions that
+ * do not hold, of indices above all, and what the transcoder ends the program for leave it by
+ * longjmp; what it holds then is freed with the heap behind the hooks, and no destructor needs to
+ * run.
  */
 #include <algorithm>
 #include <assert.h>
@@ -46,6 +47,10 @@ struct rl_call {
 
 thread_local rl_call *rl_now;
 
+[[noreturn]] void rl_fail() {
+    longjmp(rl_now->left, rl_broken);
+}
+
 void *rl_checked(void *memory) {
     if (memory == nullptr) longjmp(rl_now->left, rl_exhausted);
     return memory;
@@ -72,7 +77,7 @@ using namespace ::std;
 using ::std::swap;
 
 [[noreturn]] void terminate() {
-    longjmp(rl_now->left, rl_broken);
+    rl_fail();
 }
 
 /* Of a handful of items. */

@@ -78,11 +78,14 @@ pub fn decode(gpa: Allocator, file: []const u8, reason: *Reason) texels.Error!Te
     switch (header.storage) {
         .plain => try inflate(&hooks, header, memory, reason),
         .uastc => {
-            const raw_bytes = if (header.compression == .none) 0 else header.level_raw_bytes;
-            const raw = try huge_pages.alloc(gpa, u8, @intCast(raw_bytes));
+            // Blocks are read as words, and a file may lie at any address.
+            const is_plain = header.compression == .none;
+            const is_ready = is_plain and std.mem.isAligned(@intFromPtr(header.level.ptr), 4);
+            const copied_bytes = if (is_plain) header.level.len else header.level_raw_bytes;
+            const raw = try huge_pages.alloc(gpa, u8, @intCast(if (is_ready) 0 else copied_bytes));
             defer huge_pages.free(gpa, raw);
-            if (header.compression != .none) try inflate(&hooks, header, raw, reason);
-            const level = if (header.compression == .none) header.level else raw;
+            if (!is_ready) try inflate(&hooks, header, raw, reason);
+            const level = if (is_ready) header.level else raw;
             try transcode(&hooks, &.{
                 .width = header.width,
                 .height = header.height,

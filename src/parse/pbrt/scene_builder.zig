@@ -102,8 +102,7 @@ fn instantiateAt(builder: *SceneBuilder, mesh: u32, node: u32) Error!void {
     );
     const triangle_count_max = builder.input.resources.triangleCountMax();
     builder.triangle_count += builder.scene.meshes.items[mesh].triangles.len;
-    if (builder.triangle_count > triangle_count_max) return builder.input.fail(
-        builder.input.offset(),
+    if (builder.triangle_count > triangle_count_max) return builder.input.failHere(
         "shapes so far have over {d} triangles (see --max-triangles)",
         .{triangle_count_max},
     );

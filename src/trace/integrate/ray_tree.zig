@@ -94,8 +94,7 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
             assert(settings.depth_max <= path_file.depth_limit);
             const tree = try gpa.create(Self);
             errdefer gpa.destroy(tree);
-            const frame = try tree.own_frame
-                .init(gpa, shared_frame, settings.pool.thread_count);
+            const frame = try tree.own_frame.init(gpa, shared_frame, settings.pool.thread_count);
             errdefer tree.own_frame.deinit(gpa);
             tree.stack = try .init(gpa, settings.depth_max, frame.hasLayers());
             tree.frame = frame;
@@ -118,8 +117,8 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
 
         /// What all passes so far took.
         pub fn counts(tree: *const Self) tiles.Counts {
-            const visibility = &tree.visibility;
-            return .{ .rays = tree.rays, .tests = visibility.tests, .cuts = visibility.cuts };
+            const seen = &tree.visibility;
+            return .{ .rays = tree.rays, .tests = seen.tests, .cuts = seen.cuts };
         }
 
         /// Adds some samples of each pixel of `width` x `height`, or of a part, to the film.
@@ -132,9 +131,8 @@ pub fn RayTree(comptime Kernel: type, comptime Lighting: type) type {
         ) void {
             for (0..stride * stride) |index| {
                 const part = tree.lighting.partOf(rectangle, index) orelse continue;
-                for (first_sample..first_sample + sample_count) |sample| {
+                for (first_sample..first_sample + sample_count) |sample|
                     tree.trace(part, @intCast(sample), film);
-                }
             }
         }
 
