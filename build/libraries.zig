@@ -281,13 +281,14 @@ pub const meshopt: Library = .{
     .flags = &.{"-DMESHOPTIMIZER_NO_SIMD"},
 };
 
+/// Numbers that no integer holds become the nearest one, as which cell a vertex is in.
 pub const mikktspace: Library = .{
     .name = "mikktspace",
     .shims = &.{"src/prepare/mikktspace.c"},
-    .flags = &.{"-fno-math-errno"},
+    .flags = &.{ "-fno-math-errno", "-fno-strict-float-cast-overflow" },
     // Its sort rotates a seed by 0 to 31 bits, and so shifts it by 32 the other way where that is
     // 0: the seed comes out as it was, whether a machine makes nothing or all of that shift.
-    .tolerated = &.{"-fno-sanitize=shift-exponent"},
+    .tolerated = &.{ "-fno-sanitize=shift-exponent", "-fno-sanitize=float-cast-overflow" },
 };
 
 /// Scan lines, and the compressions that lose nothing, and PXR24.
