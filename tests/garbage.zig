@@ -132,11 +132,11 @@ fn soupOf(random: std.Random, kind: enum { small, large, bits }, count: usize) !
 test "rays that are not finite hit nothing, and no kind of garbage takes long" {
     var random_state: std.Random.DefaultPrng = .init(1);
     const random = random_state.random();
-    var scene = try soupOf(random, .small, 2000);
+    var scene = try soupOf(random, .small, 1000);
     defer scene.deinit();
     var world = try fixture.prepare(&scene, variant.lanes, .{});
     defer world.deinit();
-    const rays = try gpa.alloc(Ray, fixture.enough(512));
+    const rays = try gpa.alloc(Ray, fixture.enough(256));
     defer gpa.free(rays);
     usualRays(random, rays);
     const usual = try costOf(&world, rays, false);
@@ -172,11 +172,11 @@ test "triangles of random bits take no more tests than others as large" {
     const random = random_state.random();
     var costs: [2]f64 = undefined;
     for (&costs, [_]bool{ false, true }) |*cost, is_garbage| {
-        var scene = try soupOf(random, if (is_garbage) .bits else .large, 2000);
+        var scene = try soupOf(random, if (is_garbage) .bits else .large, 1000);
         defer scene.deinit();
         var world = try fixture.prepare(&scene, variant.lanes, .{});
         defer world.deinit();
-        const rays = try gpa.alloc(Ray, fixture.enough(512));
+        const rays = try gpa.alloc(Ray, fixture.enough(256));
         defer gpa.free(rays);
         usualRays(random, rays);
         if (is_garbage) for (rays[0 .. rays.len / 2]) |*ray| {
@@ -187,17 +187,21 @@ test "triangles of random bits take no more tests than others as large" {
     try std.testing.expect(costs[1] <= cost_max * costs[0]);
 }
 
-/// All, or one where they would take long.
-fn integrators() []const raylane.settings.Integrator {
-    const all = comptime std.enums.values(raylane.settings.Integrator);
-    return all[0..fixture.enough(all.len)];
+const integrators = std.enums.values(raylane.settings.Integrator);
+
+/// Pictures take long under an emulator, and nothing in them is the processor's.
+fn skipEmulated() error{SkipZigTest}!void {
+    if (fixture.enough(4) < 4) return error.SkipZigTest;
 }
 
-/// A picture of 8x8 pixels, which belongs to the session.
+/// Of pictures: few pixels, for some have hundreds of layers.
+const side = 4;
+
+/// A small picture, which belongs to the session.
 fn picture(session: *Session, scene: *const Scene, options: fixture.Options) ![]const [4]f32 {
     var small = options;
-    small.width = 8;
-    small.height = 8;
+    small.width = side;
+    small.height = side;
     try fixture.view(session, scene, raylane.variant.compiled[small.variant].lanes, small);
     return (try fixture.trace(session, small)).pixels;
 }
@@ -211,6 +215,7 @@ fn hasWarning(diagnostic: *const raylane.diagnostic.Diagnostic, text: []const u8
 }
 
 test "a picture of triangles of random bits has numbers, the same by every variant" {
+    try skipEmulated();
     var random_state: std.Random.DefaultPrng = .init(4);
     var builder: fixture.Builder = try .init();
     const red = fixture.matte(.{ 0.8, 0.1, 0.1 });
@@ -232,16 +237,16 @@ test "a picture of triangles of random bits has numbers, the same by every varia
     try builder.addCamera(.{ 0, 0, 4 }, 0.5);
     var scene = try builder.finish();
     defer scene.deinit();
-    for (integrators()) |integrator| {
+    for (integrators) |integrator| {
         var first: ?u64 = null;
         for (raylane.variant.compiled, 0..) |one, index| {
             if (raylane.variant.litIndexOf(index) == null) continue;
             var diagnostic: raylane.diagnostic.Diagnostic = .{};
             var session: Session = .init(gpa, std.testing.io, 1, &diagnostic);
             defer session.deinit();
-            const options: fixture.Options = .{ .width = 8, .height = 8, .depth_max = 3 };
+            const options: fixture.Options = .{ .width = side, .height = side, .depth_max = 3 };
             try fixture.view(&session, &scene, one.lanes, options);
-            session.film = try .init(gpa, 8, 8, .init(.{ .color = true }));
+            session.film = try .init(gpa, side, side, .init(.{ .color = true }));
             try session.render(.{
                 .integrator = integrator,
                 .variant = index,
@@ -258,14 +263,14 @@ test "a picture of triangles of random bits has numbers, the same by every varia
     }
 }
 
-/// Panes in a row that blend, before a card, with a light from the camera.
+/// Panes in a row that blend and are not lit, before a card, with a light from the camera.
 fn layered(count: usize, alpha: f32) !Scene {
     var builder: fixture.Builder = try .init();
     try builder.addCamera(.{ 0, 0, 4 }, 0.2);
     try builder.addPointLight(.{ 0, 0, 4 }, 50);
     const green = fixture.matte(.{ 0.1, 0.8, 0.2 });
     try builder.addQuad(green, .{ 0, 0, -1 }, .{ 2, 0, 0 }, .{ 0, 2, 0 });
-    var pane = fixture.matte(.{ 1, 0.2, 0.1 });
+    var pane = fixture.flat(.{ 1, 0.2, 0.1 });
     pane.alpha_mode = .blend;
     pane.base_color[3] = alpha;
     const corners = try gpa.alloc([3]f32, 4 * count);
@@ -284,11 +289,12 @@ fn layered(count: usize, alpha: f32) !Scene {
 }
 
 test "a card behind fifty layers that are next to nothing is as bright as without them" {
+    try skipEmulated();
     var bare = try layered(0, 0);
     defer bare.deinit();
     var scene = try layered(50, 1e-6);
     defer scene.deinit();
-    for (integrators()) |integrator| {
+    for (integrators) |integrator| {
         var diagnostic: raylane.diagnostic.Diagnostic = .{};
         var sessions: [2]Session = undefined;
         var pixels: [2][]const [4]f32 = undefined;
@@ -306,9 +312,10 @@ test "a card behind fifty layers that are next to nothing is as bright as withou
 }
 
 test "behind too many layers is the background, and a warning says so" {
+    try skipEmulated();
     var scene = try layered(300, 1e-6);
     defer scene.deinit();
-    for (integrators()) |integrator| {
+    for (integrators) |integrator| {
         var diagnostic: raylane.diagnostic.Diagnostic = .{};
         var session: Session = .init(gpa, std.testing.io, 1, &diagnostic);
         defer session.deinit();
@@ -318,10 +325,11 @@ test "behind too many layers is the background, and a warning says so" {
             .depth_max = 1,
         });
         for (pixels) |pixel| try std.testing.expectApproxEqAbs(0.75, pixel[2], 0.01);
-        try std.testing.expectEqual(64, session.traced.cuts.passing);
-        try std.testing.expect(hasWarning(&diagnostic, "64 rays met more than 255"));
+        try std.testing.expectEqual(side * side, session.traced.cuts.passing);
+        try std.testing.expect(hasWarning(&diagnostic, "16 rays met more than 255"));
     }
-    try fixture.expectOnePicture(&scene, .{ .width = 8, .height = 8, .depth_max = 1 });
+    if (raylane.variant.compiled.len > 1)
+        try fixture.expectOnePicture(&scene, .{ .width = side, .height = side, .depth_max = 1 });
     // What next to no light comes through is not gone through to its end.
     var dim = try layered(300, 0.5);
     defer dim.deinit();
@@ -330,10 +338,22 @@ test "behind too many layers is the background, and a warning says so" {
     defer session.deinit();
     _ = try picture(&session, &dim, .{ .depth_max = 1 });
     try std.testing.expectEqual(raylane.statistics.CutCounts{}, session.traced.cuts);
-    try std.testing.expect(session.traced.rays.shadow <= 64 * 17);
+}
+
+test "a card behind more layers than light goes through is dark, and a warning says so" {
+    try skipEmulated();
+    var scene = try layered(80, 1e-6);
+    defer scene.deinit();
+    var diagnostic: raylane.diagnostic.Diagnostic = .{};
+    var session: Session = .init(gpa, std.testing.io, 1, &diagnostic);
+    defer session.deinit();
+    const pixels = try picture(&session, &scene, .{ .depth_max = 0 });
+    for (pixels) |pixel| try std.testing.expect(pixel[1] < 1e-3);
+    try std.testing.expect(hasWarning(&diagnostic, "goes through more than 67 surfaces"));
 }
 
 test "glass in glass in glass: what is in too many volumes is said" {
+    try skipEmulated();
     for ([_]usize{ 3, 6 }) |count| {
         var builder: fixture.Builder = try .init();
         try builder.addCamera(.{ 0, 0, 4 }, 0.3);
@@ -350,7 +370,7 @@ test "glass in glass in glass: what is in too many volumes is said" {
         }
         var scene = try builder.finish();
         defer scene.deinit();
-        for (integrators()) |integrator| {
+        for (integrators) |integrator| {
             var diagnostic: raylane.diagnostic.Diagnostic = .{};
             var session: Session = .init(gpa, std.testing.io, 1, &diagnostic);
             defer session.deinit();
@@ -361,6 +381,7 @@ test "glass in glass in glass: what is in too many volumes is said" {
 }
 
 test "very many lights: a few stand for them, as bright as all" {
+    try skipEmulated();
     var random_state: std.Random.DefaultPrng = .init(5);
     const random = random_state.random();
     var builder: fixture.Builder = try .init();
@@ -381,7 +402,7 @@ test "very many lights: a few stand for them, as bright as all" {
     expected *= 0.8 / std.math.pi;
     var scene = try builder.finish();
     defer scene.deinit();
-    for (integrators()) |integrator| {
+    for (integrators) |integrator| {
         var diagnostic: raylane.diagnostic.Diagnostic = .{};
         var session: Session = .init(gpa, std.testing.io, 1, &diagnostic);
         defer session.deinit();
@@ -393,7 +414,7 @@ test "very many lights: a few stand for them, as bright as all" {
         try std.testing.expect(hasWarning(&diagnostic, "3000 lights: "));
         try std.testing.expect(session.world.?.lights.len <= 1024);
         var mean: f64 = 0;
-        for ([_]usize{ 27, 28, 35, 36 }) |middle| mean += 0.25 * pixels[middle][0];
+        for ([_]usize{ 5, 6, 9, 10 }) |middle| mean += 0.25 * pixels[middle][0];
         try std.testing.expectApproxEqRel(expected, mean, 0.05);
     }
 }

@@ -32,7 +32,7 @@ class Run:
     @property
     def warnings(self):
         """Lines that are warnings."""
-        return [line for line in self.lines if ": warning: " in line or ": hint: " in line]
+        return [line for line in self.lines if ": warning: " in line]
 
     @property
     def errors(self):

@@ -100,8 +100,8 @@ def soak(command, paths, every, folder):
     watchdog = threading.Timer(3600, process.kill)
     watchdog.start()
     for line in process.stderr:
-        # The warning lines come between those of files.
-        if b": warning: " in line or b": hint: " in line:
+        # Warnings come between the lines of files, the sum behind them.
+        if b": warning: " in line or b" pictures in " in line:
             continue
         if b".ppm, " in line:
             pictures += 1
