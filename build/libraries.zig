@@ -97,6 +97,8 @@ pub const Library = struct {
         headers: LazyPath,
         instruments: Instruments,
     ) void {
+        // Headers of one in C++ are not for the others, with which it would share the module.
+        if (library.files.len + library.shims.len == 0) return;
         const b = module.owner;
         const flags = library.allFlags(b, .c, instruments);
         module.addIncludePath(headers);
