@@ -97,6 +97,8 @@ pub const Library = struct {
         headers: LazyPath,
         instruments: Instruments,
     ) void {
+        // Headers of one in C++ are not for the others, with which it would share the module.
+        if (library.files.len + library.shims.len == 0) return;
         const b = module.owner;
         const flags = library.allFlags(b, .c, instruments);
         module.addIncludePath(headers);
@@ -281,13 +283,14 @@ pub const meshopt: Library = .{
     .flags = &.{"-DMESHOPTIMIZER_NO_SIMD"},
 };
 
+/// Numbers that no integer holds become the nearest one, as which cell a vertex is in.
 pub const mikktspace: Library = .{
     .name = "mikktspace",
     .shims = &.{"src/prepare/mikktspace.c"},
-    .flags = &.{"-fno-math-errno"},
+    .flags = &.{ "-fno-math-errno", "-fno-strict-float-cast-overflow" },
     // Its sort rotates a seed by 0 to 31 bits, and so shifts it by 32 the other way where that is
     // 0: the seed comes out as it was, whether a machine makes nothing or all of that shift.
-    .tolerated = &.{"-fno-sanitize=shift-exponent"},
+    .tolerated = &.{ "-fno-sanitize=shift-exponent", "-fno-sanitize=float-cast-overflow" },
 };
 
 /// Scan lines, and the compressions that lose nothing, and PXR24.

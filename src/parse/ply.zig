@@ -414,6 +414,10 @@ const Reader = struct {
         const count: usize = @intCast(element.count);
         const wants = reader.wants;
         mesh.positions = try reader.arena.alloc(Vec3, count);
+        // An element before it that had none has no say.
+        mesh.normals = null;
+        mesh.texcoords = null;
+        mesh.colors = null;
         if (reader.hasRole(element, .nx)) mesh.normals = try reader.arena.alloc(Vec3, count);
         if (wants.texcoords and reader.hasRole(element, .u))
             mesh.texcoords = try reader.arena.alloc([2]f32, count);
