@@ -273,6 +273,8 @@ pub const libwebp: Library = .{
         "-U__SSE4_1__",        "-U__AVX2__",              "-U__ARM_NEON__",
         "-U__aarch64__",       "-Dmalloc=rl_webp_malloc", "-Dcalloc=rl_webp_calloc",
         "-Dfree=rl_webp_free", "-Dlog=rl_webp_log",       "-Dpow=rl_webp_pow",
+        // Coefficients of broken files are more than its transform's products hold.
+        "-fwrapv",
     },
 };
 
