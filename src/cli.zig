@@ -506,7 +506,7 @@ const Parser = struct {
     fn finish(parser: *Parser) Error!Options {
         const reader = &parser.reader;
         parser.options.scene = parser.scene orelse return reader.fail("no scene given", .{});
-        try parser.settleSize();
+        try parser.resolveSize();
         const animation = &parser.options.animation;
         parser.options.arguments = parser.named_in;
         parser.options.batch.input_count = parser.input_count;
@@ -514,11 +514,11 @@ const Parser = struct {
         if (is_timed and animation.which == .default) animation.which = .{ .index = 0 };
         try parser.checkBatch();
         try parser.checkViewpoint();
-        try parser.settleFormat();
+        try parser.resolveFormat();
         try parser.checkSampling();
         try parser.checkShade();
         try parser.checkPart();
-        try parser.settleProgress();
+        try parser.resolveProgress();
         if (parser.options.count_tests and parser.options.render.integrator != .whitted)
             return reader.fail("'--count-tests' counts those of '--integrator whitted'", .{});
         return parser.options;
@@ -665,7 +665,7 @@ const Parser = struct {
     }
 
     /// Makes one size of what may be said in several options.
-    fn settleSize(parser: *Parser) Error!void {
+    fn resolveSize(parser: *Parser) Error!void {
         const view = &parser.options.view;
         const reader = &parser.reader;
         if (parser.sides[0] != null or parser.sides[1] != null) {
@@ -842,7 +842,7 @@ const Parser = struct {
         }
     }
 
-    fn settleProgress(parser: *Parser) Error!void {
+    fn resolveProgress(parser: *Parser) Error!void {
         const progress = &parser.options.progress;
         const quiet: settings.ProgressForm = if (parser.options.quiet) .none else .auto;
         progress.form = parser.progress orelse if (progress.file != null) .json else quiet;
@@ -978,7 +978,7 @@ const Parser = struct {
     }
 
     /// The format comes from `--format` or the output's extension, which may not disagree.
-    fn settleFormat(parser: *Parser) Error!void {
+    fn resolveFormat(parser: *Parser) Error!void {
         try parser.findFormat();
         const options = &parser.options;
         const format = options.write.format;

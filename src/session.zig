@@ -340,19 +340,15 @@ pub const Session = struct {
             settings.scene_pixel_count_max
         else
             settings.pixel_count_max;
-        const diagnostic = session.diagnostic;
-        if (pixel_count > pixel_count_max) return diagnostic.fail(
-            error.SceneTooLarge,
-            "a picture of {d}x{d} is asked for, of more than {d} pixels (see --max-pixels and -r)",
-            .{ width, height, pixel_count_max },
-        );
+        try session.checkPixels(width, height, pixel_count_max);
         const has_own_count = choices.sample_count == null and choices.noise == null and
             choices.time_budget_s == null and seen.shade != .cost;
         const sample_count = if (has_own_count) scene.sample_count orelse return else return;
-        if (pixel_count * sample_count > settings.scene_sample_count_max) return diagnostic.fail(
+        const sample_count_max = settings.scene_sample_count_max;
+        if (pixel_count * sample_count > sample_count_max) return session.diagnostic.fail(
             error.SceneTooLarge,
             "it wants {d} samples of each of {d}x{d} pixels, over {d} in all (see --spp and -r)",
-            .{ sample_count, width, height, settings.scene_sample_count_max },
+            .{ sample_count, width, height, sample_count_max },
         );
     }
 
@@ -360,11 +356,20 @@ pub const Session = struct {
     fn checkSize(session: *const Session) error{SceneTooLarge}!void {
         const seen = &session.world.?.view;
         const pixel_count_max = session.seen.pixel_count_max orelse return;
-        if (@as(u64, seen.width) * seen.height <= pixel_count_max) return;
+        return session.checkPixels(seen.width, seen.height, pixel_count_max);
+    }
+
+    fn checkPixels(
+        session: *const Session,
+        width: u32,
+        height: u32,
+        pixel_count_max: u64,
+    ) error{SceneTooLarge}!void {
+        if (@as(u64, width) * height <= pixel_count_max) return;
         return session.diagnostic.fail(
             error.SceneTooLarge,
             "a picture of {d}x{d} is asked for, of more than {d} pixels (see --max-pixels and -r)",
-            .{ seen.width, seen.height, pixel_count_max },
+            .{ width, height, pixel_count_max },
         );
     }
 

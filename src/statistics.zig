@@ -65,10 +65,7 @@ pub const TestCounts = struct {
 
     /// Adds another thread's counts.
     pub fn add(counts: *TestCounts, other: TestCounts) void {
-        counts.box_issued += other.box_issued;
-        counts.box_useful += other.box_useful;
-        counts.triangle_issued += other.triangle_issued;
-        counts.triangle_useful += other.triangle_useful;
+        addEach(counts, other);
     }
 };
 
@@ -84,11 +81,15 @@ pub const CutCounts = struct {
 
     /// Adds another thread's counts.
     pub fn add(counts: *CutCounts, other: CutCounts) void {
-        counts.passing += other.passing;
-        counts.shadow += other.shadow;
-        counts.nested += other.nested;
+        addEach(counts, other);
     }
 };
+
+/// Adds numbers field by field.
+fn addEach(counts: anytype, other: @TypeOf(counts.*)) void {
+    inline for (@typeInfo(@TypeOf(other)).@"struct".field_names) |name|
+        @field(counts, name) += @field(other, name);
+}
 
 test "counts of two threads add up" {
     var rays: RayCounts = .{ .primary = 1, .shadow = 2, .secondary = 3 };

@@ -382,7 +382,7 @@ const Worker = struct {
             .seconds = batch.options.time_max_s,
             .title = path,
         };
-        const outcome = limit.settle(worker.runWithin(&limit, &pictures), &worker.diagnostic);
+        const outcome = limit.finish(worker.runWithin(&limit, &pictures), &worker.diagnostic);
         outcome catch |err| if (err == error.OutOfMemory and batch.postpone(index))
             return display.endFile(progress, .postponed);
         const is_skipped = pictures.begun_count == 0;

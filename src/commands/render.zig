@@ -119,7 +119,7 @@ fn renderAndReport(
     job.session.pool.progress = progress;
     var arena: std.heap.ArenaAllocator = .init(gpa);
     defer arena.deinit();
-    const outcome = limit.settle(job.runWithin(&limit, account, arena.allocator()), diagnostic);
+    const outcome = limit.finish(job.runWithin(&limit, account, arena.allocator()), diagnostic);
     display.endFile(progress, if (outcome) |_| .done else |_| .failed);
     display.stop();
     job.sayWarnings();

@@ -100,7 +100,7 @@ const Server = struct {
             .problem = undefined,
         }, false) catch return console.outOfMemory(server.io);
         const outcome = server.picture(&options, output, &limit, &diagnostic);
-        if (limit.settle(outcome, &diagnostic)) |measured| {
+        if (limit.finish(outcome, &diagnostic)) |measured| {
             var report = measured;
             report.id = job.id;
             report.warnings = diagnostic.warningTexts(&warnings);

@@ -88,8 +88,8 @@ pub const TimeLimit = struct {
         return true;
     }
 
-    /// What became of the work in truth: whatever went wrong after the time was over, that is why.
-    pub fn settle(
+    /// Stops; an error after the time was over is that of the limit, whatever else it says.
+    pub fn finish(
         limit: *TimeLimit,
         outcome: anytype,
         diagnostic: *Diagnostic,

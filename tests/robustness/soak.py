@@ -121,16 +121,16 @@ def verdict(samples, code, allowed_bytes):
     """Why it is not as it should be, or None. The first tenth warms up."""
     if code not in (0, 1, 3):
         return f"ended with {code}"
-    settled = samples[len(samples) // 10:]
-    if len(settled) < 4:
+    steady = samples[len(samples) // 10:]
+    if len(steady) < 4:
         return "too few samples"
-    half = len(settled) // 2
-    early = sorted(one[1] for one in settled[:half])[half // 2]
-    late = sorted(one[1] for one in settled[half:])[half // 2]
+    half = len(steady) // 2
+    early = sorted(one[1] for one in steady[:half])[half // 2]
+    late = sorted(one[1] for one in steady[half:])[half // 2]
     if late > early + allowed_bytes:
         return f"memory grew from {early / MB:.1f} to {late / MB:.1f} MB (medians of halves)"
     # Some are open while a file is read: the fewest are those that stay so.
-    first, last = (min(one[2] for one in part) for part in (settled[:half], settled[half:]))
+    first, last = (min(one[2] for one in part) for part in (steady[:half], steady[half:]))
     if last > first:
         return f"{last - first} descriptors stayed open"
     return None

@@ -16,7 +16,7 @@ const Session = raylane.session.Session;
 const settings = raylane.settings;
 
 /// The coarsest clock of a file system, and then some.
-const settled_ns = 2 * std.time.ns_per_s;
+const mtime_step_max_ns = 2 * std.time.ns_per_s;
 
 /// A file as it was.
 const Stamp = struct {
@@ -36,8 +36,8 @@ const Stamp = struct {
             now.status.ctime.nanoseconds == then.ctime.nanoseconds;
     }
 
-    fn isSettled(stamp: *const Stamp, now: Io.Timestamp) bool {
-        return stamp.status.mtime.nanoseconds < now.nanoseconds - settled_ns;
+    fn isOlderThanStep(stamp: *const Stamp, now: Io.Timestamp) bool {
+        return stamp.status.mtime.nanoseconds < now.nanoseconds - mtime_step_max_ns;
     }
 };
 
@@ -108,7 +108,7 @@ pub const Kept = struct {
                     std.fs.path.dirname(options.scene) orelse ".", file.path,
                 });
             const found = Stamp.of(io, path);
-            if (found == null or !found.?.isSettled(start)) kept.is_good = false;
+            if (found == null or !found.?.isOlderThanStep(start)) kept.is_good = false;
             if (found) |one| stamp.* = one;
         }
         if (kept.is_good) kept.stamps = stamps;
@@ -164,7 +164,7 @@ pub const Kept = struct {
         const name = try kept.arena.allocator().dupe(u8, path);
         source.* = .{ .file = name };
         const found = Stamp.of(io, name) orelse return;
-        if (found.isSettled(Io.Clock.real.now(io))) kept.environment = found;
+        if (found.isOlderThanStep(Io.Clock.real.now(io))) kept.environment = found;
     }
 
     fn keyOf(gpa: Allocator, options: *const Options) error{OutOfMemory}![]const u8 {
