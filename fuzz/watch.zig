@@ -47,7 +47,7 @@ fn setTimer(seconds: u32) void {
     if (current.time_s_max == 0) return;
     _ = linux.setitimer(@backingInt(linux.ITIMER.PROF), &.{
         .it_interval = .{ .sec = 0, .nsec = 0 },
-        .it_value = .{ .sec = seconds, .nsec = 0 },
+        .it_value = .{ .sec = @min(seconds, std.math.maxInt(i32)), .nsec = 0 },
     }, null);
 }
 
