@@ -4,6 +4,9 @@ const std = @import("std");
 const Io = std.Io;
 const Session = @import("../session.zig").Session;
 
+/// Seconds of the system are 32 bits where addresses are.
+const wait_max_ns = std.math.maxInt(i32) * std.time.ns_per_s;
+
 /// Must stay where it is from `start` to `stop`.
 pub const Alarm = struct {
     io: Io,
@@ -26,7 +29,7 @@ pub const Alarm = struct {
 
     fn wait(alarm: *Alarm) void {
         const now_ns: u64 = @intCast(Io.Clock.awake.now(alarm.io).nanoseconds);
-        const left_ns: i64 = @intCast(@min(alarm.end_ns -| now_ns, std.math.maxInt(i64)));
+        const left_ns: i64 = @min(alarm.end_ns -| now_ns, wait_max_ns);
         alarm.is_over.waitTimeout(alarm.io, .{
             .duration = .{ .raw = .fromNanoseconds(left_ns), .clock = .awake },
         }) catch |err| switch (err) {
@@ -46,6 +49,8 @@ test Alarm {
         const end_ns: u64 = if (is_late) 0 else std.math.maxInt(u64);
         var alarm: Alarm = .{ .io = testing.io, .session = &session, .end_ns = end_ns };
         alarm.start();
+        // Not before the thread waits, mostly.
+        if (!is_late) try testing.io.sleep(.fromMilliseconds(20), .awake);
         while (is_late and !session.pool.cancelled.load(.monotonic)) std.Thread.yield() catch {};
         alarm.stop();
         try testing.expectEqual(is_late, session.pool.cancelled.load(.monotonic));

@@ -204,7 +204,8 @@ pub const Batch = struct {
         for (batch.plan.files) |file| file_bytes = @max(file_bytes, file.byte_count orelse 0);
         const job_bytes = job_bytes_least + pixel_count * pixel_bytes + file_bytes * unpacked_ratio;
         const room = batch.account.limit;
-        if (room == std.math.maxInt(usize)) return 1;
+        // Nobody knows how much there is.
+        if (room == std.math.maxInt(usize) and !batch.account.is_default) return 1;
         const wanted = @min(file_count / 2, batch.thread_count, settings.job_count.max);
         return @intCast(@max(1, @min(wanted, room / job_bytes)));
     }
