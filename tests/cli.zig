@@ -1369,12 +1369,13 @@ test "signals end a long render and leave nothing behind" {
 test "a signal has the picture so far written where that is asked for" {
     var sandbox: Sandbox = .init();
     defer sandbox.deinit();
-    var child = try startLong(&sandbox, "exec \"$@\" -r24x16 --partial -v 2>log", 2);
+    var child = try startLong(&sandbox, "exec \"$@\" -r24x16 --partial --progress=json 2>log", 2);
     errdefer child.kill(io);
     for (0..2000) |_| {
         const log = try sandbox.folder.dir.readFileAlloc(io, "log", testing.allocator, .unlimited);
         defer testing.allocator.free(log);
-        if (std.mem.find(u8, log, "tracer: ") != null) break;
+        // Before there is a frame to trace, a signal ends the program at once.
+        if (std.mem.find(u8, log, "\"stage\":\"tracing\"") != null) break;
         try io.sleep(.fromMilliseconds(10), .awake);
     } else return error.NotStarted;
     try expectEndedBy(&child, &.{}, .INT);
