@@ -43,8 +43,9 @@ pub const Campaign = struct {
     /// For the input under way.
     scratch: std.heap.ArenaAllocator,
     execution_count: u64 = 0,
-    /// The execution that was the latest to reach new code.
+    /// The execution that was the latest to do something new, and to reach an edge that none had.
     news_at: u64 = 0,
+    edge_at: u64 = 0,
     outcomes: std.EnumArray(targets.Outcome, u64) = .initFill(0),
 
     /// `counters` as `Coverage` has them; none, and what is new is not known.
@@ -97,8 +98,10 @@ pub const Campaign = struct {
             .guarded = random.uintLessThan(u8, guarded_period) == 0,
             .draws = random.uintLessThan(u8, drawn_period) == 0,
         };
+        const edge_count = campaign.coverage.edge_count;
         if (try campaign.execute(input, manner)) {
             campaign.news_at = campaign.execution_count;
+            if (campaign.coverage.edge_count > edge_count) campaign.edge_at = campaign.news_at;
             try campaign.keep(input);
             campaign.write(input);
         }

@@ -149,7 +149,7 @@ fn secondsOf(io: Io) u64 {
 fn tell(campaign: *const Campaign, choices: *const Choices) void {
     std.debug.print(
         "{t}: {d} executions in {d} s, {d} read, {d} refused, {d} out of memory, corpus {d}, " ++
-            "{d} of {d} edges, the latest at {d}, seed {d}\n",
+            "{d} of {d} edges, the latest at {d}, the latest new count of one at {d}, seed {d}\n",
         .{
             choices.target.name,
             campaign.execution_count,
@@ -160,6 +160,7 @@ fn tell(campaign: *const Campaign, choices: *const Choices) void {
             campaign.corpus.items.len,
             campaign.coverage.edge_count,
             campaign.coverage.counters.len,
+            campaign.edge_at,
             campaign.news_at,
             choices.seed,
         },

@@ -292,7 +292,7 @@ test "a card behind fifty layers that are next to nothing is as bright as withou
     try skipEmulated();
     var bare = try layered(0, 0);
     defer bare.deinit();
-    var scene = try layered(50, 1e-6);
+    var scene = try layered(50, 2e-5);
     defer scene.deinit();
     for (integrators) |integrator| {
         var diagnostic: raylane.diagnostic.Diagnostic = .{};
@@ -311,9 +311,30 @@ test "a card behind fifty layers that are next to nothing is as bright as withou
     }
 }
 
+test "layers that stop less light than can be seen are not there" {
+    try skipEmulated();
+    var bare = try layered(0, 0);
+    defer bare.deinit();
+    var scene = try layered(200, 1e-5);
+    defer scene.deinit();
+    for (integrators) |integrator| {
+        var diagnostic: raylane.diagnostic.Diagnostic = .{};
+        var sessions: [2]Session = undefined;
+        var pixels: [2][]const [4]f32 = undefined;
+        for (&sessions, &pixels, [_]*const Scene{ &bare, &scene }) |*session, *some, shown| {
+            session.* = .init(gpa, std.testing.io, 1, &diagnostic);
+            some.* = try picture(session, shown, .{ .integrator = integrator, .depth_max = 1 });
+        }
+        defer for (&sessions) |*session| session.deinit();
+        for (pixels[0], pixels[1]) |expected, found|
+            try std.testing.expectApproxEqRel(expected[1], found[1], 1e-4);
+        try std.testing.expectEqual(sessions[0].traced.rays, sessions[1].traced.rays);
+    }
+}
+
 test "behind too many layers is the background, and a warning says so" {
     try skipEmulated();
-    var scene = try layered(300, 1e-6);
+    var scene = try layered(300, 2e-5);
     defer scene.deinit();
     for (integrators) |integrator| {
         var diagnostic: raylane.diagnostic.Diagnostic = .{};
@@ -342,7 +363,7 @@ test "behind too many layers is the background, and a warning says so" {
 
 test "a card behind more layers than light goes through is dark, and a warning says so" {
     try skipEmulated();
-    var scene = try layered(80, 1e-6);
+    var scene = try layered(80, 2e-5);
     defer scene.deinit();
     var diagnostic: raylane.diagnostic.Diagnostic = .{};
     var session: Session = .init(gpa, std.testing.io, 1, &diagnostic);

@@ -3,7 +3,9 @@
 //! In: the materials' numbers, the vertex colours at the points. Out: the parameters of the BSDF,
 //! and what a surface lets straight through.
 
+const std = @import("std");
 const world_file = @import("../../world.zig");
+const simd = @import("../../simd.zig");
 const Unique = @import("unique.zig").Unique;
 
 /// A material in lanes: fields of `world.Material`, base colour times the vertex colour.
@@ -123,6 +125,10 @@ pub inline fn load(
     };
 }
 
+/// What a surface shows that blends is left out where it is worth no more: in a file of many such
+/// layers each would be shaded for a step of a millionth.
+const opacity_min = 0x1p-16;
+
 /// How much of the light is stopped at a surface, 0..1: 0 in holes, alpha where it blends.
 pub inline fn opacity(
     comptime Lanes: type,
@@ -134,7 +140,13 @@ pub inline fn opacity(
     const blends = materials.float("blend").gt(.zero());
     const cutoff = materials.float("alpha_cutoff");
     const hole = alpha.lt(cutoff).bitAnd(cutoff.ge(.zero()));
-    const clamped = alpha.max(.zero()).min(.splat(1));
+    var clamped = alpha.max(.zero()).min(.splat(1));
+    const faint = blends.bitAnd(clamped.le(.splat(opacity_min)));
+    if (faint.any()) {
+        const glow = materials.color("emissive");
+        const shown = glow.x.max(glow.y).max(glow.z).max(.splat(1)).mul(clamped);
+        clamped = .select(shown.le(.splat(opacity_min)), .zero(), clamped);
+    }
     const solid = F32.select(hole, .zero(), .splat(1));
     return F32.select(blends, clamped, solid);
 }
@@ -191,4 +203,24 @@ pub fn Attenuation(comptime Lanes: type) type {
             attenuation.weakens = attenuation.weakens.andNot(lanes);
         }
     };
+}
+
+test "what blends and stops less light than can be seen is a hole, but for what glows through it" {
+    const Single = simd.Lanes(.scalar, 1);
+    for ([_]struct { f32, f32, f32 }{
+        .{ 1e-6, 0, 0 },
+        .{ 1e-6, 1, 0 },
+        .{ 1e-6, 1000, 1e-6 },
+        .{ 2e-5, 0, 2e-5 },
+        .{ opacity_min, 0, 0 },
+        .{ -1, 1000, 0 },
+        .{ 2, 0, 1 },
+    }) |one| {
+        var material = std.mem.zeroes(world_file.Material);
+        material.base_color[3] = one[0];
+        material.emissive[1] = one[1];
+        material.blend = 1;
+        const materials: Materials(Single) = .of(&.{material}, .splat(0), .splat(true));
+        try std.testing.expectEqual(one[2], opacity(Single, &materials, .splat(1)).lane(0));
+    }
 }
