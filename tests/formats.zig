@@ -595,6 +595,34 @@ test "PLY: colours of vertices, of faces, and coordinates of corners" {
     try std.testing.expectEqualStrings("image", own.images[0].bytes);
 }
 
+test "PLY: strips and faces that have no colours beside some that do are white" {
+    for ([_][]const u8{ "uchar", "float" }) |kind| {
+        const text = try std.fmt.allocPrint(std.testing.allocator, ply_vertices ++
+            \\element tristrips 1
+            \\property list int int vertex_indices
+            \\element face 1
+            \\property list uchar int vertex_indices
+            \\property {s} red
+            \\element face 1
+            \\property list uchar int vertex_indices
+            \\end_header
+            \\0 0 0 1 0 0 1 1 0 0 1 0
+            \\3 0 1 2
+            \\3 0 1 2 255
+            \\4 0 1 2 3
+        , .{kind});
+        defer std.testing.allocator.free(text);
+        var scene = try readClean("a", text);
+        defer scene.deinit();
+        const colors = scene.meshes[0].colors.?;
+        try expectEqual(12, colors.len);
+        for (colors, 0..) |color, index| {
+            const other: f32 = if (index / 3 == 1) 0 else 1;
+            try expectEqual([4]f32{ 1, other, other, 1 }, color);
+        }
+    }
+}
+
 test "PLY: names in any case, and alpha of 0 everywhere is none" {
     var said: Diagnostic = .{};
     var scene = try read("a", "ply\nformat ascii 1.0\nelement Vertex 3\nproperty FLOAT X\n" ++

@@ -188,7 +188,8 @@ const Reader = struct {
     segments: std.ArrayList([2]u32) = .empty,
     /// Of the corners of each triangle, and colours of each triangle, where faces have any.
     corner_texcoords: std.ArrayList([3][2]f32) = .empty,
-    face_colors: std.ArrayList([4]f32) = .empty,
+    /// Null: the face has none. Of faces behind the last one that has any there is nothing.
+    face_colors: std.ArrayList(?[4]f32) = .empty,
     /// Vertices whose position is not finite; empty: none.
     bad: std.DynamicBitSetUnmanaged = .{},
     /// Of the face that is read.
@@ -532,6 +533,10 @@ const Reader = struct {
             const missing: [3][2]f32 = @splat(.{ 0, 0 });
             try reader.corner_texcoords.appendNTimes(reader.gpa, missing, before);
         }
+        if (has_color) {
+            const before = reader.triangles.items.len - reader.face_colors.items.len;
+            try reader.face_colors.appendNTimes(reader.gpa, null, before);
+        }
         for (face.cut.items) |triangle| {
             try reader.triangles.append(reader.gpa, .{
                 corners[triangle[0]], corners[triangle[1]], corners[triangle[2]],
@@ -663,18 +668,30 @@ const Reader = struct {
                 reader.corner_texcoords.items[index][corner]
             else
                 from.texcoords.?[vertex.*];
-            if (has_colors) to.colors.?[place] = if (reader.face_colors.items.len > 0)
-                reader.face_colors.items[index]
+            if (has_colors) to.colors.?[place] = if (from.colors) |colors|
+                colors[vertex.*]
             else
-                from.colors.?[vertex.*];
+                reader.faceColor(index);
             vertex.* = place;
         };
     }
 
+    /// White where the triangle's face has none.
+    fn faceColor(reader: *const Reader, triangle: usize) [4]f32 {
+        const colors = reader.face_colors.items;
+        const white = reader.colorScale();
+        return (if (triangle < colors.len) colors[triangle] else null) orelse
+            .{ white, white, white, 1 };
+    }
+
+    /// Floats of 0 to 1, unless there are larger ones: those are codes.
+    fn colorScale(reader: *const Reader) f32 {
+        return if (reader.color_max > 1) 255 else 1;
+    }
+
     /// Fractions of codes become linear light.
     fn linearize(reader: *Reader, colors: [][4]f32) void {
-        // Floats of 0 to 1, unless there are larger ones: those are codes.
-        const scale: f32 = if (reader.color_max > 1) 255 else 1;
+        const scale = reader.colorScale();
         const is_seen = for (colors) |color| {
             if (color[3] > 0) break true;
         } else false;
