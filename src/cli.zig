@@ -606,23 +606,14 @@ const Parser = struct {
         const options = &parser.options;
         const reader = &parser.reader;
         switch (given.id) {
-            .max_memory => options.memory_max = values.bytesOf(given.value) orelse
-                return reader.bad(given, "a size such as 512M or 2G"),
-            .max_time => options.time_max_s =
-                values.numberWithin(given.value, settings.time_max_s) orelse
-                return reader.bad(given, comptimePrint("{d} to {d} seconds", .{
-                    settings.time_max_s.min, settings.time_max_s.max,
-                })),
-            else => {
-                const count = values.countOf(given.value) orelse
-                    return reader.bad(given, "a number above 0 such as 500000 or 5M");
-                switch (given.id) {
-                    .max_triangles => options.load.triangle_count_max = count,
-                    .max_pixels => options.view.pixel_count_max = count,
-                    .max_texture_pixels => options.load.texture_pixel_count_max = count,
-                    else => unreachable, // `set` hands over the above.
-                }
-            },
+            .max_memory => options.memory_max = try values.memoryMaxOf(reader, given),
+            .max_time => options.time_max_s = try values.timeMaxOf(reader, given),
+            .max_triangles => options.load.triangle_count_max =
+                try values.countMaxOf(reader, given),
+            .max_pixels => options.view.pixel_count_max = try values.countMaxOf(reader, given),
+            .max_texture_pixels => options.load.texture_pixel_count_max =
+                try values.countMaxOf(reader, given),
+            else => unreachable, // `set` hands over the above.
         }
     }
 

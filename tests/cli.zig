@@ -1213,6 +1213,28 @@ test "--max-time ends what takes longer, whole or not at all" {
     _ = try sandbox.expectExit(2, &(arguments ++ .{"0"}));
 }
 
+test "info keeps to --max-time, --max-memory and --max-triangles" {
+    var sandbox: Sandbox = .init();
+    defer sandbox.deinit();
+    const waiting = "mkfifo p && { sleep 3 >p 2>&1 & } && exec \"$@\"";
+    const late = try sandbox.runShell(waiting, &.{ "info", "p", "--json", "--max-time=0.2" });
+    try testing.expectEqual(124, late.exit_code);
+    const line = "raylane: p: takes longer than the 0.2 s of --max-time\n";
+    try testing.expectEqualStrings(line, late.stderr);
+    try testing.expect(std.mem.find(u8, late.stdout, "\"exit_code\":124") != null);
+    try sandbox.write("s.pbrt", "WorldBegin Shape \"sphere\"");
+    for ([_]struct { u8, []const u8 }{
+        .{ 1, "--max-memory=1K" },
+        .{ 3, "--max-triangles=5" },
+    }) |case| {
+        const exit_code, const option = case;
+        const ending = try sandbox.expectExit(exit_code, &.{ "info", "s.pbrt", option });
+        try expectOneErrorLine(ending);
+        const name = std.mem.sliceTo(option, '=');
+        try testing.expect(std.mem.find(u8, ending.stderr, name) != null);
+    }
+}
+
 test "exhausted memory is an error in one line" {
     // An emulator needs the address space itself.
     if (testing.environ.getPosix("RAYLANE_EMULATOR") != null) return error.SkipZigTest;

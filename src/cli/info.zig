@@ -14,6 +14,10 @@ pub const Info = struct {
     /// Such a file is described all the same.
     load: settings.Load = .{ .force = true },
     sandbox: settings.Sandbox = .auto,
+    /// Bytes that may be allocated at a time; null: a share of what is left.
+    memory_max: ?u64 = null,
+    /// Null: as long as it takes.
+    time_max_s: ?f32 = null,
     json: bool = false,
     quiet: bool = false,
 };
@@ -46,6 +50,9 @@ pub const sections: []const Section = &.{
             .words = arguments_file.wordsOf(settings.Sandbox),
             .help = "auto (default), on or off, as for rendering",
         },
+        .{ .usage = "--max-memory SIZE", .help = "512M or 2G, say" },
+        .{ .usage = "--max-time S", .help = "seconds until the answer (default: no limit)" },
+        .{ .usage = "--max-triangles N", .help = "with all instances, as for rendering" },
         .{ .usage = "-q, --quiet", .help = "no warnings" },
         .{ .usage = "-h, --help", .help = "print this" },
     } },
@@ -66,7 +73,8 @@ pub const help: []const u8 = "raylane " ++ cli.version ++
 ++ arguments_file.helpOf(sections) ++
     \\
     \\Exit status: 0 done, 1 files or memory, 2 usage, 3 scene invalid or not
-    \\supported. A file that is rendered only with --force is described.
+    \\supported, 124 --max-time. A file that is rendered only with --force is
+    \\described.
     \\
 ;
 
@@ -102,6 +110,9 @@ fn set(reader: *const Reader, info: *Info, given: Reader.Given) cli.Error!void {
         .format_in => info.load.format = try reader.choice(given, settings.SceneFormat),
         .sandbox => info.sandbox = try reader.choice(given, settings.Sandbox),
         .allow_outside => info.load.allow_outside = true,
+        .max_memory => info.memory_max = try values.memoryMaxOf(reader, given),
+        .max_time => info.time_max_s = try values.timeMaxOf(reader, given),
+        .max_triangles => info.load.triangle_count_max = try values.countMaxOf(reader, given),
         .quiet => info.quiet = true,
         // By itself it is found before the rest is read.
         .help => return reader.fail("'-h' stands alone", .{}),
@@ -114,8 +125,13 @@ const testing = std.testing;
 test "a scene and how to look at it" {
     var diagnostic: Diagnostic = .{};
     const info = try parse(&.{
-        "--json", "a.glb", "--scene=1", "--up-axis=z", "-q", "--material-variant", "red",
+        "--json",             "a.glb",        "--scene=1", "--up-axis=z",     "-q",
+        "--max-time=.5",      "--max-memory", "1G",        "--max-triangles", "5M",
+        "--material-variant", "red",
     }, &diagnostic);
+    try testing.expectEqual(0.5, info.time_max_s);
+    try testing.expectEqual(1 << 30, info.memory_max);
+    try testing.expectEqual(5_000_000, info.load.triangle_count_max);
     try testing.expectEqualStrings("a.glb", info.scene);
     try testing.expect(info.json and info.quiet and info.load.force);
     try testing.expectEqual(1, info.load.scene.index);
@@ -130,6 +146,8 @@ test "mistakes name the option" {
         .{ "'--up-axis'", &.{"--up-axis=x"} },
         .{ "'--scene'", &.{"--scene="} },
         .{ "'--format-in'", &.{"--format-in=fbx"} },
+        .{ "'--max-time'", &.{"--max-time=0"} },
+        .{ "'--max-memory'", &.{"--max-memory=x"} },
         .{ "did you mean '--json'?", &.{"--jsn"} },
     }) |case| try common.expectUsage("info", parse, case[0], case[1]);
 }

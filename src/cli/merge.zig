@@ -102,8 +102,7 @@ pub fn parse(arguments: []const [:0]const u8, diagnostic: *Diagnostic) cli.Error
             .format => format = values.formatOf(flag.value) orelse
                 return reader.bad(flag, comptime arguments_file.namesOf(settings.Format)),
             .threads => merge.thread_count = try reader.number(flag, settings.thread_count),
-            .max_memory => merge.memory_max = values.bytesOf(flag.value) orelse
-                return reader.bad(flag, "a size such as 512M or 2G"),
+            .max_memory => merge.memory_max = try values.memoryMaxOf(&reader, flag),
             .sandbox => merge.sandbox = try reader.choice(flag, settings.Sandbox),
             // By itself it is found before the rest is read.
             .help => return reader.fail("'-h' stands alone", .{}),

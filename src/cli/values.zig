@@ -70,6 +70,24 @@ pub fn countOf(text: []const u8) ?u64 {
     return if (count == 0) null else std.math.mul(u64, count, factor) catch null;
 }
 
+/// The value of --max-memory, in bytes. `reader` and `given` are those of `Arguments`.
+pub fn memoryMaxOf(reader: anytype, given: anytype) error{UsageInvalid}!u64 {
+    return bytesOf(given.value) orelse reader.bad(given, "a size such as 512M or 2G");
+}
+
+/// The value of --max-time, in seconds.
+pub fn timeMaxOf(reader: anytype, given: anytype) error{UsageInvalid}!f32 {
+    const range = settings.time_max_s;
+    return numberWithin(given.value, range) orelse
+        reader.bad(given, std.fmt.comptimePrint("{d} to {d} seconds", .{ range.min, range.max }));
+}
+
+/// The value of --max-triangles and others that limit a number.
+pub fn countMaxOf(reader: anytype, given: anytype) error{UsageInvalid}!u64 {
+    return countOf(given.value) orelse
+        reader.bad(given, "a number above 0 such as 500000 or 5M");
+}
+
 /// Names with commas between them.
 pub fn layersOf(text: []const u8) ?std.EnumSet(settings.Layer) {
     var layers: std.EnumSet(settings.Layer) = .empty;

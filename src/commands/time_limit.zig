@@ -47,17 +47,22 @@ pub const TimeLimit = struct {
     ) error{OutOfMemory}!void {
         if (limit.seconds == null) return;
         var message: Message = .{};
-        limit.explain(&message);
         var told = failure;
-        told.problem = .{
-            .message = message.text(),
-            .file = limit.title,
-            .exit_code = @backingInt(ExitCode.timed_out),
-        };
+        told.problem = limit.problem(&message);
         var text: Io.Writer.Allocating = .init(arena);
         raylane.report.writeFailure(&told, &text.writer) catch return error.OutOfMemory;
         limit.answer.text = text.written();
         if (to_stderr) limit.answer.file = std.posix.STDERR_FILENO;
+    }
+
+    /// What the error is that ends the work, its text in `message`. There has to be a limit.
+    pub fn problem(limit: *const TimeLimit, message: *Message) raylane.report.Problem {
+        limit.explain(message);
+        return .{
+            .message = message.text(),
+            .file = limit.title,
+            .exit_code = @backingInt(ExitCode.timed_out),
+        };
     }
 
     /// Begins to watch the work by a pool in the memory of an account.
