@@ -3,8 +3,8 @@
 //! In: the folder that vendor/fetch fills. Out: their C files in a module of ours, and the notices
 //! that have to go with a program that holds them. All are compiled without contraction, so that
 //! every target computes the same bits, and get their memory from whoever calls them, by the hooks
-//! of src/memory_account.h or by cgltf's. What fuzzers run traps undefined behaviour in
-//! them, and indices past the bounds of arrays, but for what `Library.tolerated` names.
+//! of src/memory_account.h or by cgltf's. Debug and safe builds trap undefined behaviour in them,
+//! and indices past the bounds of arrays, but for what `Library.tolerated` names.
 
 const std = @import("std");
 const LazyPath = std.Build.LazyPath;

@@ -162,7 +162,7 @@ fn libraryArchives(package: Package) []const *Compile {
 /// What is compiled into the third-party libraries.
 pub fn instruments(package: Package) libraries.Instruments {
     return .{
-        .traps = package.is_fuzzed,
+        .traps = package.optimize == .debug or package.optimize == .safe,
         .counts = package.is_fuzzed,
     };
 }
