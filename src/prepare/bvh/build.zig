@@ -30,7 +30,7 @@ const Side = split.Side;
 const Split = split.Split;
 const Vec3 = math.Vec3;
 
-/// References a thread takes at a time while large sets are cut.
+/// References a thread takes at a time while large sets are cut, and at the end.
 const chunk_size = 4096;
 
 /// Triangles of sets that are cut by their references rather than their cells: there are more and
@@ -90,6 +90,32 @@ pub const Tree = struct {
 
     /// Pairs `begin`..`end`.
     pub const Stretch = struct { begin: u32, end: u32 };
+
+    /// Numbers of the triangles in the order of the references, which are freed: 4 bytes of 32.
+    pub fn takeOrder(
+        tree: *Tree,
+        gpa: Allocator,
+        pool: *parallel.Pool,
+    ) (error{OutOfMemory} || parallel.Error)![]align(64) u32 {
+        const order = try huge_pages.alloc(gpa, u32, tree.references.len);
+        errdefer huge_pages.free(gpa, order);
+        const Copy = struct {
+            from: []const Box,
+            to: []u32,
+
+            fn run(copy: *const @This(), index: usize, _: usize) void {
+                const begin = index * chunk_size;
+                const end = @min(begin + chunk_size, copy.to.len);
+                for (copy.from[begin..end], copy.to[begin..end]) |reference, *number|
+                    number.* = split.triangleNumber(reference);
+            }
+        };
+        const copy: Copy = .{ .from = tree.references, .to = order };
+        try pool.forEach((order.len + chunk_size - 1) / chunk_size, &copy, Copy.run);
+        huge_pages.free(gpa, tree.references);
+        tree.references = &.{};
+        return order;
+    }
 
     /// Frees the arrays.
     pub fn deinit(tree: *Tree, gpa: Allocator) void {

@@ -33,7 +33,7 @@ pub const pack_cost: f32 = 1;
 /// Bytes that a build asks for by triangle, before there is a tree.
 pub const build_triangle_bytes = @sizeOf(bvh_split.Box) + 2 * @sizeOf(bvh_build.Node);
 
-/// How many references ahead corners are fetched, and their triangles once more as many.
+/// How many numbers ahead corners are fetched, and their triangles once more as many.
 const prefetch_distance = 16;
 
 /// Nodes and packs that one thread works on: children stand behind their parents.
@@ -100,6 +100,9 @@ pub fn build(
     defer gpa.free(costs);
     var collapse: Collapse(width) = .init(input, &binary, costs);
     try collapse.weigh();
+    const order = try binary.takeOrder(gpa, input.pool);
+    defer huge_pages.free(gpa, order);
+    collapse.order = order;
     return collapse.emit(gpa, arena);
 }
 
@@ -131,6 +134,8 @@ fn Collapse(comptime width: u32) type {
         /// By binary node: lane i - 1 holds the least cost of what is below it when it is shown as
         /// at most i children of one wide node, 1 <= i < width; the last lane its cost as a leaf.
         costs: [][width]f32,
+        /// Numbers of the triangles, those of each leaf side by side. For `emit`.
+        order: []const u32 = &.{},
         root_area: f32,
         root_area_inv: f32,
 
@@ -440,7 +445,7 @@ fn Collapse(comptime width: u32) type {
 
             fn writePacks(work: *EmitWork, leaf: Item, begin: u32, pack_count: u32) void {
                 const collapse = work.collapse;
-                const references = collapse.binary.references;
+                const order = collapse.order;
                 var at: usize = leaf.begin;
                 const end = at + collapse.binary.nodes[leaf.node].count;
                 for (work.packs[begin..][0..pack_count]) |*pack| {
@@ -448,7 +453,7 @@ fn Collapse(comptime width: u32) type {
                     if (filled < width) pack.* = .empty;
                     for (0..filled) |lane| {
                         collapse.prefetch(at + lane);
-                        const number = bvh_split.triangleNumber(references[at + lane]);
+                        const number = order[at + lane];
                         pack.primitive[lane] = number;
                         for (collapse.input.triangles[number].corner, 0..) |vertex, corner| {
                             const position = collapse.input.positions[vertex];
@@ -463,15 +468,15 @@ fn Collapse(comptime width: u32) type {
             }
         };
 
-        /// Leaves follow each other much as references do, but their triangles and corners lie
+        /// Leaves follow each other much as numbers do, but their triangles and corners lie
         /// scattered; waiting for them was two thirds of the time to write packs.
         inline fn prefetch(collapse: *const Self, at: usize) void {
-            const references = collapse.binary.references;
+            const order = collapse.order;
             const triangle_at = at + 2 * prefetch_distance;
-            if (triangle_at >= references.len) return;
+            if (triangle_at >= order.len) return;
             const triangles = collapse.input.triangles;
-            @prefetch(&triangles[bvh_split.triangleNumber(references[triangle_at])], .{});
-            const number = bvh_split.triangleNumber(references[at + prefetch_distance]);
+            @prefetch(&triangles[order[triangle_at]], .{});
+            const number = order[at + prefetch_distance];
             for (triangles[number].corner) |vertex| {
                 @prefetch(&collapse.input.positions[vertex], .{});
             }
