@@ -276,6 +276,8 @@ pub const libwebp: Library = .{
         // Coefficients of broken files are more than its transform's products hold.
         "-fwrapv",
     },
+    // Its encoder adds to a pointer before it looks whether memory came.
+    .tolerated = &.{"-fno-sanitize=pointer-overflow"},
 };
 
 /// The decoders, without SIMD.

@@ -235,7 +235,7 @@ pub fn write(
 fn writeWebp(
     gpa: Allocator,
     size: [2]u32,
-    pixels: []const u8,
+    pixels: []align(4) const u8,
     settings: *const Settings,
     target: *Target,
     diagnostic: *Diagnostic,

@@ -19,7 +19,8 @@ pub const Picture = struct {
     height: u32,
     /// Three, or four with alpha, which is kept without loss.
     channel_count: u8,
-    pixels: []const u8,
+    /// Where there are four channels, the library reads words.
+    pixels: []align(4) const u8,
     /// Of lossy compression, 1 to 100; null: nothing is lost.
     quality: ?u8 = null,
 };
@@ -96,7 +97,7 @@ fn pow(base: f64, exponent: f64) callconv(.c) f64 {
 
 test "memory that runs out is an error, whenever it does; alpha and loss are what is asked for" {
     const gpa = std.testing.allocator;
-    var pixels: [20 * 30 * 4]u8 = undefined;
+    var pixels: [20 * 30 * 4]u8 align(4) = undefined;
     for (&pixels, 0..) |*byte, at| byte.* = @truncate(at * at / 7);
     for ([_]?u8{ null, 50 }) |quality| for (0..400) |fail_index| {
         var failing: std.testing.FailingAllocator = .init(gpa, .{ .fail_index = fail_index });
