@@ -159,10 +159,12 @@ fn libraryArchives(package: Package) []const *Compile {
     return list.items;
 }
 
-/// What is compiled into the third-party libraries.
+/// What is compiled into the third-party libraries. Stripped programs, as those of tests that are
+/// emulated, have no traps: these take time, and what they find does not depend on the target.
 pub fn instruments(package: Package) libraries.Instruments {
+    const is_checked = package.optimize == .debug or package.optimize == .safe;
     return .{
-        .traps = package.optimize == .debug or package.optimize == .safe,
+        .traps = is_checked and !package.is_stripped,
         .counts = package.is_fuzzed,
     };
 }
