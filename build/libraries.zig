@@ -89,6 +89,8 @@ pub const Library = struct {
     /// Undefined behaviour that does no harm on any of our targets, and why: flags that let it pass
     /// where all other traps.
     tolerated: []const []const u8 = &.{},
+    /// More of its C files, which alone need what is tolerated; none: all do.
+    tolerant_files: []const []const u8 = &.{},
 
     /// Compiles what is C of the library into `module`.
     pub fn addTo(
@@ -100,7 +102,8 @@ pub const Library = struct {
         // Headers of one in C++ are not for the others, with which it would share the module.
         if (library.files.len + library.shims.len == 0) return;
         const b = module.owner;
-        const flags = library.allFlags(b, .c, instruments);
+        const is_tolerant = library.tolerant_files.len == 0;
+        const flags = library.allFlags(b, .c, instruments, is_tolerant);
         module.addIncludePath(headers);
         for (library.includes) |folder| module.addIncludePath(headers.path(b, folder));
         if (library.own_headers) |folder| module.addIncludePath(b.path(folder));
@@ -111,6 +114,13 @@ pub const Library = struct {
             .language = .c,
         });
         module.addCSourceFiles(.{ .files = library.shims, .flags = flags });
+        if (is_tolerant) return;
+        module.addCSourceFiles(.{
+            .root = headers,
+            .files = library.tolerant_files,
+            .flags = library.allFlags(b, .c, instruments, true),
+            .language = .c,
+        });
     }
 
     /// Compiles what is C++ of it into `root`, an empty module: that sees the headers of Zig's C++
@@ -130,7 +140,7 @@ pub const Library = struct {
         root.addIncludePath(headers);
         for (library.includes) |folder| root.addIncludePath(headers.path(b, folder));
         if (library.own_headers) |folder| root.addIncludePath(b.path(folder));
-        const flags = library.allFlags(b, .cpp, instruments);
+        const flags = library.allFlags(b, .cpp, instruments, true);
         root.addCSourceFile(.{ .file = b.path(shim), .flags = flags });
     }
 
@@ -139,13 +149,14 @@ pub const Library = struct {
         b: *std.Build,
         language: Language,
         instruments: Instruments,
+        is_tolerant: bool,
     ) []const []const u8 {
         return std.mem.concat(b.allocator, []const u8, &.{
             if (language == .c) &.{ "-std=c11", "-ffp-contract=off" } else cpp_flags,
             instruments.flags(language),
             instruments.counting(),
             library.flags,
-            if (instruments.traps) library.tolerated else &.{},
+            if (instruments.traps and is_tolerant) library.tolerated else &.{},
         }) catch @panic("OOM");
     }
 };
@@ -245,7 +256,6 @@ pub const libwebp: Library = .{
         "libwebp/src/enc/picture_enc.c",
         "libwebp/src/enc/picture_rescale_enc.c",
         "libwebp/src/enc/picture_tools_enc.c",
-        "libwebp/src/enc/predictor_enc.c",
         "libwebp/src/enc/quant_enc.c",
         "libwebp/src/enc/syntax_enc.c",
         "libwebp/src/enc/token_enc.c",
@@ -276,8 +286,9 @@ pub const libwebp: Library = .{
         // Coefficients of broken files are more than its transform's products hold.
         "-fwrapv",
     },
-    // Its encoder adds to a pointer before it looks whether memory came.
+    // It adds to a pointer before it looks whether memory came.
     .tolerated = &.{"-fno-sanitize=pointer-overflow"},
+    .tolerant_files = &.{"libwebp/src/enc/predictor_enc.c"},
 };
 
 /// The decoders, without SIMD.

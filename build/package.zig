@@ -164,7 +164,7 @@ fn libraryArchives(package: Package) []const *Compile {
 pub fn instruments(package: Package) libraries.Instruments {
     const is_checked = package.optimize == .debug or package.optimize == .safe;
     return .{
-        .traps = is_checked and !package.is_stripped,
+        .traps = package.is_fuzzed or (is_checked and !package.is_stripped),
         .counts = package.is_fuzzed,
     };
 }
