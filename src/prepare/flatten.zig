@@ -27,10 +27,6 @@ const Vec3 = math.Vec3;
 
 pub const Error = error{ OutOfMemory, SceneTooLarge } || parallel.Error;
 
-/// Largest |coordinate| of a corner, in metres: the products of three differences that the
-/// triangle test forms stay within an f32 up to here.
-pub const coordinate_max: f32 = 0x1p40;
-
 /// A triangle whose doubled area has no component above this, in square metres, is degenerate:
 /// there the cross product of its edges is made of products that flush to zero.
 pub const area_twice_min: f32 = 0x1p-120;
@@ -635,7 +631,7 @@ fn lastAtOrBefore(draws: []const Draw, comptime field: []const u8, position: usi
 pub fn isWithinRange(a: Vec3, b: Vec3, c: Vec3) bool {
     var within = true;
     inline for (.{ a, b, c }) |corner| {
-        inline for (0..3) |axis| within = within and @abs(corner[axis]) <= coordinate_max;
+        inline for (0..3) |axis| within = within and @abs(corner[axis]) <= pose_file.coordinate_max;
     }
     return within;
 }

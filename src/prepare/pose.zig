@@ -16,6 +16,10 @@ const vec3d = math.vec3d;
 const AffineD = math.AffineD;
 const Vec3d = math.Vec3d;
 
+/// Largest |coordinate| of a corner, in metres: the products of three differences that the
+/// triangle test forms stay within an f32 up to here.
+pub const coordinate_max: f32 = 0x1p40;
+
 /// Farther away than this many times its size, a scene is moved to the origin.
 const sizes_max = 64;
 
@@ -28,12 +32,21 @@ pub const Pose = struct {
     maps: []const AffineD,
     joint_maps: deform.JointMaps,
     /// The median of the vertices by coordinate: in the middle of most of them, however far away
-    /// a few are.
+    /// a few are. No coordinate is above `coordinate_max`.
     center: Vec3d,
     /// The largest distance between quartiles along an axis.
     size: f64,
     /// What has been subtracted from all places of the scene.
     shift: Vec3d = @splat(0),
+
+    /// Where most vertices are left out for being too far away, the rest is about the origin: pads
+    /// by a center among those would reach as far.
+    fn limit(pose: *Pose) void {
+        for (pose.center) |coordinate| {
+            if (!(@abs(coordinate) <= coordinate_max)) pose.center = @splat(0);
+        }
+        pose.size = @min(pose.size, 2 * coordinate_max);
+    }
 
     /// Frees the maps.
     pub fn deinit(pose: *const Pose, gpa: std.mem.Allocator) void {
@@ -67,6 +80,7 @@ pub fn composeShifted(
     };
     pose.center = vec3d.sub(pose.center, shift);
     pose.shift = shift;
+    pose.limit();
     return pose;
 }
 
@@ -200,4 +214,22 @@ test "what is far away for its size comes to the origin, whatever strays" {
     const near = try testPose(&.{.{ .parent = scene.none, .local = .identity }}, &corners, 0);
     defer near.deinit(std.testing.allocator);
     try std.testing.expectEqual(AffineD.identity, near.maps[0]);
+}
+
+test "where most is too far away, the center and the size stay in the world" {
+    const nodes = [_]scene.Node{.{
+        .parent = scene.none,
+        .local = .fromTrs(.{ 3e38, 0, 0 }, .{ 0, 0, 0, 1 }, .{ 0x1p64, 2, 1 }),
+    }};
+    const large = std.math.floatMax(f32);
+    for ([_][]const math.Vec3{
+        &.{ .{ 0, 0, 0 }, .{ large, 1, 0 }, .{ -large, 0, 1 }, .{ large, large, -large } },
+        &.{.{ large, 0, 0 }},
+    }) |corners| {
+        const pose = try testPose(&nodes, corners, 0);
+        defer pose.deinit(std.testing.allocator);
+        const center = round(pose.center);
+        for (center) |coordinate| try std.testing.expect(@abs(coordinate) <= coordinate_max);
+        try std.testing.expect(pose.size <= 2 * coordinate_max);
+    }
 }

@@ -143,11 +143,7 @@ pub fn Binning(comptime bin_count: comptime_int) type {
         }
 
         inline fn binsOf(binning: *const Self, box: Box) @Vector(4, i32) {
-            // Rounding of coordinates near the largest may leave the range.
-            const last: Vec4 = @splat(bin_count - 1);
-            const zero: Vec4 = @splat(0);
-            const place = (centerTwice(box) - binning.offset) * binning.scale;
-            return @intFromFloat(@max(zero, @min(last, place)));
+            return @intFromFloat((centerTwice(box) - binning.offset) * binning.scale);
         }
     };
 }
